@@ -71,7 +71,7 @@ class _Teller:
 @click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
 @key_option()
 def estimate(**given: Any) -> int:
-    """Run an estimator (attitude, lissajous, target-fusion, or a Python file of your own) on a live link.
+    """Run an estimator (attitude, lissajous, orbit-target, target-fusion, or a Python file) on a live link.
 
     It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
     replay of flight.tlog in the run folder gives the same estimates.

@@ -117,7 +117,9 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 )
 @_link("--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS.")
 @_estimator(
-    "--estimator", metavar="NAME|FILE.py", help="Run beside the flight: attitude, lissajous, target-fusion."
+    "--estimator",
+    metavar="NAME|FILE.py",
+    help="Estimator beside the flight: attitude, lissajous, orbit-target, target-fusion.",
 )
 @_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."

@@ -6,6 +6,7 @@ from contextlib import suppress
 from statistics import fmean, pstdev
 from typing import Final
 
+from estimators.orbit_target.tracker import TargetStatus
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.orbit.gps_switch import GpsSwitch
@@ -13,7 +14,6 @@ from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
 from missions.orbit.target_observer import TICK_HZ, TargetObserver
-from missions.orbit.tracker import TargetStatus
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot

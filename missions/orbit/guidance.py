@@ -23,8 +23,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from estimators.orbit_target.relative_target import RelativeState
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from missions.orbit.relative_target import RelativeState
 
 _LEAST_SPEED_M_S: Final = 1.0
 _LEAST_COS_CRAB: Final = 0.3

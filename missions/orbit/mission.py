@@ -45,6 +45,17 @@ class OrbitMission(Mission[OrbitOptions]):
             camera=True,
         )
 
+    def estimator_settings(self, options: OrbitOptions) -> Mapping[str, float]:
+        north_m, east_m = options.target_ne_m
+        return {
+            "target_north_m": north_m,
+            "target_east_m": east_m,
+            "target_speed_m_s": 0.0 if options.wandering else options.target_speed_m_s,
+            "target_heading_rad": options.target_heading_rad,
+            "target_ground_m": options.target_ground_m,
+            **({"target_sigma_m": WANDERING_M} if options.wandering else {}),
+        }
+
     async def fly(self, vehicle: Vehicle, options: OrbitOptions) -> None:
         from missions.orbit.flight import OrbitFlight
 

@@ -1,24 +1,27 @@
-"""Observation of the target: attitude and images for the tracker, and pointing of the gimbal."""
+"""Observation of the target: attitude and images for the estimator, and pointing of the gimbal."""
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import decode
+from autopilot_bridge.mavlink import Frame
+from estimators.messages import read_message
+from estimators.orbit_target import OrbitTargetEstimator, OrbitTargetParameters
+from estimators.orbit_target.attitude import FilterAttitude
+from estimators.orbit_target.tracker import TargetStatus
+from estimators.vehicle_time import VehicleTime
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import MissionError
-from missions.orbit.attitude import AutopilotAttitude
-from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
-from missions.orbit.tracker import TargetStatus, TargetTracker
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
+from missions.vehicle.connection import AUTOPILOT_COMPONENT
+from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from missions.vehicle.vehicle import Vehicle
 
 TICK_HZ: Final = 25.0
 _GIMBAL_LEAD_S: Final = 0.15
 _BELIEVED_TO_M: Final = 20.0  # standard deviation of a place from another source (paper: 20 m)
-_DRIFT_STD_M_S: Final = 2.0
 _OLD_US: Final = 1_000_000
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
 _INERTIAL_HZ: Final = (25.0, 40.0)
@@ -26,7 +29,8 @@ _FILTER_START_S: Final = 5.0
 
 
 class TargetObserver:
-    """Observes the target from one vehicle.
+    """Observes the target from one vehicle, with the estimator `orbit-target` in the mission's own control
+    loop.
 
     Attributes:
         tracker: estimates the target's position.
@@ -37,30 +41,38 @@ class TargetObserver:
     def __init__(self, vehicle: Vehicle, options: OrbitOptions) -> None:
         self._vehicle = vehicle
         self._options = options
-        self._told = AutopilotAttitude()
-        filtered = options.attitude is AttitudeFrom.FILTER
-        self.filter = FilterAttitude(vehicle.system_id) if filtered else None
-        self.tracker = TargetTracker(self.filter or self._told)
+        self._estimator = OrbitTargetEstimator(
+            OrbitTargetParameters(
+                attitude="filter" if options.attitude is AttitudeFrom.FILTER else "autopilot",
+                target_north_m=options.target_ne_m[0],
+                target_east_m=options.target_ne_m[1],
+                target_sigma_m=WANDERING_M if options.wandering else _BELIEVED_TO_M,
+            )
+        )
+        source = self._estimator.attitude
+        self.filter = source if isinstance(source, FilterAttitude) else None
+        self.tracker = self._estimator.tracker
+        self._time = VehicleTime()
         self.with_gps = True
 
     def listen_to_payload(self) -> list[Callable[[], None]]:
-        """Pass detections and gimbal attitudes to the tracker; returns functions that end this."""
-        payload, tracker = self._vehicle.payload, self.tracker
-        return [payload.on_gimbal_attitude(tracker.gimbal), payload.on_detection(tracker.detect)]
+        """Pass detections and gimbal attitudes to the estimator; returns functions that end this."""
+        return [
+            self._listen("GIMBAL_DEVICE_ATTITUDE_STATUS", GIMBAL_COMPONENT),
+            self._listen("LANDING_TARGET", CAMERA_COMPONENT),
+        ]
 
     def listen_to_attitude(self) -> list[Callable[[], None]]:
-        """Keep the attitude source up to date; returns functions that end this."""
-        listen, own = self._vehicle.connection.listen, self._vehicle.system_id
-        if self.filter is not None:
-            return [listen(name, self.filter.hear) for name in sorted(self.filter.names)]
+        """Pass the messages of the attitude source to the estimator; returns functions that end this."""
+        return [self._listen(name, AUTOPILOT_COMPONENT) for name in sorted(self._estimator.attitude.names)]
 
-        def on_attitude(frame: Any) -> None:
-            if frame.system_id == own and frame.component_id == 1:
-                attitude = telemetry.attitude(decode(frame))
-                if attitude is not None:
-                    self._told.add(attitude)
+    def _listen(self, name: str, component_id: int) -> Callable[[], None]:
+        def take(frame: Frame) -> None:
+            if frame.system_id == self._vehicle.system_id and frame.component_id == component_id:
+                message = read_message(frame)
+                self._estimator.take(self._time.stamp(message), message)
 
-        return [listen("ATTITUDE", on_attitude)]
+        return self._vehicle.connection.listen(name, take)
 
     async def start_filter(self) -> None:
         """Start our filter, if it is used, while the aircraft is still on the ground, where it estimates its
@@ -111,17 +123,18 @@ class TargetObserver:
         attitude = self._vehicle.latest(telemetry.Attitude)
         if p is None or attitude is None or not self.informed:
             return
-        (north_m, east_m), (vn, ve) = self.target_ne(self._vehicle.clock.time_us)
+        target_ne_m, target_ne_m_s = self.target_ne(self._vehicle.clock.time_us)
         frame = LocalFrame(self._vehicle.home)
         own_north_m, own_east_m, _ = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
-        wind_n = p.vel_ned_m_s[0] - airspeed_m_s * math.cos(attitude.yaw_rad)
-        wind_e = p.vel_ned_m_s[1] - airspeed_m_s * math.sin(attitude.yaw_rad)
-        self.tracker.start(
+        self.tracker.expect(
             now_us,
-            offset_ne_m=(north_m - own_north_m, east_m - own_east_m),
-            offset_std_m=WANDERING_M if self._options.wandering else _BELIEVED_TO_M,
-            drift_ne_m_s=(vn - wind_n, ve - wind_e),
-            drift_std_m_s=_DRIFT_STD_M_S,
+            target_ne_m=target_ne_m,
+            target_ne_m_s=target_ne_m_s,
+            own_ne_m=(own_north_m, own_east_m),
+            own_ne_m_s=p.vel_ned_m_s[:2],
+            air_ne_m_s=(airspeed_m_s * math.cos(attitude.yaw_rad), airspeed_m_s * math.sin(attitude.yaw_rad)),
+            sigma_m=self._estimator.parameters.target_sigma_m,
+            drift_sigma_m_s=self._estimator.parameters.drift_sigma_m_s,
         )
 
     @property

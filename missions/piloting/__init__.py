@@ -6,11 +6,9 @@ Sans-IO: the functions compute commands from numbers.
 
 from missions.piloting.energy import EnergyController, EnergyParameters
 from missions.piloting.heading import HeadingController
-from missions.piloting.pressure_height import PressureHeight
 
 __all__ = [
     "EnergyController",
     "EnergyParameters",
     "HeadingController",
-    "PressureHeight",
 ]

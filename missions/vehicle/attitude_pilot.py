@@ -9,10 +9,10 @@ import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
+from estimators.pressure_height import PressureHeight
 from flightsim.foundation.atmosphere import air_density_ratio
 from missions.errors import MissionError, VehicleTimeout
 from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
-from missions.piloting.pressure_height import PressureHeight
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.stream_room import make_room

@@ -6,10 +6,10 @@ messages are used as they arrive; only requested messages are sent.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.mavlink import decode, dialect
+from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.errors import VehicleTimeout
 
 if TYPE_CHECKING:
@@ -24,72 +24,6 @@ TOTAL_FIELD_NAME: Final = "MAG_NT"
 _CONTROL_TOLD_US: Final = 3_000_000
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
-_IN_EARTH_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
-_YAW_LOCK: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Detection:
-    """One object in one image (LANDING_TARGET of the camera).
-
-    Attributes:
-        time_us: vehicle time at which the image was taken.
-        target: number that the camera's tracker assigns to the object (`target_num`).
-        image_x, image_y: normalized image coordinates: x to the right, y down, unit focal length.
-    """
-
-    time_us: int
-    target: int
-    image_x: float
-    image_y: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GimbalAttitude:
-    """The attitude of the gimbal (GIMBAL_DEVICE_ATTITUDE_STATUS).
-
-    Attributes:
-        time_us: vehicle time.
-        q: Hamilton quaternion (w x y z) that rotates gimbal vectors (x along the line of sight, y right, z
-            down) to the reference frame.
-        from_north: whether the reference frame is NED; otherwise it is the vehicle's level frame, x along its
-        heading.
-    """
-
-    time_us: int
-    q: tuple[float, float, float, float]
-    from_north: bool
-
-
-def detection(m: Any) -> Detection | None:
-    """From LANDING_TARGET; None when its angles are not possible in an image."""
-    if not (abs(m.angle_x) < 0.5 * math.pi and abs(m.angle_y) < 0.5 * math.pi):
-        return None
-    return Detection(
-        time_us=int(m.time_usec),
-        target=int(m.target_num),
-        image_x=math.tan(m.angle_x),
-        image_y=math.tan(m.angle_y),
-    )
-
-
-def gimbal_attitude(m: Any) -> GimbalAttitude | None:
-    """The attitude from GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is invalid.
-
-    Roll and pitch are relative to the horizon. Yaw is relative to north or to the vehicle's heading, as the
-    flags specify; for gimbals older than those flags YAW_LOCK means north.
-    """
-    w, x, y, z = (float(value) for value in m.q)
-    norm = math.sqrt(w * w + x * x + y * y + z * z)
-    if not 0.5 < norm < 2.0:
-        return None
-    flags = int(m.flags)
-    return GimbalAttitude(
-        time_us=int(m.time_boot_ms) * 1000,
-        q=(w / norm, x / norm, y / norm, z / norm),
-        from_north=bool(flags & _IN_EARTH_FRAME)
-        or (not flags & _IN_VEHICLE_FRAME and bool(flags & _YAW_LOCK)),
-    )
 
 
 class Payload:

@@ -32,7 +32,7 @@ def test_the_library_alone_imports_no_estimator():
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        ("atitude", "'atitude' is not known; there are attitude, lissajous, target-fusion"),
+        ("atitude", "'atitude' is not known; there are attitude, lissajous, orbit-target, target-fusion"),
         ("nowhere.py", "nowhere.py does not exist"),
     ],
 )

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimators.pressure_height import PressureHeight
 from missions.piloting import (
     EnergyController,
     EnergyParameters,
     HeadingController,
-    PressureHeight,
 )
 from missions.piloting.energy import EnergyState
 from missions.piloting.heading import heading_deg

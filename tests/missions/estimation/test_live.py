@@ -325,7 +325,10 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["level", "--connect", "udpin:127.0.0.1:1"], "there are attitude, lissajous, target-fusion"),
+        (
+            ["level", "--connect", "udpin:127.0.0.1:1"],
+            "there are attitude, lissajous, orbit-target, target-fusion",
+        ),
         ([LEVEL, "--connect", "carrier pigeon"], "carrier pigeon"),
         ([LEVEL, "--connect", "flight.tlog"], "that is a log; use flightstack replay"),
         ([LEVEL, "--connect", "udpin:127.0.0.1:1", "--component-id", "1"], "is not in the range"),

@@ -7,9 +7,8 @@ from collections import deque
 
 import numpy as np
 
+from estimators.tracking.line_of_sight import Detection, GimbalAttitude
 from flightsim.foundation.vectors import from_euler, product
-from missions.vehicle.payload import Detection, GimbalAttitude
-from missions.vehicle.telemetry import Attitude
 from tests.rotations import rotation_matrix
 
 STEP_US = 20_000
@@ -77,13 +76,7 @@ class PointMass:
         q_gimbal = product(q_body, from_euler(0.0, self.el, self.az))  # in NED
         level = product(from_euler(0.0, 0.0, -self.psi), q_gimbal)
         tilted = product(from_euler(self.roll_error, 0.0, 0.0), level)
-        attitude = Attitude(
-            time_us=self.time_us,
-            roll_rad=self.phi,
-            pitch_rad=0.03,
-            yaw_rad=math.remainder(self.psi, math.tau),
-            rates_frd_rad_s=(0.0, 0.0, 0.0),
-        )
+        attitude = (self.time_us, self.phi, 0.03, math.remainder(self.psi, math.tau))
         gimbal = GimbalAttitude(time_us=self.time_us, q=tuple(tilted), from_north=False)
         if self.time_us % 100_000 == 0:
             self._expose(q_gimbal)

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from missions.orbit.attitude import AutopilotAttitude
+from estimators.orbit_target.attitude import AutopilotAttitude
+from estimators.orbit_target.relative_target import RelativeState
+from estimators.orbit_target.tracker import TargetStatus, TargetTracker
 from missions.orbit.guidance import GRAVITY_M_S2, OrbitGuidance, OrbitParameters, bearing_off_velocity_rad
-from missions.orbit.relative_target import RelativeState
-from missions.orbit.tracker import TargetStatus, TargetTracker
 from tests.missions.orbit.coordinated_turn import PointMass
 from tests.slow import slow_after
 
@@ -100,14 +100,14 @@ def fly(direction, entry, *, seconds=150.0, **world):
     roll, flown = 0.0, []
     while aircraft.time_us < seconds * 1e6:
         now, gimbal, airspeed, height, detections = aircraft.step(roll)
-        attitude.add(now)
+        attitude.add(*now)
         tracker.gimbal(gimbal)
         tracker.height(height)
         for detection in detections:
             tracker.detect(detection)
         if aircraft.time_us % 40_000 == 0:  # 25 Hz, as the mission does
             tracker.step(aircraft.time_us, airspeed)
-            command = guidance.command(tracker.state(aircraft.time_us), now.yaw_rad, now.roll_rad)
+            command = guidance.command(tracker.state(aircraft.time_us), now[3], now[1])
             roll = command.roll_rad
             aircraft.pointed = tracker.pointing(aircraft.time_us, 0.1)
         flown.append((aircraft.time_us * 1e-6, aircraft.radius))

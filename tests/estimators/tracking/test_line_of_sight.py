@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flightsim.foundation.vectors import between, conjugate, from_euler, rotate, yaw_of
-from missions.orbit.line_of_sight import (
+from estimators.tracking.line_of_sight import (
+    GimbalAttitude,
     gimbal_angles,
     gimbal_from_camera,
     line_of_sight_of_gimbal,
     pointing_angles,
 )
-from missions.vehicle.payload import GimbalAttitude
+from flightsim.foundation.vectors import between, conjugate, from_euler, rotate, yaw_of
 
 angles = st.floats(-3.1, 3.1)
 

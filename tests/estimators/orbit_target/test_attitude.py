@@ -6,9 +6,11 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
+from estimators.messages import read_message
+from estimators.orbit_target.attitude import FilterAttitude
+from estimators.vehicle_time import VehicleTime
 from flightsim.foundation.vectors import yaw_of
 from missions.library import find_mission
-from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.options import AttitudeFrom, OrbitOptions
 from missions.runs.session import RunRequest, fly
 
@@ -22,10 +24,13 @@ class Sender:
     def __init__(self, system=1, component=1):
         self._encoder = FrameEncoder(system, component)
         self._parser = FrameParser()
+        self._time = VehicleTime()
 
     def frame(self, message):
+        """(time, message), as an estimator receives them."""
         (frame,) = self._parser.feed(self._encoder.encode(message))
-        return frame
+        read = read_message(frame)
+        return self._time.stamp(read), read
 
     def imu(self, time_us, roll=ROLL, pitch=PITCH, roll_rate=0.0):
         force = (
@@ -54,11 +59,11 @@ def euler(q):
 
 @pytest.fixture
 def fed():
-    source, sender = FilterAttitude(1), Sender()
+    source, sender = FilterAttitude(), Sender()
     for k in range(51):
-        source.hear(sender.imu(1_000_000 + k * 20_000))
+        source.take(*sender.imu(1_000_000 + k * 20_000))
         if k % 5 == 0:
-            source.hear(sender.attitude(1_000_000 + k * 20_000))
+            source.take(*sender.attitude(1_000_000 + k * 20_000))
     return source
 
 
@@ -70,17 +75,17 @@ def test_roll_and_pitch_are_the_filters_and_yaw_the_autopilots(fed):
 def test_an_old_roll_is_none(fed):
     assert fed.roll_rad(2_400_000) == pytest.approx(ROLL, abs=1e-4)
     assert fed.roll_rad(2_600_000) is None
-    assert FilterAttitude(1).roll_rad(0) is None
+    assert FilterAttitude().roll_rad(0) is None
 
 
 def test_between_samples():
     """A turn of 20 degrees a second, asked for half way between two samples."""
-    source, sender = FilterAttitude(1), Sender()
+    source, sender = FilterAttitude(), Sender()
     rate = math.radians(20.0)
     for k in range(21):
         t = 0.05 * k
-        source.hear(sender.imu(1_000_000 + k * 50_000, roll=rate * t, pitch=0.0, roll_rate=rate))
-        source.hear(sender.attitude(1_000_000 + k * 50_000))
+        source.take(*sender.imu(1_000_000 + k * 50_000, roll=rate * t, pitch=0.0, roll_rate=rate))
+        source.take(*sender.attitude(1_000_000 + k * 50_000))
     assert euler(source.at(1_525_000))[0] == pytest.approx(rate * 0.525, abs=2e-4)
 
 
@@ -90,18 +95,18 @@ def test_nothing_is_known_before_and_long_after(fed, time_us):
 
 
 def test_no_yaw_no_attitude():
-    source, sender = FilterAttitude(1), Sender()
+    source, sender = FilterAttitude(), Sender()
     for k in range(10):
-        source.hear(sender.imu(1_000_000 + k * 20_000))
+        source.take(*sender.imu(1_000_000 + k * 20_000))
     assert source.at(1_100_000) is None
     assert source.newest is not None
 
 
-@pytest.mark.parametrize(("system", "component"), [(2, 1), (1, 25), (1, 191)])
-def test_others_are_left_out(system, component):
-    source, sender = FilterAttitude(1), Sender(system, component)
-    source.hear(sender.imu(1_000_000))
-    source.hear(sender.attitude(1_000_000))
+@pytest.mark.parametrize("component", [25, 191])
+def test_other_components_are_left_out(component):
+    source, sender = FilterAttitude(), Sender(1, component)
+    source.take(*sender.imu(1_000_000))
+    source.take(*sender.attitude(1_000_000))
     assert source.newest is None
     assert source.at(1_000_000) is None
 
@@ -114,7 +119,7 @@ def test_names_are_what_must_be_listened_to():
         "VFR_HUD",
         "SCALED_PRESSURE",
         "ATTITUDE",
-    } <= FilterAttitude(1).names
+    } <= FilterAttitude().names
 
 
 @pytest.mark.slow

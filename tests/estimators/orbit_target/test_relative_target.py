@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from missions.orbit.line_of_sight import LineOfSight
-from missions.orbit.relative_target import RelativeTarget, RelativeTargetParameters
+from estimators.orbit_target.relative_target import RelativeTarget, RelativeTargetParameters
+from estimators.tracking.line_of_sight import LineOfSight
 
 HEIGHT = 100.0
 STEP_US = 20_000

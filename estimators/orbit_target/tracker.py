@@ -6,20 +6,27 @@ Outputs are the relative target and the direction in which the gimbal must point
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from estimators.orbit_target.attitude import AttitudeSource
+from estimators.orbit_target.relative_target import RelativeState, RelativeTarget, RelativeTargetParameters
+from estimators.tracking.line_of_sight import (
+    Detection,
+    GimbalAttitude,
+    LineOfSight,
+    line_of_sight_of_gimbal,
+    pointing_angles,
+)
 from flightsim.foundation.vectors import between, yaw_of
-from missions.orbit.attitude import AttitudeSource
-from missions.orbit.line_of_sight import LineOfSight, line_of_sight_of_gimbal, pointing_angles
-from missions.orbit.relative_target import RelativeState, RelativeTarget, RelativeTargetParameters
-from missions.vehicle.payload import Detection, GimbalAttitude
 
 _GIMBALS_KEPT: Final = 128
 _GIMBAL_STALE_US: Final = 200_000
+_IMAGES_KEPT: Final = 64
 _OLD_IMAGE_US: Final = 900_000
 _LEAST_HEIGHT_M: Final = 2.0
+_FLATTEST_RAD: Final = math.radians(5.0)  # a flatter line of sight gives no distance to start with
 
 
 class TargetStatus(StrEnum):
@@ -31,11 +38,10 @@ class TargetStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackerParameters:
-    """Parameters of the tracker.
+class TrackerParameters(RelativeTargetParameters):
+    """Parameters of the tracker and of its filter.
 
     Attributes:
-        target: parameters of the filter.
         acquired_after: number of accepted detections, each less than `lost_after_s` after the previous one,
             with which the target counts as acquired. Beyond the range of its detector a camera still reads a
             tag occasionally; such a single detection is not an acquisition, and no detection after it is not
@@ -43,11 +49,12 @@ class TrackerParameters:
         lost_after_s: time without an accepted detection after which an acquired target counts as lost.
     """
 
-    target: RelativeTargetParameters = field(default_factory=RelativeTargetParameters)
     acquired_after: int = 3
     lost_after_s: float = 3.0
 
     def __post_init__(self) -> None:
+        # zero-argument super() does not reach the base of a dataclass with slots
+        RelativeTargetParameters.__post_init__(self)
         if self.acquired_after < 1:
             raise ValueError(f"acquired_after = {self.acquired_after} is not possible; it must be 1 or more")
         if not self.lost_after_s > 0.0:
@@ -60,20 +67,29 @@ class TargetTracker:
     Args:
         attitude: attitude of the aircraft.
         parameters: noise and times.
+        first_sigmas: standard deviations of place (m) and velocity against the air (m/s) with which the first
+            detection starts the filter; None: only `start` and `expect` do.
 
     Attributes:
         target: the filter.
         losses: number of times that an acquired target was lost.
+        height_m: height of the aircraft over the target's ground; NaN: not known.
     """
 
-    def __init__(self, attitude: AttitudeSource, parameters: TrackerParameters | None = None) -> None:
+    def __init__(
+        self,
+        attitude: AttitudeSource,
+        parameters: TrackerParameters | None = None,
+        first_sigmas: tuple[float, float] | None = None,
+    ) -> None:
         self.parameters = parameters or TrackerParameters()
-        self.target = RelativeTarget(self.parameters.target)
+        self.target = RelativeTarget(self.parameters)
         self.losses = 0
         self._attitude = attitude
+        self._first_sigmas = first_sigmas
         self._gimbals: deque[GimbalAttitude] = deque(maxlen=_GIMBALS_KEPT)
         self._images: dict[int, list[Detection]] = {}
-        self._height_m = math.nan
+        self.height_m = math.nan
         self._seen_us: int | None = None
         self._sightings_us: deque[int] = deque(maxlen=self.parameters.acquired_after)
         self._status = TargetStatus.EXPECTED
@@ -102,6 +118,36 @@ class TargetTracker:
             drift_std_m_s=drift_std_m_s,
         )
 
+    def expect(
+        self,
+        time_us: int,
+        *,
+        target_ne_m: tuple[float, float],
+        target_ne_m_s: tuple[float, float],
+        own_ne_m: tuple[float, float],
+        own_ne_m_s: tuple[float, float],
+        air_ne_m_s: tuple[float, float],
+        sigma_m: float,
+        drift_sigma_m_s: float,
+    ) -> None:
+        """Start with a place where the target is expected, while the aircraft knows its own position.
+
+        Args:
+            time_us: present time.
+            target_ne_m, target_ne_m_s: expected place and velocity of the target, from home.
+            own_ne_m, own_ne_m_s: place and velocity over ground of the aircraft, from home.
+            air_ne_m_s: velocity of the aircraft through the air.
+            sigma_m, drift_sigma_m_s: standard deviations of the place and of the velocity against the air.
+        """
+        wind = (own_ne_m_s[0] - air_ne_m_s[0], own_ne_m_s[1] - air_ne_m_s[1])
+        self.start(
+            time_us,
+            offset_ne_m=(target_ne_m[0] - own_ne_m[0], target_ne_m[1] - own_ne_m[1]),
+            offset_std_m=sigma_m,
+            drift_ne_m_s=(target_ne_m_s[0] - wind[0], target_ne_m_s[1] - wind[1]),
+            drift_std_m_s=drift_sigma_m_s,
+        )
+
     def count_anew(self) -> None:
         """Reset the counts of losses and detections to zero."""
         self.losses = 0
@@ -109,16 +155,20 @@ class TargetTracker:
 
     def height(self, height_m: float) -> None:
         """Set the height of the aircraft over the target's ground."""
-        self._height_m = height_m
+        self.height_m = height_m
 
-    def gimbal(self, attitude: GimbalAttitude) -> None:
-        """Add a gimbal attitude; they must come in the order of time."""
-        if not self._gimbals or attitude.time_us > self._gimbals[-1].time_us:
-            self._gimbals.append(attitude)
+    def gimbal(self, attitude: GimbalAttitude) -> bool:
+        """Add a gimbal attitude; returns False when it is not newer than the newest."""
+        if self._gimbals and attitude.time_us <= self._gimbals[-1].time_us:
+            return False
+        self._gimbals.append(attitude)
+        return True
 
     def detect(self, detection: Detection) -> None:
         """Add one detected object of an image; it is processed in the next `step`."""
         self._images.setdefault(detection.time_us, []).append(detection)
+        if len(self._images) > _IMAGES_KEPT:
+            del self._images[min(self._images)]
 
     # outputs
 
@@ -144,19 +194,34 @@ class TargetTracker:
             self.losses += 1
 
     def _look(self, image_us: int, detections: list[Detection], now_us: int) -> None:
-        if not now_us - _OLD_IMAGE_US < image_us <= now_us or not self._height_m > _LEAST_HEIGHT_M:
+        if not now_us - _OLD_IMAGE_US < image_us <= now_us or not self.height_m > _LEAST_HEIGHT_M:
             return
         gimbal, q = self._gimbal_at(image_us), self._attitude.at(image_us)
         if gimbal is None or q is None:
             return
         lines = [line_of_sight_of_gimbal(d.image_x, d.image_y, gimbal, q) for d in detections]
+        if not self.target.known and self._first_sigmas is not None:
+            self._start_along(lines[0], now_us, self._first_sigmas)
 
         def distance(line: LineOfSight) -> float:
-            return self.target.distance_squared(image_us, line, self._height_m)
+            return self.target.distance_squared(image_us, line, self.height_m)
 
-        if self.target.see(image_us, min(lines, key=distance), self._height_m):
+        if self.target.see(image_us, min(lines, key=distance), self.height_m):
             self._seen_us = image_us
             self._sight(image_us)
+
+    def _start_along(self, line: LineOfSight, now_us: int, sigmas: tuple[float, float]) -> None:
+        """Start where a line of sight meets the ground (equation 40)."""
+        if line.depression_rad < _FLATTEST_RAD:
+            return
+        away_m = self.height_m / math.tan(line.depression_rad)
+        self.start(
+            now_us,
+            offset_ne_m=(away_m * math.cos(line.bearing_rad), away_m * math.sin(line.bearing_rad)),
+            offset_std_m=sigmas[0],
+            drift_ne_m_s=(0.0, 0.0),
+            drift_std_m_s=sigmas[1],
+        )
 
     def _sight(self, image_us: int) -> None:
         """Count an accepted detection towards the acquisition."""
@@ -207,7 +272,7 @@ class TargetTracker:
             ahead_s: time by which the target's motion is predicted, to allow for the gimbal's delay.
         """
         q = self._attitude.at(time_us)
-        if q is None or not self.target.known or not math.isfinite(self._height_m):
+        if q is None or not self.target.known or not math.isfinite(self.height_m):
             return None
         north_m, east_m = self.target.state(time_us + round(ahead_s * 1e6)).offset_ne_m
-        return pointing_angles((north_m, east_m, max(_LEAST_HEIGHT_M, self._height_m)), q)
+        return pointing_angles((north_m, east_m, max(_LEAST_HEIGHT_M, self.height_m)), q)

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from missions.orbit.attitude import AutopilotAttitude
-from missions.orbit.tracker import TargetStatus, TargetTracker, TrackerParameters
-from missions.vehicle.payload import Detection, GimbalAttitude
-from missions.vehicle.telemetry import Attitude
+from estimators.interface import Outcome
+from estimators.orbit_target.attitude import AutopilotAttitude
+from estimators.orbit_target.tracker import TargetStatus, TargetTracker, TrackerParameters
+from estimators.tracking.line_of_sight import Detection, GimbalAttitude
 from tests.missions.orbit.coordinated_turn import PointMass
 
 
@@ -27,7 +27,7 @@ class Rig:
         a, tracker = self.aircraft, self.tracker
         while a.time_us < end_us:
             now, gimbal, airspeed, height, detections = a.step(math.radians(23.0))
-            self.attitude.add(now)
+            self.attitude.add(*now)
             tracker.gimbal(gimbal)
             tracker.height(height)
             for found in detections:
@@ -106,14 +106,7 @@ def test_numbers_that_are_none_leave_the_estimate_as_it_was():
     rig = Rig()
     rig.run(3.0)
     for nothing in (math.nan, math.inf):
-        bad = Attitude(
-            time_us=rig.aircraft.time_us + 1000,
-            roll_rad=0.0,
-            pitch_rad=nothing,
-            yaw_rad=0.0,
-            rates_frd_rad_s=(0.0, 0.0, 0.0),
-        )
-        assert not rig.attitude.add(bad)
+        assert rig.attitude.add(rig.aircraft.time_us + 1000, 0.0, nothing, 0.0) is Outcome.NOT_FINITE
         rig.tracker.step(rig.aircraft.time_us + 2000, nothing)
         rig.tracker.step(rig.aircraft.time_us + 2000, 25.0, nothing)
     rig.run(1.0)
@@ -125,15 +118,12 @@ def test_nothing_is_made_of_images_without_attitude_height_or_gimbal():
     tracker = TargetTracker(attitude)
     image = Detection(time_us=1_000_000, target=0, image_x=0.0, image_y=0.0)
     look = GimbalAttitude(time_us=990_000, q=(1.0, 0.0, 0.0, 0.0), from_north=True)
-    here = Attitude(
-        time_us=1_000_000, roll_rad=0.0, pitch_rad=0.0, yaw_rad=0.0, rates_frd_rad_s=(0.0, 0.0, 0.0)
-    )
     tracker.detect(image)
     tracker.step(1_050_000, 25.0)  # no attitude at all
     tracker.start(
         1_000_000, offset_ne_m=(200.0, 0.0), offset_std_m=20.0, drift_ne_m_s=(0.0, 0.0), drift_std_m_s=1.0
     )
-    attitude.add(here)
+    attitude.add(1_000_000, 0.0, 0.0, 0.0)
     tracker.step(1_060_000, 25.0)  # no height
     tracker.height(100.0)
     tracker.detect(image)
@@ -158,16 +148,12 @@ def test_attitude_is_interpolated_and_gets_old():
     attitude = AutopilotAttitude()
 
     def sample(time_us, yaw):
-        return attitude.add(
-            Attitude(
-                time_us=time_us, roll_rad=0.0, pitch_rad=0.0, yaw_rad=yaw, rates_frd_rad_s=(0.0, 0.0, 0.0)
-            )
-        )
+        return attitude.add(time_us, 0.0, 0.0, yaw)
 
     assert attitude.at(0) is None
-    assert sample(1_000_000, 0.1)
-    assert not sample(1_000_000, 0.1)
-    assert sample(1_100_000, 0.3)
+    assert sample(1_000_000, 0.1) is Outcome.USED
+    assert sample(1_000_000, 0.1) is Outcome.REPEATED
+    assert sample(1_100_000, 0.3) is Outcome.USED
     w, _, _, z = attitude.at(1_050_000)
     assert 2.0 * math.atan2(z, w) == pytest.approx(0.2, abs=1e-4)
     assert attitude.at(900_000) is None

@@ -23,7 +23,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from missions.orbit.line_of_sight import LineOfSight
+from estimators.tracking.gaussian import Gaussian, Innovation
+from estimators.tracking.line_of_sight import LineOfSight
+
+__all__ = ["RelativeState", "RelativeTarget", "RelativeTargetParameters"]
 
 Array = NDArray[np.float64]
 
@@ -53,7 +56,7 @@ class RelativeTargetParameters:
     gate: float = 13.8
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
+        for name in RelativeTargetParameters.__slots__:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} = {value} is not possible; it must be more than 0")
@@ -88,8 +91,8 @@ class RelativeTarget:
         self.parameters = parameters or RelativeTargetParameters()
         self.accepted = 0
         self.rejected = 0
-        self._x: Array = np.zeros(SIZE)
-        self._p: Array = np.zeros((SIZE, SIZE))
+        self._belief = Gaussian(SIZE)
+        self._x, self._p = self._belief.mean, self._belief.covariance
         self._time_us = -1
         self._air = (0.0, 0.0)
         self._path: deque[tuple[int, float, float]] = deque(maxlen=_KEPT)
@@ -99,6 +102,11 @@ class RelativeTarget:
     def known(self) -> bool:
         """Whether there is an estimate."""
         return self._known
+
+    @property
+    def offset_covariance_m2(self) -> Array:
+        """(2, 2) covariance of the offset, north and east."""
+        return self._p[OFFSET, OFFSET].copy()
 
     @property
     def drift_ne_m_s(self) -> tuple[float, float]:
@@ -136,15 +144,13 @@ class RelativeTarget:
         dt = (time_us - self._time_us) * 1e-6
         north = 0.5 * dt * (self._air[0] + air_velocity_ne_m_s[0])
         east = 0.5 * dt * (self._air[1] + air_velocity_ne_m_s[1])
-        x, p, q = self._x, self._p, self.parameters
+        x, p = self._x, self.parameters
         x[0] += dt * x[2] - north
         x[1] += dt * x[3] - east
         f = np.eye(SIZE)
         f[0, 2] = f[1, 3] = dt
-        p[:] = f @ p @ f.T
-        for k in (0, 1):
-            p[k, k] += q.offset_rate_m_per_root_s**2 * dt
-            p[k + 2, k + 2] += q.drift_acceleration_m_s2_per_root_hz**2 * dt
+        walks = (p.offset_rate_m_per_root_s**2 * dt, p.drift_acceleration_m_s2_per_root_hz**2 * dt)
+        self._belief.predict(f, np.repeat(walks, 2))
         self._time_us = time_us
         self._air = air_velocity_ne_m_s
         _, n0, e0 = self._path[-1]
@@ -161,26 +167,19 @@ class RelativeTarget:
         found = self._innovation(time_us, line, height_m)
         if found is None:
             return False
-        innovation, h, s, s_inverse = found
-        if float(innovation @ s_inverse @ innovation) > self.parameters.gate:
+        if found.distance_squared > self.parameters.gate:
             self.rejected += 1
             return False
-        gain = self._p @ h.T @ s_inverse
-        self._x += gain @ innovation
-        left = np.eye(SIZE) - gain @ h
-        noise = s - h @ self._p @ h.T
-        self._p[:] = left @ self._p @ left.T + gain @ noise @ gain.T  # Joseph: stays symmetric, positive
+        self._belief.update(found)
         self.accepted += 1
         return True
 
     def distance_squared(self, time_us: int, line: LineOfSight, height_m: float) -> float:
         """Normalized innovation squared of a line of sight."""
         found = self._innovation(time_us, line, height_m)
-        return math.inf if found is None else float(found[0] @ found[3] @ found[0])
+        return math.inf if found is None else found.distance_squared
 
-    def _innovation(
-        self, time_us: int, line: LineOfSight, height_m: float
-    ) -> tuple[Array, Array, Array, Array] | None:
+    def _innovation(self, time_us: int, line: LineOfSight, height_m: float) -> Innovation | None:
         if not self._known or not height_m > 0.0:
             return None
         flown = self._flown_since(time_us)
@@ -192,7 +191,7 @@ class RelativeTarget:
         east = self._x[1] - late_s * self._x[3] + flown[1]
         rho = max(_LEAST_OFFSET_M, math.hypot(north, east))
         slant2 = rho * rho + height_m * height_m
-        innovation = np.array(
+        residual = np.array(
             (
                 math.remainder(line.bearing_rad - math.atan2(east, north), math.tau),
                 line.depression_rad - math.atan2(height_m, rho),
@@ -210,9 +209,7 @@ class RelativeTarget:
         sigma2 = self.parameters.angle_rad**2
         # near the vertical the bearing is not meaningful
         noise = np.diag((sigma2 * slant2 / rho**2, sigma2))
-        s = h @ self._p @ h.T + noise
-        inverse: Array = np.asarray(np.linalg.inv(s), dtype=np.float64)
-        return innovation, h, s, inverse
+        return self._belief.innovation(residual, h, noise)
 
     def _flown_since(self, time_us: int) -> tuple[float, float] | None:
         """Distance flown through the air since a time, (north, east) m; None when that is too long ago."""
