@@ -20,7 +20,7 @@ from typing import Any, Final
 from estimators.attitude.estimator import AttitudeEstimator
 from estimators.attitude.parameters import AttitudeParameters
 from estimators.comparison import comparisons
-from estimators.logs import Log, LogError, open_log
+from estimators.logs import Log, LogError, open_log, report_of
 from estimators.logs.dataflash import META
 from estimators.replay import replay
 
@@ -76,7 +76,7 @@ def _row(path: Path) -> dict[str, Any]:
     except LogError as error:
         return row | {"opened": "no", "note": str(error).replace(str(path), path.name)}
     row |= {"opened": "yes", "format": log.format, "messages": len(log)}
-    vehicles = log.report().vehicles
+    vehicles = report_of(log).vehicles
     row["vehicle"] = "+".join(vehicle.type for vehicle in vehicles)
     row["firmware"] = "+".join(vehicle.firmware for vehicle in vehicles)
     modes = dict.fromkeys(span.mode for vehicle in vehicles for span in vehicle.modes)

@@ -25,7 +25,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder
 from autopilot_bridge.tlog import TlogWriter
-from estimators.logs import open_log
+from estimators.logs import open_log, report_of
 
 RECORDED = Path(__file__).parents[2] / "shared" / "tlogs"
 COPIES = 5
@@ -81,7 +81,7 @@ def measure_ours(path: Path, warm: Path) -> dict[str, float]:
     """Index, decode everything, walk over the messages. Runs in a process of its own, for its peak memory."""
     small = open_log(warm)
     decode_all(small)
-    small.report()
+    report_of(small)
     del small
     before = peak_bytes()
     log, index_s, index_cpu_s = timed(lambda: open_log(path))

@@ -150,6 +150,45 @@ def test_kernels_have_the_cache_that_notices_other_modules():
     assert users == ["flightsim.foundation.kernels"]
 
 
+def needed(name):
+    """The modules of ours that a module imports; `from package import module` needs only the module."""
+    found = set()
+    for node in ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                module = f"{node.module}.{alias.name}"
+                found.add(module if module in MODULES else node.module)
+    return (found & MODULES.keys()) - {name}
+
+
+def in_circles(needs):
+    """The modules that need themselves by way of others."""
+    left = {name: set(others) for name, others in needs.items()}
+    while True:
+        used = set().union(*left.values())
+        free = {name for name, others in left.items() if not others or name not in used}
+        if not free:
+            return sorted(left)
+        left = {name: others - free for name, others in left.items() if name not in free}
+
+
+CIRCLES_LEFT = ("missions.vehicle",)
+
+
+@pytest.mark.parametrize("package", ["estimators", "missions"])
+def test_no_modules_import_each_other(package):
+    """Imports in functions and for type checking count."""
+    names = {name for name in MODULES if is_in(name, (package,)) and not is_in(name, CIRCLES_LEFT)}
+    assert in_circles({name: needed(name) & names for name in names}) == []
+
+
+def test_the_test_sees_circles():
+    assert in_circles({"a": {"b"}, "b": {"c", "d"}, "c": {"b"}, "d": set()}) == ["b", "c"]
+    assert in_circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
 FLAG = re.compile(r"(?<![\w-])--[a-z]")
 
 

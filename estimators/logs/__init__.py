@@ -3,8 +3,19 @@
 from estimators.logs.errors import LogError
 from estimators.logs.log import Boot, Key, Log
 from estimators.logs.opening import open_log
-from estimators.logs.report import LogReport
+from estimators.logs.report import LogReport, report_of
 from estimators.logs.source import LogSource, Stream
 from estimators.logs.table import Table
 
-__all__ = ["Boot", "Key", "Log", "LogError", "LogReport", "LogSource", "Stream", "Table", "open_log"]
+__all__ = [
+    "Boot",
+    "Key",
+    "Log",
+    "LogError",
+    "LogReport",
+    "LogSource",
+    "Stream",
+    "Table",
+    "open_log",
+    "report_of",
+]

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from estimators.logs.errors import LogError, NothingThere
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log_clock import LogClock, make_clock
-from estimators.logs.report import LogReport, make_report
 from estimators.logs.source import LogSource, Positions, Stream
 from estimators.logs.table import Table
 from estimators.messages import Message
@@ -386,10 +385,6 @@ class Log:
             names, system_id=system_id, component_id=component_id, boot=boot, condition=condition
         )
         return messages_in_order(self.source, selections)
-
-    def report(self) -> LogReport:
-        """Contents and defects of the log: bytes by reason, loss, gaps, rates, modes, flights."""
-        return make_report(self)
 
     def _find(self, names: Iterable[str] | None, system_id: Ids, component_id: Ids) -> list[Stream]:
         wanted = None if names is None else {self.source.dialect.find(name).name for name in names}

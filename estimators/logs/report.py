@@ -1,16 +1,14 @@
 """The contents and defects of a log in figures."""
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from estimators.logs.log import Log
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
 from estimators.vehicle_time import AUTOPILOT
-
-if TYPE_CHECKING:
-    from estimators.logs.log import Log
 
 GAP_US: Final = 2_000_000
 """A longer silence of a system is a gap."""
@@ -108,7 +106,7 @@ class LogReport:
         return asdict(self)
 
 
-def make_report(log: "Log") -> LogReport:
+def report_of(log: Log) -> LogReport:
     """Make the report of a log."""
     source = log.source
     return LogReport(
@@ -137,7 +135,7 @@ def make_report(log: "Log") -> LogReport:
     )
 
 
-def _streams(log: "Log") -> tuple[StreamReport, ...]:
+def _streams(log: Log) -> tuple[StreamReport, ...]:
     found = []
     for stream in log.source.streams:
         steps = np.diff(log.source.time_us[stream.order])
@@ -163,7 +161,7 @@ def _streams(log: "Log") -> tuple[StreamReport, ...]:
     return tuple(sorted(found, key=lambda item: (item.system_id, item.component_id, item.name)))
 
 
-def _gaps(log: "Log") -> tuple[Gap, ...]:
+def _gaps(log: Log) -> tuple[Gap, ...]:
     found = []
     clock = log.clock
     # A system without an autopilot has no clock that advances by itself.

@@ -3,18 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect, enum_name
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names
+from estimators.logs.log import Log
 from estimators.logs.table import Table
 from estimators.vehicle_time import AUTOPILOT
-
-if TYPE_CHECKING:
-    from estimators.logs.log import Log
 
 _HEARTBEAT: Final = "HEARTBEAT"
 _STATUSTEXT: Final = "STATUSTEXT"
@@ -79,7 +77,7 @@ class VehicleReport:
     flights: tuple[Flight, ...]
 
 
-def vehicles(log: "Log") -> tuple[VehicleReport, ...]:
+def vehicles(log: Log) -> tuple[VehicleReport, ...]:
     """Vehicles whose autopilot sent a HEARTBEAT, by system id."""
     found = []
     if not any(stream.name == _HEARTBEAT for stream in log.source.streams):
@@ -130,7 +128,7 @@ def mode_name(
     return names.get(custom_mode, f"MODE {custom_mode}")
 
 
-def _firmware(log: "Log", system_id: int, autopilot: int) -> tuple[str, tuple[int, int] | None]:
+def _firmware(log: Log, system_id: int, autopilot: int) -> tuple[str, tuple[int, int] | None]:
     """Name and version of a vehicle's firmware, from its banner, else from AUTOPILOT_VERSION."""
     for table in _of_autopilot(log, _STATUSTEXT, system_id):
         made_by = firmware_of(text.decode("ascii", "replace") for text in table["text"].tolist())
@@ -146,7 +144,7 @@ def _firmware(log: "Log", system_id: int, autopilot: int) -> tuple[str, tuple[in
     return "", None
 
 
-def _of_autopilot(log: "Log", name: str, system_id: int) -> list[Table]:
+def _of_autopilot(log: Log, name: str, system_id: int) -> list[Table]:
     if not any(key.name == name and key.system_id == system_id for key in log.keys):
         return []
     return log.tables(name, system_id=system_id, component_id=AUTOPILOT)

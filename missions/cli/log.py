@@ -135,9 +135,10 @@ def info(path: Path, dialect: str | None, as_json: bool) -> None:
     """Duration, boots, flights, vehicles, modes, rates, gaps, loss; where every byte went."""
 
     def work() -> None:
+        from estimators.logs import report_of
         from missions.cli.log_text import report_lines
 
-        report = _open(path, dialect).report()
+        report = report_of(_open(path, dialect))
         if as_json:
             click.echo(json.dumps(report.to_dict(), indent=2))
             return

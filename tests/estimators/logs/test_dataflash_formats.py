@@ -6,7 +6,7 @@ from pymavlink import DFReader
 
 from estimators.airborne import airborne_spans
 from estimators.attitude import AttitudeEstimator
-from estimators.logs import LogError, open_log
+from estimators.logs import LogError, open_log, report_of
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names, mode_number
 from estimators.replay import replay
 from tests.estimators.logs.onboard_logs import DataflashWriter
@@ -90,7 +90,7 @@ def test_a_part_of_a_log_has_the_parameters_from_before_it(tmp_path):
 def test_vehicle_modes_and_the_flight_of_2014(tmp_path):
     """The log begins with arming: it holds the disarming only."""
     log = open_log(copter_of_2014(tmp_path / "1.bin"))
-    (vehicle,) = log.report().vehicles
+    (vehicle,) = report_of(log).vehicles
     assert (vehicle.type, vehicle.firmware) == ("QUADROTOR", "ArduCopter V3.2.1 (36b405fb)")
     assert [span.mode for span in vehicle.modes] == ["STABILIZE", "LOITER"]
     (flight,) = vehicle.flights
@@ -102,7 +102,7 @@ def test_vehicle_modes_and_the_flight_of_2014(tmp_path):
 
 def test_armed_where_no_event_was_logged(tmp_path):
     log = open_log(copter_of_2014(tmp_path / "1.bin", events=False, banner=""))
-    (vehicle,) = log.report().vehicles
+    (vehicle,) = report_of(log).vehicles
     (flight,) = vehicle.flights
     assert (flight.start_us, flight.end_us) == (65_000_000, pytest.approx(75_900_001, abs=1000))
 
@@ -120,7 +120,7 @@ def test_a_log_that_begins_with_arming_holds_only_arm_state_0(tmp_path):
         writer.add("POS", second * 1_000_000, -35.0, 149.0, 600.0, 20.0 if 5 <= second < 25 else 0.0, 0.0)
     writer.add("ARM", 29_000_000, 0)
     log = open_log(writer.save(tmp_path / "1.bin"))
-    (flight,) = log.report().vehicles[0].flights
+    (flight,) = report_of(log).vehicles[0].flights
     assert (flight.start_us, flight.end_us) == (1_000_000, 29_000_000)
     assert airborne_spans(log, 1) == ([(5_000_000, 25_000_000)], "armed, above 2 m")
 
@@ -152,12 +152,12 @@ def test_text_logs_give_what_binary_ones_give(tmp_path):
         assert np.array_equal(ours.time_us, theirs.time_us), name
         for field in ours.fields:
             assert ours[field] == pytest.approx(theirs[field], rel=1e-6), (name, field)
-    (vehicle,) = text.report().vehicles
+    (vehicle,) = report_of(text).vehicles
     assert vehicle.firmware == "ArduCopter V3.0.1"
     assert [span.mode for span in vehicle.modes] == ["STABILIZE", "LOITER"]
     theirs = counts(DFReader.DFReader_text(str(path)))
     assert {name: len(text.table(name)) for name in theirs} == theirs
-    assert sum(text.report().bytes_by_kind.values()) == text.size_bytes
+    assert sum(report_of(text).bytes_by_kind.values()) == text.size_bytes
 
 
 def test_a_text_log_of_2013_has_the_times_of_its_gps(tmp_path):
@@ -208,7 +208,7 @@ def test_a_damaged_stamp_is_replaced_and_counted(tmp_path):
     path.write_bytes(data)
     log = open_log(path)
     assert log.duration_s < 21.0 and len(log.table("ATT")) == 200
-    assert log.report().drops["implausible_times"] == 1
+    assert report_of(log).drops["implausible_times"] == 1
 
 
 def test_what_holds_formats_but_no_message_says_so(tmp_path):
@@ -237,7 +237,7 @@ def test_px4_logs_of_before_2016(tmp_path):
     attitude = log.table("ATTITUDE")
     assert (attitude["roll"][0], attitude.time_us[-1]) == (0.5, 5_990_000)
     assert log.table("HIGHRES_IMU")["xgyro"][-1] == pytest.approx(0.099)
-    (vehicle,) = log.report().vehicles
+    (vehicle,) = report_of(log).vehicles
     assert (vehicle.autopilot, vehicle.type) == ("PX4", "QUADROTOR")
     assert [span.mode for span in vehicle.modes] == ["POSCTL"] and len(vehicle.flights) == 1
 

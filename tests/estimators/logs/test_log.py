@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as dialect
 
-from estimators.logs import LogError, open_log
+from estimators.logs import LogError, open_log, report_of
 from estimators.logs.condition import Condition
 from missions.cli.log_text import report_lines
 from tests.estimators.logs.reference import EPOCH_US, build, pack, record, tlog
@@ -146,7 +146,7 @@ def test_messages_that_fulfil_a_condition(log):
 
 
 def test_report(log):
-    report = log.report()
+    report = report_of(log)
     json.dumps(report.to_dict())
     assert sum(report.bytes_by_kind.values()) == report.size_bytes
     (vehicle,) = report.vehicles
@@ -252,7 +252,7 @@ def test_the_rate_of_two_imus_is_that_of_one(tmp_path):
     path.write_bytes(tlog(frames, step_us=20_000))
     log = open_log(path)
     assert log.rate_hz("HIGHRES_IMU") == pytest.approx(25.0, rel=0.01)
-    assert log.report().streams[0].rate_hz == pytest.approx(25.0, rel=0.01)
+    assert report_of(log).streams[0].rate_hz == pytest.approx(25.0, rel=0.01)
 
 
 def test_times_are_told_on_the_first_vehicles_clock_and_boot(tmp_path):
@@ -269,7 +269,7 @@ def test_times_are_told_on_the_first_vehicles_clock_and_boot(tmp_path):
             frames += [pack(own), pack(other, system=2), *beats]
     path.write_bytes(tlog(frames, step_us=250_000))
     log = open_log(path)
-    report = log.report()
+    report = report_of(log)
     assert report.clock == "seconds since boot of vehicle 1"
     for vehicle in report.vehicles:
         assert [(span.mode, span.boot, span.start_us) for span in vehicle.modes] == [
@@ -320,7 +320,7 @@ def test_dialect_of_a_log_that_has_none(tmp_path, magic):
 
 @each_recorded_log
 def test_recorded_logs_have_one_boot_and_one_flight(path):
-    report = open_log(path).report()
+    report = report_of(open_log(path))
     (vehicle,) = report.vehicles
     assert vehicle.boots == 1
     assert vehicle.autopilot == ("PX4" if path.stem.startswith("px4") else "ARDUPILOTMEGA")

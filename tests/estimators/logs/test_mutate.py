@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogReader
-from estimators.logs import LogError, open_log
+from estimators.logs import LogError, open_log, report_of
 from estimators.logs.faults import UNITS, FaultKind, parse_fault
 from estimators.logs.mutate import mutated_records
 from estimators.logs.raw_records import positions, read_records, window, write_records
@@ -175,7 +175,7 @@ def test_old_and_signed_frames_stay_readable(tmp_path):
     out = open_log(tmp_path / "out.tlog")
     assert out.table("ATTITUDE")["roll"].tolist() == [1.25, 1.25]
     assert out.table("ATTITUDE")["pitch"].tolist() == [0.5, 0.5]
-    remarks = out.report().remarks
+    remarks = report_of(out).remarks
     assert (remarks["frames_v1"], remarks["frames_signed"]) == (1, 0)
 
 

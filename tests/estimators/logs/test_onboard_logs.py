@@ -10,7 +10,7 @@ import pytest
 from pymavlink import DFReader
 from pyulog.core import ULog
 
-from estimators.logs import LogError, open_log
+from estimators.logs import LogError, open_log, report_of
 from estimators.logs.condition import Condition
 from tests.estimators.logs.onboard_logs import DataflashWriter, UlogWriter
 
@@ -127,7 +127,7 @@ def test_dataflash_gives_the_messages_of_estimators(bin_log):
 
 
 def test_dataflash_vehicle_modes_flights_and_date(bin_log):
-    report = bin_log.report()
+    report = report_of(bin_log)
     (vehicle,) = report.vehicles
     assert (vehicle.autopilot, vehicle.type) == ("ARDUPILOTMEGA", "FIXED_WING")
     assert [span.mode for span in vehicle.modes] == ["MANUAL", "AUTO"]
@@ -152,7 +152,7 @@ def test_damaged_dataflash(dataflash, tmp_path):
     torn.write_bytes(whole[: len(whole) - 40])
     log = open_log(torn)
     assert len(log.table("HIGHRES_IMU")) > 0
-    assert sum(log.report().bytes_by_kind.values()) == log.size_bytes
+    assert sum(report_of(log).bytes_by_kind.values()) == log.size_bytes
     holed = tmp_path / "holed.bin"
     holed.write_bytes(whole[:3000] + bytes(700) + whole[3100:])
     assert len(open_log(holed).table("ATTITUDE")) > 50
@@ -291,7 +291,7 @@ def test_ulog_gives_the_messages_of_estimators(ulg_log):
 
 
 def test_ulog_vehicle_modes_flights_and_date(ulg_log):
-    (vehicle,) = ulg_log.report().vehicles
+    (vehicle,) = report_of(ulg_log).vehicles
     assert (vehicle.autopilot, vehicle.type) == ("PX4", "FIXED_WING")
     assert [span.mode for span in vehicle.modes] == ["MANUAL", "TAKEOFF", "MISSION"]
     assert vehicle.flights[0].start_us == 2_000_000
@@ -307,7 +307,7 @@ def test_single_imus_are_turned_as_the_board_is(ulog, tmp_path):
     second = log.table("HIGHRES_IMU", instance=1)  # 0.2 about x of the board
     assert (second["xgyro"][0], second["ygyro"][0]) == pytest.approx((0.0, 0.2 * math.cos(math.radians(2.0))))
     assert second["zgyro"][0] == pytest.approx(0.2 * math.sin(math.radians(2.0)))
-    assert "SENS_BOARD_*_OFF 2 0 0 deg" in log.report().remarks["board"]
+    assert "SENS_BOARD_*_OFF 2 0 0 deg" in report_of(log).remarks["board"]
     assert b"SENS_BOARD_ROT" in log.table("PARAM_VALUE")["param_id"].tolist()
 
 
@@ -329,7 +329,7 @@ def test_a_board_on_its_side_leaves_single_imus_out(ulog, tmp_path):
     ulog.parameter("SENS_BOARD_ROT", 16)
     log = open_log(ulog.save(tmp_path / "flight.ulg"))
     assert set(log.table("HIGHRES_IMU")["id"].tolist()) == {0}
-    assert "left out" in log.report().remarks["board"]
+    assert "left out" in report_of(log).remarks["board"]
 
 
 def test_damaged_ulog(ulog, tmp_path):
@@ -363,7 +363,7 @@ def test_ulog_without_a_system_type_has_one_of_its_class(tmp_path, number, name)
     writer.subscribe("vehicle_status")
     for second in range(3):
         writer.add("vehicle_status", "QBBB", (second + 1) * 1_000_000, 1, 3, number)
-    (vehicle,) = open_log(writer.save(tmp_path / "flight.ulg")).report().vehicles
+    (vehicle,) = report_of(open_log(writer.save(tmp_path / "flight.ulg"))).vehicles
     assert vehicle.type == name
 
 
@@ -383,4 +383,4 @@ def test_ulog_of_junk_ends(tmp_path):
         path = tmp_path / "flight.ulg"
         path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + choose.randbytes(choose.randrange(3000)))
         with contextlib.suppress(LogError):
-            open_log(path).report()
+            report_of(open_log(path))
