@@ -1,17 +1,71 @@
-"""The confirmation before a flight with a real vehicle."""
+"""Questions to the user on the terminal, and the confirmation before a flight with a real vehicle."""
 
+import asyncio
+import os
+import sys
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import TYPE_CHECKING, Final
 
 import click
-
-from missions.cli.question import YES_WORDS, ask, is_yes, somebody_is_there
 
 if TYPE_CHECKING:
     from missions.preflight.before_flight import Confirm, Look
 
 _AGAINST_ADVICE: Final = "fly anyway"
+_CHUNK_BYTES: Final = 4096
+YES_WORDS: Final = "yes (or y)"
+"""The answers that `is_yes` accepts, for the text of a question."""
+
+
+def is_yes(answer: str) -> bool:
+    """Whether an answer is a yes; any other answer, or no answer, is not."""
+    return answer.strip().lower() in ("y", "yes")
+
+
+def can_ask() -> bool:
+    """Whether there is a terminal for questions; the input may also be closed."""
+    return sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()
+
+
+async def ask(question: str) -> str:
+    """Print a question on stderr and wait for a line from the terminal; "" when the terminal closes without
+    one.
+
+    This waits as a task, not in `input()`: Ctrl-C ends the wait, and text typed afterwards is not used as an
+    answer.
+    """
+    click.echo(f"{question}: ", nl=False, err=True)
+    answer = ""
+    try:
+        answer = await _line(sys.stdin.fileno())
+    finally:
+        if not answer.endswith("\n"):
+            with suppress(OSError):  # the terminal may have been closed
+                click.echo(err=True)
+    return answer.strip()
+
+
+async def _line(terminal: int) -> str:
+    loop = asyncio.get_running_loop()
+    typed = bytearray()
+    done: asyncio.Future[None] = loop.create_future()
+
+    def read() -> None:
+        try:
+            data = os.read(terminal, _CHUNK_BYTES)
+        except OSError:  # the terminal was closed
+            data = b""
+        typed.extend(data)
+        if not done.done() and (not data or b"\n" in typed):
+            done.set_result(None)
+
+    loop.add_reader(terminal, read)
+    try:
+        await done
+    finally:
+        loop.remove_reader(terminal)
+    return typed.decode(errors="replace")
 
 
 def is_hardware(connections: Sequence[str]) -> bool:
@@ -48,7 +102,7 @@ def confirmation(
     hardware = is_hardware(connections)
     if not (hardware or check):
         return None
-    if not yes and not somebody_is_there():
+    if not yes and not can_ask():
         raise click.UsageError(
             f"{', '.join(connections)}: may be a real vehicle, and there is no terminal to confirm the "
             "flight; give --yes to fly it when the checks find no problem"

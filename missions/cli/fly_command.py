@@ -23,11 +23,12 @@ _MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
     "orbit": ("missions.cli.orbit_command", "COMMAND"),
     "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
 }
+_FILES_OF_USERS: Final = "missions.cli.file_command"
 _OWN: Final = "a mission of your own"
 _FILE: Final = "a mission file"
 _FILES: Final[Mapping[str, tuple[str, str]]] = {
-    _OWN: ("missions.cli.own_mission_command", "COMMAND"),
-    _FILE: ("missions.cli.mission_file_command", "COMMAND"),
+    _OWN: (_FILES_OF_USERS, "OWN"),
+    _FILE: (_FILES_OF_USERS, "FILE"),
 }
 """The module in which each mission declares its options."""
 

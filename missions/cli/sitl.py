@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
-from missions.cli.losses import Losses
 from missions.cli.options import SLOWEST, FiniteRange, in_options
 from missions.cli.scenario import scenario_of
 from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
-from missions.cli.storage import VehicleCards, storage_option
+from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
-from missions.runs.end_requests import EndRequests
+from missions.runs.ending import EndRequests
 
 if TYPE_CHECKING:
     from autopilot_bridge.sitl import Port, Sitl

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from missions.cli.confirm import YES_WORDS, ask, can_ask, is_yes
 from missions.cli.options import FiniteRange, in_options
-from missions.cli.question import YES_WORDS, ask, is_yes, somebody_is_there
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Address
@@ -117,7 +117,7 @@ async def confirm(question: str, yes: bool) -> None:
     """Ask the user for a yes; without a terminal, --yes must be specified."""
     if yes:
         return
-    if not somebody_is_there():
+    if not can_ask():
         raise click.UsageError(f"{question}: not confirmed; there is no terminal to ask on: give --yes")
     if not is_yes(await ask(f"{question}? Type {YES_WORDS}")):
         raise click.ClickException("not confirmed, nothing was done")

@@ -28,7 +28,7 @@ from missions.estimation.embedded import COMPONENT_ID
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
-from missions.runs.end_signals import end_signals
+from missions.runs.ending import end_signals
 from missions.runs.records import FlightRecorder
 from missions.runs.run_folder import LOG_NAME, create_run_folder
 from missions.runs.signing import client_signing

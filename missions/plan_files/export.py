@@ -10,7 +10,7 @@ from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.plan_files.files import check_suffix, write_mission_file
 from missions.planning.limits import Limits
-from missions.runs.ending import AskedToEnd
+from missions.runs.ending import EndedBySignal
 from missions.runs.request import RunRequest
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
         )
         result = fly(exported, asked)
     if result.outcome == INTERRUPTED:
-        raise AskedToEnd(result.signal)
+        raise EndedBySignal(result.signal)
     if result.outcome != COMPLETED:
         raise MissionError(result.reason)
     return exported.count

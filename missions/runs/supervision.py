@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import Final
 
+
 FAILED: Final = 1
+END_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""The signals that end a command: Ctrl-C, `kill` and service managers, a closed terminal."""
 _KILLED: Final = 128
 """Added to the signal's number: the exit code that shells report for a command that a signal ended."""
-_ASKED_TO_END: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def supervised(command: Callable[[], int], *, crashed: str) -> int:
@@ -28,7 +30,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     _flush()
     # A signal between the fork and the installation of the handler must not leave the child without its
     # parent.
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED_TO_END)
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)
     lifeline, held = os.pipe()
     child = os.fork()
     if not child:
@@ -44,7 +46,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     if not os.WIFSIGNALED(status):
         return os.waitstatus_to_exitcode(status)
     number = os.WTERMSIG(status)
-    if number in _ASKED_TO_END:
+    if number in END_SIGNALS:
         return _KILLED + number
     if sys.stderr is not None:
         sys.stderr.write(f"flightstack: {crashed} ({signal.Signals(number).name})\n")
@@ -76,7 +78,7 @@ def _wait(child: int, mask: Iterable[int]) -> int:
         with contextlib.suppress(ProcessLookupError):  # it has just ended by itself
             os.kill(child, number)
 
-    before = {number: signal.signal(number, pass_on) for number in _ASKED_TO_END}
+    before = {number: signal.signal(number, pass_on) for number in END_SIGNALS}
     if sys.stdin is not None and sys.stdin.isatty():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)

@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 
 from autopilot_bridge.sitl import Sitl, SitlServer
 from autopilot_bridge.tlog import TlogReader
-from missions.cli.losses import Losses
 from missions.cli.main import command_line, run_command_line
+from missions.cli.storage import Losses
 
 QUICK = ("sitl", "--speedup", "0", "--no-wait", "--link", "udpin:127.0.0.1:0")
 ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

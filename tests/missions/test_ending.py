@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from missions.cli import main as cli
 from missions.library import find_mission
 from missions.options import FlightOptions
-from missions.runs.ending import AskedToEnd, EndingSignals
+from missions.runs.ending import EndedBySignal, EndingSignals
 from missions.runs.session import Flight, RunRequest, RunResult, fly
 
 OPTIONS = FlightOptions(width_m=40.0, height_m=30.0, pattern="L2")
@@ -160,7 +160,7 @@ def test_before_anything_has_begun_nothing_stays(
         out=tmp_path / "run",
         on_open=lambda: signal.raise_signal(number),
     )
-    with pytest.raises(AskedToEnd) as ended:
+    with pytest.raises(EndedBySignal) as ended:
         fly(find_mission("lissajous"), request)
     assert ended.value.number == number
     assert list(tmp_path.iterdir()) == []

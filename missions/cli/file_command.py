@@ -1,8 +1,10 @@
-"""The command line of a user's own mission file: the contents of its `options`."""
+"""The command lines of files: a user's own mission in Python, and a ground station's mission file."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
+
+import click
 
 from missions.cli.mission_command import Given, MissionCommand, option
 
@@ -19,7 +21,7 @@ def _arguments(pairs: tuple[str, ...]) -> dict[str, str]:
     return values
 
 
-def _build(given: Given, common: Mapping[str, Any]) -> Any:
+def _own_options(given: Given, common: Mapping[str, Any]) -> Any:
     from missions.options import FlightOptions
 
     return FlightOptions(
@@ -32,7 +34,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
     )
 
 
-COMMAND: Final = MissionCommand(
+OWN: Final = MissionCommand(
     help=(
         "Fly a mission of your own: a Python file with `async def fly(vehicle, options)`.\n\n"
         "It finds these in its `options` (altitude_m, speed_m_s, rate_hz, ...), and what --arg NAME=VALUE "
@@ -49,6 +51,37 @@ COMMAND: Final = MissionCommand(
             "--separation", type=float, default=4.0, help="Between the altitudes of a team, m. Aircraft: 20."
         ),
     ),
-    build=_build,
+    build=_own_options,
     fields=MappingProxyType({"rate": ("rate_hz",)}),
+)
+
+
+def _file_options(given: Given, common: Mapping[str, Any]) -> Any:
+    from missions.plan_files.options import FileOptions, Then
+
+    return FileOptions(
+        **common,
+        then=None if given["then"] is None else Then(given["then"]),
+        time_limit_s=given["time_limit"],
+    )
+
+
+FILE: Final = MissionCommand(
+    help=(
+        "Fly a mission file: QGroundControl's .plan, or QGC WPL 110 (.waypoints, .txt) of Mission Planner "
+        "and MAVProxy.\n\n"
+        "Fence and rally points of a .plan are uploaded too. The embedded SITL stands where the file's home "
+        "is, and has the autopilot and the class of vehicle that the file names, unless --home, --autopilot "
+        "and --model say otherwise."
+    ),
+    options=(
+        option(
+            "--then",
+            type=click.Choice(["return", "land"]),
+            help="After a mission that does not land by itself. [default: return; required for aircraft]",
+        ),
+        option("--time-limit", type=float, help="End the mission after so many seconds, with --then."),
+    ),
+    build=_file_options,
+    fields=MappingProxyType({}),
 )
