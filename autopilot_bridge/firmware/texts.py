@@ -1,7 +1,10 @@
-"""Severities of STATUSTEXT (MAVLink MAV_SEVERITY) and the shape of a text for the pilot."""
+"""Texts for the pilot: severities of STATUSTEXT (MAV_SEVERITY), and the table of a firmware's texts."""
 
+from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from autopilot_bridge.commander.events import Event
 
 
 class Severity(IntEnum):
@@ -22,3 +25,22 @@ class Notice(NamedTuple):
 
     severity: Severity
     text: str
+
+
+TextTable = Mapping[type[Event], Notice | Callable[[Any], tuple[Notice, ...]]]
+"""The text of each type of event, or the function that makes an event's texts, in order.
+
+A firmware is silent about other types.
+"""
+
+
+def notices_of(table: TextTable) -> Callable[[Event], tuple[Notice, ...]]:
+    """The function that returns the STATUSTEXTs of an event, in order."""
+
+    def notices(event: Event) -> tuple[Notice, ...]:
+        entry = table.get(type(event))
+        if entry is None:
+            return ()
+        return (entry,) if isinstance(entry, Notice) else entry(event)
+
+    return notices

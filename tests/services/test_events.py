@@ -13,8 +13,7 @@ from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.firmware.event_kinds import EventKind, definitions
 from autopilot_bridge.firmware.px4 import events as px4_events
-from autopilot_bridge.firmware.px4.copter import texts as px4_texts
-from autopilot_bridge.firmware.px4.plane import texts as px4_plane_texts
+from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE, EVENT, RequestEvent
 from autopilot_bridge.services.channel import Source
@@ -55,7 +54,7 @@ def test_numbers_are_the_hash_of_the_name() -> None:
 
 
 def test_every_fixed_text_is_an_event() -> None:
-    for notice in (*px4_texts.FIXED, *px4_plane_texts.FIXED):
+    for notice in px4_texts.FIXED:
         event = events.Armed(time_us=0)
         (occurrence,) = px4_events.occurrences(event, (notice,))
         assert occurrence.kind.message == notice.text

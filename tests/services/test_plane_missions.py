@@ -8,9 +8,9 @@ from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import DisarmReason, FailsafeAction, FailsafeKind
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
-from autopilot_bridge.firmware.ardupilot.plane import texts as ardupilot_plane_texts
+from autopilot_bridge.firmware.ardupilot import texts as ardupilot_texts
+from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
-from autopilot_bridge.firmware.px4.plane import texts as px4_plane_texts
 from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
@@ -141,8 +141,8 @@ def test_arduplane_holds_655_items() -> None:
 
 
 def text_of(flavour: str, event: events.Event) -> list[str]:
-    texts = {"px4": px4_plane_texts, "ardupilot": ardupilot_plane_texts}[flavour]
-    return [notice.text for notice in texts.notices(event)]
+    texts = {"px4": px4_texts, "ardupilot": ardupilot_texts}[flavour]
+    return [notice.text for notice in texts.plane_notices(event)]
 
 
 T = {"time_us": 0}

@@ -14,9 +14,8 @@ from autopilot_bridge.commander.events import Aid, FailsafeAction, FailsafeKind
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.firmware.event_kinds import Argument, EventEnum, EventKind, LogLevel, Occurrence
-from autopilot_bridge.firmware.px4.copter import texts as px4_texts
+from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.firmware.px4.copter.modes import CUSTOM_MODES
-from autopilot_bridge.firmware.px4.plane import texts as px4_plane_texts
 from autopilot_bridge.firmware.texts import Notice, Severity
 
 NAMESPACE: Final = "px4"
@@ -217,7 +216,7 @@ def _kind_of(notice: Notice) -> EventKind:
 
 
 _OF_TEXT: Final[Mapping[str, EventKind]] = MappingProxyType(
-    {notice.text: _kind_of(notice) for notice in (*px4_texts.FIXED, *px4_plane_texts.FIXED)}
+    {notice.text: _kind_of(notice) for notice in px4_texts.FIXED}
 )
 KINDS: Final = (
     *_OF_TEXT.values(),

@@ -12,7 +12,7 @@ from autopilot_bridge.control.multicopter.parameters import MulticopterParameter
 from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
-from autopilot_bridge.firmware.ardupilot.copter.texts import notices
+from autopilot_bridge.firmware.ardupilot.texts import copter_notices
 from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.firmware.gps_source import ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import airframe_overrides
@@ -124,7 +124,7 @@ ARDUPILOT: Final = Flavour(
     mode_names=ardupilot_modes.MODE_NAMES,
     base_mode=ardupilot_modes.base_mode,
     policy=POLICY,
-    notices=notices,
+    notices=copter_notices,
     banner=(
         Notice(Severity.INFO, IDENTITY.product),
         Notice(Severity.INFO, "flightstack SITL"),

@@ -15,7 +15,7 @@ from autopilot_bridge.firmware.ardupilot.copter.flavour import ARDUPILOT
 from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane_mapping
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
-from autopilot_bridge.firmware.ardupilot.plane.texts import notices
+from autopilot_bridge.firmware.ardupilot.texts import plane_notices
 from autopilot_bridge.firmware.flavour import SensorBits
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.fixed_wing import LandDetector
@@ -118,7 +118,7 @@ ARDUPILOT_PLANE: Final = replace(
     mode_names=ardupilot_plane_modes.MODE_NAMES,
     base_mode=ardupilot_plane_modes.base_mode,
     policy=POLICY,
-    notices=notices,
+    notices=plane_notices,
     banner=(
         Notice(Severity.INFO, IDENTITY.product),
         Notice(Severity.INFO, "flightstack SITL"),

@@ -14,7 +14,7 @@ from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.px4.copter import mapping as px4_mapping
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
-from autopilot_bridge.firmware.px4.copter.texts import notices
+from autopilot_bridge.firmware.px4.texts import copter_notices
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
 from autopilot_bridge.services.channel import AddressRule
 from flightsim.airframe import AirframeKind
@@ -115,7 +115,7 @@ PX4: Final = Flavour(
     base_mode=px4_modes.base_mode,
     listed_modes=px4_modes.LISTED_MODES,
     policy=POLICY,
-    notices=notices,
+    notices=copter_notices,
     banner=(),
     identity=IDENTITY,
     command_address=_command_address,

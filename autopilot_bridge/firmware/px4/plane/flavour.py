@@ -14,7 +14,7 @@ from autopilot_bridge.firmware.px4.copter.flavour import PX4
 from autopilot_bridge.firmware.px4.plane import mapping as px4_plane_mapping
 from autopilot_bridge.firmware.px4.plane import modes as px4_plane_modes
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
-from autopilot_bridge.firmware.px4.plane.texts import notices
+from autopilot_bridge.firmware.px4.texts import plane_notices
 from autopilot_bridge.flight.fixed_wing import LandDetector
 from flightsim.airframe import AirframeKind, LaunchKind
 
@@ -65,7 +65,7 @@ PX4_PLANE: Final = replace(
     base_mode=px4_plane_modes.base_mode,
     listed_modes=px4_plane_modes.LISTED_MODES,
     policy=POLICY,
-    notices=notices,
+    notices=plane_notices,
     parameter_definitions=lambda: PX4_PLANE_PARAMETERS,
     airframe=MappingProxyType({}),
     airframe_of=px4_plane_mapping.airframe_overrides,

@@ -1,19 +1,21 @@
-"""PX4's texts of events (docs/firmware/px4.md, sections 7 to 9).
+"""PX4's texts of events on a multicopter and on an aircraft (docs/firmware/px4.md, sections 7 to 9).
 
-PX4 gives the reasons of a refused arming in EVENT messages (`px4_events`), which need its metadata to be
+PX4 gives the reasons of a refused arming in EVENT messages (`px4.events`), which need its metadata to be
 read. Here they are sent as texts too, in the words of the events, for clients without support for events. The
 status text service ends texts that events repeat with a tab, so that clients that read events do not show
 them twice.
 """
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import Aid, BatteryLevel, DisarmReason, FailsafeAction
+from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.firmware.px4.copter.modes import MODE_NAMES
-from autopilot_bridge.firmware.texts import Notice, Severity
+from autopilot_bridge.firmware.texts import Notice, Severity, TextTable, notices_of
 
 _REASONS: Final[Mapping[Reason, str]] = {
     Reason.BOOTING: "System is starting up",
@@ -74,6 +76,17 @@ _MISSION_FINISHED: Final = Notice(Severity.INFO, "Mission finished, loitering")
 _GPS_STOPPED: Final = Notice(Severity.WARNING, "GNSS data fusion stopped")
 _GPS_STARTED: Final = Notice(Severity.INFO, "GNSS data fusion started")
 
+_EXECUTING: Final = Notice(Severity.INFO, "Executing Mission")
+_LANDED: Final = Notice(Severity.INFO, "Mission finished, landed")
+_AIRSPEED_FAILED: Final = Notice(
+    Severity.CRITICAL, "Airspeed sensor failure detected. Return to launch (RTL) is advised"
+)
+_AIRSPEED_HEALTHY: Final = Notice(Severity.INFO, "Airspeed sensor healthy, start using again")
+_RUNWAY: Final = Notice(Severity.INFO, "Takeoff on runway")
+_FLARING: Final = Notice(Severity.INFO, "Landing, flaring")
+_ABORTED: Final = Notice(Severity.CRITICAL, "Landing aborted")
+_LAUNCH_M_S2: Final = 6.0  # no propeller accelerates an aircraft so from rest, any launcher does
+
 FIXED: Final = (
     _ARMED,
     _ARMING_DENIED,
@@ -87,49 +100,91 @@ FIXED: Final = (
     *(Notice(Severity.CRITICAL, _SWITCHING.format(name)) for name in dict.fromkeys(MODE_NAMES.values())),
     *(Notice(Severity.CRITICAL, text) for text in _BATTERY.values()),
     *dict.fromkeys(_COMMANDS.values()),
+    _EXECUTING,
+    _LANDED,
+    _AIRSPEED_FAILED,
+    _AIRSPEED_HEALTHY,
+    _RUNWAY,
+    _FLARING,
+    _ABORTED,
 )
 """Texts without numbers that have a separate event."""
-
-
-def notices(event: events.Event) -> tuple[Notice, ...]:
-    """The STATUSTEXTs of an event, in order."""
-    match event:
-        case events.Armed():
-            return (_ARMED,)
-        case events.Disarmed(reason=reason):
-            return (Notice(Severity.INFO, _DISARMED[reason]),)
-        case events.ArmingDenied(reasons=reasons, check_only=check_only):
-            why = tuple(
-                Notice(Severity.CRITICAL, f"Preflight Fail: {describe(reason)}") for reason in reasons
-            )
-            if check_only:
-                return why
-            return (_ARMING_DENIED, *why)
-        case events.DisarmingDenied():
-            return (_DISARMING_DENIED,)
-        case events.ModeDenied(mode=mode) if mode is not None:
-            return (Notice(Severity.CRITICAL, _SWITCHING.format(MODE_NAMES[mode])),)
-        case events.CommandDenied(command=command, reason=reason):
-            known = _COMMANDS.get((command, reason))
-            return () if known is None else (known,)
-        case events.FailsafeActivated(action=action) if action > FailsafeAction.WARN:
-            return (Notice(Severity.CRITICAL, "Failsafe activated"),)
-        case events.FailsafeActivated(action=FailsafeAction.WARN):
-            return (Notice(Severity.CRITICAL, "Failsafe warning triggered"),)
-        case events.BatteryWarning(level=level):
-            text = _BATTERY.get(level)
-            return () if text is None else (Notice(Severity.CRITICAL, text),)
-        case events.AidChanged(aid=Aid.GPS, present=present):
-            return (_GPS_STARTED if present else _GPS_STOPPED,)
-        case events.TakeoffDetected():
-            return (_TAKEOFF,)
-        case events.LandingDetected():
-            return (_LANDING,)
-        case events.MissionFinished():
-            return (_MISSION_FINISHED,)
-    return ()
 
 
 def describe(reason: Reason) -> str:
     """One reason in PX4's words."""
     return _REASONS.get(reason, reason.name.replace("_", " ").capitalize())
+
+
+def _arming_denied(event: events.ArmingDenied) -> tuple[Notice, ...]:
+    why = tuple(Notice(Severity.CRITICAL, f"Preflight Fail: {describe(reason)}") for reason in event.reasons)
+    return why if event.check_only else (_ARMING_DENIED, *why)
+
+
+def _mode_denied(event: events.ModeDenied) -> tuple[Notice, ...]:
+    mode = event.mode
+    return () if mode is None else (Notice(Severity.CRITICAL, _SWITCHING.format(MODE_NAMES[mode])),)
+
+
+def _command_denied(event: events.CommandDenied) -> tuple[Notice, ...]:
+    known = _COMMANDS.get((event.command, event.reason))
+    return () if known is None else (known,)
+
+
+def _failsafe(event: events.FailsafeActivated) -> tuple[Notice, ...]:
+    if event.action < FailsafeAction.WARN:
+        return ()
+    warns = event.action is FailsafeAction.WARN
+    return (Notice(Severity.CRITICAL, "Failsafe warning triggered" if warns else "Failsafe activated"),)
+
+
+def _battery(event: events.BatteryWarning) -> tuple[Notice, ...]:
+    text = _BATTERY.get(event.level)
+    return () if text is None else (Notice(Severity.CRITICAL, text),)
+
+
+def _aid(event: events.AidChanged) -> tuple[Notice, ...]:
+    if event.aid is not Aid.GPS:
+        return ()
+    return (_GPS_STARTED if event.present else _GPS_STOPPED,)
+
+
+def _launch(event: events.LaunchDetected) -> tuple[Notice, ...]:
+    if event.acceleration_m_s2 < _LAUNCH_M_S2:
+        return (_RUNWAY,)
+    return (Notice(Severity.INFO, f"Launch detected. Enabling motors in {event.delay_s:.1f}s"),)
+
+
+COPTER: Final[TextTable] = MappingProxyType(
+    {
+        events.Armed: _ARMED,
+        events.Disarmed: lambda event: (Notice(Severity.INFO, _DISARMED[event.reason]),),
+        events.ArmingDenied: _arming_denied,
+        events.DisarmingDenied: _DISARMING_DENIED,
+        events.ModeDenied: _mode_denied,
+        events.CommandDenied: _command_denied,
+        events.FailsafeActivated: _failsafe,
+        events.BatteryWarning: _battery,
+        events.AidChanged: _aid,
+        events.TakeoffDetected: _TAKEOFF,
+        events.LandingDetected: _LANDING,
+        events.MissionFinished: _MISSION_FINISHED,
+    }
+)
+"""Texts on a multicopter."""
+
+PLANE: Final[TextTable] = MappingProxyType(
+    {
+        **COPTER,
+        events.ModeChanged: lambda event: (_EXECUTING,) if event.mode is FlightMode.MISSION else (),
+        events.MissionFinished: lambda event: (_LANDED if event.landed else _MISSION_FINISHED,),
+        events.AirspeedChanged: lambda event: (_AIRSPEED_HEALTHY if event.valid else _AIRSPEED_FAILED,),
+        events.LaunchDetected: _launch,
+        events.FlareStarted: _FLARING,
+        events.LandingAborted: _ABORTED,
+    }
+)
+"""Texts on an aircraft: those of a multicopter, those of aircraft in their place or besides."""
+
+copter_notices: Final = notices_of(COPTER)
+plane_notices: Final = notices_of(PLANE)
