@@ -145,6 +145,18 @@ def test_only_clock_and_shells_know_the_wall_clock():
     assert users == []
 
 
+def test_flight_tasks_of_both_classes_of_vehicle_do_not_know_each_other():
+    """What both use is in the package above them."""
+    one, other = "autopilot_bridge.flight.multicopter", "autopilot_bridge.flight.fixed_wing"
+    wrong = [
+        (name, item)
+        for name in MODULES
+        for item in imports_of(name)
+        if (is_in(name, (one,)) and is_in(item, (other,))) or (is_in(name, (other,)) and is_in(item, (one,)))
+    ]
+    assert [name for name in MODULES if is_in(name, (one,))] and wrong == []
+
+
 def test_kernels_have_the_cache_that_notices_other_modules():
     users = [name for name in MODULES if "numba" in imports_of(name)]
     assert users == ["flightsim.foundation.kernels"]

@@ -28,11 +28,10 @@ from autopilot_bridge.flight.fixed_wing import (
     TakeoffTask,
 )
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.multicopter.hold import IdleTask
-from autopilot_bridge.flight.multicopter.offboard import OffboardKind
-from autopilot_bridge.flight.multicopter.yaw import Turn
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.plan_reading import is_waypoint, target_of
-from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.flight.streamed import OffboardKind
+from autopilot_bridge.flight.task import FlightTask, IdleTask, SpeedKind
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 

@@ -11,8 +11,8 @@ from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
-from autopilot_bridge.flight.multicopter.offboard import Vector
-from autopilot_bridge.flight.multicopter.yaw import Turn
+from autopilot_bridge.flight.heading import Turn
+from autopilot_bridge.flight.streamed import Vector
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask
 
 if TYPE_CHECKING:

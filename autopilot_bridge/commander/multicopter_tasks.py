@@ -13,22 +13,23 @@ from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.follow import FollowTask
 from autopilot_bridge.flight.multicopter.goto import RepositionTask
-from autopilot_bridge.flight.multicopter.guided import GuidedKind, GuidedTask
-from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask, IdleTask
+from autopilot_bridge.flight.multicopter.guided import GuidedTask
+from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask
 from autopilot_bridge.flight.multicopter.land import LandTask
 from autopilot_bridge.flight.multicopter.loiter import LoiterTask
 from autopilot_bridge.flight.multicopter.manual import ManualMode, ManualTask
 from autopilot_bridge.flight.multicopter.mission import MissionTask
-from autopilot_bridge.flight.multicopter.offboard import OffboardKind, OffboardTask
+from autopilot_bridge.flight.multicopter.offboard import OffboardTask
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask, OrbitYaw, circle_ahead
 from autopilot_bridge.flight.multicopter.precision_land import PrecisionLandTask, landing_task
 from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
-from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
+from autopilot_bridge.flight.task import FlightTask, IdleTask, SpeedKind
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 _MANUAL: Final = {

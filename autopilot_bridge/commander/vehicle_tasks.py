@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.context import FlightContext, LandedState
-from autopilot_bridge.flight.multicopter.yaw import Turn
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
 from autopilot_bridge.mission_plan import MissionItem
 

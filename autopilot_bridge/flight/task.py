@@ -1,5 +1,6 @@
-"""The interface of a flight task: one kind of manoeuvre, updated at 50 Hz, that writes the control
-setpoint.
+"""The interface of a flight task: one kind of manoeuvre, updated at 50 Hz, that writes the control setpoint.
+
+The idle task is the one that all classes of vehicle share.
 """
 
 import math
@@ -7,7 +8,7 @@ from enum import IntEnum
 from typing import Protocol, runtime_checkable
 
 from autopilot_bridge.control.multicopter import setpoint as sp
-from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 
 
 class TaskStatus(IntEnum):
@@ -56,3 +57,14 @@ def clear_setpoint(setpoint: Array, level: float) -> None:
     """Clear every field (NaN: not controlled) and set the level."""
     setpoint[:] = math.nan
     setpoint[sp.LEVEL] = level
+
+
+class IdleTask:
+    """Motors off while disarmed, at idle while armed."""
+
+    def activate(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.CRUISE
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)
+        return TaskStatus.RUNNING

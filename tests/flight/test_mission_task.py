@@ -7,8 +7,9 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import MissionFinished, MissionModeRequested, WaypointReached
+from autopilot_bridge.flight.heading import turn_angle
 from autopilot_bridge.flight.multicopter import MissionTask, TaskStatus
-from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_angle, turn_distance, turn_speed
+from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_distance, turn_speed
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from tests.flight.rig import Rig, positions, velocities

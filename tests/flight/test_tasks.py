@@ -7,6 +7,7 @@ import pytest
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import TouchedDown
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter import (
     BrakeTask,
     FlightParameters,
@@ -28,7 +29,7 @@ from autopilot_bridge.flight.multicopter import (
     TaskStatus,
 )
 from autopilot_bridge.flight.multicopter.return_home import return_height
-from autopilot_bridge.flight.multicopter.yaw import Turn, YawSteering
+from autopilot_bridge.flight.multicopter.yaw import YawSteering
 from autopilot_bridge.navigation import layout as nav_layout
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.flight.rig import Rig, positions, tilts, velocities

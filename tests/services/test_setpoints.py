@@ -10,8 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
-from autopilot_bridge.flight.multicopter.guided import GuidedKind
-from autopilot_bridge.flight.multicopter.offboard import OffboardKind
+from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
 from tests.services.command_rig import NAN, ServiceRig
 
 POSITION_ONLY = 0x0DF8

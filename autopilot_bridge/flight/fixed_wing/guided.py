@@ -12,8 +12,7 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.multicopter.guided import GuidedKind
-from autopilot_bridge.flight.multicopter.offboard import Vector
+from autopilot_bridge.flight.streamed import GuidedKind, Vector
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 

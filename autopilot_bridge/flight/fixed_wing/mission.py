@@ -18,7 +18,7 @@ from autopilot_bridge.flight.fixed_wing.position_lost import PositionLost
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffTask
-from autopilot_bridge.flight.multicopter.corners import turn_angle
+from autopilot_bridge.flight.heading import turn_angle
 from autopilot_bridge.flight.plan_reading import JUMPS, Command, is_navigation, is_waypoint, target_of
 from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_task import PlanTask

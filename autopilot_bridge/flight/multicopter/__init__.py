@@ -2,18 +2,19 @@
 
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState, ManualInput
 from autopilot_bridge.flight.multicopter.goto import GotoTask, RepositionTask
-from autopilot_bridge.flight.multicopter.guided import GuidedKind, GuidedTask
-from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask, IdleTask
+from autopilot_bridge.flight.multicopter.guided import GuidedTask
+from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask
 from autopilot_bridge.flight.multicopter.land import LandTask
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector, LandDetectorParameters
 from autopilot_bridge.flight.multicopter.manual import ManualMode, ManualTask
 from autopilot_bridge.flight.multicopter.mission import MissionTask
-from autopilot_bridge.flight.multicopter.offboard import OffboardKind, OffboardTask
+from autopilot_bridge.flight.multicopter.offboard import OffboardTask
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask, OrbitYaw
 from autopilot_bridge.flight.multicopter.return_home import ReturnPhase, ReturnTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
-from autopilot_bridge.flight.task import FlightTask, TaskStatus, clear_setpoint
+from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
+from autopilot_bridge.flight.task import FlightTask, IdleTask, TaskStatus, clear_setpoint
 
 __all__ = [
     "BrakeTask",

@@ -4,25 +4,14 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from autopilot_bridge.flight.heading import SAME_PLACE_M, Point, turn_angle
 from autopilot_bridge.flight.multicopter.trajectory import braking_speed
 from autopilot_bridge.flight.parameters import FlightParameters
-
-Point = tuple[float, float, float]
 
 _STRAIGHT_RAD: Final = 1e-3
 _REVERSAL_RAD: Final = math.radians(150.0)
 _TURN_SHARE: Final = 0.85  # of the acceptance radius: a turn begins inside it
 _SWING_OUT: Final = 0.2  # of the acceptance radius
-_SAME_PLACE_M: Final = 0.1
-
-
-def turn_angle(before: Point, corner: Point, after: Point) -> float:
-    """Horizontal change of course at a corner, 0 (straight) to pi; 0 next to a vertical leg."""
-    n1, e1 = corner[0] - before[0], corner[1] - before[1]
-    n2, e2 = after[0] - corner[0], after[1] - corner[1]
-    if math.hypot(n1, e1) < _SAME_PLACE_M or math.hypot(n2, e2) < _SAME_PLACE_M:
-        return 0.0
-    return abs(math.atan2(n1 * e2 - e1 * n2, n1 * n2 + e1 * e2))
 
 
 def turn_distance(angle_rad: float, speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
@@ -71,7 +60,7 @@ def turn_room(path: Sequence[Point], radii_m: Sequence[float], index: int) -> fl
         math.dist(path[index - 1][0:2], path[index][0:2]),
         math.dist(path[index][0:2], path[index + 1][0:2]),
     )
-    half_leg = 0.5 * min(ahead, behind if behind > _SAME_PLACE_M else math.inf)
+    half_leg = 0.5 * min(ahead, behind if behind > SAME_PLACE_M else math.inf)
     return min(_TURN_SHARE * radii_m[index], half_leg)
 
 
@@ -100,7 +89,7 @@ def passing_speed(path: Sequence[Point], radii_m: Sequence[float], parameters: F
     speed = turn_in = 0.0
     for i in range(len(path) - 2, 0, -1):
         ahead = math.dist(path[i][0:2], path[i + 1][0:2])
-        if ahead < _SAME_PLACE_M:
+        if ahead < SAME_PLACE_M:
             speed = turn_in = 0.0  # a vertical climb
             continue
         reach = braking_speed(

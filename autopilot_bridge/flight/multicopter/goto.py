@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 from flightsim.foundation.vectors import wrap_pi

@@ -6,33 +6,20 @@ and the vehicle stops. Attitude thrust is a climb rate: 0.5 holds the height, 1 
 """
 
 import math
-from enum import IntEnum
 
 import numpy as np
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.avoidance import limited_velocity
 from autopilot_bridge.flight.multicopter.goto import GotoTask
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.multicopter.offboard import NAN3, Vector
-from autopilot_bridge.flight.multicopter.yaw import Turn
+from autopilot_bridge.flight.streamed import NAN3, GuidedKind, Vector
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
-
-
-class GuidedKind(IntEnum):
-    """The kind of the present target."""
-
-    HOLD = 0
-    POSITION = 1
-    VELOCITY = 2
-    ACCELERATION = 3
-    TRAJECTORY = 4  # position and velocity together, streamed
-    ATTITUDE = 5
-    HEADING = 6  # of a fixed wing: a constant direction
 
 
 class GuidedTask:

@@ -1,25 +1,13 @@
-"""Tasks that hold a position: idle on the ground, hold, brake."""
+"""Tasks that hold a position: hold, brake."""
 
 import math
 
 import numpy as np
 
-from autopilot_bridge.control.multicopter import setpoint as sp
-from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
+from autopilot_bridge.flight.context import Array, FlightContext, TaskFinished
 from autopilot_bridge.flight.multicopter.cruise import CruiseTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
-
-
-class IdleTask:
-    """Motors off while disarmed, at idle while armed."""
-
-    def activate(self, ctx: FlightContext) -> None:
-        ctx.phase = FlightPhase.CRUISE
-
-    def update(self, ctx: FlightContext) -> TaskStatus:
-        clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)
-        return TaskStatus.RUNNING
+from autopilot_bridge.flight.task import TaskStatus
 
 
 class HoldTask(CruiseTask):

@@ -8,7 +8,8 @@ import numpy as np
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
-from autopilot_bridge.flight.multicopter.corners import Point, passing_speed, turn_in_distance
+from autopilot_bridge.flight.heading import Point, Turn
+from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_in_distance
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
@@ -19,7 +20,6 @@ from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.spline import SplineCurve, SplineFlight
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.multicopter.trajectory import SPEED
-from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.parameters import YawBehaviour
 from autopilot_bridge.flight.plan_reading import (
     JUMPS,

@@ -7,6 +7,7 @@ import numpy as np
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.trajectory import (
     SPEED,
     SPEED_DOWN,
@@ -14,7 +15,7 @@ from autopilot_bridge.flight.multicopter.trajectory import (
     SPEED_UP,
     TrajectoryGenerator,
 )
-from autopilot_bridge.flight.multicopter.yaw import Turn, YawSteering
+from autopilot_bridge.flight.multicopter.yaw import YawSteering
 from autopilot_bridge.flight.parameters import YawBehaviour
 from autopilot_bridge.flight.region_of_interest import roi_heading
 from autopilot_bridge.flight.task import SpeedKind, clear_setpoint

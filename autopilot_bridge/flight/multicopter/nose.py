@@ -4,7 +4,8 @@ import math
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.flight.multicopter.yaw import Turn, YawSteering
+from autopilot_bridge.flight.heading import Turn
+from autopilot_bridge.flight.multicopter.yaw import YawSteering
 
 
 class Nose:

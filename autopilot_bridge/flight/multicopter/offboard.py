@@ -1,7 +1,6 @@
 """External setpoints, flown directly: PX4's Offboard."""
 
 import math
-from enum import IntEnum
 from typing import Final
 
 import numpy as np
@@ -10,23 +9,12 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
+from autopilot_bridge.flight.streamed import NAN3, OffboardKind, Vector
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
-NAN3: Final = (math.nan, math.nan, math.nan)
 _WANTS_UP_M: Final = 0.2
 _WANTS_UP_M_S: Final = 0.1
-
-Vector = Array | tuple[float, float, float]
-
-
-class OffboardKind(IntEnum):
-    """The quantity that the latest setpoint controls."""
-
-    NONE = 0
-    TRAJECTORY = 1
-    ATTITUDE = 2
-    RATES = 3
 
 
 class OffboardTask:

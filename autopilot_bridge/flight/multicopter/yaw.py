@@ -2,58 +2,11 @@
 
 import math
 
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.parameters import FlightParameters
 from flightsim.foundation.vectors import wrap_pi
 
 _GAIN_1_S = 2.0
-_TURNED_RAD = math.radians(1.0)
-
-
-class Turn:
-    """A commanded turn with its direction and rate (CONDITION_YAW); afterwards the heading is held.
-
-    Args:
-        angle_rad: heading to turn to; with `relative` the angle to turn by.
-        direction: positive clockwise, negative counter-clockwise, 0: the shorter way (relative: clockwise).
-        rate_max_rad_s: None: the vehicle's own limit.
-        relative: turn by the angle, not to it.
-    """
-
-    __slots__ = ("_angle_rad", "_direction", "_left_rad", "_relative", "rate_max_rad_s")
-
-    def __init__(
-        self,
-        angle_rad: float,
-        *,
-        direction: int = 0,
-        rate_max_rad_s: float | None = None,
-        relative: bool = False,
-    ) -> None:
-        self._angle_rad = angle_rad
-        self._direction = direction
-        self._relative = relative
-        self._left_rad = math.nan
-        self.rate_max_rad_s = rate_max_rad_s
-
-    def left_rad(self, heading_rad: float) -> float:
-        """The remaining angle of the turn from a heading, positive clockwise; fixed at the first call."""
-        if math.isnan(self._left_rad):
-            if self._relative:
-                self._left_rad = math.copysign(self._angle_rad, -1.0 if self._direction < 0 else 1.0)
-            else:
-                self._left_rad = wrap_pi(self._angle_rad - heading_rad)
-                if self._direction * self._left_rad < 0.0:
-                    self._left_rad += math.copysign(2.0 * math.pi, self._direction)
-        return self._left_rad
-
-    def advance(self, turned_rad: float) -> None:
-        """Record that the heading has turned by an angle."""
-        self._left_rad -= turned_rad
-
-    @property
-    def done(self) -> bool:
-        """The wanted heading is reached."""
-        return abs(self._left_rad) < _TURNED_RAD
 
 
 class YawSteering:

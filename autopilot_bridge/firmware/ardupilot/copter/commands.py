@@ -9,7 +9,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
-from autopilot_bridge.flight.multicopter.yaw import Turn
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import Command, CommandHooks, whole
