@@ -20,9 +20,9 @@ from typing import Any, Final
 from estimators.attitude.estimator import AttitudeEstimator
 from estimators.attitude.parameters import AttitudeParameters
 from estimators.comparison import comparisons
+from estimators.log_replay import replay
 from estimators.logs import Log, LogError, open_log, report_of
 from estimators.logs.dataflash import META
-from estimators.replay import replay
 
 _COLUMNS: Final = (
     "log", "format", "opened", "vehicle", "firmware", "modes", "messages", "theirs", "counts", "air_s",

@@ -19,8 +19,8 @@ from typing import Any
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogWriter
 from estimators.library import make_estimator
+from estimators.log_replay import Replay, replay
 from estimators.logs import open_log
-from estimators.replay import Replay, replay
 
 EPOCH_US = 1_700_000_000_000_000
 G = 9.80665

@@ -1,1 +1,58 @@
-"""Onboard estimators and the logs they can be fed from."""
+"""Onboard estimators, and the logs that they can be fed from.
+
+from estimators import comparisons, open_log, replay
+
+log = open_log("flight.tlog")
+for runner in replay(log, "attitude").fleet.runners.values():
+    print(comparisons([log], runner))
+
+"""
+
+from typing import TYPE_CHECKING, Final
+
+from flightsim.foundation.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from estimators.comparison import Comparison, comparisons
+    from estimators.errors import EstimatorError
+    from estimators.interface import Estimate, Estimator, Need
+    from estimators.library import make_estimator
+    from estimators.log_replay import Replay, replay
+    from estimators.logs.errors import LogError
+    from estimators.logs.log import Log
+    from estimators.logs.opening import open_log
+    from estimators.logs.report import report_of
+
+__all__ = [
+    "Comparison",
+    "Estimate",
+    "Estimator",
+    "EstimatorError",
+    "Log",
+    "LogError",
+    "Need",
+    "Replay",
+    "comparisons",
+    "make_estimator",
+    "open_log",
+    "replay",
+    "report_of",
+]
+
+_MODULES: Final = {
+    "Comparison": "estimators.comparison",
+    "Estimate": "estimators.interface",
+    "Estimator": "estimators.interface",
+    "EstimatorError": "estimators.errors",
+    "Log": "estimators.logs.log",
+    "LogError": "estimators.logs.errors",
+    "Need": "estimators.interface",
+    "Replay": "estimators.log_replay",
+    "comparisons": "estimators.comparison",
+    "make_estimator": "estimators.library",
+    "open_log": "estimators.logs.opening",
+    "replay": "estimators.log_replay",
+    "report_of": "estimators.logs.report",
+}
+
+__getattr__ = lazy_exports(__name__, _MODULES)

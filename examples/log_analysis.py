@@ -12,8 +12,8 @@ import numpy as np
 
 from estimators.comparison import comparisons
 from estimators.library import make_estimator
+from estimators.log_replay import replay
 from estimators.logs import LogError, open_log
-from estimators.replay import replay
 
 AUTOPILOT, SIMULATOR = 1, 25  # component ids
 

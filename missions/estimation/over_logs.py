@@ -9,9 +9,9 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from estimators.errors import EstimatorError
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
+from estimators.log_replay import replay
 from estimators.logs import Log, LogError, open_log
 from estimators.logs.dialect import load_dialect
-from estimators.replay import replay
 from missions.errors import PlanError
 from missions.estimation.report import FAILED, EstimationResult, ReportRequest, report
 from missions.runs.run_folder import RUNS, create_run_folder

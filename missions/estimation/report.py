@@ -11,9 +11,9 @@ import numpy as np
 
 from estimators.comparison import Comparison, comparisons
 from estimators.fleet import Fleet
+from estimators.log_replay import log_supplies, missing_of, vehicles_in
 from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
-from estimators.replay import log_supplies, missing_of, vehicles_in
 from estimators.runner import EstimateTable, Runner
 from missions.runs.run_folder import replace_summary, versions, whole, write_summary
 

@@ -20,6 +20,7 @@ from missions.runs.ending import EndingSignals, signal_of
 from missions.errors import MissionError, PlanError
 from missions.estimation.in_flight import estimators_of
 from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
+from missions.library import find_mission
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
 from missions.runs.vehicle_opening import Stage, open_vehicles, open_world
@@ -117,11 +118,20 @@ ProgressListener = Callable[[Flight], None]
 """Called each second of vehicle time."""
 
 
-def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
+def fly(
+    mission: Mission[Any] | str,
+    request: RunRequest | None = None,
+    on_progress: ProgressListener | None = None,
+) -> RunResult:
     """Fly a mission and write its run folder. Blocks until the run is finished.
 
     A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
     vehicles safe, and still returns a result and writes a complete log.
+
+    Args:
+        mission: a mission, its name, or the path of a user's own or of a mission file.
+        request: settings of the run; None: the defaults.
+        on_progress: called each second of vehicle time.
 
     Raises:
         KeyboardInterrupt: the run was interrupted before it began, or while its results were written.
@@ -129,8 +139,9 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
         MissionError: a file of the embedded world cannot be written; nothing was started.
         BridgeError: a link can't be opened.
     """
+    flown = find_mission(mission) if isinstance(mission, str) else mission
     with EndingSignals() as ending:
-        return _fly_interruptible(mission, request, on_progress, ending)
+        return _fly_interruptible(flown, request or RunRequest(), on_progress, ending)
 
 
 def _fly_interruptible(

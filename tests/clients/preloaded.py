@@ -10,7 +10,7 @@ from tests.compiled import compile_in_turn
 matplotlib.use("Agg")
 for name in (
     "estimators.library",
-    "estimators.replay",
+    "estimators.log_replay",
     "matplotlib.pyplot",
     "mavsdk.asyncio",
     "missions.cli.estimate",

@@ -9,9 +9,9 @@ from autopilot_bridge.mavlink import dialect
 from estimators.airborne import airborne_spans, duration_s, within
 from estimators.comparison import comparisons
 from estimators.library import estimator_class
+from estimators.log_replay import replay
 from estimators.logs import open_log
 from estimators.references import Series, error_figures, errors, references
-from estimators.replay import replay
 
 
 def us(*seconds):

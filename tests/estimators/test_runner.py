@@ -13,8 +13,8 @@ from estimators.errors import EstimatorError, EstimatorFailure
 from estimators.fleet import MAX_VEHICLES, Fleet
 from estimators.interface import Need, Outcome
 from estimators.library import estimator_class
+from estimators.log_replay import log_rate_hz, replay
 from estimators.logs import open_log
-from estimators.replay import log_rate_hz, replay
 from estimators.runner import Runner
 from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
 

@@ -9,8 +9,8 @@ import pytest
 
 from estimators.attitude import AttitudeEstimator
 from estimators.comparison import comparisons
+from estimators.log_replay import replay
 from estimators.logs import open_log
-from estimators.replay import replay
 from tests.recorded_logs import recorded_log
 
 REFERENCES = Path(__file__).parents[1] / "references" / "attitude.json"

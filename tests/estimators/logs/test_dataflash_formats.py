@@ -6,9 +6,9 @@ from pymavlink import DFReader
 
 from estimators.airborne import airborne_spans
 from estimators.attitude import AttitudeEstimator
+from estimators.log_replay import replay
 from estimators.logs import LogError, open_log, report_of
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names, mode_number
-from estimators.replay import replay
 from tests.estimators.logs.onboard_logs import DataflashWriter
 
 WEEK, WEEK_MS = 1777, 56_674_000

@@ -11,8 +11,8 @@ from estimators.errors import EstimatorError
 from estimators.fleet import Fleet
 from estimators.interface import Estimator, Need, Outcome
 from estimators.library import estimator_class
+from estimators.log_replay import replay
 from estimators.logs import open_log
-from estimators.replay import replay
 from estimators.team_time import TeamTime
 from tests.recorded_logs import each_recorded_log
 

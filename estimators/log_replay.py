@@ -3,6 +3,7 @@
 import heapq
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from estimators.errors import EstimatorError, EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Estimator, Need
+from estimators.library import make_estimator
 from estimators.messages import Message
 from estimators.needs import NOT_STREAMED, Supply, supplies
 from estimators.runner import why_unheard
@@ -59,7 +61,7 @@ class Replay:
 
 def replay(
     logs: "Log | Sequence[Log]",
-    make: Callable[[], Estimator[Any]],
+    estimator: str | Callable[[], Estimator[Any]],
     *,
     system_id: int | None = None,
     from_s: float | None = None,
@@ -70,15 +72,16 @@ def replay(
 
     Args:
         logs: open logs; several only for an estimator of a team, each with different vehicles.
-        make: creates a new estimator.
+        estimator: name of an estimator, path of a user's file, or a function that creates a new estimator.
         system_id: the only vehicle to use; None: all in the log.
         from_s, to_s, boot: part of each log to read, with the meaning they have in `Log.inside`.
 
     Raises:
-        EstimatorError: the estimator needs a message that it is not allowed to receive; or there are several
-            logs for an estimator of one vehicle, or with the same vehicle in them.
+        EstimatorError: the estimator does not exist, or needs a message that it is not allowed to receive; or
+            there are several logs for an estimator of one vehicle, or with the same vehicle in them.
         LogError: a log has no such part.
     """
+    make = partial(make_estimator, estimator) if isinstance(estimator, str) else estimator
     opened = [logs] if not isinstance(logs, Sequence) else list(logs)
     probe = Fleet(make)
     if len(opened) > 1 and not probe.team:
