@@ -1,4 +1,4 @@
-"""Public names of a package that are imported when they are used, so that the package itself imports quickly."""
+"""Public names of a package, imported when they are used, so that the package itself imports quickly."""
 
 import importlib
 from collections.abc import Callable, Mapping

@@ -1,0 +1,35 @@
+"""What the packages export: a few public names each, imported when they are used."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+PACKAGES = ("autopilot_bridge", "estimators", "flightsim", "missions")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_exists_and_is_documented(package):
+    module = importlib.import_module(package)
+    assert sorted(module.__all__) == sorted(module._MODULES)
+    for name in module.__all__:
+        found = getattr(module, name)
+        assert getattr(importlib.import_module(module._MODULES[name]), name) is found
+        assert found.__doc__ or name.isupper()  # constants have their text in the source
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_other_names_are_refused(package):
+    module = importlib.import_module(package)
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'no_such_name'"):
+        _ = module.no_such_name
+
+
+def test_packages_import_nothing_heavy():
+    code = (
+        f"import sys, {', '.join(PACKAGES)};"
+        "print(sorted({'numba', 'numpy', 'jsbsim', 'pymavlink', 'asyncio'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
