@@ -206,6 +206,14 @@ def test_px4_loads_saves_and_resets(p1: int, result: int, value: float) -> None:
     assert storage.saved() == (value != 6.0)  # a value as at the start is not stored
 
 
+def test_an_action_that_is_no_number_loads() -> None:
+    storage = Storage("px4")
+    storage.value = 7.0
+    storage.ask(1)
+    storage.value = 9.0
+    assert storage.ask(float("nan")) == ACCEPTED and storage.value == 7.0
+
+
 def test_loading_is_no_change_to_be_stored() -> None:
     storage = Storage("px4")
     storage.value = 7.0
@@ -326,6 +334,24 @@ def test_ardupilot_numbers_its_logs_from_1() -> None:
         (3, "00000013.tlog", 0, 0),
         (4, "99999999999.tlog", 11, 1_600_000_000),
     ]
+
+
+@pytest.mark.parametrize(
+    ("names", "created"),
+    [
+        ((), "00000001"),
+        (("notes.tlog",), "00000001"),  # not a number
+        (("999999999.tlog",), "1000000000"),
+        (("9999999999.tlog", "00000002.tlog"), "00000003"),  # more than nine digits
+    ],
+)
+def test_ardupilots_next_log_has_the_next_number(names: tuple[str, ...], created: str) -> None:
+    files = MemoryStore()
+    for name in names:
+        put(files, ("LOGS", name), b"1")
+    path, file = LogBook(files, CARD_LAYOUTS["ardupilot"]).create(0)
+    file.close()
+    assert path[-1] == f"{created}.tlog"
 
 
 def test_the_time_of_a_log_fits_its_field() -> None:
@@ -457,10 +483,16 @@ def test_another_log_ends_the_download_of_the_first() -> None:
     transfer.tick()
     assert data(asker) == [(1, 0, transfer.contents[1])]
     transfer.ask(data_of(0, 0, 90), asker)
-    transfer.ask(m.MAVLink_log_request_end_message(1, 1), asker)
     transfer.ask(data_of(7, 0, 90), asker)  # there is none
     transfer.tick()
     assert data(asker) == []
+    transfer.ask(data_of(0, 0, 90), asker)
+    transfer.ask(m.MAVLink_log_request_end_message(1, 1), asker)
+    transfer.tick()
+    assert data(asker) == []
+    transfer.ask(data_of(0, 0, 90), asker)  # the download that was ended begins anew
+    transfer.tick()
+    assert [at for _, at, _ in data(asker)] == [0]
 
 
 def test_no_more_than_64_ranges_are_queued() -> None:
