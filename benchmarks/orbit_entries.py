@@ -20,6 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flightsim.environment import Environment
+from flightsim.world_spec import WorldSpec
+from missions.embedded import orbit_world
 from missions.errors import PlanError
 from missions.library import find_mission
 from missions.options import parse_wind
@@ -92,18 +95,20 @@ def fly_case(
 ) -> tuple[str, Mapping[str, Any]]:
     """One flight: why it failed ("" if it didn't), and its summary."""
     speed_m_s, from_deg = parse_wind(wind)
+    options = case.options(duration_s, radius_m)
+    world = WorldSpec.of_team(
+        model="aerosonde",
+        autopilot=case.autopilot,
+        seed=case.seed,
+        air=Environment.from_wind(speed_m_s=speed_m_s, from_deg=from_deg, turbulence=turbulence),
+    )
     with tempfile.TemporaryDirectory() as folder:
         try:
             result = fly(
                 find_mission("orbit"),
                 RunRequest(
-                    options=case.options(duration_s, radius_m),
-                    autopilot=case.autopilot,
-                    model="aerosonde",
-                    seed=case.seed,
-                    wind_speed_m_s=speed_m_s,
-                    wind_from_deg=from_deg,
-                    turbulence=turbulence,
+                    options=options,
+                    world=orbit_world(world, options),
                     out=Path(folder) / "run",
                     picture=False,
                 ),

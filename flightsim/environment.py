@@ -120,6 +120,17 @@ class Environment:
         factor = self.profile.factor(height_m)
         return factor * north, factor * east, down
 
+    @property
+    def wind_speed_m_s(self) -> float:
+        """Horizontal speed of the mean wind at the profile's reference height."""
+        return round(math.hypot(*self.wind_ned_m_s[:2]), 9)
+
+    @property
+    def wind_from_deg(self) -> float:
+        """True direction that the mean wind comes from, clockwise from north, 0..360."""
+        north, east, _ = self.wind_ned_m_s
+        return round(math.degrees(math.atan2(-east, -north)), 9) % 360.0 if self.wind_speed_m_s else 0.0
+
     @classmethod
     def from_wind(
         cls,

@@ -10,10 +10,10 @@ import math
 import tomllib
 import types
 from collections.abc import Callable, Mapping
-from dataclasses import is_dataclass, replace
+from dataclasses import is_dataclass
 from enum import Enum, IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Final, Union, get_args, get_origin, get_type_hints
 
 from flightsim.environment import Environment, Turbulence
 from flightsim.home import Home
@@ -35,10 +35,6 @@ from flightsim.payload import (
 from flightsim.payload.detection import DetectionModel
 from flightsim.toml_tables import listed
 from flightsim.wind_profile import WindProfile
-from flightsim.world_spec import WorldSpec, in_a_row
-
-if TYPE_CHECKING:
-    AnyWorld = TypeVar("AnyWorld", bound=WorldSpec)
 
 
 class WorldFileError(ValueError):
@@ -77,33 +73,18 @@ _WORDS: Final[Mapping[Any, str]] = {
 }
 
 
-def read_world(cls: "type[AnyWorld]", path: Path) -> "AnyWorld":
-    """The world that a file describes.
-
-    Vehicles without `system_id` get 1, 2, ... in their order. When no vehicle has `offset_ne_m`, they stand
-    in a row to the right of the first.
+def read_toml(path: Path) -> dict[str, Any]:
+    """The content of a world file.
 
     Raises:
-        WorldFileError: the file can't be read, or a value is not accepted.
+        WorldFileError: it can't be read.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise WorldFileError(f"can't read world file {path}: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise WorldFileError(f"{path} is not a TOML file: {error}") from error
-    tables = data.get("vehicles", [])
-    if isinstance(tables, list):
-        for number, table in enumerate(tables, 1):
-            if isinstance(table, dict):
-                table.setdefault("system_id", number)
-    reader = _Reader(path)
-    world: AnyWorld = reader.make(cls, data, "")
-    if tables and not any("offset_ne_m" in table for table in tables):
-        with reader.naming("vehicles"):
-            placed = in_a_row(world.vehicles, heading_deg=world.place.heading_deg)
-        world = replace(world, vehicles=placed)
-    return world
 
 
 class _Naming:
@@ -119,7 +100,16 @@ class _Naming:
             raise WorldFileError(f"{self._where}{error}") from error
 
 
-class _Reader:
+class WorldReader:
+    """Makes values of parameter classes from the tables of a file.
+
+    Args:
+        path: the file, for errors and for the paths in it.
+
+    Raises:
+        WorldFileError: a value is not accepted, from all methods.
+    """
+
     def __init__(self, path: Path) -> None:
         self._path = path
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Any, Final, Self
 
 from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
@@ -19,6 +19,7 @@ from flightsim.payload import GroundTargetParameters, MagneticField, MagneticSpe
 from flightsim.sensors import GpsParameters, SensorSuiteParameters
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.world import WorldParameters
+from flightsim.world_file import WorldReader, read_toml
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: the default time of boot, so that equal flights give equal logs."""
@@ -191,17 +192,78 @@ class WorldSpec:
             return self.home
         return HOMES.get(self.vehicles[0].autopilot, HOMES["px4"])
 
+    @property
+    def magnetic_target_ne_m(self) -> tuple[float, float] | None:
+        """True place of the first magnetic target, north and east of the map's home; None: there is none."""
+        field = self.magnetic_field
+        if field is None or not field.signatures:
+            return None
+        return field.signatures[0].north_m, field.signatures[0].east_m
+
+    @classmethod
+    def of_team(
+        cls,
+        count: int | None = None,
+        *,
+        model: str | Path | Sequence[str | Path] = "iris",
+        autopilot: str = "px4",
+        parameters: Mapping[str, float] = MappingProxyType({}),
+        launch: str | None = None,
+        gps: str = "differential",
+        home: Home | None = None,
+        **fields: Any,
+    ) -> Self:
+        """A world with a team (`team`) that has the heading of home.
+
+        Args:
+            count: None: as many as models.
+            model, autopilot, parameters, launch, gps: of the team.
+            home: None: the default place of the flavour.
+            fields: other fields of the world.
+
+        Raises:
+            ValueError: a value is not accepted.
+        """
+        place = HOMES.get(autopilot, HOMES["px4"]) if home is None else home
+        if count is None:
+            count = 1 if isinstance(model, str | Path) else len(model)
+        vehicles = team(
+            count,
+            model=model,
+            autopilot=autopilot,
+            parameters=parameters,
+            launch=launch,
+            heading_deg=place.heading_deg,
+            gps=gps,
+        )
+        return cls(vehicles=vehicles, home=home, **fields)
+
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """The world that a TOML file describes (docs/world.md).
+
+        Vehicles without `system_id` get 1, 2, ... in their order. When no vehicle has `offset_ne_m`, they
+        stand in a row to the right of the first.
 
         Raises:
             WorldFileError: the file can't be read or a value is not accepted; the message names file, key,
                 value and what is accepted.
         """
-        from flightsim.world_file import read_world
-
-        return read_world(cls, Path(path))
+        path = Path(path)
+        data = read_toml(path)
+        vehicles = data.get("vehicles")
+        tables = (
+            [table for table in vehicles if isinstance(table, dict)] if isinstance(vehicles, list) else []
+        )
+        for number, table in enumerate(tables, 1):
+            table.setdefault("system_id", number)
+        reader = WorldReader(path)
+        world: Self = reader.make(cls, data, "")
+        if tables and not any("offset_ne_m" in table for table in tables):
+            with reader.naming("vehicles"):
+                placed = in_a_row(world.vehicles, heading_deg=world.place.heading_deg)
+            world = replace(world, vehicles=placed)
+        return world
 
 
 def in_a_row(vehicles: Sequence[VehicleSpec], *, heading_deg: float) -> tuple[VehicleSpec, ...]:

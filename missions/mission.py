@@ -8,7 +8,6 @@ from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.options import MissionOptions
 from missions.planning.limits import Limits
-from missions.scenario import Scenario, Setting
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,11 +50,14 @@ class Debriefing:
         records: recorded messages of all vehicles and, embedded, of the truth.
         flights: notes and scores, one per vehicle.
         options: options of the first vehicle.
+        target_ne_m: true place of the first magnetic target of an embedded world, north and east of the map's
+            home; None: not known.
     """
 
     records: "FlightRecords"
     flights: "Sequence[tuple[FlightNotes, FlightScore]]"
     options: MissionOptions
+    target_ne_m: tuple[float, float] | None = None
 
 
 def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
@@ -102,11 +104,12 @@ class Mission(Generic[AnyOptions]):
         Called for embedded vehicles, whose home is known; for other vehicles the mission itself calls it.
         """
 
-    def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:
-        """The objects besides the vehicles that an embedded world must contain; not called for other
-        vehicles.
+    def with_map(self, options: AnyOptions, published: "Path") -> AnyOptions:
+        """The options, after a magnetic map of the embedded world was published to a file.
+
+        Called for embedded vehicles only.
         """
-        return Scenario()
+        return options
 
     async def outline(self, vehicle: "Vehicle", options: AnyOptions) -> "Outline | None":
         """The path that one vehicle, which is ready to arm, would fly; None: it is not known in advance."""

@@ -1,5 +1,6 @@
 """The files in `examples/` run as a user runs them, and the commands in their first lines parse."""
 
+import json
 import re
 import subprocess
 import sys
@@ -8,11 +9,13 @@ from typing import Final
 
 import pytest
 
+from estimators.logs import open_log
 from tests.clients.forked_process import flightstack_done
 from tests.documented_commands import commands_in, parse
 
 ROOT: Final = Path(__file__).parents[1]
 EXAMPLES: Final = ROOT / "examples"
+WORLD: Final = EXAMPLES / "windy_world.toml"
 MISSION, ESTIMATOR, AIRCRAFT, ANALYSIS = (
     EXAMPLES / name for name in ("own_mission.py", "own_estimator.py", "own_aircraft.toml", "log_analysis.py")
 )
@@ -57,6 +60,29 @@ def test_the_analysis_refuses_what_is_no_log(tmp_path: Path) -> None:
     done = analysed(tmp_path / "empty.tlog")
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
+
+
+def test_the_windy_world_is_flown_and_its_options_are_overridden(tmp_path: Path) -> None:
+    arguments = ("--world", str(WORLD), "--pattern", "L1", "--seed", "8", "--no-picture")
+    flown = flightstack_done("fly", "lissajous", *arguments, "--out", str(tmp_path / "run"))
+    assert flown.returncode == 0, flown.stderr
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["vehicle"] == "iris,aerosonde"
+    assert summary["gps"] == "standalone,differential"
+    assert summary["seed"] == 8
+    assert summary["wind"] == {"speed_m_s": 5.0, "from_deg": 240.0, "profile": "log", "turbulence": "light"}
+    log = open_log(tmp_path / "run" / "flight.tlog")
+    receiver = log.table("GPS_RAW_INT", system_id=1, component_id=1)
+    time_s = receiver.time_us * 1e-6
+    lost_s = time_s[(receiver.columns["fix_type"] < 3) & (time_s > 40.0)]
+    assert (
+        len(lost_s) > 5
+    )  # the quadrotor's GPS is off from 45 s to 48 s, and is reported lost after a second
+    assert 45.0 < lost_s.min() < lost_s.max() < 48.1
+
+
+def test_docs_show_the_windy_world() -> None:
+    assert WORLD.read_text(encoding="utf-8") in (ROOT / "docs/world.md").read_text(encoding="utf-8")
 
 
 def test_own_aircraft_flies(tmp_path: Path) -> None:

@@ -13,14 +13,16 @@ from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal,
 from missions.cli.mission_command import FlightOption, Scope
 from missions.cli.options import SECONDS, SPEEDUP, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
+from missions.cli.world import WORLD_HELP, world_of
 
 if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
     from missions.cli.mission_command import MissionCommand
     from missions.mission import Mission
     from missions.runs.session import RunRequest
 
 _link = partial(flight_option, group="Vehicles")
-_world = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
+_embedded = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
 _elsewhere = partial(flight_option, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 _flight = partial(flight_option, group="The flight")
 _estimator = partial(flight_option, group="An estimator beside it")
@@ -40,43 +42,44 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     metavar="ID",
     help="Of the vehicle, where several are on its link; one for each --connect. [default: the first]",
 )
-@_world(
+@_embedded("--world", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=WORLD_HELP)
+@_embedded(
     "--autopilot",
     type=click.Choice(["px4", "ardupilot"]),
     help="Its firmware's ways. [default: px4, or what a mission file is for]",
 )
-@_world(
+@_embedded(
     "--model",
     multiple=True,
     metavar="NAME|PATH",
     help="Its vehicle; one for all of a team, or one for each (repeat, or A,B,C). "
     "[default: iris, or an aircraft where the mission needs one]",
 )
-@_world(
+@_embedded(
     "--launch",
     type=click.Choice(["runway", "catapult", "hand"]),
     help="How aircraft get into the air. [default: as described with the model]",
 )
-@_world("--home", help="lat,lon,alt[,heading]. [default: the firmware's own]")
-@_world("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
-@_world(
+@_embedded("--home", help="lat,lon,alt[,heading]. [default: the firmware's own]")
+@_embedded("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
+@_embedded(
     "--wind",
     metavar="SPEED[@FROM]",
     help="Wind of the day, m/s at 10 m above ground, and degrees it comes from; turns are planned for it, "
     "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
 )
-@_world(
+@_embedded(
     "--wind-profile",
     type=click.Choice(["log", "power", "uniform"]),
     default="log",
     help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
 )
-@_world(
+@_embedded(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
     help="[default: none; orbit, occupancy: light]",
 )
-@_world(
+@_embedded(
     "--gps",
     type=click.Choice(["differential", "standalone"]),
     help="Receiver: decimetres with corrections, or metres that wander without. [default: differential]",
@@ -87,7 +90,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     help="Forecast: wind to plan turns for, m/s, at the height of the flight. [default: --wind where it is "
     "given, as it is at 100 m or the mission's altitude, else 5]",
 )
-@_world("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
+@_embedded("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @_flight("--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params).")
 @_results("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
 @_flight(
@@ -152,18 +155,14 @@ def fly(**given: Any) -> int:
         return KILLED + signal_of(interrupt)
 
 
-def _models(
-    given: tuple[str, ...], mission: "Mission[Any]", vehicles: int | None, connections: int
-) -> list[str]:
-    """The models of the vehicles, one for each."""
-    models = [name.strip() for text in given for name in text.split(",")]
-    if not all(models):
-        raise click.UsageError(
-            f"--model {','.join(given)!r} has a place without a name; give NAME, or NAME,NAME,... for a team"
-        )
-    models = models or [mission.world_defaults.model]
-    count = vehicles or max(1, connections, len(models))
-    return models * count if len(models) == 1 else models
+def _world(given: dict[str, Any], mission: "Mission[Any]", chosen: frozenset[str]) -> "WorldSpec | None":
+    """The embedded world without what the mission adds to it; None: the vehicles are connected by links."""
+    if given["connect"]:
+        return None
+    try:
+        return world_of(given, chosen, count=given["vehicles"], defaults=mission.world_defaults)
+    except ValueError as error:
+        raise click.UsageError(in_options(error)) from error
 
 
 def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
@@ -176,30 +175,28 @@ def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
 
 
 def _fly(given: dict[str, Any]) -> int:
-    from flightsim.wind_profile import WindLaw, WindProfile
     from missions.library import find_mission
-    from missions.options import check_positive, parameters_from_file, parse_wind
+    from missions.options import check_positive, parameters_from_file
 
     mission = find_mission(given["mission"])
     context = click.get_current_context()
     declared: MissionCommand = context.meta["mission command"]
-    models = _models(given["model"], mission, given["vehicles"], len(given["connect"]))
-    common = {
-        "vehicles": given["vehicles"] or max(1, len(given["connect"]), len(models)),
-        "given": declared.chosen_fields(chosen_names(context)),
-    }
+    chosen = chosen_names(context)
+    world = _world(given, mission, chosen)
+    count = len(given["connect"]) if world is None else len(world.vehicles)
+    common = {"vehicles": given["vehicles"] or count, "given": declared.chosen_fields(chosen)}
     options = declared.build(given, common)
-    world = mission.world_defaults
-    wind_speed_m_s, wind_from_deg = parse_wind(world.wind if given["wind"] is None else given["wind"])
+    if world is not None:
+        world = declared.world(given, options, world)
     check_positive(expect_wind=given["expect_wind"] or None, max_error=given["max_error"])
     if given["system_id"] and len(given["system_id"]) != len(given["connect"]):
         raise click.UsageError(
             f"{len(given['system_id'])} --system-id for {len(given['connect'])} --connect; give one for each"
         )
     forecast_m_s = given["expect_wind"]
-    if forecast_m_s is None and given["wind"] is not None:
-        profile = WindProfile(law=WindLaw(given["wind_profile"]))
-        forecast_m_s = wind_speed_m_s * profile.factor(max(options.altitude_m, _FORECAST_HEIGHT_M))
+    if forecast_m_s is None and given["wind"] is not None and world is not None:
+        height_m = max(options.altitude_m, _FORECAST_HEIGHT_M)
+        forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
@@ -233,18 +230,9 @@ def _fly(given: dict[str, Any]) -> int:
             options=options,
             connect=given["connect"],
             system_ids=given["system_id"],
-            autopilot=given["autopilot"] or world.autopilot or "px4",
-            model=models,
-            launch=given["launch"],
-            seed=given["seed"],
+            world=world,
             speedup=given["speedup"],
-            wind_speed_m_s=wind_speed_m_s,
-            wind_from_deg=wind_from_deg,
-            wind_profile=given["wind_profile"],
-            turbulence=given["turbulence"] or world.turbulence,
-            gps=given["gps"] or "differential",
             expected_wind_m_s=forecast_m_s,
-            home=given["home"] or (None if given["connect"] else world.home),
             parameters=parameters,
             out=given["out"],
             picture=not given["no_picture"],

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
     from missions.options import MissionOptions
 
 Given = Mapping[str, Any]
@@ -58,6 +59,7 @@ class MissionCommand:
         options: command-line options in addition to those of every mission. The mission accepts no others.
         build: creates the mission's options from the given values. `chosen` names the fields that the user
             specified; common values are passed unchanged.
+        world: adds to an embedded world what the mission is for, such as targets and payload.
         fields: the fields of the mission's options that each command-line option sets, when the names differ.
     """
 
@@ -65,6 +67,7 @@ class MissionCommand:
     options: tuple[FlightOption, ...]
     build: Callable[[Given, Mapping[str, Any]], "MissionOptions"]
     fields: Mapping[str, tuple[str, ...]]
+    world: Callable[[Given, Any, "WorldSpec"], "WorldSpec"] = lambda _given, _options, world: world
 
     def chosen_fields(self, chosen: frozenset[str]) -> frozenset[str]:
         """Fields of the mission's options that the user specified on the command line."""

@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
+
+if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
 
 
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
@@ -19,7 +22,6 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
             "(numpy .npz, format flightstack-magnetic-map-1)"
         )
     width_m, height_m = parse_pair(given["size"], "--size", "x,")
-    along_m, across_m = parse_pair(given["sigma"], "--sigma", "x,")
     return OccupancyOptions(
         **common,
         altitude_m=given["altitude"],
@@ -41,6 +43,17 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         search_time_s=given["search_time"],
         speed_m_s=given["speed"],
         map_file=given["map"],
+    )
+
+
+def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
+    from missions.embedded import occupancy_world
+    from missions.options import parse_pair
+
+    along_m, across_m = parse_pair(given["sigma"], "--sigma", "x,")
+    return occupancy_world(
+        world,
+        options,
         target_ne_m=_place("--target", given["target"]),
         amplitude_nt=given["amplitude"],
         sigma_along_m=along_m,
@@ -141,6 +154,7 @@ COMMAND: Final = MissionCommand(
         ),
     ),
     build=_build,
+    world=_world,
     fields=MappingProxyType(
         {
             "size": ("width_m", "height_m"),

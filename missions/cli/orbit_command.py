@@ -3,12 +3,15 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
 from missions.cli.options import radians_of
+
+if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
 
 
 def _place(text: str) -> tuple[float, float]:
@@ -26,9 +29,8 @@ def _place(text: str) -> tuple[float, float]:
 
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
     from missions.orbit.options import AttitudeFrom, GpsOff, OrbitOptions
-    from missions.scenario import TargetMotion
 
-    heading, motion = given["entry_heading"], given["target_motion"]
+    heading = given["entry_heading"]
     return OrbitOptions(
         **common,
         altitude_m=given["altitude"],
@@ -40,7 +42,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         target_ne_m=_place(given["target"]),
         target_speed_m_s=given["target_speed"],
         target_heading_rad=radians_of("--target-heading", given["target_heading"]),
-        target_motion=None if motion is None else TargetMotion(motion),
+        target_wanders=given["target_motion"] in ("circle", "random-walk"),
         target_ground_m=given["target_ground"],
         entry_bearing_rad=radians_of("--entry-bearing", given["entry_bearing"]),
         entry_distance_m=given["entry_distance"],
@@ -50,6 +52,13 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         lost_limit_s=given["lost_limit"],
         attitude=AttitudeFrom(given["attitude"]),
     )
+
+
+def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
+    from missions.embedded import MotionKind, orbit_world
+
+    motion = given["target_motion"]
+    return orbit_world(world, options, motion=None if motion is None else MotionKind(motion))
 
 
 COMMAND: Final = MissionCommand(
@@ -107,5 +116,6 @@ COMMAND: Final = MissionCommand(
         option("--separation", type=float, default=20.0, help="Between the altitudes of a team, m."),
     ),
     build=_build,
+    world=_world,
     fields=MappingProxyType({}),
 )

@@ -2,22 +2,25 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
+from missions.cli.fly_command import chosen_names
 from missions.cli.options import SLOWEST, FiniteRange, in_options
-from missions.cli.scenario import scenario_of
 from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
+from missions.cli.world import WORLD_HELP, equipped, world_of
 from missions.runs.ending import EndRequests
 
 if TYPE_CHECKING:
     from autopilot_bridge.sitl import Port, Sitl
+    from flightsim.world_spec import WorldSpec
 
 _LOG_RATE_HZ = 4
 _FAILED = 1
@@ -51,6 +54,30 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
     }
 
 
+def _for_clients(
+    spec: "WorldSpec", speedup: float, parameters: Mapping[str, float], unix_epoch_us: int
+) -> "WorldSpec":
+    """The world with calendar time, timeouts for clients in wall time, and the parameters of a file.
+
+    Its magnetic field is made here, so that an unusable map is refused before the vehicles are.
+    """
+    from flightsim.payload import MagneticSpec, magnetic_field_of
+
+    field = spec.magnetic_field
+    if isinstance(field, MagneticSpec):
+        field, _ = magnetic_field_of(
+            field, home=spec.place, seed=spec.seed, decimal_year=spec.air.decimal_year
+        )
+    vehicles = tuple(
+        replace(
+            vehicle,
+            parameters={**_loss_times(vehicle.autopilot, speedup), **vehicle.parameters, **parameters},
+        )
+        for vehicle in spec.vehicles
+    )
+    return replace(spec, vehicles=vehicles, magnetic_field=field, unix_epoch_us=unix_epoch_us)
+
+
 def _request_streams() -> bytes:
     """Request for all of ArduPilot's streams from every vehicle, at the rate that MAVProxy requests."""
     from autopilot_bridge.mavlink import FrameEncoder, dialect
@@ -60,7 +87,7 @@ def _request_streams() -> bytes:
 
 
 @contextlib.contextmanager
-def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iterator[None]:
+def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     """Write a new log of the vehicles' messages until the context ends or the file can no longer be written.
 
     Raises:
@@ -69,8 +96,10 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
     from autopilot_bridge.sitl import PacketLog
 
     recorder = PacketLog(path)
-    for listener in world.record(recorder, losses.log_ended):
-        if autopilot == "ardupilot":  # it sends only what was requested
+    for spec, listener in zip(
+        simulated.spec.vehicles, simulated.record(recorder, losses.log_ended), strict=True
+    ):
+        if spec.autopilot == "ardupilot":  # it sends only what was requested
             listener.send(_request_streams())
     try:
         yield
@@ -82,6 +111,7 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 
 
 @click.command()
+@click.option("--world", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=WORLD_HELP)
 @click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
 @click.option(
     "--model",
@@ -177,19 +207,10 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
     "--duration", type=FiniteRange(min=0.0, max=1e9), help="Stop after so many seconds of vehicle time."
 )
 def sitl(
-    autopilot: str,
-    model: tuple[str, ...],
-    launch: str | None,
     count: int,
     speedup: float,
     links: tuple[str, ...],
     gcs_links: tuple[str, ...],
-    home: str | None,
-    seed: int,
-    wind: str,
-    wind_profile: str,
-    turbulence: str,
-    gps: str,
     camera: bool,
     targets: tuple[str, ...],
     map_file: str | None,
@@ -204,6 +225,7 @@ def sitl(
     log: str | None,
     no_wait: bool,
     duration: float | None,
+    **_world: Any,
 ) -> int:
     """Simulated vehicles (SITL) for external clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
 
@@ -216,70 +238,49 @@ def sitl(
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
-    from flightsim.environment import Environment
-    from flightsim.home import Home
     from flightsim.vehicle import VehicleDivergedError
-    from flightsim.wind_profile import WindLaw, WindProfile
-    from flightsim.world_spec import HOMES, WorldSpec, team
-    from missions.embedded.scenario import equipped
-    from missions.options import parameters_from_file, parse_wind
+    from missions.mission import WorldDefaults
+    from missions.options import parameters_from_file
 
-    models = [name for text in model for name in text.split(",") if name] or ["iris"]
-    count = len(models) if count == 1 else count
+    context = click.get_current_context()
+    chosen = chosen_names(context)
     losses = Losses()
     with EndRequests() as ending, contextlib.ExitStack() as at_end:
         try:
             ports = _ports(links, gcs_links)
             signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
-            wind_speed_m_s, wind_from_deg = parse_wind(wind)
-            place = None if home is None else Home.parse(home)
-            heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
-            configuration = WorldSpec(
-                vehicles=team(
-                    count,
-                    model=models[0] if len(models) == 1 else models,
-                    autopilot=autopilot,
-                    launch=launch,
-                    heading_deg=heading_deg,
-                    gps=gps,
-                    parameters={
-                        **_loss_times(autopilot, speedup),
-                        **({} if params is None else parameters_from_file(params)),
-                    },
-                ),
-                home=place,
-                air=Environment.from_wind(
-                    speed_m_s=wind_speed_m_s,
-                    from_deg=wind_from_deg,
-                    profile=WindProfile(law=WindLaw(wind_profile)),
-                    turbulence=turbulence,
-                ),
-                seed=seed,
-                unix_epoch_us=unix_time_us(),  # its clients use calendar time
+            spec = world_of(
+                context.params, chosen, count=count if "count" in chosen else None, defaults=WorldDefaults()
             )
+            spec = _for_clients(
+                equipped(spec, camera, targets, map_file, map_target),
+                speedup,
+                {} if params is None else parameters_from_file(params),
+                unix_time_us(),
+            )
+            count = len(spec.vehicles)
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
-            equipment = equipped(configuration, scenario_of(camera, targets, map_file, map_target))
             click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
-            world = Sitl(equipment, signing=signing, cards=memory.cards)
-            compile_flight_code(world.spec.vehicles)
-            server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
-            pictured = start_video(world, video, pictures, losses.picture_lost)
+            simulated = Sitl(spec, signing=signing, cards=memory.cards)
+            compile_flight_code(spec.vehicles)
+            server = SitlServer(simulated, speedup=speedup or None, monotonic=wall_time_s)
+            pictured = start_video(simulated, video, pictures, losses.picture_lost)
             if pictured is not None:
                 at_end.callback(pictured.close)
             if count > 1 and ports:
                 opened = server.open([()] * count, shared=ports)
             else:
                 opened = server.open([ports] if ports else None)
-            at_end.callback(world.close)
+            at_end.callback(simulated.close)
             ending.remember()
             if log is not None:  # created last, when no other check can still fail
-                at_end.enter_context(_recording(world, log, autopilot, losses))
+                at_end.enter_context(_recording(simulated, log, losses))
         except (ValueError, OSError, BridgeError) as error:
             raise click.UsageError(in_options(error)) from error
         for vehicle, port, address in opened:
             system_id = vehicle.specification.system_id
-            kind = f"{autopilot} {vehicle.specification.model}"
+            kind = f"{vehicle.specification.autopilot} {vehicle.specification.model}"
             how = signed_how(signing, port.address)
             click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{how}")
         for named in dict.fromkeys(port.address for _, port, _ in opened):
@@ -291,7 +292,7 @@ def sitl(
         def report(pace: PaceReport) -> None:
             click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
 
-        if autopilot == "ardupilot" and not ports and not no_wait:
+        if spec.vehicles[0].autopilot == "ardupilot" and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
             server.wait_for_client(lambda: ending.asked)
         try:
@@ -303,5 +304,5 @@ def sitl(
         except VehicleDivergedError as error:
             raise click.ClickException(f"the simulation ended: {error}") from error
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
-    click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
+    click.echo(f"stopped at {simulated.time_us * 1e-6:.1f} s of vehicle time{lost}")
     return _FAILED if losses.any else 0

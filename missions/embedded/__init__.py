@@ -1,11 +1,26 @@
-"""An embedded SITL for missions: the simulated world in this process, on virtual time."""
+"""Embedded worlds: a simulated world in this process that missions are flown in."""
 
-from missions.embedded.sitl import (
-    MAX_FLIGHT_S,
-    EmbeddedConfiguration,
-    EmbeddedSitl,
-    model_kind,
-    open_embedded,
+from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
+from missions.embedded.worlds import (
+    CAMERA,
+    MAGNETOMETER,
+    MotionKind,
+    carrying,
+    motion_of,
+    occupancy_world,
+    orbit_world,
 )
 
-__all__ = ["MAX_FLIGHT_S", "EmbeddedConfiguration", "EmbeddedSitl", "model_kind", "open_embedded"]
+__all__ = [
+    "CAMERA",
+    "MAGNETOMETER",
+    "MAX_FLIGHT_S",
+    "EmbeddedSitl",
+    "MotionKind",
+    "alone",
+    "carrying",
+    "model_kind",
+    "motion_of",
+    "occupancy_world",
+    "orbit_world",
+]

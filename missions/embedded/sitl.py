@@ -1,115 +1,63 @@
 """An embedded SITL: the simulated world in this process, on virtual time, one memory link per vehicle."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
+from estimators.logs.errors import LogError
+from estimators.logs.new_file import new_file
 from flightsim.airframe import load_airframe
-from flightsim.environment import Environment
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.home import Home
+from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
-from flightsim.wind_profile import WindLaw, WindProfile
-from flightsim.world_spec import HOMES, WorldSpec, team
-from missions.embedded.scenario import equipped, publish
+from flightsim.world_spec import WorldSpec
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.scenario import Scenario
 
 MAX_FLIGHT_S = 24 * 3600.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EmbeddedConfiguration:
-    """Configuration of the simulated world that a mission is flown in.
-
-    Attributes:
-        vehicles: number of vehicles, with system ids 1, 2, ...
-        model: model of all vehicles, or one for each vehicle: a name, or a path.
-        launch: launch method of the aircraft; None: the method in each aircraft's description.
-        flavour: "px4" or "ardupilot".
-        seed: the same seed gives the same flight.
-        physics_rate_hz: steps per second of vehicle time.
-        speedup: simulated seconds per wall second at most; None: as fast as the machine can.
-        wind_speed_m_s, wind_from_deg: mean wind, at 10 m above ground.
-        wind_profile: law of wind speed over height, a `flightsim.wind_profile.WindLaw`.
-        turbulence: "none", "light", "moderate" or "severe".
-        parameters: autopilot parameters that differ from the flavour's defaults.
-        gps: receiver class of all vehicles, "differential" or "standalone".
-        home: "lat,lon,alt[,heading]"; None: the default place of the flavour's own SITL.
-        max_flight_s: vehicle time, s, after which a run that has not ended fails.
-        scenario: targets, payload and magnetic map that the mission needs.
-    """
-
-    vehicles: int = 1
-    model: str | Path | Sequence[str | Path] = "iris"
-    launch: str | None = None
-    flavour: str = "px4"
-    seed: int = 0
-    physics_rate_hz: int = 250
-    speedup: float | None = None
-    wind_speed_m_s: float = 0.0
-    wind_from_deg: float = 0.0
-    wind_profile: str = "log"
-    turbulence: str = "none"
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    gps: str = "differential"
-    home: str | None = None
-    max_flight_s: float = MAX_FLIGHT_S
-    scenario: Scenario = field(default_factory=Scenario)
-
-    def __post_init__(self) -> None:
-        if self.speedup is not None and not 0.0 < self.speedup < float("inf"):
-            raise ValueError(f"speed factor {self.speedup} is not accepted; give a number above 0")
 
 
 class EmbeddedSitl:
     """A simulated world, the event loop that runs on its time, and a link to each vehicle.
 
+    Args:
+        world: description of the world.
+        publish_to: path to which a generated magnetic map is written.
+        speedup: simulated seconds per wall second at most; None: as fast as the machine can.
+        max_flight_s: vehicle time, s, after which a run that has not ended fails.
+
     Attributes:
         sitl: the world.
         loop: run the mission on it (`autopilot_bridge.clock.run`).
         links: the mission's end of each vehicle's link.
+        published_map: file of the published magnetic map; None: there is none.
+
+    Raises:
+        ValueError: a value is not accepted; the message names it and what is accepted.
+        MissionError: a generated map can't be written.
     """
 
-    def __init__(self, configuration: EmbeddedConfiguration) -> None:
-        flavour = configuration.flavour
-        if configuration.home is not None:
-            home = Home.parse(configuration.home)
-        else:
-            home = HOMES.get(flavour, HOMES["px4"])
-        vehicles = team(
-            configuration.vehicles,
-            model=configuration.model,
-            autopilot=flavour,
-            parameters=configuration.parameters,
-            launch=configuration.launch,
-            heading_deg=home.heading_deg,
-            gps=configuration.gps,
-        )
-        environment = Environment.from_wind(
-            speed_m_s=configuration.wind_speed_m_s,
-            from_deg=configuration.wind_from_deg,
-            profile=WindProfile(law=WindLaw(configuration.wind_profile)),
-            turbulence=configuration.turbulence,
-        )
-        world = WorldSpec(
-            vehicles=vehicles,
-            home=home,
-            air=environment,
-            seed=configuration.seed,
-            physics_rate_hz=configuration.physics_rate_hz,
-        )
-        self.sitl = Sitl(equipped(world, configuration.scenario))
-        for path in configuration.scenario.published:
-            assert self.sitl.published_map is not None
-            publish(self.sitl.published_map, path)
-        self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
-        sitl = self.sitl
+    def __init__(
+        self,
+        world: WorldSpec,
+        *,
+        publish_to: Path | None = None,
+        speedup: float | None = None,
+        max_flight_s: float = MAX_FLIGHT_S,
+    ) -> None:
+        if speedup is not None and not 0.0 < speedup < float("inf"):
+            raise ValueError(f"speed factor {speedup} is not accepted; give a number above 0")
+        self.sitl = sitl = Sitl(world)
+        field = world.magnetic_field
+        self.published_map = field.map_file if isinstance(field, MagneticSpec) else None
+        if self.published_map is None and sitl.published_map is not None and publish_to is not None:
+            publish(sitl.published_map, publish_to)
+            self.published_map = publish_to
+        self.links: list[Link] = [sitl.connect(index) for index in range(len(world.vehicles))]
 
         def advance() -> None:
             try:
@@ -118,10 +66,7 @@ class EmbeddedSitl:
                 raise MissionError(f"the simulation ended: {error}") from error
 
         self.loop = VirtualTimeLoop(
-            advance,
-            lambda: sitl.time_us,
-            speedup=configuration.speedup,
-            max_time_us=round(configuration.max_flight_s * 1e6),
+            advance, lambda: sitl.time_us, speedup=speedup, max_time_us=round(max_flight_s * 1e6)
         )
 
     def parameters(self, index: int, names: Sequence[str]) -> dict[str, float]:
@@ -152,14 +97,25 @@ class EmbeddedSitl:
             link.close()
 
 
-def open_embedded(configuration: EmbeddedConfiguration) -> EmbeddedSitl:
-    """Build the world. Simulated time does not advance before the loop runs.
+def publish(made: MagneticMap, path: Path) -> None:
+    """Write a generated map to the file from which missions read it.
 
     Raises:
-        ValueError: a value is not accepted; the message names it and what is accepted.
-        MissionError: a file that the scenario publishes cannot be written.
+        MissionError: it can't be written.
     """
-    return EmbeddedSitl(configuration)
+    try:
+        with new_file(path) as part:
+            made.save(part)
+    except LogError as error:
+        raise MissionError(f"{error}; nothing was flown") from error
+
+
+def alone(world: WorldSpec, index: int) -> WorldSpec:
+    """A world with one of the vehicles, in still air and without anything else, for its parameters."""
+    return WorldSpec(
+        vehicles=(replace(world.vehicles[index], payload=PayloadParameters(), offset_ne_m=(0.0, 0.0)),),
+        home=world.place,
+    )
 
 
 def model_kind(model: str | Path) -> VehicleKind:

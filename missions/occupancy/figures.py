@@ -14,17 +14,14 @@ if TYPE_CHECKING:
     from missions.runs.score import FlightScore
 
 
-def search_figures(
-    team: "SearchTeam", debriefing: "Debriefing", target_ne_m: tuple[float, float] | None
-) -> Mapping[str, Any]:
+def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:
     """Figures of a finished search.
 
     Args:
         team: the team at the end of the search.
         debriefing: debriefing of the run.
-        target_ne_m: true place of the target; None: not known.
     """
-    search = team.search
+    search, target_ne_m = team.search, debriefing.target_ne_m
     found = search.found
     estimate = None if found is None else found.place_ne_m
     time_to_find_s = None if found is None else (search.found_us - team.began_us) * 1e-6

@@ -18,7 +18,6 @@ LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0
 """Smallest ratio of threshold to noise; below it, noise alone exceeds the threshold."""
 
-LARGEST_DEPTH_M: Final = 1000.0
 _USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
 _USUAL_LINES_M: Final = 200.0
 _SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
@@ -48,12 +47,8 @@ class OccupancyOptions(MissionOptions):
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
         speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: the vehicle's default.
-        map_file: published magnetic map; None: the embedded world makes one from its seed.
-        target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle: the
-            place that the result is compared with.
-        amplitude_nt, sigma_along_m, sigma_across_m: Gaussian field of the embedded world's target.
-        moment_a_m2, depth_m: moment of the embedded world's target as a dipole that is magnetised along the
-            Earth's field, and its depth below home; None: the target is a Gaussian.
+        map_file: published magnetic map; None: the map that the
+            embedded world publishes.
     """
 
     altitude_m: float = 80.0
@@ -74,12 +69,6 @@ class OccupancyOptions(MissionOptions):
     search_time_s: float = 900.0
     speed_m_s: float | None = None
     map_file: str | None = None
-    target_ne_m: tuple[float, float] | None = None
-    amplitude_nt: float = 30.0
-    sigma_along_m: float = 80.0
-    sigma_across_m: float = 60.0
-    moment_a_m2: float | None = None
-    depth_m: float = 10.0
 
     def __post_init__(self) -> None:
         super(OccupancyOptions, self).__post_init__()
@@ -111,29 +100,10 @@ class OccupancyOptions(MissionOptions):
                 "`threshold_nt`, "
                 "or give the `noise_nt` of a better magnetometer"
             )
-        for name, value in (("sigma_along_m", self.sigma_along_m), ("sigma_across_m", self.sigma_across_m)):
-            if not (math.isfinite(value) and value > 0.0):
-                raise PlanError(f"`{name}` {value:g} m of the target is not possible; ask for more than 0")
-        if not (math.isfinite(self.amplitude_nt) and abs(self.amplitude_nt) > self.threshold_nt):
-            raise PlanError(
-                f"`amplitude_nt` {self.amplitude_nt:g} nT of the target is not beyond `threshold_nt` "
-                f"{self.threshold_nt:g} nT: no pass could see it; lower the threshold"
-            )
         if self.map_error_nt is not None:
             MapError(sigma_nt=self.map_error_nt)
-        check_positive(moment_a_m2=self.moment_a_m2)
-        if not (math.isfinite(self.depth_m) and abs(self.depth_m) <= LARGEST_DEPTH_M):
-            raise PlanError(
-                f"`depth_m` {self.depth_m:g} m of the target is not within {LARGEST_DEPTH_M:g} m of home"
-            )
-        layout = self.layout  # these constructors refuse impossible values
-        _ = self.search_parameters, self.decision_parameters
-        if self.target_ne_m is not None and not layout.contains(*self.target_ne_m):
-            raise PlanError(
-                f"`target_ne_m` {self.target_ne_m[0]:g},{self.target_ne_m[1]:g} is outside the searched map, "
-                f"which reaches from north {layout.south_m:g} to {layout.north_m:g} m and east "
-                f"{layout.west_m:g} to {layout.east_m:g} m; move it, or ask for a larger `width_m, height_m`"
-            )
+        # these constructors refuse impossible values
+        _ = self.layout, self.search_parameters, self.decision_parameters
 
     @property
     def layout(self) -> GridLayout:

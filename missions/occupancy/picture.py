@@ -42,13 +42,7 @@ def four_moments(search: "Search", end_us: int) -> list["Snapshot"]:
     return [min(snapshots, key=lambda s: abs(s.time_us - time_us)) for time_us in times_us]
 
 
-def draw_search(
-    path: Path,
-    title: str,
-    team: "SearchTeam",
-    debriefing: "Debriefing",
-    target_ne_m: tuple[float, float] | None,
-) -> None:
+def draw_search(path: Path, title: str, team: "SearchTeam", debriefing: "Debriefing") -> None:
     """Draw the search.
 
     Args:
@@ -56,9 +50,8 @@ def draw_search(
         title: title above the picture.
         team: the team at the end of the search.
         debriefing: debriefing of the run.
-        target_ne_m: true place of the target; None: not known.
     """
-    search = team.search
+    search, target_ne_m = team.search, debriefing.target_ne_m
     end_us = max([search.snapshots[-1].time_us] + [s.track[-1][0] for s in team.searchers if s.track])
     moments = four_moments(search, end_us)
     figure = Figure(figsize=(10.0, 12.6), dpi=130, layout="constrained", facecolor="white")
@@ -77,7 +70,7 @@ def draw_search(
     bar.ax.tick_params(labelsize=8, colors=_INK)
     _draw_probability(figure.add_subplot(grid[2, :]), team, end_us)
     figure.legend(
-        handles=_handles(debriefing, target_ne_m, search.found is not None),
+        handles=_handles(debriefing, search.found is not None),
         loc="outside lower center",
         ncols=6,
         fontsize=8,
@@ -166,7 +159,7 @@ def _draw_probability(axes: Any, team: "SearchTeam", end_us: int) -> None:
         axes.spines[side].set_visible(False)
 
 
-def _handles(debriefing: "Debriefing", target_ne_m: tuple[float, float] | None, found: bool) -> list[Any]:
+def _handles(debriefing: "Debriefing", found: bool) -> list[Any]:
     handles: list[Any] = [
         Line2D(
             [], [], color=_COLOURS[k % len(_COLOURS)], marker="x", markersize=7, markeredgewidth=2.0,
@@ -177,7 +170,7 @@ def _handles(debriefing: "Debriefing", target_ne_m: tuple[float, float] | None, 
     handles.append(
         Line2D([], [], color=_INK, marker="o", markerfacecolor="none", linestyle="", label="anomaly")
     )
-    if target_ne_m is not None:
+    if debriefing.target_ne_m is not None:
         handles.append(
             Rectangle((0, 0), 1, 1, fill=False, linestyle="--", edgecolor=_TARGET, label="target (truth)")
         )

@@ -10,7 +10,6 @@ from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.orbit.options import WANDERING_M, OrbitOptions
 from missions.orbit.verdict import orbit_verdict
 from missions.planning.limits import FixedWingLimits, Limits
-from missions.scenario import Scenario, Setting, TargetMotion, TargetScenario
 from missions.vehicle.vehicle import Vehicle
 
 
@@ -26,34 +25,15 @@ class OrbitMission(Mission[OrbitOptions]):
             raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
         options.check(limits)
 
-    def scenario(self, options: OrbitOptions, setting: Setting) -> Scenario:
-        north_m, east_m = options.target_ne_m
-        if options.motion is TargetMotion.CIRCLE:  # it starts in the north of its circle
-            north_m -= WANDERING_M
-        return Scenario(
-            targets=(
-                TargetScenario(
-                    north_m=north_m,
-                    east_m=east_m,
-                    motion=options.motion,
-                    speed_m_s=options.target_speed_m_s,
-                    course_rad=options.target_heading_rad,
-                    range_m=WANDERING_M,
-                    size_m=options.tag_size_m,
-                ),
-            ),
-            camera=True,
-        )
-
     def estimator_settings(self, options: OrbitOptions) -> Mapping[str, float]:
         north_m, east_m = options.target_ne_m
         return {
             "target_north_m": north_m,
             "target_east_m": east_m,
-            "target_speed_m_s": 0.0 if options.wandering else options.target_speed_m_s,
+            "target_speed_m_s": 0.0 if options.target_wanders else options.target_speed_m_s,
             "target_heading_rad": options.target_heading_rad,
             "target_ground_m": options.target_ground_m,
-            **({"target_sigma_m": WANDERING_M} if options.wandering else {}),
+            **({"target_sigma_m": WANDERING_M} if options.target_wanders else {}),
         }
 
     async def fly(self, vehicle: Vehicle, options: OrbitOptions) -> None:

@@ -9,7 +9,6 @@ from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.options import MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
-from missions.scenario import TargetMotion
 
 WANDERING_M: Final = 100.0
 """Largest distance of a wandering target from its place: radius of its circle, half the side of its area."""
@@ -21,12 +20,6 @@ class AttitudeFrom(StrEnum):
     AUTOPILOT = "autopilot"
     FILTER = "filter"
     """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
-
-
-_TAG_PX: Final = 24.0  # size seen from above; half of the tags with 11 pixels are read
-_FORESHORTENING: Final = 0.742  # effective size: times the sine of the depression to this power
-_FOCAL_PX: Final = 1108.5  # focal length of the embedded camera, 1280 pixels over 60 degrees
-_LEAST_TAG_M: Final = 4.0
 
 
 class GpsOff(StrEnum):
@@ -52,8 +45,7 @@ class OrbitOptions(MissionOptions):
         airspeed_m_s: equivalent airspeed; None: the aircraft's default.
         target_ne_m: believed position of the target from home, when the vehicle is first received.
         target_speed_m_s, target_heading_rad: believed motion of the target, along a straight line.
-        target_motion: motion of the target; None: straight if it has a speed, else static. A target on a
-            circle or a random walk is believed to be within 100 m of its place.
+        target_wanders: the path of the target is not known, only that it stays within 100 m of its place.
         target_ground_m: height of the ground at the target, above home.
         entry_bearing_rad: bearing from the target to the place where GPS is lost.
         entry_distance_m: distance between the two.
@@ -73,7 +65,7 @@ class OrbitOptions(MissionOptions):
     target_ne_m: tuple[float, float] = (500.0, 300.0)
     target_speed_m_s: float = 0.0
     target_heading_rad: float = 0.0
-    target_motion: TargetMotion | None = None
+    target_wanders: bool = False
     target_ground_m: float = 0.0
     entry_bearing_rad: float = math.pi
     entry_distance_m: float = 400.0
@@ -104,37 +96,11 @@ class OrbitOptions(MissionOptions):
             raise PlanError(
                 f"`target_ground_m` {self.target_ground_m:g} m is not a height; give metres above home"
             )
-        if self.target_motion not in (None, TargetMotion.STATIC) and self.target_speed_m_s == 0.0:
-            raise PlanError(f"`target_motion` {self.target_motion} needs a `target_speed_m_s` of more than 0")
-        if self.target_motion is TargetMotion.STATIC and self.target_speed_m_s > 0.0:
-            raise PlanError("`target_motion=static` leaves no `target_speed_m_s`; choose one")
-
-    @property
-    def motion(self) -> TargetMotion:
-        """Motion of the target in an embedded world."""
-        if self.target_motion is not None:
-            return self.target_motion
-        return TargetMotion.STRAIGHT if self.target_speed_m_s > 0.0 else TargetMotion.STATIC
-
-    @property
-    def wandering(self) -> bool:
-        """Whether the target's path is not known, only that it stays near its place."""
-        return self.target_motion in (TargetMotion.CIRCLE, TargetMotion.RANDOM_WALK)
 
     @property
     def height_over_target_m(self) -> float:
         """Height of this vehicle over the target."""
         return self.own_altitude_m - self.target_ground_m
-
-    @property
-    def tag_size_m(self) -> float:
-        """Side of the embedded world's tag, so large that its camera reads the tag from the orbit and from
-        somewhat farther away.
-        """
-        height_m = self.height_over_target_m
-        range_m = math.hypot(height_m, self.radius_m)
-        foreshortened = max(height_m / range_m, math.sin(LEAST_DEPRESSION_RAD)) ** _FORESHORTENING
-        return max(_LEAST_TAG_M, _TAG_PX * range_m / (_FOCAL_PX * foreshortened))
 
     @property
     def entry_course_rad(self) -> float:

@@ -46,7 +46,7 @@ class TargetObserver:
                 attitude="filter" if options.attitude is AttitudeFrom.FILTER else "autopilot",
                 target_north_m=options.target_ne_m[0],
                 target_east_m=options.target_ne_m[1],
-                target_sigma_m=WANDERING_M if options.wandering else _BELIEVED_TO_M,
+                target_sigma_m=WANDERING_M if options.target_wanders else _BELIEVED_TO_M,
             )
         )
         source = self._estimator.attitude
@@ -147,7 +147,7 @@ class TargetObserver:
     def target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Believed position and velocity of the target, from home."""
         o = self._options
-        if o.wandering:  # its place is known only approximately
+        if o.target_wanders:  # its place is known only approximately
             return o.target_ne_m, (0.0, 0.0)
         velocity = (
             o.target_speed_m_s * math.cos(o.target_heading_rad),

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -13,6 +14,9 @@ from missions.options import MissionOptions
 from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
 from missions.runs.request import RunRequest
 from missions.vehicle.link_view import ADAPTERS
+
+if TYPE_CHECKING:
+    from flightsim.world_spec import VehicleSpec
 
 _WIDEST: Mapping[VehicleKind, Limits] = {
     VehicleKind.MULTICOPTER: WIDEST_LIMITS,
@@ -56,17 +60,13 @@ def check_request(mission: Mission[Any], request: RunRequest) -> None:
     Raises:
         PlanError: names the reason and the option to change.
     """
-    if not request.connect and len(request.models) != request.options.vehicles:
-        raise PlanError(
-            f"{len(request.models)} models for {request.options.vehicles} vehicles; "
-            "give one for all, or one for each"
-        )
+    world = None if request.connect else request.embedded_world
     for index in range(request.options.vehicles):
         own = vehicle_options(request.options, index)
-        if request.connect:
+        if world is None:
             _check_any(mission, request, own)
             continue
-        limits = _kind_limits(request, request.models[index])
+        limits = _kind_limits(world.vehicles[index])
         try:
             mission.check(mission.adapted(own, limits), limits)
         except PlanError:
@@ -79,8 +79,8 @@ def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> Non
     """Refuse what the vehicles of an embedded world can't fly. Their parameters and their place are known."""
     if stage.parameters is None or stage.home is None:
         return
-    for index, model in enumerate(request.models):
-        adapter = ADAPTERS[request.autopilot, _kind(model)]()
+    for index, spec in enumerate(request.embedded_world.vehicles):
+        adapter = ADAPTERS[spec.autopilot, _kind(spec.model)]()
         limits = adapter.limits(stage.parameters(index, list(adapter.limiting_parameters)))
         mission.check_place(
             _check_with(mission, request, index, limits, stage.home.alt_m), limits, stage.home
@@ -89,21 +89,15 @@ def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> Non
 
 def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> None:
     """Check with the limits of one embedded aircraft, without creating the world that the mission needs."""
-    from missions.embedded import EmbeddedConfiguration, open_embedded
+    from missions.embedded import EmbeddedSitl, alone
 
+    world = request.embedded_world
     try:
-        sitl = open_embedded(
-            EmbeddedConfiguration(
-                model=request.models[index],
-                flavour=request.autopilot,
-                parameters=request.parameters,
-                home=request.home,
-            )
-        )
+        sitl = EmbeddedSitl(alone(world, index))
     except ValueError as error:
         raise PlanError(str(error)) from error
     try:
-        adapter = ADAPTERS[request.autopilot, VehicleKind.FIXED_WING]()
+        adapter = ADAPTERS[world.vehicles[index].autopilot, VehicleKind.FIXED_WING]()
         limits = adapter.limits(sitl.parameters(0, list(adapter.limiting_parameters)))
         ground_alt_m = sitl.home.alt_m
     finally:
@@ -139,7 +133,7 @@ def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptio
     raise PlanError(f"{refusals[0]} (that is for any vehicle; the limits of this one may ask for more)")
 
 
-def _kind(model: str) -> VehicleKind:
+def _kind(model: str | Path) -> VehicleKind:
     from missions.embedded import model_kind
 
     try:
@@ -148,17 +142,17 @@ def _kind(model: str) -> VehicleKind:
         raise PlanError(str(error)) from error
 
 
-def _kind_limits(request: RunRequest, model: str) -> Limits:
+def _kind_limits(spec: "VehicleSpec") -> Limits:
     """Limits from the firmware's defaults and the specified parameters. For a fixed wing the widest limits
     are returned, because its own limits come with the aircraft.
     """
-    kind = _kind(model)
+    kind = _kind(spec.model)
     if kind is VehicleKind.FIXED_WING:
         return WIDEST_FIXED_WING_LIMITS
-    if (request.autopilot, kind) not in ADAPTERS:
+    if (spec.autopilot, kind) not in ADAPTERS:
         return WIDEST_LIMITS
-    adapter = ADAPTERS[request.autopilot, kind]()
-    given: Mapping[str, float] = request.parameters
+    adapter = ADAPTERS[spec.autopilot, kind]()
+    given: Mapping[str, float] = spec.parameters
     names: Sequence[str] = list(adapter.limiting_parameters)
     for name in names:
         if not given.get(name, 1.0) > 0.0:

@@ -1,17 +1,19 @@
 """The request of a run."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import SigningKey
 from missions.vehicle.connection import GROUND_STATION
+from missions.errors import PlanError
 from missions.options import FlightOptions, MissionOptions
 from missions.planning.limits import FORECAST_WIND_M_S
 from missions.vehicle.adapter import Mode
 
 if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
     from missions.preflight.before_flight import Confirm
 
 REGAIN_S: Final = 60.0
@@ -27,11 +29,10 @@ class RunRequest:
         connect: connection strings, one per vehicle; empty: the vehicles are embedded (SITL).
         system_ids: system ids of the vehicles, one per connection; empty: the first vehicle received on each
             connection.
-        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, wind_profile, turbulence, gps, home: settings
-            of the embedded SITL.
-        model: its vehicle model: one for all vehicles of a team, or one for each.
-        launch: launch method of its aircraft: "runway", "catapult", "hand"; None: the method in the
-            aircraft's description.
+        world: the embedded world; None: quadrotors with PX4 in still air, one per vehicle of the options.
+            Missions and estimators can't reach it. With `connect` only its magnetic target is used, as the place
+            that a result is compared with.
+        speedup: simulated seconds per wall second at most in the embedded world; None: no limit.
         expected_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
             is not used: a mission plans in the same way for embedded and for other vehicles.
         parameters: autopilot parameters to set before the flight.
@@ -55,18 +56,9 @@ class RunRequest:
     options: MissionOptions = field(default_factory=FlightOptions)
     connect: Sequence[str] = ()
     system_ids: Sequence[int] = ()
-    autopilot: str = "px4"
-    model: str | Sequence[str] = "iris"
-    launch: str | None = None
-    seed: int = 0
+    world: "WorldSpec | None" = None
     speedup: float | None = None
-    wind_speed_m_s: float = 0.0
-    wind_from_deg: float = 0.0
-    wind_profile: str = "log"
-    turbulence: str = "none"
-    gps: str = "differential"
     expected_wind_m_s: float | None = None
-    home: str | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     out: Path | None = None
     picture: bool = True
@@ -82,11 +74,25 @@ class RunRequest:
     signing_key: SigningKey | None = None
 
     @property
-    def models(self) -> list[str]:
-        """The model of each vehicle of the team."""
-        if isinstance(self.model, str):
-            return [self.model] * self.options.vehicles
-        return list(self.model)
+    def embedded_world(self) -> "WorldSpec":
+        """The embedded world, its autopilots with the parameters to set.
+
+        Raises:
+            PlanError: it has another number of vehicles than the options.
+        """
+        from flightsim.world_spec import WorldSpec  # a connected flight does without
+
+        world = WorldSpec.of_team(self.options.vehicles) if self.world is None else self.world
+        count = len(world.vehicles)
+        if count != self.options.vehicles:
+            raise PlanError(f"the world has {count} vehicles, and `vehicles` is {self.options.vehicles}")
+        if not self.parameters:
+            return world
+        vehicles = tuple(
+            replace(vehicle, parameters={**vehicle.parameters, **self.parameters})
+            for vehicle in world.vehicles
+        )
+        return replace(world, vehicles=vehicles)
 
     @property
     def planning_wind_m_s(self) -> float:

@@ -158,7 +158,9 @@ def _fly_interruptible(
     folder = claimed.path
     stage = None
     try:
-        stage = open_vehicles(request) if request.connect else open_world(mission, request, claimed)
+        stage = open_vehicles(request) if request.connect else open_world(request, claimed)
+        if stage.published_map is not None:
+            request = replace(request, options=mission.with_map(request.options, stage.published_map))
         request.on_open()
         check_stage(mission, request, stage)
     except BaseException:
@@ -187,7 +189,7 @@ def _fly_interruptible(
         stage.loop.close()
     sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
-    debriefing = _debrief(mission, request, recorder.records, flight)
+    debriefing = _debrief(request, recorder.records, flight)
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
         reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)
@@ -333,15 +335,14 @@ async def _report(flight: Flight, on_progress: ProgressListener | None) -> None:
         await flight.clock.sleep(1.0)
 
 
-def _debrief(
-    mission: Mission[Any], request: RunRequest, records: FlightRecords, flight: Flight
-) -> Debriefing:
+def _debrief(request: RunRequest, records: FlightRecords, flight: Flight) -> Debriefing:
     from missions.runs.score import score
 
     notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
     flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
     options = notes[0].options if notes and notes[0].options is not None else request.options
-    return Debriefing(records=records, flights=flights, options=options)
+    target_ne_m = None if request.world is None else request.world.magnetic_target_ne_m
+    return Debriefing(records=records, flights=flights, options=options, target_ne_m=target_ne_m)
 
 
 def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:
@@ -377,13 +378,13 @@ def _summary(
         for key, value in asdict(replace(debriefing.options, arguments={}, centre=None, given=None)).items()
         if value is not None
     }
-    remote = bool(request.connect)
-    models = dict.fromkeys(request.models)
+    world = None if request.connect else request.embedded_world
+    vehicles = () if world is None else world.vehicles
     summary: dict[str, Any] = {
         "mission": mission.name,
-        "vehicle": "remote" if remote else ",".join(models),
-        "autopilot": notes[0].autopilot if notes else request.autopilot,
-        "seed": None if remote else request.seed,
+        "vehicle": "remote" if world is None else ",".join(dict.fromkeys(str(spec.model) for spec in vehicles)),
+        "autopilot": notes[0].autopilot if notes else vehicles[0].autopilot if vehicles else None,
+        "seed": None if world is None else world.seed,
         "outcome": outcome,
         "reason": reason,
         "sim_time_s": round(sim_time_s, 6),
@@ -400,14 +401,14 @@ def _summary(
         "command": request.command,
     }
     summary["planned_wind_m_s"] = request.planning_wind_m_s
-    if not remote:
+    if world is not None:
         summary["wind"] = {
-            "speed_m_s": request.wind_speed_m_s,
-            "from_deg": request.wind_from_deg,
-            "profile": request.wind_profile,
-            "turbulence": request.turbulence,
+            "speed_m_s": world.air.wind_speed_m_s,
+            "from_deg": world.air.wind_from_deg,
+            "profile": world.air.profile.law.value,
+            "turbulence": world.air.turbulence.value,
         }
-        summary["gps"] = request.gps
+        summary["gps"] = ",".join(dict.fromkeys(spec.gps for spec in vehicles))
     return summary
 
 

@@ -3,19 +3,22 @@
 import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.runs.claimed_folder import ClaimedFolder
 from missions.errors import PlanError
-from missions.mission import Mission
 from missions.runs.request import RunRequest
 from missions.runs.run_folder import EPOCH_UNIX_US
-from missions.scenario import Setting
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Link
+
+
+MAP_NAME: Final = "magnetic_map.npz"
+"""Name of the published magnetic map in a run folder."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -32,6 +35,7 @@ class Stage:
             requested.
         home: home of an embedded world; None: the vehicles report theirs.
         close: releases everything; called at the end.
+        published_map: file of the published magnetic map of an embedded world; None: there is none.
     """
 
     loop: asyncio.AbstractEventLoop
@@ -43,37 +47,22 @@ class Stage:
     parameters: Callable[[int, Sequence[str]], dict[str, float]] | None
     home: GeodeticPosition | None
     close: Callable[[], None]
+    published_map: Path | None = None
 
 
-def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder) -> Stage:
-    """Open an embedded SITL with the objects that the mission needs.
+def open_world(request: RunRequest, folder: ClaimedFolder) -> Stage:
+    """Open an embedded SITL.
 
     Raises:
         PlanError: a value is not accepted; the message names it and what is accepted.
         MissionError: a file that the world publishes cannot be written.
     """
-    from missions.embedded import EmbeddedConfiguration, open_embedded
+    from missions.embedded import EmbeddedSitl
 
-    scenario = mission.scenario(request.options, Setting(seed=request.seed, folder=folder.path))
-    folder.published.extend(scenario.published)
+    folder.published.append(folder.path / MAP_NAME)
     try:
-        sitl = open_embedded(
-            EmbeddedConfiguration(
-                vehicles=request.options.vehicles,
-                model=request.models,
-                launch=request.launch,
-                flavour=request.autopilot,
-                seed=request.seed,
-                speedup=request.speedup,
-                wind_speed_m_s=request.wind_speed_m_s,
-                wind_profile=request.wind_profile,
-                wind_from_deg=request.wind_from_deg,
-                turbulence=request.turbulence,
-                parameters=request.parameters,
-                home=request.home,
-                gps=request.gps,
-                scenario=scenario,
-            )
+        sitl = EmbeddedSitl(
+            request.embedded_world, publish_to=folder.path / MAP_NAME, speedup=request.speedup
         )
     except ValueError as error:
         raise PlanError(str(error)) from error
@@ -87,6 +76,7 @@ def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder
         parameters=sitl.parameters,
         home=sitl.home,
         close=sitl.close,
+        published_map=sitl.published_map,
     )
 
 

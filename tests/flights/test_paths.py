@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from flightsim.environment import Environment
+from flightsim.world_spec import WorldSpec
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
@@ -37,11 +39,15 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Any:
         windy = air == "windy"
         request = RunRequest(
             options=FlightOptions(pattern=name if name in LISSAJOUS else "L3", via=via),
-            autopilot=flavour,
-            seed=seed,
-            wind_speed_m_s=5.0 if windy else 0.0,
-            wind_from_deg=70.0 * seed,
-            turbulence="moderate" if windy else "none",
+            world=WorldSpec.of_team(
+                autopilot=flavour,
+                seed=seed,
+                air=Environment.from_wind(
+                    speed_m_s=5.0 if windy else 0.0,
+                    from_deg=70.0 * seed,
+                    turbulence="moderate" if windy else "none",
+                ),
+            ),
             out=runs / f"{name}-{flavour}-{via}-{air}-{seed}",
             picture=False,
         )

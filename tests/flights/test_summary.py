@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
+from flightsim.environment import Environment
+from flightsim.world_spec import WorldSpec
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
@@ -73,7 +75,12 @@ def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     result = fly(
         find_mission("lissajous"),
         RunRequest(
-            options=options, autopilot=request.param, seed=11, wind_speed_m_s=3.0, out=folder, picture=False
+            options=options,
+            world=WorldSpec.of_team(
+                autopilot=request.param, seed=11, air=Environment.from_wind(speed_m_s=3.0, from_deg=0.0)
+            ),
+            out=folder,
+            picture=False,
         ),
     )
     assert result.outcome == "completed", result.reason

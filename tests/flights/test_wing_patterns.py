@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from flightsim.environment import Environment
+from flightsim.world_spec import WorldSpec
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
@@ -31,12 +33,16 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Any:
             chosen["via"] = via
         request = RunRequest(
             options=FlightOptions(**chosen, given=frozenset(chosen)),
-            model="aerosonde",
-            autopilot=flavour,
-            seed=5,
-            wind_speed_m_s=6.0 if windy else 0.0,
-            wind_from_deg=300.0,
-            turbulence="moderate" if windy else "none",
+            world=WorldSpec.of_team(
+                model="aerosonde",
+                autopilot=flavour,
+                seed=5,
+                air=Environment.from_wind(
+                    speed_m_s=6.0 if windy else 0.0,
+                    from_deg=300.0,
+                    turbulence="moderate" if windy else "none",
+                ),
+            ),
             out=runs / f"{mission}-{flavour}-{via}-{windy}-{pattern}",
             picture=False,
         )
@@ -100,8 +106,7 @@ def test_search_patterns_turn_their_corners(flown: Any, mission: str, flavour: s
 def test_a_team_of_aircraft_and_a_quadrotor_flies_as_one(tmp_path: Path) -> None:
     request = RunRequest(
         options=FlightOptions(vehicles=3, pattern="L1", given=frozenset({"vehicles", "pattern"})),
-        model=("aerosonde", "aerosonde", "iris"),
-        seed=1,
+        world=WorldSpec.of_team(model=("aerosonde", "aerosonde", "iris"), seed=1),
         out=tmp_path / "team",
         picture=False,
     )
@@ -117,8 +122,8 @@ def test_a_team_of_aircraft_and_a_quadrotor_flies_as_one(tmp_path: Path) -> None
 def test_a_search_time_ends_the_pattern_and_lands(tmp_path: Path) -> None:
     chosen = {"search_time_s": 60.0, "pattern": "L1"}
     request = RunRequest(
-        options=FlightOptions(**chosen, given=frozenset(chosen)),  # type: ignore[arg-type]
-        model="aerosonde",
+        options=FlightOptions(**chosen, given=frozenset(chosen)),
+        world=WorldSpec.of_team(model="aerosonde"),
         out=tmp_path / "search",
         picture=False,
     )

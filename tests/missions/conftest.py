@@ -409,6 +409,7 @@ class FakeSitl:
     def __init__(self, flavour="px4", vehicles=1, truth=True):
         self.time_us = 0
         self.home = HOME
+        self.published_map = None
         self.autopilots, self.links, self._listeners = [], [], []
         for k in range(vehicles):
             theirs, ours = memory_pair(f"mission{k}", f"vehicle{k}")

@@ -8,8 +8,10 @@ import pytest
 
 from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.mavlink import dialect
+from flightsim.environment import Environment
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.embedded import EmbeddedConfiguration, open_embedded
+from flightsim.world_spec import WorldSpec
+from missions.embedded import EmbeddedSitl
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits
@@ -26,15 +28,14 @@ HEIGHT = 80.0
 
 def flown(flavour, script, *, wind=5.0):
     """Run `async def script(vehicle)` on an aircraft in wind from the east; gives its result."""
-    sitl = open_embedded(
-        EmbeddedConfiguration(
+    sitl = EmbeddedSitl(
+        WorldSpec.of_team(
             model="aerosonde",
-            flavour=flavour,
+            autopilot=flavour,
             seed=3,
-            wind_speed_m_s=wind,
-            wind_from_deg=90.0,
-            max_flight_s=900.0,
-        )
+            air=Environment.from_wind(speed_m_s=wind, from_deg=90.0),
+        ),
+        max_flight_s=900.0,
     )
 
     async def main():

@@ -7,7 +7,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.mission_plan import MissionItem
-from missions.embedded import EmbeddedConfiguration, open_embedded
+from flightsim.world_spec import WorldSpec
+from missions.embedded import EmbeddedSitl
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.limits_before_flight import adapted
@@ -20,7 +21,7 @@ both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 def fly_in_a_row(flavour: str, model: str, flights: list[FlightOptions]) -> list[Vehicle]:
     """Each flight by a client of its own, in one SITL."""
-    sitl = open_embedded(EmbeddedConfiguration(flavour=flavour, model=model))
+    sitl = EmbeddedSitl(WorldSpec.of_team(model=model, autopilot=flavour))
     mission = find_mission("sector")
 
     async def one(link, options: FlightOptions) -> Vehicle:

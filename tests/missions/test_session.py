@@ -18,6 +18,7 @@ from pymavlink import mavutil
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
+from flightsim.world_spec import WorldSpec
 from missions.cli import fly as cli_fly
 from missions.cli import main as cli
 from missions.errors import MissionError, PlanError
@@ -43,21 +44,16 @@ def embedded(monkeypatch, make_sitl):
     opened = []
     module = types.ModuleType("missions.embedded")
 
-    class EmbeddedConfiguration:
-        def __init__(self, **values):
-            self.__dict__.update(values)
-
     def model_kind(model):
         if model != "iris":
             raise ValueError(f"vehicle model {model!r} is unknown")
         return VehicleKind.MULTICOPTER
 
-    def open_embedded(configuration):
-        opened.append(make_sitl(configuration.flavour, configuration.vehicles))
+    def open_embedded(world, **_options):
+        opened.append(make_sitl(world.vehicles[0].autopilot, len(world.vehicles)))
         return opened[-1]
 
-    module.EmbeddedConfiguration = EmbeddedConfiguration
-    module.open_embedded = open_embedded
+    module.EmbeddedSitl = open_embedded
     module.model_kind = model_kind
     monkeypatch.setitem(sys.modules, "missions.embedded", module)
     return opened
@@ -72,7 +68,10 @@ def small(**changes):
 @pytest.mark.parametrize("name", [n for n, m in MISSIONS.items() if isinstance(m, PatternMission)])
 def test_every_mission_on_both_firmwares_by_both_ways(embedded, tmp_path, name, via, flavour):
     request = RunRequest(
-        options=small(via=via), autopilot=flavour, out=tmp_path / "run", seed=7, picture=False
+        options=small(via=via),
+        world=WorldSpec.of_team(autopilot=flavour, seed=7),
+        out=tmp_path / "run",
+        picture=False,
     )
     result = fly(find_mission(name), request)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -365,7 +364,7 @@ def test_a_failed_flight_exits_1_with_one_line(embedded, tmp_path, capsys, monke
         def advance(self):
             self.time_us += 20_000
 
-    monkeypatch.setattr(sys.modules["missions.embedded"], "open_embedded", lambda c: Deaf())
+    monkeypatch.setattr(sys.modules["missions.embedded"], "EmbeddedSitl", lambda *_, **__: Deaf())
     code, _out, err = command_line(capsys, "fly", "sector", "--out", str(tmp_path / "run"))
     assert code == 1
     assert len(err.splitlines()) == 1

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from flightsim.world_spec import WorldSpec
 from missions.kind import VehicleKind
 from missions.library import find_mission
 from missions.notes import PATTERN, CommandedPath, FlightNotes
@@ -122,9 +123,14 @@ def test_a_mission_that_is_reported_and_not_flown_has_failed(
 
             autopilot._fly = stay
 
-    monkeypatch.setattr("missions.embedded.open_embedded", lambda configuration: Idle())
+    monkeypatch.setattr("missions.embedded.EmbeddedSitl", lambda world, **_: Idle())
     options = FlightOptions(pattern="sector", width_m=60.0, height_m=60.0, via=via)
-    request = RunRequest(options=options, autopilot=flavour, picture=False, out=tmp_path / "run")
+    request = RunRequest(
+        options=options,
+        world=WorldSpec.of_team(autopilot=flavour),
+        picture=False,
+        out=tmp_path / "run",
+    )
     result = fly(find_mission("sector"), request)
     assert result.outcome == "failed"
     assert "own position" in result.reason

@@ -9,7 +9,10 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
 from estimators.messages import read_message
 from estimators.orbit_target.attitude import FilterAttitude
 from estimators.vehicle_time import VehicleTime
+from flightsim.environment import Environment
 from flightsim.foundation.vectors import yaw_of
+from flightsim.world_spec import WorldSpec
+from missions.embedded import orbit_world
 from missions.library import find_mission
 from missions.orbit.options import AttitudeFrom, OrbitOptions
 from missions.runs.session import RunRequest, fly
@@ -126,16 +129,18 @@ def test_names_are_what_must_be_listened_to():
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_an_orbit_flown_with_it(tmp_path, autopilot):
     """The circle is held as with the autopilot's attitude."""
+    options = OrbitOptions(duration_s=120.0, attitude=AttitudeFrom.FILTER)
+    world = WorldSpec.of_team(
+        model="aerosonde",
+        autopilot=autopilot,
+        seed=1,
+        air=Environment.from_wind(speed_m_s=4.0, from_deg=40.0, turbulence="light"),
+    )
     result = fly(
         find_mission("orbit"),
         RunRequest(
-            options=OrbitOptions(duration_s=120.0, attitude=AttitudeFrom.FILTER),
-            autopilot=autopilot,
-            model="aerosonde",
-            seed=1,
-            wind_speed_m_s=4.0,
-            wind_from_deg=40.0,
-            turbulence="light",
+            options=options,
+            world=orbit_world(world, options),
             out=tmp_path / "run",
             picture=False,
         ),

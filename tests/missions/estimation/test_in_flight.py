@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimators.logs import open_log
+from flightsim.world_spec import WorldSpec
 from missions.cli.main import run_command_line
 from missions.errors import PlanError
 from missions.estimation.in_flight import estimators_of
@@ -26,21 +27,21 @@ def scripted(monkeypatch, make_sitl):
     """Embedded worlds are scripted autopilots; gives the list of those that were opened."""
     opened = []
     module = types.ModuleType("missions.embedded")
-    module.EmbeddedConfiguration = lambda **values: types.SimpleNamespace(**values)
     module.model_kind = lambda _model: VehicleKind.MULTICOPTER
 
-    def open_embedded(configuration):
-        opened.append(make_sitl(configuration.flavour, configuration.vehicles))
+    def open_embedded(world, **_options):
+        opened.append(make_sitl(world.vehicles[0].autopilot, len(world.vehicles)))
         return opened[-1]
 
-    module.open_embedded = open_embedded
+    module.EmbeddedSitl = open_embedded
     monkeypatch.setitem(sys.modules, "missions.embedded", module)
     return opened
 
 
 def flight(tmp_path, **changes):
     options = FlightOptions(width_m=40.0, height_m=30.0, pattern="L2", vehicles=changes.pop("vehicles", 1))
-    request = RunRequest(options=options, out=tmp_path / "run", picture=False, **changes)
+    world = WorldSpec.of_team(options.vehicles, autopilot=changes.pop("autopilot", "px4"))
+    request = RunRequest(options=options, world=world, out=tmp_path / "run", picture=False, **changes)
     return fly(find_mission("lissajous"), request)
 
 

@@ -13,18 +13,21 @@ import pytest
 
 from autopilot_bridge.mavlink import decode, definition
 from autopilot_bridge.tlog import TlogReader
+from flightsim.environment import Environment
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.home import Home
 from flightsim.payload import DipoleSignature, MagneticMap, magnetic_field_of
+from flightsim.world_spec import WorldSpec
 from missions.cli import main as cli
-from missions.embedded.scenario import magnetic_spec
+from missions.embedded import occupancy_world
 from missions.errors import PlanError
-from missions.occupancy.mission import MAP_NAME, OccupancyMission
+from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
 from missions.runs.records import FlightRecords
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
-from missions.scenario import Scenario, Setting
+from missions.runs.vehicle_opening import MAP_NAME
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 
 SMALL = OccupancyOptions(
@@ -36,12 +39,17 @@ SMALL = OccupancyOptions(
     cell_m=100.0,
     detection_range_m=60.0,
     confirmations=1,
-    target_ne_m=(110.0, 30.0),
 )
+TARGET_NE_M = (110.0, 30.0)
 
 
-def request(out, options=SMALL, **values) -> RunRequest:
-    return RunRequest(options=options, out=out, **{"seed": 1, "model": "iris", **values})
+def world_of(options=SMALL, *, target_ne_m=TARGET_NE_M, moment_a_m2=None, **values) -> WorldSpec:
+    world = WorldSpec.of_team(options.vehicles, **{"seed": 1, **values})
+    return occupancy_world(world, options, target_ne_m=target_ne_m, moment_a_m2=moment_a_m2)
+
+
+def request(out, options=SMALL, *, picture=True, **values) -> RunRequest:
+    return RunRequest(options=options, world=world_of(options, **values), out=out, picture=picture)
 
 
 @pytest.fixture(scope="module")
@@ -86,10 +94,11 @@ def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_rep
     assert not (again.folder / MAP_NAME).exists()
 
 
-def true_field(found, options=SMALL, *, target=True):
+def true_field(found, *, target=True, moment_a_m2=None):
     """The field of the flown world, made again, with its target or without."""
-    survey = OccupancyMission().scenario(options, Setting(seed=1, folder=found.folder)).survey
-    spec = magnetic_spec(survey if target else replace(survey, target_ne_m=None))
+    spec = world_of(moment_a_m2=moment_a_m2).magnetic_field
+    if not target:
+        spec = replace(spec, signatures=())
     home = MagneticMap.load(found.folder / MAP_NAME).home
     return magnetic_field_of(spec, home=home, seed=1, decimal_year=2026.0)[0]
 
@@ -142,8 +151,7 @@ def test_the_field_is_not_the_published_map(found):
     differential_nt = np.concatenate(away_nt)
     assert len(differential_nt) > 100
     assert differential_nt.std() > 1.0  # the magnetometer's own noise is 0.2 nT
-    dipole = replace(SMALL, moment_a_m2=2e4)
-    seen = true_field(found, dipole)
+    seen = true_field(found, moment_a_m2=2e4)
     assert isinstance(seen.signatures[0], DipoleSignature)
     assert np.linalg.norm(seen.signatures[0].moment_ned_a_m2) == pytest.approx(2e4)
 
@@ -166,15 +174,10 @@ def test_a_map_without_data_in_the_area_is_refused_before_anything_starts(found,
         )
 
 
-class WithoutMagnetometer(OccupancyMission):
-    def scenario(self, options, setting):
-        super().scenario(options, setting)
-        return Scenario()
-
-
 def test_without_a_magnetometer_nobody_takes_off(found, tmp_path):
     options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
-    result = fly(WithoutMagnetometer(), request(tmp_path / "run", options))
+    bare = replace(request(tmp_path / "run", options), world=WorldSpec.of_team(options.vehicles))
+    result = fly(OccupancyMission(), bare)
     assert result.outcome == "failed"
     assert "no survey magnetometer" in result.reason
     for block in result.summary["vehicles"]:
@@ -184,7 +187,7 @@ def test_without_a_magnetometer_nobody_takes_off(found, tmp_path):
 
 def test_a_map_of_another_place_keeps_everybody_on_the_ground(found, tmp_path):
     options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
-    elsewhere = request(tmp_path / "run", options, home="47.6,8.6,500")
+    elsewhere = request(tmp_path / "run", options, home=Home.parse("47.6,8.6,500"))
     with pytest.raises(PlanError, match="the map of this place"):
         fly(OccupancyMission(), elsewhere)
     assert not (tmp_path / "run").exists()
@@ -250,7 +253,7 @@ def test_the_command_line_refuses_with_usage_errors(arguments, words, tmp_path, 
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_three_aircraft_search_in_wind(autopilot, tmp_path):
-    options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0, target_ne_m=(-300.0, 350.0))
+    options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0)
     result = fly(
         OccupancyMission(),
         request(
@@ -258,9 +261,8 @@ def test_three_aircraft_search_in_wind(autopilot, tmp_path):
             options,
             model="aerosonde",
             autopilot=autopilot,
-            wind_speed_m_s=5.0,
-            wind_from_deg=270.0,
-            turbulence="light",
+            target_ne_m=(-300.0, 350.0),
+            air=Environment.from_wind(speed_m_s=5.0, from_deg=270.0, turbulence="light"),
         ),
     )
     assert (result.outcome, result.reason) == ("completed", "")
@@ -275,9 +277,11 @@ def test_three_aircraft_search_in_wind(autopilot, tmp_path):
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_quadrotor_and_two_aircraft_search_together(tmp_path):
-    options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0, target_ne_m=(-500.0, 400.0))
+    options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0)
     models = ("aerosonde", "aerosonde", "iris")
-    result = fly(OccupancyMission(), request(tmp_path / "run", options, model=models, wind_speed_m_s=4.0))
+    air = Environment.from_wind(speed_m_s=4.0, from_deg=0.0)
+    asked = request(tmp_path / "run", options, model=models, target_ne_m=(-500.0, 400.0), air=air)
+    result = fly(OccupancyMission(), asked)
     assert (result.outcome, result.reason) == ("completed", "")
     summary = result.summary
     assert [searcher["kind"] for searcher in summary["searchers"]] == ["fixed_wing"] * 2 + ["multicopter"]

@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import pytest
 
+from flightsim.world_spec import WorldSpec
+from missions.embedded import occupancy_world
+from missions.embedded.worlds import drawn_target
 from missions.errors import PlanError
-from missions.mission import Mission
-from missions.occupancy.mission import OccupancyMission, drawn_target
+from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions, check_vehicle
 from missions.planning.limits import FixedWingLimits, MulticopterLimits
-from missions.scenario import Setting
 
 WINGS = FixedWingLimits(
     airspeed_min_m_s=18.0,
@@ -34,13 +35,10 @@ WINGS = FixedWingLimits(
         ({"detection_range_m": 0.0}, "`detection_range_m`"),
         ({"threshold_nt": 1.0}, "`threshold_nt` 1 nT is below 3 standard deviations"),
         ({"noise_nt": 2.0}, "`noise_nt`"),
-        ({"amplitude_nt": 2.0}, "`amplitude_nt`"),
-        ({"sigma_along_m": 0.0}, "`sigma_along_m`"),
         ({"confirmations": 0}, "`confirmations`"),
         ({"raise_radius_m": 0.0}, "`raise_radius_m`"),
         ({"search_time_s": 0.0}, "`search_time_s`"),
         ({"search_time_s": 1e6}, "`search_time_s`"),
-        ({"target_ne_m": (0.0, 1300.0)}, "`target_ne_m` 0,1300 is outside the searched map"),
         ({"area_ne_m": (math.nan, 0.0)}, "`area_ne_m`"),
         ({"vehicles": 0}, "`vehicles`"),
     ],
@@ -81,6 +79,22 @@ def test_each_kind_of_vehicle_has_its_own_habits_and_speed():
     assert (chosen.heading_penalty, chosen.speed_m_s) == (0.7, 8.0)
 
 
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"amplitude_nt": 2.0}, "`amplitude_nt` 2 nT of the target is not beyond `threshold_nt`"),
+        ({"sigma_along_m": 0.0}, "`sigma_along_m` 0 m of the target is not possible"),
+        ({"sigma_across_m": math.nan}, "`sigma_across_m` nan m"),
+        ({"moment_a_m2": -1.0}, "`moment_a_m2` -1 A m2"),
+        ({"depth_m": 2000.0}, "`depth_m` 2000 m of the target is not within 1000 m"),
+        ({"target_ne_m": (0.0, 1300.0)}, "`target_ne_m` 0,1300 is outside the searched map"),
+    ],
+)
+def test_an_impossible_target_is_refused_by_name(values, words):
+    with pytest.raises(PlanError, match=words):
+        occupancy_world(WorldSpec(), OccupancyOptions(), **values)
+
+
 def test_the_target_follows_the_seed_and_nothing_else():
     options = OccupancyOptions(vehicles=3)
     first, _ = drawn_target(options, 1)
@@ -88,18 +102,22 @@ def test_the_target_follows_the_seed_and_nothing_else():
     assert drawn_target(options, 2)[0] != first
     for seed in range(50):
         assert options.layout.contains(*drawn_target(options, seed)[0])
-    given = replace(options, target_ne_m=(10.0, 20.0))
-    assert drawn_target(given, 1)[0] == (10.0, 20.0)
+    assert drawn_target(options, 1, (10.0, 20.0))[0] == (10.0, 20.0)
 
 
-def test_a_world_is_asked_for_with_room_around_the_area(tmp_path):
-    mission: Mission = OccupancyMission()
+def test_the_world_of_a_search_has_magnetometers_and_a_map_with_room_around_the_area(tmp_path):
     options = OccupancyOptions(area_ne_m=(300.0, -100.0))
-    survey = mission.scenario(options, Setting(seed=1, folder=tmp_path)).survey
-    assert survey is not None
-    assert survey.publish_to == tmp_path / "magnetic_map.npz"
-    assert 0.5 * survey.height_m >= 300.0 + 1200.0 + 200.0
-    assert 0.5 * survey.width_m >= 100.0 + 1200.0 + 200.0
+    world = occupancy_world(WorldSpec(seed=1), options)
+    field = world.magnetic_field
+    assert field.map_file is None
+    assert 0.5 * field.height_m >= 300.0 + 1200.0 + 200.0
+    assert 0.5 * field.width_m >= 100.0 + 1200.0 + 200.0
+    assert all(vehicle.payload.magnetometer for vehicle in world.vehicles)
+    assert occupancy_world(world, options, target_ne_m=(0.0, 0.0)) == world  # its own field stays
+    given = occupancy_world(WorldSpec(), replace(options, map_file=str(tmp_path / "map.npz")))
+    assert given.magnetic_field.map_file == tmp_path / "map.npz"
+    published = OccupancyMission().with_map(options, tmp_path / "made.npz")
+    assert published.map_file == str(tmp_path / "made.npz")
 
 
 def test_a_map_that_is_none_is_refused_before_the_flight(tmp_path):

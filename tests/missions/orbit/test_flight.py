@@ -3,33 +3,39 @@
 import json
 import math
 import struct
+from dataclasses import replace
 
 import pytest
 
 from autopilot_bridge.mavlink import decode
 from autopilot_bridge.tlog import TlogReader
+from flightsim.environment import Environment
+from flightsim.world_spec import WorldSpec
+from missions.embedded import orbit_world
 from missions.library import find_mission
 from missions.orbit.options import GpsOff, OrbitOptions
 from missions.runs.records import FlightRecords
 from missions.runs.run_folder import EPOCH_UNIX_US
 from missions.runs.session import RunRequest, fly
-from missions.scenario import Scenario
 from tests.slow import slow
 
 KEYS = {"radius_mean_error_percent", "radius_std_m", "altitude_error_m", "gps_lost_at_s"}
 
 
-def orbit(tmp_path, autopilot="px4", picture=False, name="run", seed=1, **options):
+def orbit(tmp_path, autopilot="px4", picture=False, name="run", seed=1, target=True, **changes):
+    options = OrbitOptions(**({"duration_s": 60.0} | changes))
+    world = WorldSpec.of_team(
+        model="aerosonde",
+        autopilot=autopilot,
+        seed=seed,
+        air=Environment.from_wind(speed_m_s=4.0, from_deg=40.0, turbulence="light"),
+    )
+    world = orbit_world(world, options)
     return fly(
         find_mission("orbit"),
         RunRequest(
-            options=OrbitOptions(**({"duration_s": 60.0} | options)),
-            autopilot=autopilot,
-            model="aerosonde",
-            seed=seed,
-            wind_speed_m_s=4.0,
-            wind_from_deg=40.0,
-            turbulence="light",
+            options=options,
+            world=world if target else replace(world, targets=()),
             out=tmp_path / name,
             picture=picture,
         ),
@@ -104,10 +110,8 @@ def test_the_same_seed_flies_the_same_orbit(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_target_that_is_not_there_ends_the_mission_and_brings_the_aircraft_home(tmp_path, monkeypatch):
-    mission = find_mission("orbit")
-    monkeypatch.setattr(type(mission), "scenario", lambda self, options, setting: Scenario(camera=True))
-    result = orbit(tmp_path, duration_s=60.0, lost_limit_s=8.0)
+def test_a_target_that_is_not_there_ends_the_mission_and_brings_the_aircraft_home(tmp_path):
+    result = orbit(tmp_path, target=False, duration_s=60.0, lost_limit_s=8.0)
     assert result.outcome == "failed"
     assert "the target was never seen" in result.reason
     assert result.summary["gps_back_at_s"] is not None

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from flightsim.home import Home
+from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.library import find_mission
 from missions.options import FlightOptions
@@ -18,11 +20,18 @@ both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
 
 def request(path: Path, flavour: str = "px4", **more) -> RunRequest:
-    world = find_mission(str(path)).world_defaults
+    defaults = find_mission(str(path)).world_defaults
+    home = more.pop("home", defaults.home)
     asked = RunRequest(
-        options=FileOptions(), autopilot=flavour, model=world.model, home=world.home, picture=False,
+        options=FileOptions(),
+        world=WorldSpec.of_team(
+            model=more.pop("model", defaults.model),
+            autopilot=flavour,
+            home=None if home is None else Home.parse(home),
+        ),
+        picture=False,
         out=path.parent / "run",
-    )  # fmt: skip
+    )
     return replace(asked, **more)
 
 
@@ -107,7 +116,10 @@ def test_an_aircraft_flies_its_plan_and_lands(flavour: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(("flavour", "suffix"), [("px4", ".plan"), ("ardupilot", ".waypoints")])
 def test_a_pattern_is_written_and_flown_from_its_file(flavour: str, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"l2{suffix}"
-    asked = RunRequest(options=FlightOptions(pattern="L2", width_m=40.0, height_m=40.0), autopilot=flavour)
+    asked = RunRequest(
+        options=FlightOptions(pattern="L2", width_m=40.0, height_m=40.0),
+        world=WorldSpec.of_team(autopilot=flavour),
+    )
     count = export_plan(find_mission("lissajous"), asked, path)
     document = read_mission_file(path)
     assert len(document.items) == count > 10
