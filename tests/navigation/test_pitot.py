@@ -53,6 +53,38 @@ def test_any_values(pressure_pa: float, static_pa: float, temperature_c: float) 
     assert 0.5 < pitot.true_per_equivalent < 5.0
 
 
+@pytest.mark.parametrize(
+    ("static_pa", "valid"), [(1.0e4, True), (9_999.5, False), (1.2e5, True), (120_000.5, False)]
+)
+def test_an_impossible_static_pressure_leaves_the_density(static_pa: float, valid: bool) -> None:
+    assert (pitot_at(100.0, static_pa, 20.0).true_per_equivalent != 1.0) == valid
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "valid"), [(-60.0, True), (-60.5, False), (80.0, True), (80.5, False)]
+)
+def test_an_impossible_temperature_is_as_none(temperature_c: float, valid: bool) -> None:
+    standard = pitot_at(100.0, 95_000.0, math.nan).true_per_equivalent
+    assert (pitot_at(100.0, 95_000.0, temperature_c).true_per_equivalent != standard) == valid
+
+
+@pytest.mark.parametrize(
+    ("pressure_pa", "valid"), [(1.0e4, True), (10_001.0, False), (-1.0e4, True), (-10_001.0, False)]
+)
+def test_an_impossible_differential_pressure_is_no_sample(pressure_pa: float, valid: bool) -> None:
+    assert (pitot_at(pressure_pa, 95_000.0, 20.0).sample_us == 1000) == valid
+
+
+def test_a_sensor_is_alive_for_a_second_after_a_sample_and_two_after_a_change() -> None:
+    pitot = pitot_at(100.0, 95_000.0, 20.0)
+    assert pitot.alive(1_002_000) and not pitot.alive(1_002_001)
+    pitot._readings.airspeed.time_us = 1_500_000
+    pitot.look(1_500_000)
+    assert pitot.alive(2_002_000) and not pitot.alive(2_002_001)
+    pitot.restart()
+    assert not pitot.alive(1_500_000)
+
+
 def test_alive() -> None:
     readings = SensorReadings()
     pitot = Pitot(PARAMETERS, readings=readings)

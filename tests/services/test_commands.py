@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.services.commands.handlers import whole
 from tests.services.command_rig import NAN, ServiceRig
 
 ARM, MODE, TAKEOFF, LAND, RTL = 400, 176, 22, 21, 20
@@ -483,3 +484,21 @@ def test_no_command_ever_raises(place: tuple[str, str], calls: list[tuple]) -> N
         assert len(acks) <= 2
         rig.run(0.1)
         sane(rig)
+
+
+@pytest.mark.parametrize(
+    ("value", "number"),
+    [
+        (2.5, 3),
+        (2.49, 2),
+        (-2.5, -3),
+        (-2.49, -2),
+        (0.5, 1),
+        (-0.5, -1),
+        (0.0, 0),
+        (math.nan, 7),
+        (-math.inf, 7),
+    ],
+)
+def test_whole_numbers_are_rounded_half_away_from_zero(value: float, number: int) -> None:
+    assert whole(value, 7) == number

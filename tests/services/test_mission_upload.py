@@ -213,6 +213,104 @@ def test_another_partner_does_not_disturb_an_upload(vehicle: Vehicle) -> None:
     assert vehicle.mission[1].z == 10.0
 
 
+@pytest.mark.parametrize("changed", [{"system_id": 254}, {"component_id": 191}])
+def test_a_partner_is_a_component_on_a_channel(vehicle: Vehicle, changed: dict[str, int]) -> None:
+    """The answers go to the client that sent the message; a cancellation by another one has no effect."""
+    vehicle.tell(count(3))
+    stranger = vehicle.gcs._replace(**changed)
+    (reply,) = vehicle.tell(count(2), stranger)
+    assert reply.type == vehicle.policy.foreign_count_result
+    assert (reply.target_system, reply.target_component) == (stranger.system_id, stranger.component_id)
+    twin = vehicle.gcs._replace(channel=vehicle.other)
+    for other in (stranger, twin):
+        assert vehicle.tell(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED), other) == []
+        assert vehicle.tell(ack(mavlink.MAV_MISSION_UNSUPPORTED), other) == []
+    for each in plan(3):
+        (reply,) = vehicle.tell(each)
+    assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0) and len(vehicle.stores[0].items) == 3
+
+
+def test_an_item_of_another_partner_is_refused_as_each_firmware_does(vehicle: Vehicle) -> None:
+    vehicle.tell(count(3))
+    stranger = vehicle.gcs._replace(component_id=191)
+    replies = vehicle.tell(item(0, z=99.0), stranger)
+    if vehicle.policy is PX4_MISSION_POLICY:
+        assert replies == [] and vehicle.texts[-1][1] == "REJ. MIS ITEM: partner id mismatch"
+    else:
+        (reply,) = replies
+        assert (reply.type, reply.target_component) == (mavlink.MAV_MISSION_DENIED, 191)
+
+
+@pytest.mark.parametrize("changed", [{"system_id": 254}, {"component_id": 191}])
+def test_the_last_item_again_is_acknowledged_again_for_its_sender(
+    px4: Vehicle, changed: dict[str, int]
+) -> None:
+    items = plan(2)
+    upload(px4, items)
+    plan_id = px4.stores[MissionType.MISSION].plan_id
+    (again,) = px4.tell(items[1])
+    assert (again.type, again.opaque_id) == (0, plan_id)
+    for message, source in (
+        (items[0], px4.gcs),
+        (item(1, kind=1), px4.gcs),
+        (items[1], px4.gcs._replace(**changed)),
+        (items[1], px4.gcs._replace(channel=px4.other)),
+    ):
+        px4.take_texts()
+        (refused,) = px4.tell(message, source)
+        assert refused.type == mavlink.MAV_MISSION_ERROR
+        assert px4.take_texts()[-1][1] == "IGN MISSION_ITEM: No transfer"
+
+
+@pytest.mark.parametrize(
+    ("flavour", "retry_s", "timeout_s", "ends"), [("px4", 0.25, 5.0, []), ("ardupilot", 1.0, 8.0, [15])]
+)
+def test_when_an_item_is_requested_again_and_when_the_upload_ends(
+    flavour: str, retry_s: float, timeout_s: float, ends: list[int]
+) -> None:
+    vehicle = Vehicle(flavour)
+    vehicle.tell(count(2))
+    heard = vehicle.tick(timeout_s + 3.0)
+    asked = [at for at, message in heard if message.get_type().startswith("MISSION_REQUEST")]
+    tick_s = 0.02
+    step_s = tick_s * (math.floor(retry_s / tick_s + 1e-9) + 1)  # after the time, not at it
+    assert asked == pytest.approx([step_s * (k + 1) for k in range(int(timeout_s / step_s + 1e-9))])
+    acks = [(at, message.type) for at, message in heard if message.get_type() == "MISSION_ACK"]
+    assert [kind for _, kind in acks] == ends
+    assert [at for at, _ in acks] == pytest.approx([timeout_s + tick_s] * len(ends))
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "accepted"), [(0, 2, True), (1, 1, True), (2, 3, False), (-1, 1, False), (2, 1, False)]
+)
+def test_a_part_of_a_plan_is_uploaded_again(
+    ardupilot: Vehicle, first: int, last: int, accepted: bool
+) -> None:
+    upload(ardupilot, plan(3))
+    message = mavlink.MAVLink_mission_write_partial_list_message(1, 1, first, last, 0)
+    (reply,) = ardupilot.tell(message)
+    assert (reply.get_type() == "MISSION_REQUEST") == accepted
+    if not accepted:
+        assert reply.type == mavlink.MAV_MISSION_ERROR
+        return
+    for seq in range(first, last + 1):
+        assert reply.seq == seq
+        (reply,) = ardupilot.tell(item(seq, z=77.0))
+    assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0)
+    changed = [index for index, each in enumerate(ardupilot.mission) if each.z == 77.0]
+    assert len(ardupilot.mission) == 3 and set(changed) == set(range(first, last + 1)) - {0}  # 0 is home
+
+
+def test_a_part_is_refused_for_another_partner_and_an_unknown_type(ardupilot: Vehicle) -> None:
+    upload(ardupilot, plan(3))
+    unknown = mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 1, 77)
+    assert ardupilot.tell(unknown)[0].type == mavlink.MAV_MISSION_UNSUPPORTED
+    ardupilot.tell(count(2))
+    part = mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 1, 0)
+    (reply,) = ardupilot.tell(part, ardupilot.gcs._replace(component_id=191))
+    assert reply.type == mavlink.MAV_MISSION_DENIED
+
+
 BAD: list[tuple[Any, int | None, int]] = [
     # (item 1 of a mission, PX4's result, ArduPilot's result)
     (item(1, 9999), 3, 3),

@@ -125,6 +125,7 @@ def test_rally_points() -> None:
     assert [item.z for item in vehicle.rally()] == [-20.0, 80.0]
     (back,) = vehicle.tell(mavlink.MAVLink_rally_fetch_point_message(1, 1, 1))
     assert (back.idx, back.count, back.lat, back.alt) == (1, 2, 475000000, 80)
+    assert (back.break_alt, back.land_dir, back.flags) == (0, 0, 0)
     assert vehicle.tell(mavlink.MAVLink_rally_fetch_point_message(1, 1, 2)) == []
     assert vehicle.texts[-1] == "Bad rally point ID"
     for message, text in (

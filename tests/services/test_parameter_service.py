@@ -5,6 +5,7 @@ Expected: docs/firmware/px4.md, section 11, and docs/firmware/ardupilot.md, sect
 
 import math
 import struct
+import zlib
 from typing import Any
 
 import pytest
@@ -206,6 +207,15 @@ def test_px4_hash_follows_the_values(px4: Vehicle) -> None:
     assert px4.service.hash_check != before
     px4.store.set("MPC_XY_CRUISE", 5.0)
     assert px4.service.hash_check == before
+
+
+def test_px4_hash_is_the_crc_of_names_and_raw_values(px4: Vehicle) -> None:
+    crc = 0
+    for definition in px4.store.definitions:
+        value = px4.store.get(definition.name)
+        raw = struct.pack("<i", int(value)) if definition.is_integer else struct.pack("<f", value)
+        crc = zlib.crc32(raw, zlib.crc32(definition.name.encode(), crc))
+    assert px4.service.hash_check == crc
 
 
 def test_px4_setting_the_hash_ends_the_list(px4: Vehicle) -> None:

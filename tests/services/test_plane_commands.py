@@ -259,6 +259,81 @@ def test_arduplane_heading_altitude_and_airspeed_are_flown() -> None:
     assert rig.int(CHANGE_ALTITUDE, 0, 0, 0, 0, 0, 0, 50.0, frame=1) == [2]
 
 
+class Noted:
+    """Notes what a guided command passes on, in the place of the guidance."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[float, ...]] = []
+
+    def change_heading(self, heading_rad: float, *, course: bool, acceleration_m_s2: float) -> None:
+        self.calls.append((heading_rad, course, acceleration_m_s2))
+
+    def change_altitude(self, down_m: float, *, rate_m_s: float) -> None:
+        self.calls.append((down_m, rate_m_s))
+
+    def change_airspeed(self, airspeed_m_s: float, *, acceleration_m_s2: float) -> None:
+        self.calls.append((airspeed_m_s, acceleration_m_s2))
+
+
+@pytest.mark.parametrize(
+    ("command", "parameters", "passed_on"),
+    [
+        (CHANGE_HEADING, (0, 90, 3), (math.pi / 2.0, True, 3.0)),
+        (CHANGE_HEADING, (1, 0, 0.04), (0.0, False, 0.05)),
+        (CHANGE_HEADING, (1, 359.5, -3), (math.radians(359.5), False, 0.05)),
+        (CHANGE_HEADING, (1, 180, NAN), (math.pi, False, 0.05)),
+        (CHANGE_ALTITUDE, (0, 0, -2.5, 0, 0, 0, 120), (-120.0, 2.5)),
+        (CHANGE_ALTITUDE, (0, 0, NAN, 0, 0, 0, 120), (-120.0, 0.0)),
+        (CHANGE_ALTITUDE, (0, 0, 2.5, 0, 0, 0, -2), (2.0, 2.5)),
+        (CHANGE_SPEED, (0, 25, -1.5), (25.0, 1.5)),
+        (CHANGE_SPEED, (0, 25, NAN), (25.0, 0.0)),
+    ],
+)
+def test_rates_and_accelerations_of_guided_changes(
+    command: int, parameters: tuple[float, ...], passed_on: tuple[float, ...]
+) -> None:
+    """Rates have no sign; the lateral acceleration is at least 0.05 m/s^2."""
+    rig = rig_of("ardupilot", "flying")
+    rig.commander.guidance = noted = Noted()  # type: ignore[assignment]
+    assert rig.long(command, *parameters) == [0]
+    assert noted.calls == [pytest.approx(passed_on, abs=0.01)]
+
+
+def test_the_limits_of_guided_airspeeds() -> None:
+    for name, outside in (("AIRSPEED_MIN", -0.5), ("AIRSPEED_MAX", 0.5)):
+        rig = rig_of("ardupilot", "flying")
+        limit = rig.store.get(name)
+        for command, answer in ((CHANGE_SPEED, 2), (mavlink.MAV_CMD_DO_CHANGE_SPEED, 4)):
+            assert rig.long(command, 0, limit) == [0]
+            assert rig.long(command, 0, limit + outside) == [answer]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "answer", "texts"),
+    [
+        ((9, 0, 0), 4, []),
+        ((9, 0, 1), 0, ["Set throttle 1"]),
+        ((9, 0, 100), 0, ["Set throttle 100"]),
+        ((9, 0, 101), 4, []),
+        ((9, 0, -1), 4, []),
+        ((9, 0, NAN), 4, []),
+        ((1, 0, 0), 0, ["Set groundspeed 0 m/s"]),
+        ((1, 100, 0), 0, ["Set groundspeed 100 m/s"]),
+        ((1, 100.5, 0), 4, []),
+        ((1, -0.5, 0), 4, []),
+        ((1, -1, 60), 0, ["Set throttle 60"]),
+        ((0, -2, 60), 0, []),
+        ((NAN, 25, 0), 0, ["Set airspeed 25 m/s"]),
+    ],
+)
+def test_speed_ground_speed_and_throttle(
+    parameters: tuple[float, ...], answer: int, texts: list[str]
+) -> None:
+    rig = rig_of("ardupilot", "flying")
+    assert rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, *parameters) == [answer]
+    assert rig.channel.texts() == texts
+
+
 def landing_plan(rig: PlaneRig) -> tuple[MissionItem, ...]:
     return (
         rig.waypoint(500.0, 0.0, 100.0),
