@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.channels import AutopilotChannel, ChannelStreams
-from autopilot_bridge.autopilot.firmware import FIRMWARES
-from autopilot_bridge.autopilot.messages import telemetry_messages
-from autopilot_bridge.autopilot.microservices import microservices
 from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
+from autopilot_bridge.autopilot.status_text import StatusTextService
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
@@ -41,7 +39,6 @@ from autopilot_bridge.services.parameters.parameter_file import boot_parameters
 from autopilot_bridge.services.parameters.protocol import ParameterService, fix_identity
 from autopilot_bridge.services.plans.geofence import MissionFence
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
-from autopilot_bridge.services.status_text import StatusTextService
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
@@ -119,7 +116,7 @@ class Autopilot:
     ) -> None:
         if physics_rate_hz % SLOW_RATE_HZ:
             raise ValueError(f"physics rate {physics_rate_hz} Hz is not a multiple of {SLOW_RATE_HZ} Hz")
-        firmware = FIRMWARES[flavour.name, flavour.kind]
+        firmware = flavour.services
         self.flavour = flavour
         self.system_id = system_id
         self.channels: list[AutopilotChannel] = []
@@ -140,7 +137,7 @@ class Autopilot:
         memory = VehicleMemory(
             card=card,
             stored=boot_parameters(
-                self.parameters, card, flavour.name, system_id=system_id, given=parameters or {}
+                self.parameters, card, firmware.card, system_id=system_id, given=parameters or {}
             ),
             time_us=lambda: self._time_us,
             unix_epoch_us=unix_epoch_us,
@@ -201,23 +198,27 @@ class Autopilot:
         self._status = StatusReport(flavour, self.commander)
         self._view = TelemetryView(self.context, self.navigation.state, readings)
         self._messages = self._build_messages(unix_epoch_us)
-        self._more = microservices(
-            AutopilotParts(
-                flavour=flavour,
-                system_id=system_id,
-                commander=self.commander,
-                navigation=self.navigation,
-                parameters=self.parameters,
-                readings=readings,
-                stores=stores,
-                missions=firmware.missions,
-                broadcast=self,
-                announce=self._texts.announce,
-                memory=memory,
-                simulation=simulation,
-                execute=lambda command: self.commands.carry_out(command),
-            )
+        parts = AutopilotParts(
+            kind=flavour.kind,
+            system_id=system_id,
+            commander=self.commander,
+            navigation=self.navigation,
+            parameters=self.parameters,
+            readings=readings,
+            stores=stores,
+            missions=firmware.missions,
+            broadcast=self,
+            announce=self._texts.announce,
+            memory=memory,
+            simulation=simulation,
+            execute=lambda command: self.commands.carry_out(command),
         )
+        if simulation is not None:
+            simulation.connect(
+                self.parameters,
+                lambda failed: self.commander.pilot.lose_signal(failed, self.commander.time_us),
+            )
+        self._more = firmware.microservices(parts)
         self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
         self._streams = ChannelStreams(
             self.channels,
@@ -260,15 +261,13 @@ class Autopilot:
         coarse_timers = [more for more in timed if more.coarse_timers]
         self._coarse_timers = tuple(coarse_timers[turn::_TURNS] for turn in range(_TURNS))
         self._turn = 0
-        self.commands = CommandService.for_flavour(
-            flavour.name,
-            self.commander,
-            hooks,
+        self.commands = CommandService(
+            firmware.commands(self.commander, hooks),
             flavour.command_address(system_id),
             merged(*(more.commands for more in self._more)),
         )
         services: tuple[Service, ...] = (
-            SetpointService(flavour.name, self.commander),
+            SetpointService(firmware.setpoints(self.commander)),
             self.commands,
             self._parameter_service,
             self.missions,
@@ -333,7 +332,7 @@ class Autopilot:
         if receivers is None:
             return
         message = decode(frame)
-        if self._simulation is not None and self._simulation.deaf_to(getattr(message, "command", None)):
+        if self._simulation is not None and self._simulation.drops_message(getattr(message, "command", None)):
             return
         if frame.message_id not in _ALWAYS_ANSWERED and not self._address.accepts(message):
             return
@@ -411,15 +410,12 @@ class Autopilot:
             battery_level=lambda: int(self.commander.battery_level),
             position_ready=lambda: self.commander.situation.position,
             unix_epoch_us=unix_epoch_us,
+            current_mode=self._status.current_mode,
+            orbit=lambda: self.commander.tasks.orbit,
             task=lambda: self.commander.tasks.task,
             missions=self.commander.missions,
         )
-        return telemetry_messages(
-            self.flavour,
-            sources,
-            current_mode=self._status.current_mode,
-            orbit=lambda: self.commander.tasks.orbit,
-        )
+        return self._firmware.messages(sources)
 
     def _on_plan_changed(self, mission_type: MissionType) -> None:
         if mission_type is MissionType.MISSION:

@@ -5,8 +5,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import PAYLOAD_ROLE, Firmware
-from autopilot_bridge.firmware.ardupilot.messages import STREAM_RATE_PARAMETERS
+from autopilot_bridge.firmware.services import PAYLOAD_ROLE, FirmwareServices
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE
@@ -69,7 +68,7 @@ class ChannelStreams:
         self,
         channels: list[AutopilotChannel],
         *,
-        firmware: Firmware,
+        firmware: FirmwareServices,
         parameters: ParameterStore,
         cache: PayloadCache,
         motion: MotionMessages,
@@ -163,7 +162,7 @@ class ChannelStreams:
         """ArduPilot's SRn_* parameters: rates of the stream groups of channel n (one that changed)."""
         if index >= len(self._ports):
             return
-        for group, ending in STREAM_RATE_PARAMETERS.items():
+        for group, ending in self._firmware.stream_rate_parameters.items():
             name = f"SR{index}_{ending}"
             if name not in self._parameters or changed not in (None, name):
                 continue

@@ -13,12 +13,14 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
 from autopilot_bridge.firmware.gps_source import GpsSource, own_receiver
+from autopilot_bridge.firmware.services import FirmwareServices
 from autopilot_bridge.firmware.texts import Notice
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 from autopilot_bridge.services.channel import AddressRule
+from autopilot_bridge.services.commands.available_modes import ListedMode
 from flightsim.airframe import AirframeKind, LaunchKind
 
 if TYPE_CHECKING:  # its module brings scipy
@@ -45,22 +47,6 @@ class ModeDisplay(NamedTuple):
     landed: bool
     attitude_setpoints: bool
     thrust_setpoints: bool
-
-
-class ListedMode(NamedTuple):
-    """A mode as AVAILABLE_MODES lists it (standard modes protocol).
-
-    Attributes:
-        custom_mode: as in HEARTBEAT.
-        name: empty where `standard_mode` names it.
-        standard_mode: MAV_STANDARD_MODE; 0: the mode is the firmware's own.
-        properties: MAV_MODE_PROPERTY bits.
-    """
-
-    custom_mode: int
-    name: str
-    standard_mode: int
-    properties: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,6 +175,7 @@ class Flavour:
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
         reboot_starts_again: a reboot starts the simulated vehicle again too, at its first place and level
             (ArduPilot's SITL); else only the autopilot boots, as on a vehicle.
+        services: what its services do differently.
         gps_source: which receiver the first GPS is, as the parameters were at boot.
     """
 
@@ -221,6 +208,7 @@ class Flavour:
     heartbeat_on_mode_change: bool
     sends_events: bool
     bytewise_parameters: bool
+    services: FirmwareServices
     listed_modes: tuple[ListedMode, ...] = ()
     reboot_starts_again: bool = False
     gps_source: Callable[[ParameterStore], GpsSource] = own_receiver

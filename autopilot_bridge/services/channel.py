@@ -121,13 +121,3 @@ class AddressRule:
             return False
         component = getattr(message, "target_component", 0)
         return component == 0 or self.component_ids is None or component in self.component_ids
-
-
-def px4_address_rule(system_id: int) -> AddressRule:
-    """PX4: own system id only; component 1, 190 (formerly the mission planner's) or 0."""
-    return AddressRule(system_id=system_id, component_ids=frozenset((1, 190)), any_system=False)
-
-
-def ardupilot_address_rule(system_id: int) -> AddressRule:
-    """ArduPilot: own system id or 0, any component id."""
-    return AddressRule(system_id=system_id, component_ids=None, any_system=True)

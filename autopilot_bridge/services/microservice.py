@@ -1,6 +1,6 @@
 """What a MAVLink microservice may provide besides answers to messages, and which parts it may use.
 
-`autopilot.microservices` builds those of an autopilot; a new one needs a class here and a line there.
+`FirmwareServices.microservices` of each firmware builds those of an autopilot.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
@@ -22,13 +21,14 @@ from autopilot_bridge.services.commands.handlers import Command, Handler
 from autopilot_bridge.services.plans.policy import MissionPolicy
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.telemetry.streams import Builder
+from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 
 
 class Simulation(Protocol):
     """The simulated world of an autopilot, if there is one: it makes received data fail."""
 
-    def attend(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
+    def connect(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
         """An autopilot has booted.
 
         Args:
@@ -37,12 +37,12 @@ class Simulation(Protocol):
         """
         ...
 
-    def spoil(self, unit: int, values: NDArray[np.float64]) -> bool:
+    def apply_failure(self, unit: int, values: NDArray[np.float64]) -> bool:
         """Apply a failure to the values of a FAILURE_UNIT's sample in place; False: the sample is lost."""
         ...
 
-    def deaf_to(self, command: int | None) -> bool:
-        """True: received messages are lost; `command` is the MAV_CMD of a command, None: another message."""
+    def drops_message(self, command: int | None) -> bool:
+        """Whether a received message is lost; `command`: MAV_CMD of a command, None: another message."""
         ...
 
 
@@ -51,7 +51,7 @@ class AutopilotParts:
     """The parts of an autopilot that microservices may use.
 
     Attributes:
-        flavour: which firmware is emulated.
+        kind: the class of vehicle.
         system_id: the vehicle's.
         commander: modes, arming, guidance.
         navigation: the filter; `navigation.state` is in `navigation.layout`.
@@ -66,7 +66,7 @@ class AutopilotParts:
         execute: executes a command as if a client had sent it; None: not available.
     """
 
-    flavour: Flavour
+    kind: AirframeKind
     system_id: int
     commander: Commander
     navigation: NavigationFilter
@@ -100,7 +100,7 @@ class Microservice:
 
     @property
     def commands(self) -> Mapping[int, Handler]:
-        """The MAV_CMDs that it executes; they take precedence over the flavour's own table. Read once."""
+        """The MAV_CMDs that it executes; they take precedence over the firmware's own table. Read once."""
         return {}
 
     @property

@@ -37,7 +37,7 @@ _EFFECTIVENESS: Final = {_OK: 1.0, _OFF: 0.0, _WRONG: 0.5}
 
 NEVER_US: Final = 1 << 62
 
-_HEARD_WITHOUT_SIGNAL: Final = frozenset({mavlink.MAV_CMD_INJECT_FAILURE})
+_RECEIVED_WITHOUT_SIGNAL: Final = frozenset({mavlink.MAV_CMD_INJECT_FAILURE})
 
 
 class FailureInjector:
@@ -51,12 +51,12 @@ class FailureInjector:
         sensors: its sensors.
     """
 
-    __slots__ = ("_deaf", "_entries", "_lose_radio", "_others", "_sensors", "_vehicle")
+    __slots__ = ("_entries", "_lose_radio", "_others", "_sensors", "_signal_lost", "_vehicle")
 
     def __init__(self, vehicle: Vehicle, sensors: SensorSuite) -> None:
         self._vehicle = vehicle
         self._sensors = sensors
-        self._deaf = False
+        self._signal_lost = False
         self._lose_radio: Callable[[bool], None] | None = None
         self._others: Mapping[int, Callable[[int, int], bool]] = {
             mavlink.FAILURE_UNIT_SYSTEM_MOTOR: self._motor,
@@ -69,10 +69,10 @@ class FailureInjector:
             for unit in ENTRY_UNITS
         }
 
-    def attend(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
+    def connect(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
         """An autopilot has booted: use its parameters and its pilot input from now on."""
         self._lose_radio = lose_radio
-        self._deaf = False
+        self._signal_lost = False
         parameters = SimulatorParameters(self._vehicle, self._sensors, self.fail_radio, self.weaken_motors)
         store.subscribe(lambda name, value: parameters.changed(store, name))
         parameters.apply(store)
@@ -109,23 +109,23 @@ class FailureInjector:
     def _link(self, failure: int, instance: int) -> bool:
         if failure not in (_OK, _OFF) or instance not in (0, 1):
             return False
-        self._deaf = failure == _OFF
+        self._signal_lost = failure == _OFF
         return True
 
     # data received by messages
 
-    def spoil(self, unit: int, values: NDArray[np.float64]) -> bool:
+    def apply_failure(self, unit: int, values: NDArray[np.float64]) -> bool:
         """Apply a failure to a sample received by a message; False when the sample is lost."""
         point = self._entries[unit]
         return point.deliver(values)
 
-    def deaf_to(self, command: int | None) -> bool:
+    def drops_message(self, command: int | None) -> bool:
         """True: the autopilot receives no messages, except the command that ends the failure.
 
         Args:
             command: MAV_CMD of a COMMAND_LONG or COMMAND_INT; None: another message.
         """
-        return self._deaf and command not in _HEARD_WITHOUT_SIGNAL
+        return self._signal_lost and command not in _RECEIVED_WITHOUT_SIGNAL
 
     def fail_radio(self, failed: bool) -> None:
         """Interrupt or restore the pilot's stick input."""

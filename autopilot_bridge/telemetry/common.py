@@ -36,6 +36,8 @@ class TelemetrySources:
         position_ready: the position can be used for flight (the boot timeline is over and the filter has
             one).
         unix_epoch_us: Unix time of boot, microseconds.
+        current_mode: (standard_mode, custom_mode, intended_custom_mode).
+        orbit: (signed radius m, centre north, east, down m) while circling, else None.
         task: the flight task being flown, None while there is none (aircraft).
         missions: the plan a mission task flies (aircraft).
     """
@@ -52,6 +54,8 @@ class TelemetrySources:
     battery_level: Callable[[], int]
     position_ready: Callable[[], bool]
     unix_epoch_us: int
+    current_mode: Callable[[], Values] = lambda: (0, 0, 0)
+    orbit: Callable[[], tuple[float, float, float, float] | None] = lambda: None
     task: Callable[[], object] = lambda: None
     missions: MissionStore | None = None
 

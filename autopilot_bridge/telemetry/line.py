@@ -153,16 +153,6 @@ class FlowControl:
     most_ms: int = 2000
 
 
-PX4_FLOW_CONTROL: Final = FlowControl(
-    factors=((25, 0.8), (35, 0.975)), recovery=(50, 1.025), timeout_us=5 * MICROSECONDS
-)
-"""PX4's `Mavlink::update_radio_status`."""
-ARDUPILOT_FLOW_CONTROL: Final = FlowControl(
-    slowdowns_ms=((20, 60), (50, 20)), speedups_ms=((95, 40, 200), (90, 20, 0))
-)
-"""ArduPilot's `GCS_MAVLINK::handle_radio_status`."""
-
-
 class RadioFlow:
     """The transmit buffer of a radio at the end of a channel, from its messages.
 

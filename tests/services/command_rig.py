@@ -1,21 +1,31 @@
 """Services around a commander rig, on a channel that keeps what was sent."""
 
+from types import SimpleNamespace
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.autopilot.status_text import StatusTextService
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
+from autopilot_bridge.firmware.px4 import services as px4_services
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import CommandHooks
 from autopilot_bridge.services.commands.protocol import CommandService
-from autopilot_bridge.services.inputs.manual import ManualService, manual_rules
+from autopilot_bridge.services.inputs.manual import ManualService
 from autopilot_bridge.services.inputs.setpoints import SetpointService
 from autopilot_bridge.services.plans.geofence import ArdupilotGeofence
-from autopilot_bridge.services.status_text import StatusTextService
+from flightsim.airframe import AirframeKind
 from tests.commander.rig import Rig
 from tests.services.dispatch import deliver
 
 NAN = float("nan")
+MANUAL = {
+    ("px4", AirframeKind.MULTICOPTER): px4_services.MANUAL,
+    ("px4", AirframeKind.FIXED_WING): px4_services.MANUAL,
+    ("ardupilot", AirframeKind.MULTICOPTER): ardupilot_services.COPTER_MANUAL,
+    ("ardupilot", AirframeKind.FIXED_WING): ardupilot_services.PLANE_MANUAL,
+}
 
 
 class Channel:
@@ -81,13 +91,13 @@ class ServiceRig(Rig):
             inject_failure=self._inject,
         )
         more = ArdupilotGeofence(self.commander, self.store, self).commands if flavour == "ardupilot" else {}
-        self.commands = CommandService.for_flavour(
-            flavour, self.commander, hooks, self.flavour.command_address(1), more
+        services = self.flavour.services
+        self.commands = CommandService(
+            services.commands(self.commander, hooks), self.flavour.command_address(1), more
         )
-        self.setpoints = SetpointService(flavour, self.commander)
-        self.manual = ManualService(
-            self.commander, system_id=1, parameters=self.store, rules=manual_rules(self.flavour)
-        )
+        self.setpoints = SetpointService(services.setpoints(self.commander))
+        parts: Any = SimpleNamespace(commander=self.commander, system_id=1, parameters=self.store)
+        self.manual = ManualService(parts, MANUAL[flavour, self.flavour.kind])
 
     def handle(self, message: Any) -> bool:
         services = (self.setpoints, self.manual, self.commands, self.status)

@@ -5,9 +5,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.ardupilot.mission_rules import ARDUPILOT_MISSION_POLICY
+from autopilot_bridge.firmware.px4.mission_rules import PX4_MISSION_POLICY
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from flightsim.foundation.geodesy import GeodeticPosition
 from tests.services.dispatch import deliver

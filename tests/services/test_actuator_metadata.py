@@ -8,8 +8,8 @@ import pytest
 
 from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.firmware.px4.actuators import FUNCTIONS, actuator_metadata
+from autopilot_bridge.firmware.px4.component_metadata import parameter_metadata
 from autopilot_bridge.parameters import ParameterDefinition
-from autopilot_bridge.services.files.component_metadata import parameter_metadata
 from flightsim.airframe import AirframeKind
 
 KINDS = (AirframeKind.MULTICOPTER, AirframeKind.FIXED_WING)

@@ -14,12 +14,12 @@ from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.firmware.event_kinds import EventKind, definitions
 from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.px4 import texts as px4_texts
+from autopilot_bridge.firmware.px4.component_metadata import GENERAL, ComponentMetadataService
+from autopilot_bridge.firmware.px4.event_service import KEPT, EventService
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE, EVENT, RequestEvent
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import Command
-from autopilot_bridge.services.events import KEPT, EventService
-from autopilot_bridge.services.files.component_metadata import GENERAL, ComponentMetadataService
 from autopilot_bridge.services.files.ftp_protocol import crc32
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from autopilot_bridge.firmware.ardupilot.gps_input import GpsInputService
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.services.inputs.gps_input import GpsInputService
 from flightsim import interface as i
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver

@@ -5,21 +5,21 @@ from typing import Any
 import pytest
 
 from autopilot_bridge.commander.events import RebootRequested
-from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import Command
-from autopilot_bridge.services.commands.power import POWER_POLICIES, PowerService
+from autopilot_bridge.services.commands.power import PowerService
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.services.files.log_transfer import LogTransferService
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
-from autopilot_bridge.services.parameters.storage import STORAGE_POLICIES, ParameterStorageService
+from autopilot_bridge.services.parameters.storage import ParameterStorageService
 from autopilot_bridge.services.vehicle_memory import PowerAction
 from autopilot_bridge.storage import Mode, VehiclePath
 from autopilot_bridge.storage.files import make_directories
 from autopilot_bridge.storage.memory import MemoryStore
 from tests.services.command_rig import Channel, ServiceRig
 from tests.services.dispatch import deliver
+from tests.services.parts_rig import DATA
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 REBOOT, SHUTDOWN = PowerAction.REBOOT, PowerAction.SHUTDOWN
@@ -41,7 +41,7 @@ class Power:
         self.rig = ServiceRig(flavour)
         self.done: list[PowerAction] = []
         act = self.done.append if possible else None
-        self.service = PowerService(POWER_POLICIES[flavour], self.rig.commander, act)
+        self.service = PowerService(DATA[flavour].POWER, self.rig.commander, act)
         self.service.tick(START_US)
 
     def ask(self, p1: float, p6: float = 0.0) -> Any:
@@ -135,13 +135,13 @@ class Storage:
         self.rig = ServiceRig(flavour, **{NAME[flavour]: INITIAL[flavour]})
         self.flavour, self.store, self.files = flavour, self.rig.store, MemoryStore()
         self.texts: list[str] = []
-        layout = CARD_LAYOUTS[flavour]
+        layout = DATA[flavour].CARD
         self.path = layout.parameters
         self.service = ParameterStorageService(
             StoredParameters(self.store, self.files, layout, system_id=1),
             self.store,
             self.rig.commander,
-            STORAGE_POLICIES[flavour],
+            DATA[flavour].STORAGE,
             layout,
             lambda severity, text: self.texts.append(text),
         )
@@ -300,7 +300,7 @@ def began(unix_s: int, more: bytes = b"") -> bytes:
 
 def test_px4_has_a_folder_for_each_day_and_a_file_for_each_second() -> None:
     files = MemoryStore()
-    book = LogBook(files, CARD_LAYOUTS["px4"])
+    book = LogBook(files, DATA["px4"].CARD)
     paths = []
     for unix_s in (1_700_000_000, 1_700_000_000, 1_700_000_000, 1_700_086_401):
         path, file = book.create(unix_s * 1_000_000 + 999_999)
@@ -322,7 +322,7 @@ def test_px4_has_a_folder_for_each_day_and_a_file_for_each_second() -> None:
 
 def test_ardupilot_numbers_its_logs_from_1() -> None:
     files = MemoryStore()
-    book = LogBook(files, CARD_LAYOUTS["ardupilot"])
+    book = LogBook(files, DATA["ardupilot"].CARD)
     for name in ("00000003.tlog", "00000012.bin", "notes.txt", "99999999999.tlog"):
         put(files, ("LOGS", name), began(1_600_000_000, b"123"))
     path, file = book.create(0)
@@ -358,7 +358,7 @@ def test_the_time_of_a_log_fits_its_field() -> None:
     files = MemoryStore()
     put(files, ("LOGS", "00000001.tlog"), b"\xff" * 8)
     put(files, ("LOGS", "00000002.tlog"), began(1_600_000_000)[:7])
-    assert [log.time_utc_s for log in LogBook(files, CARD_LAYOUTS["ardupilot"]).logs()] == [0xFFFFFFFF, 0]
+    assert [log.time_utc_s for log in LogBook(files, DATA["ardupilot"].CARD).logs()] == [0xFFFFFFFF, 0]
 
 
 def test_erasing_keeps_the_running_log_and_other_files() -> None:
@@ -366,7 +366,7 @@ def test_erasing_keeps_the_running_log_and_other_files() -> None:
     kept = ("log", "2023-11-15", "08_00_00.tlog")
     for path in (kept, ("log", "2023-11-14", "07_00_00.ulg"), ("log", "2023-11-13", "notes.txt")):
         put(files, path, b"1")
-    book = LogBook(files, CARD_LAYOUTS["px4"])
+    book = LogBook(files, DATA["px4"].CARD)
     book.erase(but=kept)
     assert [log.path for log in book.logs()] == [kept]
     assert sorted(entry.name for entry in files.entries(("log",))) == ["2023-11-13", "2023-11-15"]
@@ -378,7 +378,7 @@ class Transfer:
     def __init__(self, flavour: str = "px4") -> None:
         self.files = MemoryStore()
         self.contents = (began(1_700_000_000, bytes(range(242))), bytes(range(90)))
-        layout = CARD_LAYOUTS[flavour]
+        layout = DATA[flavour].CARD
         folder = ("2023-11-14",) if layout.log_folder_by_day else ()
         for name, content in zip(("1.tlog", "2.ulg"), self.contents, strict=True):
             put(self.files, (*layout.logs, *folder, name), content)

@@ -1,10 +1,11 @@
 """Nothing is taken into a plan and then ignored: every accepted command is flown, carried out or listed."""
 
+import itertools
 import math
 
 import pytest
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES
+from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
 from autopilot_bridge.firmware.ardupilot import mission_rules as mission_rules_ardupilot
 from autopilot_bridge.firmware.px4 import mission_rules as mission_rules_px4
 from autopilot_bridge.flight.plan_reading import CONDITIONS, JUMPS, MARKERS, Command
@@ -23,7 +24,7 @@ KINDS = {"iris": AirframeKind.MULTICOPTER, "aerosonde": AirframeKind.FIXED_WING}
 
 def accepted(flavour: str, kind: AirframeKind) -> set[int]:
     """Commands that an upload takes, in one frame or the other."""
-    rules = FIRMWARES[flavour, kind].missions.rules
+    rules = get_flavour(flavour, kind).services.missions.rules
     found = set()
     for command in range(0, 3100):
         for frame in (2, 6):
@@ -33,10 +34,10 @@ def accepted(flavour: str, kind: AirframeKind) -> set[int]:
     return found
 
 
-@pytest.mark.parametrize("firmware", list(FIRMWARES))
+@pytest.mark.parametrize("firmware", list(itertools.product(FLAVOUR_NAMES, AirframeKind)))
 def test_what_is_stored_would_be_taken_again(firmware: tuple[str, AirframeKind]) -> None:
     """A stored plan is judged by the same rules when the vehicle boots."""
-    rules = FIRMWARES[firmware].missions.rules
+    rules = get_flavour(*firmware).services.missions.rules
     taken = 0
     for kind in MissionType:
         for command in range(0, 6000):
@@ -89,7 +90,7 @@ def test_every_accepted_command_does_something(flavour: str, model: str) -> None
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("command", [92, 94, 222, 4501, 260, 42702, 42703, 213 + 3000])
 def test_what_is_not_flown_is_refused(flavour: str, command: int) -> None:
-    rules = FIRMWARES[flavour, AirframeKind.MULTICOPTER].missions.rules
+    rules = get_flavour(flavour, AirframeKind.MULTICOPTER).services.missions.rules
     for frame in (2, 6):
         item = MissionItem(command=command, frame=frame, x=47.4, y=8.5, z=10.0)
         assert rules.check(item, MissionType.MISSION, 1, 9) == 3
@@ -106,6 +107,6 @@ def test_what_is_not_flown_is_refused(flavour: str, command: int) -> None:
     ],
 )
 def test_values_that_can_not_be_flown(command: int, params: tuple[float, ...], result: int) -> None:
-    rules = FIRMWARES["ardupilot", AirframeKind.MULTICOPTER].missions.rules
+    rules = get_flavour("ardupilot", AirframeKind.MULTICOPTER).services.missions.rules
     named = {f"param{k}": value for k, value in enumerate(params, start=1)}
     assert rules.check(MissionItem(command=command, frame=2, **named), MissionType.MISSION, 1, 9) == result

@@ -6,9 +6,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.ardupilot.mission_rules import ARDUPILOT_MISSION_POLICY
+from autopilot_bridge.firmware.px4.mission_rules import PX4_MISSION_POLICY
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
 from tests.services.mission_rig import (
     LAND,
     RELATIVE,

@@ -13,14 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
 from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
+from autopilot_bridge.firmware.px4 import services as px4_services
 from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Source, ardupilot_address_rule, px4_address_rule
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.parameters.protocol import (
-    ARDUPILOT_PARAMETER_POLICY,
-    PX4_PARAMETER_POLICY,
     ParameterService,
 )
 from autopilot_bridge.sitl import Sitl
@@ -45,8 +45,8 @@ class Recorder:
 class Vehicle:
     def __init__(self, flavour: str) -> None:
         table, policy = {
-            "px4": (PX4_PARAMETERS, PX4_PARAMETER_POLICY),
-            "ardupilot": (ARDUPILOT_PARAMETERS, ARDUPILOT_PARAMETER_POLICY),
+            "px4": (PX4_PARAMETERS, px4_services.PARAMETER_POLICY),
+            "ardupilot": (ARDUPILOT_PARAMETERS, ardupilot_services.PARAMETER_POLICY),
         }[flavour]
         self.asking = Recorder("asking")
         self.other = Recorder("other")
@@ -261,7 +261,7 @@ def test_address_rules() -> None:
     def to(system: int, component: int) -> Any:
         return mavlink.MAVLink_param_request_list_message(system, component)
 
-    px4, ardupilot = px4_address_rule(1), ardupilot_address_rule(1)
+    px4, ardupilot = px4_services.address_rule(1), ardupilot_services.address_rule(1)
     for system, component in ((1, 1), (1, 0), (1, 190)):
         assert px4.accepts(to(system, component))
     for system, component in ((2, 1), (0, 1), (0, 0), (1, 191)):

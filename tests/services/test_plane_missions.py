@@ -9,13 +9,14 @@ from autopilot_bridge.commander.events import DisarmReason, FailsafeAction, Fail
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.firmware.ardupilot import texts as ardupilot_texts
+from autopilot_bridge.firmware.ardupilot.mission_rules import ARDUPLANE_MISSION_POLICY
 from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
+from autopilot_bridge.firmware.px4.mission_rules import PX4_PLANE_MISSION_POLICY
 from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.plans.policy import ARDUPLANE_MISSION_POLICY, PX4_PLANE_MISSION_POLICY
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.services.mission_rig import HOME, Recorder

@@ -6,14 +6,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.services.commands.protocol import CommandService
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from autopilot_bridge.services.vehicle_services import small_services
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver
+from tests.services.parts_rig import parts_of
 from tests.services.plane_rig import PlaneRig
 
 CALIBRATE = mavlink.MAV_CMD_PREFLIGHT_CALIBRATION
@@ -27,20 +25,9 @@ class Vehicle:
     def __init__(self, flavour: str, *, plane: bool = False, **parameters: float) -> None:
         self.rig = PlaneRig(flavour, **parameters) if plane else ServiceRig(flavour, **parameters)
         rig = self.rig
-        parts = AutopilotParts(
-            flavour=rig.flavour,
-            system_id=1,
-            commander=rig.commander,
-            navigation=None,  # type: ignore[arg-type]
-            parameters=rig.store,
-            readings=rig.readings,
-            stores={},
-            missions=FIRMWARES[flavour, rig.flavour.kind].missions,
-            broadcast=rig,
-            announce=rig.status.announce,
-            memory=None,  # type: ignore[arg-type]
-        )
-        self.services: tuple[Microservice, ...] = small_services(parts)
+        services = rig.flavour.services.microservices(parts_of(rig))
+        names = [type(service).__name__ for service in services]
+        self.services = services[names.index("ManualService") : names.index("FileTransferService")]
         more = {number: take for service in self.services for number, take in service.commands.items()}
         rig.commands = CommandService(rig.commands._handlers, rig.commands._address, more)
         rig.manual = self.services[0]

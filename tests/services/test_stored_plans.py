@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.plans.stored_plans import StoredPlans, pack_plan, unpack_plan
 from autopilot_bridge.storage import MemoryStore, Quota
@@ -55,7 +55,7 @@ class Vehicle:
     def __init__(self, files: MemoryStore, flavour: str = "px4") -> None:
         self.stores = {kind: MissionStore() for kind in MissionType}
         self.texts: list[str] = []
-        policy = FIRMWARES[flavour, AirframeKind.MULTICOPTER].missions
+        policy = get_flavour(flavour, AirframeKind.MULTICOPTER).services.missions
         self.service = StoredPlans(
             self.stores, files, FOLDER, policy, lambda severity, text: self.texts.append(text)
         )
@@ -99,7 +99,7 @@ def test_plans_are_there_at_the_next_boot(flavour: str) -> None:
     files = MemoryStore()
     first = Vehicle(files, flavour)
     assert files.entries(()) == []  # nothing is written before there is a plan
-    rules = FIRMWARES[flavour, AirframeKind.MULTICOPTER].missions.rules
+    rules = get_flavour(flavour, AirframeKind.MULTICOPTER).services.missions.rules
     for kind, plan in PLANS.items():
         kept = tuple(rules.stored(item) for item in plan[flavour == "px4" and kind is MissionType.MISSION :])
         first.stores[kind].replace(kept, 100 + kind)

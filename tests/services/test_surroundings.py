@@ -24,7 +24,7 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.commander.rig import ORIGIN
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver
-from tests.services.parts_rig import parts_of
+from tests.services.parts_rig import service_of
 
 NOW_US = 60_000_000
 OTHER = Source(None, 7, 1)  # type: ignore[arg-type]  # the autopilot of another vehicle
@@ -41,7 +41,7 @@ class Follower:
         enabled = {"FOLL_ENABLE": 1} if flavour == "ardupilot" else {}
         self.rig = ServiceRig(flavour, **{**enabled, **parameters})
         self.leader = self.rig.context.surroundings.leader
-        self.service = FollowService(parts_of(self.rig))
+        self.service = service_of(self.rig, FollowService)
 
     def take(self, message: Any, source: Source = OTHER, time_us: int = NOW_US) -> None:
         deliver(message, source, time_us, self.service)
@@ -233,7 +233,7 @@ class Circle:
         rig = ServiceRig(flavour, **parameters)
         self.context = rig.context
         self.map = rig.context.surroundings.obstacles
-        self.service = ObstacleService(parts_of(rig))
+        self.service = service_of(rig, ObstacleService)
 
     def take(self, message: Any, source: Source = ONBOARD) -> dict[int, float]:
         """Deliver; the known distances, by sector of 5 degrees."""
@@ -392,7 +392,7 @@ class Odometry:
     def __init__(self, flavour: str = "ardupilot", **parameters: float) -> None:
         self.rig = ServiceRig(flavour, **parameters)
         self.filter = Filter()
-        self.service = ExternalOdometryService(parts_of(self.rig, navigation=self.filter))
+        self.service = service_of(self.rig, ExternalOdometryService, navigation=self.filter)
 
     def take(self, message: Any, source: Source = ONBOARD) -> None:
         deliver(message, source, NOW_US, self.service)

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES
-from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore, ParameterType
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
@@ -18,7 +17,7 @@ from autopilot_bridge.storage import Mode, OpenFile, VehiclePath
 from autopilot_bridge.storage.folder import FolderStore
 from flightsim.airframe import AirframeKind
 
-LAYOUT = CARD_LAYOUTS["px4"]
+LAYOUT = get_flavour("px4").services.card
 STEPS = 12
 """More than there are in any of the tests."""
 
@@ -129,7 +128,7 @@ def test_stored_parameters_are_the_old_or_the_new(tmp_path: Path, steps: int) ->
 def plans(card: FolderStore, texts: list[str]) -> tuple[dict[MissionType, MissionStore], StoredPlans]:
     """The plans of a boot."""
     stores = {kind: MissionStore() for kind in MissionType}
-    policy = FIRMWARES["px4", AirframeKind.MULTICOPTER].missions
+    policy = get_flavour("px4", AirframeKind.MULTICOPTER).services.missions
     service = StoredPlans(stores, card, LAYOUT.plans, policy, lambda severity, text: texts.append(text))
     service.tick(0)
     return stores, service

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.mavlink import Frame, decode, definition
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.sitl import Sitl
@@ -130,7 +130,7 @@ def check_card(folder: Path, flavour: str, parameters: dict[str, float], items: 
     autopilot = sitl.vehicles[0].autopilot
     assert {name: autopilot.parameters.get(name) for name in parameters} == parameters
     assert len(autopilot.commander.missions.items) == items
-    (log,) = LogBook(files, CARD_LAYOUTS[flavour]).logs()
+    (log,) = LogBook(files, get_flavour(flavour).services.card).logs()
     check_readable(folder.joinpath(*log.path), by_others=False)
     sitl.close()
     files.close()

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
@@ -17,6 +16,7 @@ from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.firmware.ardupilot.plane import messages as ardupilot_plane
 from autopilot_bridge.firmware.ardupilot.plane.messages import ArduPlaneMessages
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES
+from autopilot_bridge.firmware.ardupilot.services import PLANE_SERVICES
 from autopilot_bridge.firmware.px4.plane import messages as px4_plane
 from autopilot_bridge.firmware.px4.plane.messages import Px4PlaneMessages
 from autopilot_bridge.flight.context import FlightContext, LandedState
@@ -34,7 +34,6 @@ from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
 from autopilot_bridge.tlog import TlogReader
 from flightsim import interface
-from flightsim.airframe import AirframeKind
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import SensorReadings
@@ -97,7 +96,7 @@ class Aircraft:
             task=lambda: self.task,
             missions=self.missions,
         )
-        self.px4 = Px4PlaneMessages(self.sources, current_mode=lambda: (0, 0, 0), orbit=lambda: None)
+        self.px4 = Px4PlaneMessages(self.sources)
         self.ardupilot = ArduPlaneMessages(self.sources)
 
     def actuate(self, **values: float) -> None:
@@ -267,7 +266,7 @@ def test_arduplane_refuses_rates_beyond_its_loop(rate_hz: float, result: int) ->
     table = StreamTable(cache, channel, {}, physics_step_us=4000)  # type: ignore[arg-type]
     texts: list[str] = []
     service = MessageIntervalService(
-        FIRMWARES["ardupilot", AirframeKind.FIXED_WING].intervals,
+        PLANE_SERVICES.intervals,
         {"one": table},
         cache,
         lambda severity, text: texts.append(text),

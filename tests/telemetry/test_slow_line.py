@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
+from autopilot_bridge.firmware.px4 import services as px4_services
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, MAVLinkMessage, dialect
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.telemetry.line import (
-    ARDUPILOT_FLOW_CONTROL,
     LATEST_S,
-    PX4_FLOW_CONTROL,
     SLOW_US,
     LineBudget,
     RadioFlow,
@@ -169,7 +169,7 @@ def test_a_radio_with_a_full_buffer_slows_the_streams_down(flavour: str) -> None
 
 
 def test_px4_forgets_a_radio_that_is_gone() -> None:
-    flow = RadioFlow(PX4_FLOW_CONTROL)
+    flow = RadioFlow(px4_services.FLOW_CONTROL)
     flow.heard(5, 1_000_000)
     flow.advance(3_000_000)
     assert flow.multiplier == 0.8
@@ -178,7 +178,7 @@ def test_px4_forgets_a_radio_that_is_gone() -> None:
 
 
 def test_ardupilot_slows_down_to_two_seconds() -> None:
-    flow = RadioFlow(ARDUPILOT_FLOW_CONTROL)
+    flow = RadioFlow(ardupilot_services.FLOW_CONTROL)
     for _ in range(100):
         flow.heard(0, 0)
     assert flow.slowdown_us == 2_040_000

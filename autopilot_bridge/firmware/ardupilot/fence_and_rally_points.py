@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.messages import plan_checksum
 
 FENCE_TOTAL: Final = "FENCE_TOTAL"
@@ -69,11 +69,6 @@ class OldPoints(Microservice):
         self._warned: set[int] = set()
         self._versions = [0, 0]
         parameters.subscribe(self._on_parameter)
-
-    @classmethod
-    def of(cls, parts: AutopilotParts) -> "OldPoints":
-        """Build the service of an autopilot."""
-        return cls(parts.parameters, parts.stores, parts.announce)
 
     @property
     def receivers(self) -> Mapping[int, Receiver]:

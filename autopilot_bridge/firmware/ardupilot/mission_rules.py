@@ -1,4 +1,4 @@
-"""ArduPilot's rules for mission items: commands, frames and how items are read back."""
+"""ArduPilot's missions: the protocol, and rules for items (commands, frames, how an item is stored)."""
 
 from dataclasses import replace
 from typing import Final
@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
+from autopilot_bridge.services.plans.policy import CRITICAL, WARNING, MissionPolicy, MissionTexts
 from autopilot_bridge.services.plans.rules import (
     check_fence,
     check_finite,
@@ -188,3 +189,46 @@ class ArdupilotItemRules:
 
 def _without_place(item: MissionItem) -> bool:
     return item.frame == mavlink.MAV_FRAME_MISSION and item.command in _PLACE_OPTIONAL
+
+
+ARDUPILOT_MISSION_POLICY: Final = MissionPolicy(
+    rules=ArdupilotItemRules(),
+    texts=MissionTexts(
+        timeout=(WARNING, "Mission upload timeout"),
+        too_many=(WARNING, "Only {capacity} items are supported"),
+        partial_rejected=(WARNING, "Flight plan update rejected"),
+        changed_in_flight=(CRITICAL, "Auto mission changed but failed to restart command"),
+        float_item=(WARNING, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT"),
+        float_request=(WARNING, "got MISSION_REQUEST; use MISSION_REQUEST_INT!"),
+        received={
+            MissionType.MISSION: "Flight plan received",
+            MissionType.FENCE: "Fence received",
+            MissionType.RALLY: "Rally points received",
+        },
+    ),
+    capacity={MissionType.MISSION: 650, MissionType.FENCE: 84, MissionType.RALLY: 50},
+    retry_us=1_000_000,
+    timeout_us=8_000_000,
+    timeout_result=mavlink.MAV_MISSION_OPERATION_CANCELLED,
+    requests_as_int=False,
+    wrong_sequence_result=mavlink.MAV_MISSION_INVALID_SEQUENCE,
+    restart_on_count=True,
+    foreign_count_result=mavlink.MAV_MISSION_DENIED,
+    ordered_download=False,
+    home_is_item_0=True,
+    partial_writes=True,
+    clears_all_types=False,
+    refuses_clear_in_flight=True,
+    plan_ids=False,
+    total_when_empty=0,
+    mission_state=True,
+    reached_repeats=0,
+    sends_current_on_change=False,
+    acks_set_current=True,
+    guided_items=True,
+)
+ARDUPLANE_MISSION_POLICY: Final = replace(
+    ARDUPILOT_MISSION_POLICY,
+    rules=ArdupilotItemRules(aircraft=True),
+    capacity={**ARDUPILOT_MISSION_POLICY.capacity, MissionType.MISSION: 655},
+)

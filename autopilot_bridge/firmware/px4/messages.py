@@ -1,7 +1,7 @@
 """Messages and stream sets of PX4 v1.16, as seen on its onboard and ground-station links."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -95,29 +95,15 @@ ODID_EPOCH_UNIX_S: Final = 1546300800
 
 
 class Px4Messages(CommonMessages):
-    """Builders of PX4's messages.
-
-    Args:
-        current_mode: (standard_mode, custom_mode, intended_custom_mode).
-        estimator_flags: ESTIMATOR_STATUS_FLAGS of the navigation filter.
-        orbit: (signed radius m, centre north, east, down m) while circling, else None.
-    """
+    """Builders of PX4's messages."""
 
     servo_unused_us = 900
     servo_disarmed_us = 900
     gps_timeout_us = 1_000_000
     gps_told_before_first = False
 
-    def __init__(
-        self,
-        sources: TelemetrySources,
-        *,
-        current_mode: Callable[[], Values],
-        orbit: Callable[[], tuple[float, float, float, float] | None],
-    ) -> None:
+    def __init__(self, sources: TelemetrySources) -> None:
         super().__init__(sources)
-        self._current_mode = current_mode
-        self._orbit = orbit
         self._ping_sequence = -1
 
     def builders(self) -> Mapping[int, Builder]:
@@ -130,7 +116,7 @@ class Px4Messages(CommonMessages):
             _M.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
             _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
             _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: self.orbit_execution_status,
-            _M.MAVLINK_MSG_ID_CURRENT_MODE: self._current_mode,
+            _M.MAVLINK_MSG_ID_CURRENT_MODE: self.sources.current_mode,
             _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: self.open_drone_id_location,
             _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: self.open_drone_id_system,
         }
@@ -212,7 +198,7 @@ class Px4Messages(CommonMessages):
 
     def orbit_execution_status(self) -> Values | None:
         """ORBIT_EXECUTION_STATUS (360), while circling."""
-        orbit = self._orbit()
+        orbit = self.sources.orbit()
         frame = self.sources.context.frame
         if orbit is None or frame is None:
             return None

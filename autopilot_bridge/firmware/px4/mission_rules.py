@@ -1,13 +1,18 @@
-"""PX4's rules for mission items: commands, frames, how an item is stored and read back."""
+"""PX4's missions: the protocol, and rules for items (commands, frames, how an item is stored)."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
+from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.plans.policy import CRITICAL, INFO, MissionPolicy, MissionTexts
 from autopilot_bridge.services.plans.rules import (
     ACCEPTED,
     CIRCLE_COMMANDS,
@@ -172,3 +177,67 @@ def _number(value: float) -> float:
 def _heading(degrees: float) -> float:
     """Heading in 0..360 deg; NaN (keep or follow the course) stays."""
     return degrees % 360.0
+
+
+def _multicopter_problems(
+    items: tuple[MissionItem, ...],
+    parameters: ParameterStore,
+    *,
+    home_alt_m: float | None,
+    landed: bool,
+    outside: Callable[[MissionItem], bool] | None,
+) -> tuple[str, ...]:
+    return mission_problems(items, home_alt_m=home_alt_m, landed=landed, outside=outside)
+
+
+def _aircraft_problems(
+    items: tuple[MissionItem, ...],
+    parameters: ParameterStore,
+    *,
+    home_alt_m: float | None,
+    landed: bool,
+    outside: Callable[[MissionItem], bool] | None,
+) -> tuple[str, ...]:
+    rules = AircraftRules.of(parameters)
+    return mission_problems(items, home_alt_m=home_alt_m, landed=landed, aircraft=rules, outside=outside)
+
+
+PX4_MISSION_POLICY: Final = MissionPolicy(
+    rules=Px4ItemRules(),
+    texts=MissionTexts(
+        upload_busy=(CRITICAL, "WPM: REJ. CMD: Busy"),
+        download_open=(CRITICAL, "WPM: IGN MISSION_COUNT: Busy"),
+        uploading=(INFO, "Mission download request ignored, already active"),
+        clear_busy=(CRITICAL, "WPM: IGN CLEAR CMD: Busy"),
+        set_current_busy=(CRITICAL, "WPM: IGN WP CURR CMD: Busy"),
+        no_transfer=(CRITICAL, "IGN MISSION_ITEM: No transfer"),
+        partner_mismatch=(CRITICAL, "REJ. MIS ITEM: partner id mismatch"),
+        unexpected_request=(CRITICAL, "WPM: REJ. CMD: Req. WP was unexpected"),
+        not_in_list=(CRITICAL, "WPM: WP CURR CMD: Not in list"),
+        invalid_item=(CRITICAL, "IGN MISSION_ITEM: Invalid item"),
+        timeout=(CRITICAL, "Operation timeout"),
+        home_outside_fence=(CRITICAL, "Geofence invalid, doesn't contain Home position"),
+    ),
+    capacity={MissionType.MISSION: 10_000, MissionType.FENCE: 64, MissionType.RALLY: 32},
+    retry_us=250_000,
+    timeout_us=5_000_000,
+    timeout_result=None,
+    requests_as_int=True,
+    wrong_sequence_result=None,
+    restart_on_count=False,
+    foreign_count_result=mavlink.MAV_MISSION_ERROR,
+    ordered_download=True,
+    home_is_item_0=False,
+    partial_writes=False,
+    clears_all_types=True,
+    refuses_clear_in_flight=False,
+    plan_ids=True,
+    total_when_empty=65535,
+    mission_state=False,
+    reached_repeats=10,
+    sends_current_on_change=True,
+    acks_set_current=False,
+    guided_items=False,
+    feasibility=_multicopter_problems,
+)
+PX4_PLANE_MISSION_POLICY: Final = replace(PX4_MISSION_POLICY, feasibility=_aircraft_problems)

@@ -1,23 +1,39 @@
 """AVAILABLE_MODES: the modes of the vehicle and their names (standard modes protocol; PX4)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.microservice import Microservice
+
+
+class ListedMode(NamedTuple):
+    """A mode as AVAILABLE_MODES lists it (standard modes protocol).
+
+    Attributes:
+        custom_mode: as in HEARTBEAT.
+        name: empty where `standard_mode` names it.
+        standard_mode: MAV_STANDARD_MODE; 0: the mode is the firmware's own.
+        properties: MAV_MODE_PROPERTY bits.
+    """
+
+    custom_mode: int
+    name: str
+    standard_mode: int
+    properties: int
 
 
 class AvailableModes(Microservice):
     """Answers requests for AVAILABLE_MODES.
 
     Args:
-        flavour: the firmware with these modes.
+        modes: the listed modes, in their order.
     """
 
-    def __init__(self, flavour: Flavour) -> None:
-        self._modes = flavour.listed_modes
+    def __init__(self, modes: Sequence[ListedMode]) -> None:
+        self._modes = modes
 
     @property
     def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:

@@ -7,8 +7,6 @@ does.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -40,28 +38,6 @@ class PowerPolicy:
     armed: Result
     force: int | None
     delay_s: float
-
-
-POWER_POLICIES: Final[Mapping[str, PowerPolicy]] = MappingProxyType(
-    {
-        "px4": PowerPolicy(
-            actions=MappingProxyType({1: PowerAction.REBOOT, 2: PowerAction.SHUTDOWN, 3: PowerAction.REBOOT}),
-            nothing=Result.ACCEPTED,
-            unknown=Result.DENIED,
-            armed=Result.DENIED,
-            force=None,
-            delay_s=0.4,
-        ),
-        "ardupilot": PowerPolicy(
-            actions=MappingProxyType({1: PowerAction.REBOOT, 3: PowerAction.REBOOT}),
-            nothing=Result.UNSUPPORTED,
-            unknown=Result.UNSUPPORTED,
-            armed=Result.FAILED,
-            force=20190226,
-            delay_s=0.2,
-        ),
-    }
-)
 
 
 class PowerService(Microservice):

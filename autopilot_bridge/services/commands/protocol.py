@@ -1,34 +1,17 @@
 """The MAVLink command protocol, autopilot side: COMMAND_LONG, COMMAND_INT, SET_MODE, acknowledgements."""
 
 from collections.abc import Mapping
-from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.firmware.ardupilot.copter.commands import ArduCopterCommands
-from autopilot_bridge.firmware.ardupilot.plane.commands import ArduPlaneCommands
-from autopilot_bridge.firmware.px4.commands import Px4Commands
-from autopilot_bridge.firmware.px4.plane.commands import Px4PlaneCommands
 from autopilot_bridge.services.channel import NOBODY, AddressRule, MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.commands.handlers import (
     Command,
     CommandHandlers,
-    CommandHooks,
     Handler,
     command_from_message,
 )
-from autopilot_bridge.services.vehicle_class import is_aircraft
-
-_MULTICOPTERS: Final[Mapping[str, type[CommandHandlers]]] = {
-    "px4": Px4Commands,
-    "ardupilot": ArduCopterCommands,
-}
-_AIRCRAFT: Final[Mapping[str, type[CommandHandlers]]] = {
-    "px4": Px4PlaneCommands,
-    "ardupilot": ArduPlaneCommands,
-}
 
 
 class CommandService:
@@ -46,19 +29,6 @@ class CommandService:
         self._handlers = handlers
         self._address = address
         self._more = dict(more or {})
-
-    @classmethod
-    def for_flavour(
-        cls,
-        name: str,
-        commander: Commander,
-        hooks: CommandHooks,
-        address: AddressRule,
-        more: Mapping[int, Handler] | None = None,
-    ) -> "CommandService":
-        """The command service of a flavour, by name, for the commander's class of vehicle."""
-        handlers = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
-        return cls(handlers[name](commander, hooks), address, more)
 
     @property
     def receivers(self) -> Mapping[int, Receiver]:

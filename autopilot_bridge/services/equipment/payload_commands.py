@@ -33,27 +33,6 @@ _PRESENT_US: Final = 5_000_000
 _NO_CLIENT: Final = (0, 0)
 _TAKE, _GIVE_UP = -2.0, -3.0
 
-_TRIGGER: Final = frozenset(
-    (
-        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-    )
-)
-_PX4_TRIGGER: Final = _TRIGGER | {
-    mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
-    mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
-}
-_ARDUPILOT_CAMERA: Final = _TRIGGER | {
-    mavlink.MAV_CMD_SET_CAMERA_ZOOM,
-    mavlink.MAV_CMD_SET_CAMERA_FOCUS,
-    mavlink.MAV_CMD_IMAGE_START_CAPTURE,
-    mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
-    mavlink.MAV_CMD_VIDEO_START_CAPTURE,
-    mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
-    mavlink.MAV_CMD_CAMERA_TRACK_POINT,
-    mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE,
-    mavlink.MAV_CMD_CAMERA_STOP_TRACKING,
-}
 _ROI: Final = frozenset(
     (
         mavlink.MAV_CMD_DO_SET_ROI,
@@ -85,32 +64,17 @@ class PayloadPolicy:
     bad_place: Result
 
 
-PX4_PAYLOAD: Final = PayloadPolicy(
-    camera=_PX4_TRIGGER,
-    absent=None,
-    nose_modes={FlightMode.MISSION: False},  # mission_base.cpp: heading_sp_update
-    kinds_of_roi=True,
-    bad_place=Result.DENIED,
-)
-ARDUPILOT_PAYLOAD: Final = PayloadPolicy(
-    camera=_ARDUPILOT_CAMERA,
-    absent=Result.UNSUPPORTED,
-    nose_modes={FlightMode.MISSION: False, FlightMode.GUIDED: True},  # autoyaw.cpp: set_roi
-    kinds_of_roi=False,
-    bad_place=Result.FAILED,
-)
-
-
 class PayloadCommands(Microservice):
     """Forwards commands to camera and gimbal.
 
     Args:
         parts: of the autopilot.
+        policy: the firmware's.
     """
 
-    def __init__(self, parts: AutopilotParts) -> None:
+    def __init__(self, parts: AutopilotParts, policy: PayloadPolicy) -> None:
         self._parts = parts
-        self._policy = PX4_PAYLOAD if parts.flavour.name == "px4" else ARDUPILOT_PAYLOAD
+        self._policy = policy
         self._received_us: dict[int, int] = {}
         self._in_control: frozenset[tuple[int, int]] = frozenset()
 

@@ -7,7 +7,7 @@ own formats. Log files from other sources in the same folders (.ulg, .bin) are o
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
-from autopilot_bridge.firmware.card_layout import CardLayout
+from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.storage import Entry, FileStore, Mode, OpenFile, VehiclePath
 from autopilot_bridge.storage.files import exists, make_directories
 

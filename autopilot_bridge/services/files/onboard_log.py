@@ -11,10 +11,10 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import Armed, Disarmed, Event
-from autopilot_bridge.firmware.card_layout import CardLayout, LogTimes
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage
+from autopilot_bridge.services.files.card_layout import CardLayout, LogTimes
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE

@@ -1,28 +1,37 @@
 """The microservices of a vehicle that use files, built for one autopilot."""
 
-from autopilot_bridge.firmware.ardupilot import packed_parameters
-from autopilot_bridge.firmware.ardupilot.counter_parameters import Counters
-from autopilot_bridge.firmware.ardupilot.mission_files import plan_files
-from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
-from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.commands.power import POWER_POLICIES, PowerService
-from autopilot_bridge.services.events import EventService
-from autopilot_bridge.services.files.component_metadata import MOUNT, ComponentMetadataService
+from collections.abc import Mapping
+
+from autopilot_bridge.services.commands.power import PowerPolicy, PowerService
+from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.services.files.log_transfer import LogTransferService
 from autopilot_bridge.services.files.onboard_log import OnboardLog
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from autopilot_bridge.services.parameters.storage import STORAGE_POLICIES, ParameterStorageService
+from autopilot_bridge.services.parameters.storage import ParameterStorageService, StoragePolicy
 from autopilot_bridge.services.plans.stored_plans import StoredPlans
 from autopilot_bridge.storage import FileStore, MountTable, VehiclePath
-from autopilot_bridge.storage.generated import GeneratedStore
 
 
-def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
-    """File transfer, logs, stored parameters and power of one autopilot."""
-    memory, name = parts.memory, parts.flavour.name
-    layout, card = CARD_LAYOUTS[name], memory.card.files
+def vehicle_files(
+    parts: AutopilotParts,
+    *,
+    layout: CardLayout,
+    storage: StoragePolicy,
+    power: PowerPolicy,
+    folders: Mapping[VehiclePath, FileStore],
+    more: tuple[Microservice, ...],
+) -> tuple[Microservice, ...]:
+    """File transfer, logs, stored parameters and power of one autopilot.
+
+    Args:
+        layout: of the memory card.
+        storage, power: the firmware's answers.
+        folders: generated files that clients see besides the card.
+        more: the firmware's own services, which come before the onboard log.
+    """
+    memory, card = parts.memory, parts.memory.card.files
     book = LogBook(card, layout)
     recorder = (
         OnboardLog(
@@ -38,34 +47,20 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
         if memory.card.logs
         else None
     )
-    places: dict[VehiclePath, FileStore] = {layout.mount: card}
-    told: tuple[Microservice, ...] = ()
-    if name == "px4":
-        metadata = ComponentMetadataService(parts.parameters.definitions, memory.time_us)
-        places[MOUNT] = metadata.store()
-        told = (metadata, EventService(parts.commander, parts.broadcast, parts.flavour.notices))
-    else:
-        places["@PARAM",] = _packed_parameters(parts.parameters)
-        places["@MISSION",] = plan_files(parts.stores)
-        told = (Counters(parts),)
-    files = FileTransferService(MountTable(places))
     logs = LogTransferService(
         book,
         lambda: None if recorder is None else recorder.path,
         lambda: parts.commander.armed,
         layout.armed_refusal,
     )
-    storage = ParameterStorageService(
-        memory.stored, parts.parameters, parts.commander, STORAGE_POLICIES[name], layout, parts.announce
-    )
-    power = PowerService(POWER_POLICIES[name], parts.commander, memory.power)
-    plans = StoredPlans(parts.stores, card, layout.plans, parts.missions, parts.announce)
-    return (files, logs, storage, power, plans, *told, *(() if recorder is None else (recorder,)))
-
-
-def _packed_parameters(store: ParameterStore) -> FileStore:
-    """ArduPilot's `@PARAM`."""
-    return GeneratedStore(
-        {"param.pck": lambda query: packed_parameters.pack(store, query)},
-        {"param.pck": lambda data: packed_parameters.apply(store, data)},
+    return (
+        FileTransferService(MountTable({layout.mount: card, **folders})),
+        logs,
+        ParameterStorageService(
+            memory.stored, parts.parameters, parts.commander, storage, layout, parts.announce
+        ),
+        PowerService(power, parts.commander, memory.power),
+        StoredPlans(parts.stores, card, layout.plans, parts.missions, parts.announce),
+        *more,
+        *(() if recorder is None else (recorder,)),
     )

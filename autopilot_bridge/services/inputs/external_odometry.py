@@ -16,7 +16,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.firmware.mapping import integer
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation.external import (
     POSITION_M,
@@ -47,7 +46,7 @@ _NED_FROM_ENU: Final = (0.0, _HALF, _HALF, 0.0)
 _FRD_FROM_FLU: Final = (0.0, 1.0, 0.0, 0.0)
 _SAME: Final = (1.0, 0.0, 0.0, 0.0)
 
-_POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] = {
+POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] = {
     mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME, _SAME),
     mavlink.MAV_FRAME_LOCAL_ENU: (ExternalFrame.NED, _NED_FROM_ENU, _FRD_FROM_FLU),
     mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME, _SAME),
@@ -55,7 +54,7 @@ _POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] 
 }
 """By ODOMETRY.frame_id: our frame, our axes from the message's axes, and our body axes from the message's."""
 
-_VELOCITY_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion]]] = {
+VELOCITY_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion]]] = {
     mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME),
     mavlink.MAV_FRAME_LOCAL_ENU: (ExternalFrame.NED, _NED_FROM_ENU),
     mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME),
@@ -87,64 +86,24 @@ class ExternalPolicy:
     one_frame: bool
 
 
-def _ardupilot_frame(store: ParameterStore) -> ExternalFrame:
-    """ArduPilot takes every frame as NED; if it uses the sender's heading, that is a separate frame."""
-    yaw_source = integer(store, "EK3_SRC1_YAW", 1)
-    return ExternalFrame.LOCAL_FRD if yaw_source == EXTERNAL_NAV_SOURCE else ExternalFrame.NED
-
-
-EXTERNAL_NAV_SOURCE: Final = 6
-"""Value ExternalNav of EK3_SRC1_*."""
-
-POLICIES: Final[Mapping[str, ExternalPolicy]] = {
-    "px4": ExternalPolicy(
-        messages=frozenset(
-            {
-                mavlink.MAVLINK_MSG_ID_ODOMETRY,
-                mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
-                mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP,
-            }
-        ),
-        pose_frames=frozenset(_POSE_FRAMES),
-        velocity_frames=frozenset(_VELOCITY_FRAMES),
-        enabled=lambda store: True,
-        local_frame=lambda store: ExternalFrame.NED,
-        one_frame=False,
-    ),
-    "ardupilot": ExternalPolicy(
-        messages=frozenset(
-            {
-                mavlink.MAVLINK_MSG_ID_ODOMETRY,
-                mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
-                mavlink.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE,
-                mavlink.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE,
-                mavlink.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE,
-                mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP,
-            }
-        ),
-        pose_frames=frozenset({mavlink.MAV_FRAME_LOCAL_FRD}),
-        velocity_frames=frozenset({mavlink.MAV_FRAME_BODY_FRD}),
-        enabled=lambda store: integer(store, "VISO_TYPE", 0) != 0,
-        local_frame=_ardupilot_frame,
-        one_frame=True,
-    ),
-}
-
-
 class ExternalOdometryService(Microservice):
     """Converts messages into samples of the navigation filter, and sets its origin.
+
+    Args:
+        parts: of the autopilot.
+        policy: what the firmware accepts.
 
     Attributes:
         wrong_frames: number of messages in frames that are not accepted.
     """
 
-    def __init__(self, parts: AutopilotParts) -> None:
+    def __init__(self, parts: AutopilotParts, policy: ExternalPolicy) -> None:
         self._navigation = parts.navigation
         self._parameters = parts.parameters
         self._broadcast = parts.broadcast
         self._system_id = parts.system_id
         self._simulation = parts.simulation
-        self._policy = POLICIES[parts.flavour.name]
+        self._policy = policy
         self.wrong_frames = 0
 
     @property
@@ -164,7 +123,7 @@ class ExternalOdometryService(Microservice):
         sample = _READERS[message.get_msgId()](self, message, time_us)
         if sample is None:
             self.wrong_frames += 1
-        elif self._simulation is None or self._simulation.spoil(_VIO, sample.values):
+        elif self._simulation is None or self._simulation.apply_failure(_VIO, sample.values):
             self._navigation.take_external(sample)
 
     def _set_origin(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
@@ -190,8 +149,8 @@ class ExternalOdometryService(Microservice):
         pose, twist = int(message.frame_id), int(message.child_frame_id)
         if pose not in policy.pose_frames or twist not in policy.velocity_frames:
             return None
-        frame, local, body = _POSE_FRAMES[pose]
-        velocity_frame, velocity_local = _VELOCITY_FRAMES[twist]
+        frame, local, body = POSE_FRAMES[pose]
+        velocity_frame, velocity_local = VELOCITY_FRAMES[twist]
         values = np.full(SAMPLE_SIZE, math.nan)
         values[POSITION_M] = _rotated(local, (message.x, message.y, message.z))
         values[Q_LOCAL_FROM_FRD] = _changed(local, message.q, body)

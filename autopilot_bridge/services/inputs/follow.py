@@ -25,19 +25,23 @@ _FORGET_S: Final = 10.0  # after this time another system may be followed
 class FollowService(Microservice):
     """Keeps `surroundings.leader` up to date.
 
+    Args:
+        parts: of the autopilot.
+        by_position: GLOBAL_POSITION_INT of another system is a target too (ArduPilot).
+
     Attributes:
         leader_id: id of the followed system; 0: none received.
     """
 
-    def __init__(self, parts: AutopilotParts) -> None:
+    def __init__(self, parts: AutopilotParts, *, by_position: bool) -> None:
         self._context = parts.commander.context
         self._system_id = parts.system_id
-        self._by_position = parts.flavour.name == "ardupilot"
+        self._by_position = by_position
         self.leader_id = 0
 
     @property
     def receivers(self) -> Mapping[int, Receiver]:
-        """FOLLOW_TARGET, and on ArduPilot GLOBAL_POSITION_INT."""
+        """FOLLOW_TARGET, and GLOBAL_POSITION_INT where the firmware follows it."""
         positions = (
             {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._on_position} if self._by_position else {}
         )

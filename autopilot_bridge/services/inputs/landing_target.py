@@ -47,7 +47,7 @@ class LandingTargetService(Microservice):
         self._context = parts.commander.context
         self._navigation = parts.navigation
         self._system_id = parts.system_id
-        self._lands_there = parts.flavour.kind is AirframeKind.MULTICOPTER
+        self._lands_there = parts.kind is AirframeKind.MULTICOPTER
         self._gimbal: deque[tuple[int, Array, bool]] = deque(maxlen=32)
         self.refused = 0
 

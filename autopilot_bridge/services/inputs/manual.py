@@ -1,14 +1,11 @@
 """Manual control: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, heartbeats of ground stations."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
-from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.inputs.transmitter import (
@@ -21,7 +18,6 @@ from autopilot_bridge.services.inputs.transmitter import (
 )
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.telemetry.streams import Builder, Values
-from flightsim.airframe import AirframeKind
 
 _UNUSED: Final = 65535  # RC_CHANNELS_OVERRIDE: this channel is not changed
 _RELEASE: Final = 0  # back to the radio, for channels 1 to 8
@@ -64,92 +60,18 @@ class ManualRules:
         return not self.source or round(parameters.get(self.source)) in (1, 2, 3)
 
 
-_PX4: Final = ManualRules(
-    at_rest=(),
-    axes=("RC_MAP_ROLL", "RC_MAP_PITCH", "RC_MAP_THROTTLE", "RC_MAP_YAW"),
-    gcs_only="",
-    source="COM_RC_IN_MODE",
-    timeout_s=lambda parameters: _NO_RADIO_S,
-    sticks_are_radio=False,
-    mode_switch=ModeSwitchRules(
-        channel="RC_MAP_FLTMODE",
-        slot="COM_FLTMODE{}",
-        limits_us=(1167, 1333, 1500, 1667, 1833),
-        modes={
-            0: FlightMode.MANUAL,
-            1: FlightMode.ALTITUDE,
-            2: FlightMode.POSITION,
-            3: FlightMode.MISSION,
-            4: FlightMode.HOLD,
-            5: FlightMode.RETURN,
-            6: FlightMode.ACRO,
-            7: FlightMode.OFFBOARD,
-            8: FlightMode.STABILIZED,
-            10: FlightMode.TAKEOFF,
-            11: FlightMode.LAND,
-            12: FlightMode.FOLLOW,
-            13: FlightMode.PRECISION_LAND,
-        },
-    ),
-    gesture=GestureRules(
-        switch="MAN_ARM_GESTURE",
-        arm_from=1,
-        disarm_from=1,
-        hold_s=lambda parameters: parameters.get("COM_RC_ARM_HYST") * 1e-3,
-        throttle_below=-0.8,
-        yaw_beyond=0.9,
-        centred=True,
-        by_hand_only=True,
-    ),
-)
-_ARDUCOPTER: Final = ManualRules(
-    at_rest=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800),
-    axes=("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_THROTTLE", "RCMAP_YAW"),
-    gcs_only="SYSID_MYGCS",
-    source="",
-    timeout_s=lambda parameters: parameters.get("RC_OVERRIDE_TIME"),
-    sticks_are_radio=True,
-    mode_switch=ModeSwitchRules(
-        channel="FLTMODE_CH", slot="FLTMODE{}", limits_us=(1231, 1361, 1491, 1621, 1750), modes={}
-    ),
-    gesture=GestureRules(
-        switch="ARMING_RUDDER",
-        arm_from=1,
-        disarm_from=2,
-        hold_s=lambda parameters: 2.0,
-        throttle_below=-0.95,
-        yaw_beyond=0.89,
-        centred=False,
-        by_hand_only=False,
-    ),
-)
-_ARDUPLANE: Final = replace(_ARDUCOPTER, gesture=replace(_ARDUCOPTER.gesture, hold_s=lambda parameters: 3.0))
-
-
-def manual_rules(flavour: Flavour) -> ManualRules:
-    """The rules of a flavour; ArduPilot's modes have its own numbers."""
-    if flavour.name == "px4":
-        return _PX4
-    rules = _ARDUPLANE if flavour.kind is AirframeKind.FIXED_WING else _ARDUCOPTER
-    modes = {number: mode for mode, number in flavour.custom_modes.items()}
-    return replace(rules, mode_switch=replace(rules.mode_switch, modes=modes))
-
-
 class ManualService(Microservice):
     """Converts stick messages into the commander's pilot input, and reports the radio's channels.
 
     Args:
-        commander: receives the pilot input.
-        system_id: the vehicle's id; messages for other vehicles are ignored.
-        parameters: of the vehicle.
+        parts: of the autopilot. Messages for other vehicles are ignored.
         rules: the firmware's.
     """
 
-    def __init__(
-        self, commander: Commander, *, system_id: int, parameters: ParameterStore, rules: ManualRules
-    ) -> None:
+    def __init__(self, parts: AutopilotParts, rules: ManualRules) -> None:
+        commander, parameters = parts.commander, parts.parameters
         self._commander = commander
-        self._system_id = system_id
+        self._system_id = parts.system_id
         self._parameters = parameters
         self._rules = rules
         self._radio = Radio(rules.at_rest)
@@ -158,16 +80,6 @@ class ManualService(Microservice):
         self._used = False
         self._steering = False
         self._time_us = 0
-
-    @classmethod
-    def of(cls, parts: AutopilotParts) -> "ManualService":
-        """The service of an autopilot."""
-        return cls(
-            parts.commander,
-            system_id=parts.system_id,
-            parameters=parts.parameters,
-            rules=manual_rules(parts.flavour),
-        )
 
     @property
     def builders(self) -> Mapping[int, Builder]:

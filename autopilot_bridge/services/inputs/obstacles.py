@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.firmware.mapping import integer
 from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
@@ -25,27 +24,25 @@ _UNKNOWN_CM: Final = 65535
 _AUTOPILOT: Final = 1
 _SENSOR_WIDTH_RAD: Final = math.radians(30.0)
 _HORIZONTAL: Final = range(mavlink.MAV_SENSOR_ROTATION_NONE, mavlink.MAV_SENSOR_ROTATION_YAW_315 + 1)
-_MAV_TYPE_PROXIMITY: Final = 2  # PRX1_TYPE
-
-_LISTENS: Final[Mapping[str, Callable[[ParameterStore], bool]]] = {
-    "px4": lambda store: True,
-    "ardupilot": lambda store: integer(store, "PRX1_TYPE", 0) == _MAV_TYPE_PROXIMITY,
-}
 
 
 class ObstacleService(Microservice):
     """Keeps `surroundings.obstacles` up to date.
 
+    Args:
+        parts: of the autopilot.
+        enabled: returns whether the firmware uses the messages, from its parameters.
+
     Attributes:
         refused: number of messages without usable content.
     """
 
-    def __init__(self, parts: AutopilotParts) -> None:
+    def __init__(self, parts: AutopilotParts, enabled: Callable[[ParameterStore], bool]) -> None:
         self._context = parts.commander.context
         self._parameters = parts.parameters
         self._simulation = parts.simulation
         self._system_id = parts.system_id
-        self._listens = _LISTENS[parts.flavour.name]
+        self._enabled = enabled
         self.refused = 0
 
     @property
@@ -58,7 +55,7 @@ class ObstacleService(Microservice):
 
     def _on_obstacles(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """A DISTANCE_SENSOR of another vehicle is ignored."""
-        if not self._listens(self._parameters) or source.component_id == _AUTOPILOT:
+        if not self._enabled(self._parameters) or source.component_id == _AUTOPILOT:
             return
         circle = message.get_msgId() == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
         self.refused += not (self._circle(message, time_us) if circle else self._beam(message, time_us))
@@ -81,7 +78,7 @@ class ObstacleService(Microservice):
         values = np.array(message.distances, dtype=np.float64)[:SECTORS]
         told = values != _UNKNOWN_CM
         values *= 0.01
-        if self._simulation is not None and not self._simulation.spoil(_AVOIDANCE, values):
+        if self._simulation is not None and not self._simulation.apply_failure(_AVOIDANCE, values):
             return True
         nearest_m, reach_m = message.min_distance * 0.01, message.max_distance * 0.01
         obstacles = self._context.surroundings.obstacles

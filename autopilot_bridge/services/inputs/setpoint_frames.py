@@ -7,6 +7,7 @@ import numpy as np
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.services.channel import MavlinkMessage
 
 Triple = tuple[float, float, float]
 
@@ -22,6 +23,12 @@ ACCELERATION_BITS: Final = (64, 128, 256)
 FORCE_BIT: Final = 512
 YAW_BIT: Final = 1024
 YAW_RATE_BIT: Final = 2048
+
+THROTTLE_BIT: Final = 64
+"""Of SET_ATTITUDE_TARGET.type_mask, as the next."""
+ATTITUDE_BIT: Final = 128
+_RATE_BITS: Final = (1, 2, 4)
+_MAX_RATE_RAD_S: Final = 100.0
 
 
 class Target(NamedTuple):
@@ -136,3 +143,13 @@ def unit_quaternion(values: list[float], tolerance: float) -> np.ndarray | None:
     q = np.array(values, dtype=np.float64)
     length = float(np.sqrt(q @ q)) if np.isfinite(q).all() else math.nan
     return q / length if abs(length - 1.0) <= tolerance else None
+
+
+def rates_of(message: MavlinkMessage) -> Triple:
+    """Body rates that are not ignored, rad/s; NaN for the others."""
+    values = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
+    roll, pitch, yaw = (
+        float(value) if not message.type_mask & bit and abs(value) <= _MAX_RATE_RAD_S else math.nan
+        for value, bit in zip(values, _RATE_BITS, strict=True)
+    )
+    return roll, pitch, yaw

@@ -46,9 +46,6 @@ class TrafficRules:
     conflicts: bool = False
 
 
-PX4_TRAFFIC: Final = TrafficRules(conflicts=True)
-ARDUPILOT_TRAFFIC: Final = TrafficRules(switch="ADSB_TYPE")
-
 _ACTIONS: Final[Mapping[int, tuple[FlightMode, str]]] = {
     2: (FlightMode.RETURN, ", returning home"),
     3: (FlightMode.LAND, ", landing"),

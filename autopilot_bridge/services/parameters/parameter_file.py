@@ -4,7 +4,6 @@ import contextlib
 from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
-from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS, CardLayout
 from autopilot_bridge.parameter_files import (
     QGC_SUFFIX,
     format_mavproxy,
@@ -12,6 +11,7 @@ from autopilot_bridge.parameter_files import (
     parse_untyped_parameters,
 )
 from autopilot_bridge.parameters import ParameterError, ParameterStore
+from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.storage import FileStore
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import exists, make_directories, read_whole, replace_whole
@@ -93,7 +93,7 @@ class StoredParameters:
 def boot_parameters(
     store: ParameterStore,
     card: MemoryCard,
-    flavour_name: str,
+    layout: CardLayout,
     *,
     system_id: int,
     given: Collection[str],
@@ -103,7 +103,7 @@ def boot_parameters(
     At the first boot of a run, the `given` values (from the command line) take precedence over the stored
     ones; at a reboot the stored values take precedence over all, because clients may have changed them since.
     """
-    stored = StoredParameters(store, card.files, CARD_LAYOUTS[flavour_name], system_id=system_id)
+    stored = StoredParameters(store, card.files, layout, system_id=system_id)
     stored.load(without=() if card.boots else given)
     card.boots += 1
     return stored

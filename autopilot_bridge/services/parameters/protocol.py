@@ -71,28 +71,6 @@ class ParameterPolicy:
             raise ValueError(f"list_per_tick {self.list_per_tick} is not at least 1")
 
 
-PX4_PARAMETER_POLICY: Final = ParameterPolicy(
-    bytewise=True,
-    strict_type=True,
-    ignore_case=False,
-    index_by_name=True,
-    set_echo_to_all=False,
-    hash_parameter=True,
-    identity=("MAV_SYS_ID", "MAV_COMP_ID"),
-    list_per_tick=20,  # measured: 904 in 0.9 s
-)
-ARDUPILOT_PARAMETER_POLICY: Final = ParameterPolicy(
-    bytewise=False,
-    strict_type=False,
-    ignore_case=True,
-    index_by_name=False,
-    set_echo_to_all=True,
-    hash_parameter=False,
-    identity=("SYSID_THISMAV",),
-    list_per_tick=43,  # measured: 1397 in 0.65 s
-)
-
-
 def fix_identity(store: ParameterStore, policy: ParameterPolicy, system_id: int) -> None:
     """Set the identity parameters to the vehicle's ids, whatever a file contains."""
     for name, value in zip(policy.identity, (system_id, _COMPONENT_ID), strict=False):

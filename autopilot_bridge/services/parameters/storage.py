@@ -6,17 +6,16 @@ sets at the start are not stored. PX4 stores a short time after a change, ArduPi
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.firmware.card_layout import CardLayout
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Source
 from autopilot_bridge.services.commands.handlers import Command, Handler, whole
+from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
 
@@ -43,21 +42,6 @@ class StoragePolicy:
     unknown: Result | None
     armed: Result
     reset_at_boot: bool
-
-
-STORAGE_POLICIES: Final[Mapping[str, StoragePolicy]] = MappingProxyType(
-    {
-        "px4": StoragePolicy(
-            actions=frozenset({LOAD, SAVE, RESET, RESET_SENSORS, RESET_ALL}),
-            unknown=None,
-            armed=Result.TEMPORARILY_REJECTED,
-            reset_at_boot=False,
-        ),
-        "ardupilot": StoragePolicy(
-            actions=frozenset({RESET}), unknown=Result.DENIED, armed=Result.DENIED, reset_at_boot=True
-        ),
-    }
-)
 
 
 class ParameterStorageService(Microservice):

@@ -19,7 +19,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
 from autopilot_bridge.services.commands.handlers import Command, Handler, whole
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.rules import PLACED_COMMANDS
 from autopilot_bridge.telemetry.streams import Builder, Values
 
@@ -45,11 +45,6 @@ class ArdupilotGeofence(Microservice):
         self._commander = commander
         self._parameters = parameters
         self._broadcast = broadcast
-
-    @classmethod
-    def of(cls, parts: AutopilotParts) -> "ArdupilotGeofence":
-        """Build the service of an autopilot."""
-        return cls(parts.commander, parts.parameters, parts.broadcast)
 
     @property
     def commands(self) -> Mapping[int, Handler]:

@@ -1,14 +1,13 @@
-"""The differences between PX4 and ArduPilot in the mission protocol, as data."""
+"""The differences between the firmwares in the mission protocol: the shape of their data."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Final
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.firmware.ardupilot.mission_rules import ArdupilotItemRules
-from autopilot_bridge.firmware.px4.mission_rules import Px4ItemRules
-from autopilot_bridge.mission_plan import MissionType
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.plans.rules import ItemRules
 
 CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
@@ -43,6 +42,30 @@ class MissionTexts:
     received: Mapping[MissionType, str] = field(default_factory=dict)  # MAV_SEVERITY_INFO
 
 
+class FeasibilityCheck(Protocol):
+    """Why a stored mission may not be flown, in the firmware's words; empty when it may."""
+
+    def __call__(
+        self,
+        items: tuple[MissionItem, ...],
+        parameters: ParameterStore,
+        *,
+        home_alt_m: float | None,
+        landed: bool,
+        outside: Callable[[MissionItem], bool] | None,
+    ) -> tuple[str, ...]:
+        """Check a mission.
+
+        Args:
+            items: the stored mission.
+            parameters: the vehicle's.
+            home_alt_m: home altitude above mean sea level; None: not known.
+            landed: the vehicle stands on the ground.
+            outside: returns whether an item lies outside the geofence; None: there is none.
+        """
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionPolicy:
     """The differences of one firmware.
@@ -70,7 +93,7 @@ class MissionPolicy:
         sends_current_on_change: MISSION_CURRENT goes out at once when the current item changes.
         acks_set_current: MISSION_SET_CURRENT is answered with MISSION_CURRENT.
         guided_items: MISSION_ITEM with current = 2 is a guided-mode target (old DroneKit clients).
-        aircraft: the vehicle is a fixed wing, whose missions must meet additional rules (PX4).
+        feasibility: checks a stored mission before it is flown; None: only in flight (ArduPilot).
     """
 
     rules: ItemRules
@@ -95,88 +118,4 @@ class MissionPolicy:
     sends_current_on_change: bool
     acks_set_current: bool
     guided_items: bool
-    aircraft: bool = False
-
-
-PX4_MISSION_POLICY: Final = MissionPolicy(
-    rules=Px4ItemRules(),
-    texts=MissionTexts(
-        upload_busy=(CRITICAL, "WPM: REJ. CMD: Busy"),
-        download_open=(CRITICAL, "WPM: IGN MISSION_COUNT: Busy"),
-        uploading=(INFO, "Mission download request ignored, already active"),
-        clear_busy=(CRITICAL, "WPM: IGN CLEAR CMD: Busy"),
-        set_current_busy=(CRITICAL, "WPM: IGN WP CURR CMD: Busy"),
-        no_transfer=(CRITICAL, "IGN MISSION_ITEM: No transfer"),
-        partner_mismatch=(CRITICAL, "REJ. MIS ITEM: partner id mismatch"),
-        unexpected_request=(CRITICAL, "WPM: REJ. CMD: Req. WP was unexpected"),
-        not_in_list=(CRITICAL, "WPM: WP CURR CMD: Not in list"),
-        invalid_item=(CRITICAL, "IGN MISSION_ITEM: Invalid item"),
-        timeout=(CRITICAL, "Operation timeout"),
-        home_outside_fence=(CRITICAL, "Geofence invalid, doesn't contain Home position"),
-    ),
-    capacity={MissionType.MISSION: 10_000, MissionType.FENCE: 64, MissionType.RALLY: 32},
-    retry_us=250_000,
-    timeout_us=5_000_000,
-    timeout_result=None,
-    requests_as_int=True,
-    wrong_sequence_result=None,
-    restart_on_count=False,
-    foreign_count_result=mavlink.MAV_MISSION_ERROR,
-    ordered_download=True,
-    home_is_item_0=False,
-    partial_writes=False,
-    clears_all_types=True,
-    refuses_clear_in_flight=False,
-    plan_ids=True,
-    total_when_empty=65535,
-    mission_state=False,
-    reached_repeats=10,
-    sends_current_on_change=True,
-    acks_set_current=False,
-    guided_items=False,
-)
-
-ARDUPILOT_MISSION_POLICY: Final = MissionPolicy(
-    rules=ArdupilotItemRules(),
-    texts=MissionTexts(
-        timeout=(WARNING, "Mission upload timeout"),
-        too_many=(WARNING, "Only {capacity} items are supported"),
-        partial_rejected=(WARNING, "Flight plan update rejected"),
-        changed_in_flight=(CRITICAL, "Auto mission changed but failed to restart command"),
-        float_item=(WARNING, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT"),
-        float_request=(WARNING, "got MISSION_REQUEST; use MISSION_REQUEST_INT!"),
-        received={
-            MissionType.MISSION: "Flight plan received",
-            MissionType.FENCE: "Fence received",
-            MissionType.RALLY: "Rally points received",
-        },
-    ),
-    capacity={MissionType.MISSION: 650, MissionType.FENCE: 84, MissionType.RALLY: 50},
-    retry_us=1_000_000,
-    timeout_us=8_000_000,
-    timeout_result=mavlink.MAV_MISSION_OPERATION_CANCELLED,
-    requests_as_int=False,
-    wrong_sequence_result=mavlink.MAV_MISSION_INVALID_SEQUENCE,
-    restart_on_count=True,
-    foreign_count_result=mavlink.MAV_MISSION_DENIED,
-    ordered_download=False,
-    home_is_item_0=True,
-    partial_writes=True,
-    clears_all_types=False,
-    refuses_clear_in_flight=True,
-    plan_ids=False,
-    total_when_empty=0,
-    mission_state=True,
-    reached_repeats=0,
-    sends_current_on_change=False,
-    acks_set_current=True,
-    guided_items=True,
-)
-
-PX4_PLANE_MISSION_POLICY: Final = replace(PX4_MISSION_POLICY, aircraft=True)
-
-ARDUPLANE_MISSION_POLICY: Final = replace(
-    ARDUPILOT_MISSION_POLICY,
-    rules=ArdupilotItemRules(aircraft=True),
-    capacity={**ARDUPILOT_MISSION_POLICY.capacity, MissionType.MISSION: 655},
-)
+    feasibility: FeasibilityCheck | None = None

@@ -10,8 +10,6 @@ from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
-from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
@@ -36,7 +34,6 @@ class _Judged(NamedTuple):
     version: int
     landed: bool
     home_alt_m: float | None
-    aircraft: AircraftRules | None
     fence: object
 
 
@@ -114,8 +111,7 @@ class MissionService:
         self._downloads = MissionDownloads(policy, self._stores, self._sessions, announce, self._read_plan)
         self._report = MissionReport(policy, self._stores, broadcast, self._progress)
         self._judged: tuple[_Judged, tuple[str, ...]] | None = None
-        self._rules: AircraftRules | None = None
-        self._parameters.subscribe(self._forget_rules)
+        self._parameters.subscribe(self._forget_judgement)
 
     @property
     def stores(self) -> Mapping[MissionType, MissionStore]:
@@ -132,29 +128,25 @@ class MissionService:
 
     def problems(self, *, landed: bool = True) -> tuple[str, ...]:
         """Why the stored mission may not be flown, in the firmware's words; empty when it may."""
-        store = self._stores[MissionType.MISSION]
-        if self._policy.home_is_item_0:  # ArduPilot checks in flight
+        feasibility = self._policy.feasibility
+        if feasibility is None:
             return ()
-        home = self._home()
+        store, home, fence = self._stores[MissionType.MISSION], self._home(), self._fence
         home_alt_m = None if home is None else home.alt_m
-        if self._policy.aircraft and self._rules is None:
-            self._rules = AircraftRules.of(self._parameters)
-        aircraft = self._rules
-        fence = self._fence
-        key = _Judged(store.version, landed, home_alt_m, aircraft, None if fence is None else fence.state)
+        key = _Judged(store.version, landed, home_alt_m, None if fence is None else fence.state)
         if self._judged is None or self._judged[0] != key:
-            problems = mission_problems(
+            problems = feasibility(
                 store.items,
+                self._parameters,
                 home_alt_m=home_alt_m,
                 landed=landed,
-                aircraft=aircraft,
                 outside=None if fence is None else fence.excludes,
             )
             self._judged = (key, problems)
         return self._judged[1]
 
-    def _forget_rules(self, name: str, value: float) -> None:
-        self._rules = None  # depends on parameters
+    def _forget_judgement(self, name: str, value: float) -> None:
+        self._judged = None  # may depend on parameters
 
     def has_mission(self) -> bool:
         """A mission is stored (ArduPilot's home item does not count)."""

@@ -12,6 +12,7 @@ from autopilot_bridge.control.multicopter.parameters import MulticopterParameter
 from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.services import SERVICES, address_rule
 from autopilot_bridge.firmware.ardupilot.texts import copter_notices
 from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.firmware.gps_source import ardupilot_gps_source
@@ -19,7 +20,6 @@ from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
 from autopilot_bridge.flight.plan_rules import ARDUCOPTER_PLANS
-from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule
 from flightsim.airframe import AirframeKind
 
 _FLOWN: Final = frozenset(
@@ -111,10 +111,6 @@ IDENTITY: Final = Identity(
 )
 
 
-def _command_address(system_id: int) -> AddressRule:
-    return ardupilot_address_rule(system_id)
-
-
 ARDUPILOT: Final = Flavour(
     name="ardupilot",
     kind=AirframeKind.MULTICOPTER,
@@ -131,7 +127,7 @@ ARDUPILOT: Final = Flavour(
         Notice(Severity.INFO, "Frame: QUAD/X"),
     ),
     identity=IDENTITY,
-    command_address=_command_address,
+    command_address=address_rule,
     parameter_definitions=lambda: ARDUPILOT_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, ARDUPILOT_PARAMETERS),
     airframe_of=None,
@@ -157,4 +153,5 @@ ARDUPILOT: Final = Flavour(
     bytewise_parameters=False,
     reboot_starts_again=True,
     gps_source=ardupilot_gps_source,
+    services=SERVICES,
 )

@@ -15,6 +15,7 @@ from autopilot_bridge.firmware.ardupilot.copter.flavour import ARDUPILOT
 from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane_mapping
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.services import PLANE_SERVICES
 from autopilot_bridge.firmware.ardupilot.texts import plane_notices
 from autopilot_bridge.firmware.flavour import SensorBits
 from autopilot_bridge.firmware.texts import Notice, Severity
@@ -144,4 +145,5 @@ ARDUPILOT_PLANE: Final = replace(
     controller_parameters=ardupilot_plane_mapping.controller_parameters,
     navigation_parameters=ardupilot_plane_mapping.navigation_parameters,
     text_needs_heartbeat=False,
+    services=PLANE_SERVICES,
 )

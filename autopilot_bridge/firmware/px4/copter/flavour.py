@@ -14,6 +14,7 @@ from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.px4.copter import mapping as px4_mapping
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
+from autopilot_bridge.firmware.px4.services import SERVICES
 from autopilot_bridge.firmware.px4.texts import copter_notices
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
 from autopilot_bridge.services.channel import AddressRule
@@ -142,4 +143,5 @@ PX4: Final = Flavour(
     heartbeat_on_mode_change=False,
     sends_events=True,
     bytewise_parameters=True,
+    services=SERVICES,
 )

@@ -7,7 +7,8 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
-from autopilot_bridge.firmware.flavour import ListedMode, ModeDisplay
+from autopilot_bridge.firmware.flavour import ModeDisplay
+from autopilot_bridge.services.commands.available_modes import ListedMode
 
 MAIN_MANUAL: Final = 1
 MAIN_ALTITUDE: Final = 2

@@ -14,6 +14,7 @@ from autopilot_bridge.firmware.px4.copter.flavour import PX4
 from autopilot_bridge.firmware.px4.plane import mapping as px4_plane_mapping
 from autopilot_bridge.firmware.px4.plane import modes as px4_plane_modes
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
+from autopilot_bridge.firmware.px4.services import PLANE_SERVICES
 from autopilot_bridge.firmware.px4.texts import plane_notices
 from autopilot_bridge.flight.fixed_wing import LandDetector
 from flightsim.airframe import AirframeKind, LaunchKind
@@ -85,4 +86,5 @@ PX4_PLANE: Final = replace(
     flight_parameters=px4_plane_mapping.flight_parameters,
     controller_parameters=px4_plane_mapping.controller_parameters,
     navigation_parameters=px4_plane_mapping.navigation_parameters,
+    services=PLANE_SERVICES,
 )

@@ -1,7 +1,7 @@
 """Messages and stream sets of PX4 v1.16 on a fixed wing, as recorded from its airplane in flight."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -46,14 +46,8 @@ _NOTHING: Final = (NAN,) * 8
 class Px4PlaneMessages(Px4Messages):
     """Builders of what PX4 sends on a fixed wing."""
 
-    def __init__(
-        self,
-        sources: TelemetrySources,
-        *,
-        current_mode: Callable[[], Values],
-        orbit: Callable[[], tuple[float, float, float, float] | None],
-    ) -> None:
-        super().__init__(sources, current_mode=current_mode, orbit=orbit)
+    def __init__(self, sources: TelemetrySources) -> None:
+        super().__init__(sources)
         self._aircraft = AircraftState(sources)
         self._has_flown = False
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from autopilot_bridge.firmware.gps_source import GpsSource
+from autopilot_bridge.firmware.gps_source import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
@@ -47,7 +47,7 @@ class GpsInputService(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self._reading = parts.readings.gps
         self._parameters = parts.parameters
-        self._listens = parts.flavour.gps_source(parts.parameters) is GpsSource.MESSAGES
+        self._listens = ardupilot_gps_source(parts.parameters) is GpsSource.MESSAGES
         self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
         self.taken = self.refused = 0
 

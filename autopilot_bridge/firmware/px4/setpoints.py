@@ -1,0 +1,108 @@
+"""Streamed setpoints as PX4 takes them in OFFBOARD (docs/firmware/px4.md, section 9)."""
+
+import math
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.services.channel import MavlinkMessage
+from autopilot_bridge.services.inputs.setpoint_frames import (
+    ATTITUDE_BIT,
+    FORCE_BIT,
+    POSITION_BITS,
+    THROTTLE_BIT,
+    UNSET,
+    Target,
+    Triple,
+    acceleration_of,
+    heading_of,
+    local_from_global,
+    position_of,
+    rates_of,
+    rotated_by_heading,
+    unit_quaternion,
+    velocity_of,
+    yaw_of,
+)
+
+_GLOBAL_FRAMES: Final = {
+    mavlink.MAV_FRAME_GLOBAL_INT: False,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
+}
+"""Whether the altitude is over home."""
+
+
+class Px4Setpoints:
+    """PX4: each component can be ignored; a setpoint that controls nothing does not count."""
+
+    def __init__(self, commander: Commander) -> None:
+        self.commander = commander
+
+    def on_local(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_POSITION_TARGET_LOCAL_NED."""
+        mask = message.type_mask
+        position = position_of((message.x, message.y, message.z), mask)
+        velocity = velocity_of((message.vx, message.vy, message.vz), mask)
+        acceleration = acceleration_of((message.afx, message.afy, message.afz), mask)
+        if message.coordinate_frame == mavlink.MAV_FRAME_BODY_NED:
+            if any(not mask & bit for bit in POSITION_BITS):
+                return
+            heading = heading_of(self.commander.context)
+            velocity = rotated_by_heading(velocity, heading)
+            acceleration = rotated_by_heading(acceleration, heading)
+        elif message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
+            return
+        self._take(message, position, velocity, acceleration, time_us)
+
+    def on_global(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_POSITION_TARGET_GLOBAL_INT."""
+        mask = message.type_mask
+        relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
+        if relative is None:
+            return
+        position = UNSET
+        if not all(mask & bit for bit in POSITION_BITS):
+            place = local_from_global(
+                self.commander.context, message.lat_int, message.lon_int, message.alt, relative=relative
+            )
+            if place is None:
+                return
+            position = position_of(place, mask)
+        velocity = velocity_of((message.vx, message.vy, message.vz), mask)
+        acceleration = acceleration_of((message.afx, message.afy, message.afz), mask)
+        self._take(message, position, velocity, acceleration, time_us)
+
+    def _take(
+        self, message: MavlinkMessage, position: Triple, velocity: Triple, acceleration: Triple, time_us: int
+    ) -> None:
+        if message.type_mask & FORCE_BIT:
+            return
+        target = Target(
+            position, velocity, acceleration, *yaw_of(message.yaw, message.yaw_rate, message.type_mask)
+        )
+        if not (target.has_position or target.has_velocity or target.has_acceleration):
+            return
+        stream = self.commander.setpoints
+        stream.offboard.set_trajectory(*target)
+        stream.note(time_us, needs_position=target.has_position or target.has_velocity)
+
+    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_ATTITUDE_TARGET."""
+        mask = message.type_mask
+        thrust = message.thrust
+        if mask & THROTTLE_BIT or not math.isfinite(thrust):
+            return
+        thrust = min(1.0, max(0.0, thrust))
+        rates = rates_of(message)
+        stream = self.commander.setpoints
+        if not mask & ATTITUDE_BIT:
+            q = unit_quaternion(list(message.q), tolerance=0.1)
+            if q is None:
+                return
+            stream.offboard.set_attitude(q, thrust, rates)
+        elif all(math.isfinite(rate) for rate in rates):
+            stream.offboard.set_rates(rates, thrust)
+        else:
+            return
+        stream.note(time_us, needs_position=False)

@@ -1,0 +1,67 @@
+"""The shape of what the services of one firmware do differently, as data and functions."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.services.channel import AddressRule
+from autopilot_bridge.services.commands.handlers import CommandHandlers, CommandHooks
+from autopilot_bridge.services.commands.message_interval import IntervalPolicy
+from autopilot_bridge.services.files.card_layout import CardLayout
+from autopilot_bridge.services.inputs.setpoints import SetpointRules
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.parameters.protocol import ParameterPolicy
+from autopilot_bridge.services.plans.policy import MissionPolicy
+from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
+from autopilot_bridge.telemetry.line import FlowControl
+
+PAYLOAD_ROLE: Final = "payload"
+PAYLOAD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
+    {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0,
+        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    }
+)
+"""Messages sent to devices on the vehicle's own bus: its identity, position, attitude and time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareServices:
+    """Services of one firmware for one class of vehicle.
+
+    Attributes:
+        address: the target ids of this autopilot, for everything but commands.
+        parameters, missions, intervals: policies of the services.
+        card: the files on the memory card.
+        commands: makes the handlers of the firmware's commands.
+        setpoints: makes the rules for streamed setpoints.
+        messages: makes the streamed messages.
+        microservices: makes the other services, in the order in which they get messages and timers.
+        rates_hz: streams that run from the start, by role of the channel.
+        stream_rate_parameters: endings of the parameters SRn_* that set the rates of a stream group, by group
+            (ArduPilot).
+        answers_ping: PING requests are answered.
+        flow_control: how streams follow a radio's transmit buffer.
+        position_pushed_at_arm: HOME_POSITION and GPS_GLOBAL_ORIGIN are sent once more at every arming.
+    """
+
+    address: Callable[[int], AddressRule]
+    parameters: ParameterPolicy
+    missions: MissionPolicy
+    intervals: IntervalPolicy
+    card: CardLayout
+    commands: Callable[[Commander, CommandHooks], CommandHandlers]
+    setpoints: Callable[[Commander], SetpointRules]
+    messages: Callable[[TelemetrySources], CommonMessages]
+    microservices: Callable[[AutopilotParts], tuple[Microservice, ...]]
+    rates_hz: Mapping[str, Mapping[int, float]]
+    stream_rate_parameters: Mapping[int, str]
+    answers_ping: bool
+    flow_control: FlowControl
+    position_pushed_at_arm: bool
