@@ -54,6 +54,16 @@ SANS_IO = (
 )
 
 
+# These know no firmware: what differs between firmwares is data that `autopilot` hands to them.
+KNOW_NO_FIRMWARE = tuple(
+    f"autopilot_bridge.{name}"
+    for name in (
+        *("services", "telemetry", "payload", "storage"),
+        *("commander", "control", "flight", "navigation"),
+    )
+)
+
+
 def is_in(module, packages):
     return any(module == package or module.startswith(package + ".") for package in packages)
 
@@ -135,6 +145,11 @@ def test_imports_point_one_way(name):
 @pytest.mark.parametrize("name", sorted(name for name in MODULES if is_in(name, SANS_IO)))
 def test_cores_do_no_io(name):
     assert sorted(item for item in imports_of(name) if is_in(item, SANS_IO_FORBIDDEN)) == []
+
+
+@pytest.mark.parametrize("name", sorted(name for name in MODULES if is_in(name, KNOW_NO_FIRMWARE)))
+def test_firmwares_stand_above_what_they_configure(name):
+    assert sorted(item for item in imports_of(name) if is_in(item, ("autopilot_bridge.firmware",))) == []
 
 
 def test_only_clock_and_shells_know_the_wall_clock():
