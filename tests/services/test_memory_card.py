@@ -349,7 +349,7 @@ def test_ardupilots_next_log_has_the_next_number(names: tuple[str, ...], created
     files = MemoryStore()
     for name in names:
         put(files, ("LOGS", name), b"1")
-    path, file = LogBook(files, CARD_LAYOUTS["ardupilot"]).create(0)
+    path, file = LogBook(files, DATA["ardupilot"].CARD).create(0)
     file.close()
     assert path[-1] == f"{created}.tlog"
 
