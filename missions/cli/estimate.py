@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from missions.cli.options import FiniteRange, in_options, report
+from missions.cli.options import FiniteRange, StatusLine, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
 
 if TYPE_CHECKING:
@@ -20,30 +20,24 @@ class _Teller:
     """Reports missing inputs when they change and, on a terminal, the progress."""
 
     def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
+        self._line = StatusLine()
         self._told: tuple[str, ...] = ()
-        self._shown = False
 
     def __call__(self, progress: "LiveProgress") -> None:
         # rates change all the time and are not compared
         lacking = tuple(text.split(" at ")[0] for text in progress.lacking)
         if lacking != self._told:
             self._told = lacking
-            self.end()
+            self._line.end()
             for text in progress.lacking:
                 report(text)
             if not lacking:
                 report("all that is needed comes now")
-        if self._terminal:
-            text = f"{progress.time_s:9.1f} s  {progress.estimates} estimates"
-            click.echo(f"\r{text:<60}", nl=False, err=True)
-            self._shown = True
+        self._line.show(f"{progress.time_s:9.1f} s  {progress.estimates} estimates")
 
     def end(self) -> None:
         """End the progress line."""
-        if self._shown:
-            click.echo("", err=True)
-            self._shown = False
+        self._line.end()
 
 
 @click.command()

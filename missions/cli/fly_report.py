@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.options import report
+from missions.cli.options import StatusLine, report
 
 if TYPE_CHECKING:
     from missions.mission import Mission
@@ -37,7 +37,7 @@ class ProgressLine:
     """The progress line on a terminal. It shows nothing in a pipe, and nothing while it is paused."""
 
     def __init__(self) -> None:
-        self._width = 0
+        self._line = StatusLine()
         self._held = False
         self._last_wall_s = -math.inf
         self._pace = Pace()
@@ -62,16 +62,13 @@ class ProgressLine:
             height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
             progress = sum(vehicle.notes.progress for vehicle in heard) / len(heard)
         speed = "" if factor is None else f"x{factor:.1f}"
-        text = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
-        click.echo(f"\r{text:<{self._width}}", nl=False, err=True)
-        self._width = len(text)
+        self._line.show(f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %")
 
     @contextmanager
     def held(self) -> Iterator[None]:
         """Context in which other code writes to the terminal: the progress line is erased and not shown."""
-        if self._width:
-            click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
-        self._width, self._held = 0, True
+        self._line.erase()
+        self._held = True
         try:
             yield
         finally:
@@ -79,9 +76,7 @@ class ProgressLine:
 
     def end(self) -> None:
         """End the progress line."""
-        if self._width:
-            click.echo("", err=True)
-            self._width = 0
+        self._line.end()
 
 
 class Pace:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from autopilot_bridge.errors import BridgeError
-from missions.cli.options import FiniteRange, in_options
+from missions.cli.options import FiniteRange, StatusLine, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
 
 if TYPE_CHECKING:
@@ -280,11 +279,10 @@ def play(
             raise click.UsageError(in_options(error)) from error
         opened = _open(path, dialect)
         selections = _select(opened, given)
-        terminal = sys.stderr.isatty()
+        line = StatusLine()
 
         def show(played: Played) -> None:
-            if terminal:
-                click.echo(f"\r{played.log_s:8.1f} s  {played.frames} frames", err=True, nl=False)
+            line.show(f"{played.log_s:8.1f} s  {played.frames} frames")
 
         signing = client_signing(key)
         connection = open_link(address)
@@ -303,8 +301,7 @@ def play(
             )
         finally:
             connection.close()
-            if terminal:
-                click.echo(err=True)
+            line.end()
         lost = connection.counters.dropped
         but = f" ({lost} dropped: no receiver, or a slow one)" if lost else ""
         click.echo(f"played: {played.frames} frames{but}, {played.log_s:.1f} s of the log, to {address}")

@@ -1,7 +1,8 @@
-"""Types of options on the command line, and messages that name fields by the options that set them."""
+"""Types of options, messages that name fields by the options that set them, and the status line."""
 
 import math
 import re
+import sys
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
@@ -79,3 +80,29 @@ def in_options(message: object) -> str:
 def report(message: object) -> None:
     """Print one line about the command on stderr."""
     click.echo(f"flightstack: {in_options(message)}", err=True)
+
+
+class StatusLine:
+    """A line on a terminal in which each text replaces the last one. In a pipe it shows nothing."""
+
+    def __init__(self) -> None:
+        self.terminal = sys.stderr.isatty()
+        self._width = 0
+
+    def show(self, text: str) -> None:
+        """Replace the text."""
+        if self.terminal:
+            click.echo(f"\r{text:<{self._width}}", nl=False, err=True)
+            self._width = len(text)
+
+    def erase(self) -> None:
+        """Leave the line empty, for other output on it."""
+        if self._width:
+            click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
+            self._width = 0
+
+    def end(self) -> None:
+        """Keep the last text, and continue on the next line."""
+        if self._width:
+            click.echo("", err=True)
+            self._width = 0

@@ -1,7 +1,6 @@
 """`flightstack sitl`: simulated vehicles for external clients."""
 
 import contextlib
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,7 @@ import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from missions.cli.fly_command import chosen_names
-from missions.cli.options import SLOWEST, FiniteRange, in_options
+from missions.cli.options import SLOWEST, FiniteRange, StatusLine, in_options
 from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
@@ -289,8 +288,10 @@ def sitl(
             click.echo(f"video: {uri}")
         click.echo("ready, Ctrl-C ends it")
 
+        line = StatusLine()
+
         def report(pace: PaceReport) -> None:
-            click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
+            line.show(f"{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}")
 
         if spec.vehicles[0].autopilot == "ardupilot" and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
@@ -298,7 +299,7 @@ def sitl(
         try:
             server.run(
                 lambda: ending.asked,
-                report=report if sys.stderr.isatty() else None,
+                report=report if line.terminal else None,
                 until_us=None if duration is None else round(duration * 1e6),
             )
         except VehicleDivergedError as error:

@@ -13,32 +13,7 @@ if TYPE_CHECKING:
 
 _FAILED: Final = 1
 _INTERRUPTED: Final = 130
-_BAR: Final = 40
-
-
-class _Bar:
-    """The progress bar on a terminal. In a pipe it shows nothing."""
-
-    def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
-        self._shown = -1
-
-    def say(self, text: str) -> None:
-        """Print a line before the bar begins."""
-        if self._terminal:
-            click.echo(text, err=True)
-
-    def __call__(self, share: float) -> None:
-        percent = int(100.0 * share)
-        if self._terminal and percent != self._shown:
-            self._shown = percent
-            full = int(_BAR * share)
-            click.echo(f"\r[{'#' * full}{'.' * (_BAR - full)}] {percent:3d} %", nl=False, err=True)
-
-    def end(self) -> None:
-        """End the progress bar's line."""
-        if self._shown >= 0:
-            click.echo("", err=True)
+_BAR_STEPS: Final = 1000
 
 
 class _Studies(click.Group):
@@ -83,12 +58,11 @@ def lissajous_localization(
 
     if workers is None:
         workers = processors()
-    bar = _Bar()
     try:
         folder = create_run_folder(out, "lissajous-localization")
     except PlanError as error:
         raise click.UsageError(in_options(error)) from error
-    return _lissajous_localization(runs, seed, workers, _readings(equations), folder, not no_picture, bar)
+    return _lissajous_localization(runs, seed, workers, _readings(equations), folder, not no_picture)
 
 
 def _readings(equations: str) -> "tuple[Equations, ...]":
@@ -107,7 +81,6 @@ def _lissajous_localization(
     equations: "tuple[Equations, ...]",
     folder: Path,
     picture: bool,
-    bar: _Bar,
 ) -> int:
     from autopilot_bridge.clock.pacing import wall_time_s
     from missions.runs.run_folder import versions, whole, write_summary
@@ -115,15 +88,17 @@ def _lissajous_localization(
     from missions.studies.lissajous_table import summary_of, table_of
 
     started_s = wall_time_s()
-    bar.say("starting (the first start compiles the estimators, some ten seconds)")
+    terminal = sys.stderr.isatty()
+    if terminal:
+        click.echo("starting (the first start compiles the estimators, some ten seconds)", err=True)
     try:
         compile_study()
     except KeyboardInterrupt:
         folder.rmdir()  # no file is in it yet
         raise
     request = StudyRequest(runs=runs, seed=seed, workers=workers, equations=equations)
-    result = run_study(request, bar)
-    bar.end()
+    with click.progressbar(length=_BAR_STEPS, file=sys.stderr, hidden=not terminal) as bar:
+        result = run_study(request, lambda share: bar.update(round(_BAR_STEPS * share) - bar.pos))
     summary = summary_of(result, wall_time_s() - started_s)
     table = table_of(summary["cells"], equations)
     for line in table:

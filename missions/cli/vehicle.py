@@ -1,13 +1,13 @@
 """`flightstack vehicle`: what is connected, its parameters, its logs, its health."""
 
 import math
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from missions.cli.options import StatusLine
 from missions.cli.vehicle_link import FAILED, address, confirm, connected, print_json, run, with_client
 from missions.cli.vehicle_params import params
 
@@ -92,14 +92,12 @@ def download(which: str, folder: Path, **given: Any) -> int:
     from autopilot_bridge.clock.pacing import wall_time_s
     from missions.vehicle_client import logs as client_logs
 
-    terminal = sys.stderr.isatty()
-
     async def work(client: "VehicleClient") -> list[dict[str, Any]]:
         got = []
         shelf = client_logs.VehicleLogs(client)
         for entry in client_logs.chosen(await shelf.entries(), which):
             there = client_logs.fetched(folder, entry)
-            line = DownloadLine(entry.id, entry.size_bytes, wall_time_s if terminal else None)
+            line = DownloadLine(entry.id, entry.size_bytes, wall_time_s)
             try:
                 path = there or await shelf.download(entry, folder, line)
             finally:
@@ -127,12 +125,13 @@ class DownloadLine:
     Args:
         number: number of the log.
         size_bytes: size of the log.
-        monotonic: wall clock in seconds; None: there is no terminal, and nothing is shown.
+        monotonic: wall clock in seconds.
     """
 
-    def __init__(self, number: int, size_bytes: int, monotonic: Callable[[], float] | None) -> None:
+    def __init__(self, number: int, size_bytes: int, monotonic: Callable[[], float]) -> None:
         self._number, self._size_bytes = number, size_bytes
         self._monotonic = monotonic
+        self._line = StatusLine()
         self._begun_s: float | None = None
         self._shown_s = -math.inf
 
@@ -142,7 +141,7 @@ class DownloadLine:
         Args:
             done: received share, 0..1; NaN while it is not known.
         """
-        if self._monotonic is None or not math.isfinite(done):
+        if not math.isfinite(done):
             return
         now_s = self._monotonic()
         if self._begun_s is None:
@@ -155,12 +154,11 @@ class DownloadLine:
         if passed_s > 1.0 and done > 0.0:
             left_s = passed_s * (1.0 - done) / done
             text += f", {1e-3 * done * self._size_bytes / passed_s:.0f} kB/s, {_duration(left_s)} left"
-        click.echo(f"\r{text:<60}", nl=False, err=True)
+        self._line.show(text)
 
     def end(self) -> None:
         """End the progress line."""
-        if self._begun_s is not None:
-            click.echo("", err=True)
+        self._line.end()
 
 
 def _duration(seconds: float) -> str:

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import sys
 from pathlib import Path
 
 import click
@@ -9,7 +10,7 @@ import pytest
 
 from missions.cli.fly_command import _FILES, _MISSIONS, _command_of
 from missions.cli.main import command_line
-from missions.cli.options import in_options
+from missions.cli.options import StatusLine, in_options
 
 ROOT = Path(__file__).parents[2]
 FIELD = re.compile(r"`[a-z]\w*(?:, [a-z]\w*)*(?:=[\w:]+)?`")
@@ -60,3 +61,17 @@ def test_every_field_that_an_error_names_has_an_option():
                         missing.append((path.name, field, shown))
     assert count > 50
     assert missing == []
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_status_line_is_for_terminals_only(capsys, monkeypatch, terminal):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    line = StatusLine()
+    line.show("longer")
+    line.show("short")
+    line.erase()
+    line.end()  # nothing is shown any more
+    line.show("last")
+    line.end()
+    expected = "\rlonger\rshort \r" + " " * 5 + "\r\rlast\n"
+    assert capsys.readouterr().err == (expected if terminal else "")

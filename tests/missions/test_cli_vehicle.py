@@ -76,7 +76,10 @@ def test_rounding_of_a_table_of_defaults_is_no_difference() -> None:
     assert len(parameters.differences(vehicle, table)) == 4  # a file has all digits
 
 
-def test_a_download_shows_how_far_and_how_fast_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_download_shows_how_far_and_how_fast_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     now_s = [100.0]
     line = DownloadLine(7, 62_000_000, lambda: now_s[0])
     line(float("nan"))
@@ -94,7 +97,7 @@ def test_a_download_shows_how_far_and_how_fast_it_is(capsys: pytest.CaptureFixtu
 
 
 def test_a_download_in_a_pipe_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    line = DownloadLine(7, 62_000_000, None)
+    line = DownloadLine(7, 62_000_000, lambda: 0.0)
     line(0.5)
     line.end()
     assert capsys.readouterr().err == ""
