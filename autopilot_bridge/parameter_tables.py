@@ -10,7 +10,7 @@ one value for each. `reboot = true`: a change waits for the next boot.
 """
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib.resources.abc import Traversable
 from typing import Any, Final
 
@@ -68,3 +68,23 @@ def _definition(name: str, entry: dict[str, Any], default: float) -> ParameterDe
         description=entry.get("text", ""),
         reboot_required=entry.get("reboot", False),
     )
+
+
+def combined(
+    base: Iterable[ParameterDefinition], own: Iterable[ParameterDefinition], *, without: tuple[str, ...]
+) -> tuple[ParameterDefinition, ...]:
+    """The table of another vehicle class: `base` with `own` rows in place of those of the same name.
+
+    Args:
+        base: the table of the class that has the shared rows.
+        own: the additional and different rows of the other class; additional rows come last.
+        without: names, or beginnings of names that end in `_`, that the other class does not have.
+    """
+    replaced = {definition.name: definition for definition in own}
+    prefixes = tuple(name for name in without if name.endswith("_"))
+    shared = [
+        replaced.pop(definition.name, definition)
+        for definition in base
+        if not (definition.name in without or definition.name.startswith(prefixes))
+    ]
+    return (*shared, *replaced.values())

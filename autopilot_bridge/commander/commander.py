@@ -7,9 +7,7 @@ A request returns a `Verdict`; events are typed, and flavours convert them into 
 from collections.abc import Callable
 from typing import Final
 
-from autopilot_bridge.commander.aids_watch import AidsWatch
-from autopilot_bridge.commander.arming import arming_reasons, mode_obstacle
-from autopilot_bridge.commander.arming_checks import ArmingChecks
+from autopilot_bridge.commander.arming import ArmingChecks, arming_reasons, mode_obstacle
 from autopilot_bridge.commander.battery import BatteryMonitor
 from autopilot_bridge.commander.crash import CrashCheck
 from autopilot_bridge.commander.disarming import AutoDisarm
@@ -33,15 +31,14 @@ from autopilot_bridge.commander.fence_watch import FenceWatch
 from autopilot_bridge.commander.guidance import Guidance
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.home import Home
+from autopilot_bridge.commander.link_and_sensor_monitor import LinkAndSensorMonitor
 from autopilot_bridge.commander.mode_memory import ModeMemory
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
-from autopilot_bridge.commander.pilot import PilotInput
+from autopilot_bridge.commander.pilot import PilotInput, StickOverride
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.setpoints import SetpointStream
-from autopilot_bridge.commander.situation import Situation
-from autopilot_bridge.commander.stick_override import StickOverride
-from autopilot_bridge.commander.survey import Survey
+from autopilot_bridge.commander.situation import Situation, SituationUpdate
 from autopilot_bridge.commander.task_events import TaskFollower
 from autopilot_bridge.commander.tasks import TaskRunner
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
@@ -124,7 +121,7 @@ class Commander:
         self._land_detector = land_detector
         self._thrust = thrust
         self._fence_keeper = FenceKeeper(self.fence, context, health, lambda: self.parameters.fence)
-        self._survey = Survey(
+        self._situation_update = SituationUpdate(
             self.situation,
             context,
             policy,
@@ -140,7 +137,7 @@ class Commander:
         self._ticks = 0
         self._disarming = AutoDisarm(policy)
         self._override = StickOverride()
-        self._aids = AidsWatch()
+        self._monitor = LinkAndSensorMonitor()
         self._crash = CrashCheck()
         self._memory = ModeMemory(active=policy.radio_restores_mode)
         self._follower = TaskFollower(self)
@@ -322,7 +319,7 @@ class Commander:
             self._checks.run(self.commanded_mode, self.situation, self.parameters)
             if self.booted and self._checks.report_due(time_us):
                 self._tell_reasons(self.arming_reasons, check_only=True)
-        self._events.extend(self._aids.update(self.situation, self.parameters, self.context.health))
+        self._events.extend(self._monitor.update(self.situation, self.parameters, self.context.health))
         told = self.failsafes.update(self.situation, self.parameters)
         self._events.extend(told)
         self._select()
@@ -340,7 +337,7 @@ class Commander:
 
     def _refresh(self) -> None:
         """Update the situation."""
-        self._events += self._survey.update(
+        self._events += self._situation_update.update(
             self.parameters,
             mode=self.commanded_mode,
             terminated=self.terminated,

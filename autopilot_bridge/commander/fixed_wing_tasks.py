@@ -88,7 +88,7 @@ class FixedWingTasks:
                 return TakeoffTask()
             case FlightMode.MISSION:
                 return MissionTask(
-                    self._missions, first_item=self._policy.mission_first_item, habits=self._policy.plans
+                    self._missions, first_item=self._policy.mission_first_item, rules=self._policy.plans
                 )
             case FlightMode.OFFBOARD:
                 return self.offboard
@@ -97,7 +97,7 @@ class FixedWingTasks:
                 return self.guided
             case FlightMode.RETURN:
                 return ReturnTask(
-                    self._missions, first_item=self._policy.mission_first_item, habits=self._policy.plans
+                    self._missions, first_item=self._policy.mission_first_item, rules=self._policy.plans
                 )
             case FlightMode.LAND:
                 return LandTask()

@@ -19,8 +19,7 @@ from autopilot_bridge.flight.multicopter.goto import RepositionTask
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
 from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask
 from autopilot_bridge.flight.multicopter.land import LandTask
-from autopilot_bridge.flight.multicopter.loiter import LoiterTask
-from autopilot_bridge.flight.multicopter.manual import ManualMode, ManualTask
+from autopilot_bridge.flight.multicopter.manual import LoiterTask, ManualMode, ManualTask
 from autopilot_bridge.flight.multicopter.mission import MissionTask
 from autopilot_bridge.flight.multicopter.offboard import OffboardTask
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask, OrbitYaw, circle_ahead
@@ -84,14 +83,14 @@ class MulticopterTasks:
             case FlightMode.MISSION:
                 if policy.mission_waits_for_start and context.on_ground and not mission_started:
                     return IdleTask()
-                return MissionTask(self._missions, first_item=policy.mission_first_item, habits=policy.plans)
+                return MissionTask(self._missions, first_item=policy.mission_first_item, rules=policy.plans)
             case FlightMode.OFFBOARD:
                 return self.offboard
             case FlightMode.GUIDED | FlightMode.GUIDED_NOGPS:
                 self.guided.set_hold(context)
                 return self.guided
             case FlightMode.RETURN | FlightMode.SMART_RETURN | FlightMode.AUTO_RETURN:
-                return ReturnTask(self._missions, first_item=policy.mission_first_item, habits=policy.plans)
+                return ReturnTask(self._missions, first_item=policy.mission_first_item, rules=policy.plans)
             case FlightMode.LAND:
                 return landing_task(context)
             case FlightMode.PRECISION_LAND:

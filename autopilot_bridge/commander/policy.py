@@ -7,7 +7,7 @@ from enum import Enum, auto
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules
 
 
 class MissionRestart(Enum):
@@ -125,7 +125,7 @@ class CommanderPolicy:
     mission_end_mode: FlightMode | None = None
     mission_restart: MissionRestart = MissionRestart.NEVER
     landing_blocks_arming: bool = False
-    plans: PlanHabits = PX4_PLANS
+    plans: PlanRules = PX4_PLANS
     fence_bounds_targets: bool = True
     fence_in_status: bool = False
     gps_shown_when_used: bool = False

@@ -1,12 +1,21 @@
-"""The input of arming checks and failsafes: one snapshot of the vehicle, updated at 50 Hz."""
+"""The input of arming checks and failsafes: one snapshot of the vehicle, and its update at 50 Hz."""
 
 import math
 from dataclasses import dataclass, field
+from typing import Final
 
-from autopilot_bridge.commander.events import BatteryLevel
+from autopilot_bridge.commander.battery import BatteryMonitor
+from autopilot_bridge.commander.events import BatteryLevel, Event, NavigationLost, NavigationReady
 from autopilot_bridge.commander.health import VehicleHealth
+from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.flight.context import FlightContext, FlightPhase
+from autopilot_bridge.navigation import layout as nav
 
 
 @dataclass(slots=True)
@@ -71,3 +80,92 @@ class Situation:
     tilt_rad: float = 0.0
     terminated: bool = False
     calibrating: bool = False
+
+
+_POSITION_HYSTERESIS: Final = (
+    2.5  # how much worse than required a position may become before it is lost (PX4)
+)
+
+
+class SituationUpdate:
+    """Fills a `Situation` from its sources; the geofence and the commander add their own parts.
+
+    Args:
+        situation: the snapshot to update.
+        context: navigation, sticks and the flight task's state.
+        policy: the flavour's boot timeline.
+        setpoints, pilot: provide the age of their newest input.
+        home: provides whether home is known.
+        battery: provides the warning level.
+    """
+
+    __slots__ = ("_battery", "_context", "_home", "_pilot", "_policy", "_setpoints", "_situation")
+
+    def __init__(
+        self,
+        situation: Situation,
+        context: FlightContext,
+        policy: CommanderPolicy,
+        *,
+        setpoints: SetpointStream,
+        pilot: PilotInput,
+        home: Home,
+        battery: BatteryMonitor,
+    ) -> None:
+        self._situation = situation
+        self._context = context
+        self._policy = policy
+        self._setpoints = setpoints
+        self._pilot = pilot
+        self._home = home
+        self._battery = battery
+
+    def update(
+        self,
+        parameters: CommanderParameters,
+        *,
+        mode: FlightMode,
+        terminated: bool,
+        mission_problem: Reason | None,
+    ) -> list[Event]:
+        """Update everything; returns the event when a position has become known, or was lost.
+
+        Args:
+            mode: the commanded mode.
+            terminated: the flight was terminated.
+            mission_problem: why the stored mission can't be flown.
+        """
+        situation, context = self._situation, self._context
+        time_us = situation.time_us
+        situation.mode = mode
+        situation.terminated = terminated
+        situation.mission_problem = mission_problem
+        situation.armed = context.armed
+        situation.airborne = context.armed and not context.on_ground
+        situation.landing = situation.airborne and context.phase is FlightPhase.LANDING
+        situation.ready = time_us >= self._policy.armable_s * 1e6
+        was_known = situation.position
+        situation.position = self._position_known(parameters)
+        situation.setpoint_age_s = self._setpoints.age_s(time_us)
+        situation.setpoint_needs_position = self._setpoints.needs_position
+        situation.gcs_age_s = self._pilot.gcs_age_s(time_us)
+        situation.sticks_age_s = self._pilot.sticks_age_s(time_us, parameters.stick_timeout_s)
+        situation.throttle_high = context.sticks.valid and context.sticks.throttle > THROTTLE_HIGH
+        situation.home_set = self._home.position is not None
+        situation.battery_level = self._battery.level
+        roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()
+        situation.roll_rad, situation.pitch_rad = roll, pitch
+        situation.tilt_rad = math.acos(math.cos(roll) * math.cos(pitch))
+        if situation.position == was_known:
+            return []
+        return [(NavigationLost if was_known else NavigationReady)(time_us=time_us)]
+
+    def _position_known(self, parameters: CommanderParameters) -> bool:
+        situation = self._situation
+        situation.position_accuracy_m = situation.health.position_accuracy_m
+        limit_m = parameters.position_accuracy_max_m * (_POSITION_HYSTERESIS if situation.position else 1.0)
+        return (
+            situation.health.position
+            and situation.time_us >= self._policy.position_ready_s * 1e6
+            and not situation.position_accuracy_m > limit_m
+        )

@@ -4,9 +4,15 @@ import math
 from typing import Final
 
 from autopilot_bridge.firmware.mapping import integer
-from autopilot_bridge.flight.avoidance_parameters import AvoidanceParameters
-from autopilot_bridge.flight.follow_parameters import FollowHeight, FollowParameters, FollowYaw
-from autopilot_bridge.flight.precision_parameters import Precision, PrecisionParameters, TargetLost
+from autopilot_bridge.flight.surroundings_parameters import (
+    AvoidanceParameters,
+    FollowHeight,
+    FollowParameters,
+    FollowYaw,
+    Precision,
+    PrecisionParameters,
+    TargetLost,
+)
 from autopilot_bridge.parameters import ParameterStore
 
 _SMOOTHING_S: Final = 5.0  # of FLW_TGT_RS 1

@@ -22,13 +22,14 @@ from autopilot_bridge.flight.plan_reading import (
     CONDITIONS,
     JUMPS,
     MARKERS,
+    PX4_PLANS,
     Command,
+    PlanRules,
     is_navigation,
     is_waypoint,
     jump_target,
     target_of,
 )
-from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, RoiMode, roi_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
@@ -43,7 +44,7 @@ class PlanTask(ABC):
     """Executes the items of a store, from its current one; DONE (and holding) after the last.
 
     A new plan or another current item in the store takes effect at the next update. DO_ items act at once.
-    With `PlanHabits.conditions` they act during the flight to the next position, delayed by CONDITION_ items,
+    With `PlanRules.conditions` they act during the flight to the next position, delayed by CONDITION_ items,
     and those that did not act before the arrival are dropped. Items for equipment are reported as
     `ItemCommanded`. An item that takes time is either a separate task (`_sub`) or a leg, which the vehicle's
     class flies.
@@ -51,7 +52,7 @@ class PlanTask(ABC):
     Args:
         store: the plan; its `current` is updated.
         first_item: 1 where item 0 is home (ArduPilot).
-        habits: how the firmware flies a plan.
+        rules: how the firmware flies a plan.
     """
 
     __slots__ = (
@@ -59,8 +60,8 @@ class PlanTask(ABC):
         "_condition_left_s",
         "_finished",
         "_first_item",
-        "_habits",
         "_jumps",
+        "_rules",
         "_seq",
         "_store",
         "_sub",
@@ -68,10 +69,10 @@ class PlanTask(ABC):
         "_wait_left_s",
     )
 
-    def __init__(self, store: MissionStore, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS) -> None:
+    def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
         self._store = store
         self._first_item = first_item
-        self._habits = habits
+        self._rules = rules
         self._version = -1
         self._seq = -1
         self._sub: FlightTask | None = None
@@ -126,7 +127,7 @@ class PlanTask(ABC):
 
     def _tell(self, ctx: FlightContext, event: FlightEvent) -> None:
         """Report progress, unless the plan is not the stored one."""
-        if not self._habits.silent:
+        if not self._rules.silent:
             ctx.events.append(event)
 
     def _restart(self, ctx: FlightContext) -> None:
@@ -163,7 +164,7 @@ class PlanTask(ABC):
             if item.command in JUMPS:
                 seq = self._jump(item, seq)
                 continue
-            if self._habits.conditions:
+            if self._rules.conditions:
                 self._beside.append(seq)
             else:
                 self._seq = self._store.current = seq
@@ -288,11 +289,11 @@ class PlanTask(ABC):
 
     def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         """Begin an item that takes time; False when there is nothing to fly."""
-        if self._habits.hurries and item.command in _WAITS:
+        if self._rules.hurries and item.command in _WAITS:
             item = replace(item, command=Command.NAV_WAYPOINT, param1=0.0, param2=0.0, param3=0.0)
         if item.command == Command.NAV_DELAY:
             self._wait_left_s = item.param1 if math.isfinite(item.param1) else 0.0
-            if not self._wait_left_s > 0.0 or self._habits.hurries:
+            if not self._wait_left_s > 0.0 or self._rules.hurries:
                 return False
             self._set_sub(ctx, self._hold_task())
             return True

@@ -1,19 +1,26 @@
-"""The target of a return: home, a rally point, or the landing of the plan (PX4 RTL_TYPE | ArduPilot RALLY_*).
+"""The target of a return (PX4 RTL_TYPE | ArduPilot RALLY_*), and a return along the plan.
 
 Source: PX4 1.16 navigator/rtl (findRtlDestination), ArduPilot 4.6 AP_Rally.
 """
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.flight.plan_reading import Command, is_waypoint, landing_start, target_of
-from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
+from autopilot_bridge.flight.parameters import ALONG_PLAN, RallyRule, ReturnDestination
+from autopilot_bridge.flight.plan_reading import Command, PlanRules, is_waypoint, landing_start, target_of
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
+
+if TYPE_CHECKING:
+    from autopilot_bridge.flight.context import FlightContext
+    from autopilot_bridge.flight.plan_task import PlanTask
 
 _PREFERENCE_M: Final = 2.0  # home, then the landing, unless another place is closer by more than this (PX4)
 _LANDINGS: Final = frozenset({Command.NAV_LAND, Command.NAV_VTOL_LAND})
@@ -163,3 +170,44 @@ def _landing_place(ctx: FlightContext, store: MissionStore | None, landing: int 
 def _away_m(ctx: FlightContext, place: Array) -> float:
     here = ctx.nav[nav_layout.POS_NED_M]
     return math.hypot(float(place[0] - here[0]), float(place[1] - here[1]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReturnPlan:
+    """The plan that a return flies.
+
+    Attributes:
+        store: the plan; for the way back a separate plan.
+        first_item: the first item that is flown.
+        rules: how it is flown; a return skips the waiting times.
+    """
+
+    store: MissionStore
+    first_item: int
+    rules: PlanRules
+
+    @classmethod
+    def of(
+        cls,
+        ctx: FlightContext,
+        store: MissionStore,
+        first_item: int,
+        rules: PlanRules,
+        destination: ReturnDestination,
+        place: ReturnPlace | None,
+    ) -> ReturnPlan:
+        """The plan of a return to `place`, set to the item where it begins."""
+        begin = None if place is None else place.landing
+        if destination in ALONG_PLAN:
+            shorter = destination is ReturnDestination.ALONG_PLAN_SHORTER
+            own, begin = way_back(ctx, store, first_item, plan_landing(store), shorter=shorter)
+            rules = replace(rules, hurries=True, silent=own is not store)
+            if own is not store:
+                return cls(store=own, first_item=0, rules=rules)
+        if begin is not None:
+            store.current = begin
+        return cls(store=store, first_item=first_item, rules=rules)
+
+    def task(self, make: Callable[..., PlanTask]) -> PlanTask:
+        """The task that flies the plan."""
+        return make(self.store, first_item=self.first_item, rules=self.rules)

@@ -15,8 +15,7 @@ from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.air_aiding import AirAiding
 from autopilot_bridge.navigation.alignment import tilt_from_accel
-from autopilot_bridge.navigation.clocks import Clocks
-from autopilot_bridge.navigation.contradictions import Contradictions
+from autopilot_bridge.navigation.clocks import Clocks, Contradictions
 from autopilot_bridge.navigation.external import ExternalSample
 from autopilot_bridge.navigation.external_aiding import ExternalAiding
 from autopilot_bridge.navigation.gps_aiding import GpsAiding

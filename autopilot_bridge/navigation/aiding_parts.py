@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from autopilot_bridge.navigation.clocks import Clocks
-from autopilot_bridge.navigation.contradictions import Contradictions
+from autopilot_bridge.navigation.clocks import Clocks, Contradictions
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.standby import Standby

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import FailsafeKind, FenceBreached, FenceSwitched
-from autopilot_bridge.commander.fence_return import place_ahead
+from autopilot_bridge.commander.fence_keeper import place_ahead
 from autopilot_bridge.commander.fence_watch import FenceWatch
 from autopilot_bridge.commander.geofence import Geofence
 from autopilot_bridge.commander.geofence_parameters import (

@@ -17,8 +17,7 @@ from autopilot_bridge.flight.context import (
 )
 from autopilot_bridge.flight.multicopter import MissionTask
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.plan_reading import Command
-from autopilot_bridge.flight.plan_rules import ARDUCOPTER_PLANS, PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_reading import ARDUCOPTER_PLANS, PX4_PLANS, Command, PlanRules
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as n
 from tests.flight.rig import Rig, positions, velocities
@@ -43,13 +42,13 @@ class Flight:
     def __init__(
         self,
         *items: MissionItem,
-        habits: PlanHabits = PX4_PLANS,
+        rules: PlanRules = PX4_PLANS,
         parameters: FlightParameters | None = None,
     ) -> None:
         self.rig = Rig(height_m=HEIGHT_M, parameters=parameters)
         self.store = MissionStore()
         self.store.replace(items, 1)
-        self.task = MissionTask(self.store, habits=habits)
+        self.task = MissionTask(self.store, rules=rules)
         self.rig.fly(self.task)
         self.times: list[tuple[float, FlightEvent]] = []
 
@@ -106,13 +105,13 @@ def test_a_waypoint_is_held_for_its_time(hold_s: float) -> None:
     assert (still.sum() * 0.1 > hold_s - 0.5) if hold_s else (still.sum() == 0)
 
 
-@pytest.mark.parametrize(("habits", "passes_m"), [(PX4_PLANS, 3.0), (ARDUCOPTER_PLANS, 1.5)])
-def test_an_own_acceptance_radius_rounds_the_corner(habits: PlanHabits, passes_m: float) -> None:
+@pytest.mark.parametrize(("rules", "passes_m"), [(PX4_PLANS, 3.0), (ARDUCOPTER_PLANS, 1.5)])
+def test_an_own_acceptance_radius_rounds_the_corner(rules: PlanRules, passes_m: float) -> None:
     """ArduCopter has one radius for all waypoints; PX4 rounds by the item's."""
-    flight = Flight(place(30.0, 0.0, param2=9.0), place(30.0, 30.0), habits=habits)
+    flight = Flight(place(30.0, 0.0, param2=9.0), place(30.0, 30.0), rules=rules)
     track = positions(flight.run(30.0))[:, :2]
     missed = np.linalg.norm(track - [30.0, 0.0], axis=1).min()
-    assert (missed > 1.0) if habits.item_radius else (missed < passes_m)
+    assert (missed > 1.0) if rules.item_radius else (missed < passes_m)
 
 
 def test_loiter_time_delay_and_height() -> None:
@@ -157,7 +156,7 @@ def test_jumps_repeat_as_often_as_they_say(repeats: int, tagged: bool) -> None:
         )
     else:
         first, jump = do(Command.DO_LAND_START), do(Command.DO_JUMP, param1=0.0, param2=float(repeats))
-    flight = Flight(first, place(3.0, 0.0), place(0.0, 0.0), jump, habits=ARDUCOPTER_PLANS)
+    flight = Flight(first, place(3.0, 0.0), place(0.0, 0.0), jump, rules=ARDUCOPTER_PLANS)
     flight.run(80.0)
     assert [seq for seq in flight.reached if seq in (1, 2)] == [1, 2] * (repeats + 1)
 
@@ -201,7 +200,7 @@ def test_condition_delay_holds_items_up_beside_the_flight() -> None:
         do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(40.0, 0.0),
     )
-    beside = Flight(*items, habits=ARDUCOPTER_PLANS)
+    beside = Flight(*items, rules=ARDUCOPTER_PLANS)
     beside.run(40.0)
     assert 2.9 < beside.when(2) - beside.when(0) < 3.3 < beside.when(3) - beside.when(0)
     at_once = Flight(*items)
@@ -216,7 +215,7 @@ def test_a_condition_that_is_overtaken_drops_what_waits_for_it() -> None:
         do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(10.0, 0.0),
         place(12.0, 0.0),
-        habits=ARDUCOPTER_PLANS,
+        rules=ARDUCOPTER_PLANS,
     )
     flight.run(40.0)
     assert flight.commanded == []
@@ -229,7 +228,7 @@ def test_condition_distance() -> None:
         do(Command.CONDITION_DISTANCE, param1=10.0),
         do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(30.0, 0.0),
-        habits=ARDUCOPTER_PLANS,
+        rules=ARDUCOPTER_PLANS,
     )
     flight.run(30.0, until=lambda: bool(flight.commanded))
     assert 19.5 < float(flight.rig.nav[n.POS_NED_M][0]) < 21.5
@@ -243,7 +242,7 @@ def test_condition_yaw_turns_the_nose_on_the_way(relative: float, wanted_deg: fl
         do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(40.0, 0.0),
         place(80.0, 0.0),
-        habits=ARDUCOPTER_PLANS,
+        rules=ARDUCOPTER_PLANS,
         parameters=FlightParameters(use_waypoint_yaw=False),
     )
     log = flight.run(60.0, until=lambda: 3 in flight.reached)
@@ -271,8 +270,8 @@ def roi(command: int, **fields: float) -> MissionItem:
         roi(Command.NAV_ROI, param1=3.0),
     ],
 )
-@pytest.mark.parametrize("habits", [PX4_PLANS, ARDUCOPTER_PLANS])
-def test_the_nose_follows_a_place(item: MissionItem, habits: PlanHabits) -> None:
+@pytest.mark.parametrize("rules", [PX4_PLANS, ARDUCOPTER_PLANS])
+def test_the_nose_follows_a_place(item: MissionItem, rules: PlanRules) -> None:
     flight = Flight(
         place(1.0, 0.0),
         item,
@@ -280,7 +279,7 @@ def test_the_nose_follows_a_place(item: MissionItem, habits: PlanHabits) -> None
         do(Command.NAV_DELAY, param1=4.0),
         do(Command.DO_SET_ROI_NONE),
         place(60.0, 0.0),
-        habits=habits,
+        rules=rules,
     )
     log = flight.run(40.0, until=lambda: 2 in flight.reached)
     on_the_way = [state for state in log if state[n.POS_NED_M][0] > 12.0]
@@ -321,7 +320,7 @@ def spline(north: float, east: float, height: float = HEIGHT_M, **params: float)
 
 def test_splines_pass_their_waypoints_smoothly() -> None:
     points = [(30.0, 0.0, 20.0), (60.0, 20.0, 24.0), (40.0, 50.0, 24.0), (0.0, 40.0, 20.0)]
-    flight = Flight(place(*points[0]), *(spline(*point) for point in points[1:]), habits=ARDUCOPTER_PLANS)
+    flight = Flight(place(*points[0]), *(spline(*point) for point in points[1:]), rules=ARDUCOPTER_PLANS)
     log = flight.run(90.0)
     assert flight.reached == [0, 1, 2, 3]
     track = positions(log)
@@ -337,7 +336,7 @@ def test_splines_pass_their_waypoints_smoothly() -> None:
 
 
 def test_a_spline_between_straight_legs_keeps_their_directions() -> None:
-    flight = Flight(place(30.0, 0.0), spline(60.0, 30.0), place(60.0, 80.0), habits=ARDUCOPTER_PLANS)
+    flight = Flight(place(30.0, 0.0), spline(60.0, 30.0), place(60.0, 80.0), rules=ARDUCOPTER_PLANS)
     log = flight.run(60.0)
     track, speed = positions(log), velocities(log)
     into = np.linalg.norm(track[:, :2] - [30.0, 0.0], axis=1).argmin()
@@ -350,7 +349,7 @@ def test_a_spline_between_straight_legs_keeps_their_directions() -> None:
 
 def test_a_held_spline_waypoint_stops_there() -> None:
     flight = Flight(
-        place(20.0, 0.0), spline(40.0, 20.0, param1=3.0), spline(20.0, 40.0), habits=ARDUCOPTER_PLANS
+        place(20.0, 0.0), spline(40.0, 20.0, param1=3.0), spline(20.0, 40.0), rules=ARDUCOPTER_PLANS
     )
     log = flight.run(60.0)
     still = np.linalg.norm(velocities(log), axis=1) < 0.3
@@ -360,7 +359,7 @@ def test_a_held_spline_waypoint_stops_there() -> None:
 
 
 def test_a_spline_from_a_hover_and_back_to_the_same_place() -> None:
-    flight = Flight(spline(0.0, 0.0), spline(12.0, 0.0), spline(12.0, 0.0), habits=ARDUCOPTER_PLANS)
+    flight = Flight(spline(0.0, 0.0), spline(12.0, 0.0), spline(12.0, 0.0), rules=ARDUCOPTER_PLANS)
     flight.run(60.0)
     assert flight.reached == [0, 1, 2]
     assert np.isfinite(flight.rig.ctx.setpoint[sp.POS_NED_M]).all()

@@ -11,10 +11,9 @@ from autopilot_bridge.flight.context import FlightContext, MissionFinished, Touc
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing import ReturnTask as AircraftReturnTask
 from autopilot_bridge.flight.multicopter import ReturnPhase, ReturnTask
-from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, ReturnDestination
 from autopilot_bridge.flight.plan_reading import Command
 from autopilot_bridge.flight.return_place import choose_return, plan_landing
-from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame

@@ -6,8 +6,7 @@ import pytest
 from autopilot_bridge.navigation import NavigationParameters, fusion
 from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.aiding_parts import AidingParts
-from autopilot_bridge.navigation.clocks import Clocks
-from autopilot_bridge.navigation.contradictions import Contradictions
+from autopilot_bridge.navigation.clocks import Clocks, Contradictions
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.height_aiding import HeightAiding
 from autopilot_bridge.navigation.solution import Solution

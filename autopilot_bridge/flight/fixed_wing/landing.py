@@ -11,11 +11,11 @@ from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, T
 from autopilot_bridge.flight.fixed_wing.approach import Approach, approach_along_leg, approach_into_wind
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle import Circle
+from autopilot_bridge.flight.fixed_wing.climb_out_checks import PowerCheck
 from autopilot_bridge.flight.fixed_wing.descend import DescendTask
 from autopilot_bridge.flight.fixed_wing.flare import Flare
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.fixed_wing.power_check import PowerCheck
 from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 from flightsim.foundation.vectors import wrap_pi

@@ -10,17 +10,24 @@ from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing.base import GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle_item import CircleItem
 from autopilot_bridge.flight.fixed_wing.command import FlightCommand
+from autopilot_bridge.flight.fixed_wing.descend import PositionLost
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.leg import Leg, Place
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.fixed_wing.position_lost import PositionLost
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffTask
 from autopilot_bridge.flight.heading import turn_angle
-from autopilot_bridge.flight.plan_reading import JUMPS, Command, is_navigation, is_waypoint, target_of
-from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_reading import (
+    JUMPS,
+    PX4_PLANS,
+    Command,
+    PlanRules,
+    is_navigation,
+    is_waypoint,
+    target_of,
+)
 from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus, clear_setpoint
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
@@ -47,7 +54,7 @@ class MissionTask(PlanTask):
     Args:
         store: the plan; its `current` is kept up to date.
         first_item: 1 where item 0 is home (ArduPilot).
-        habits: how the firmware goes through a plan.
+        rules: how the firmware goes through a plan.
     """
 
     __slots__ = (
@@ -64,8 +71,8 @@ class MissionTask(PlanTask):
         "_track_down_m",
     )
 
-    def __init__(self, store: MissionStore, first_item: int = 0, habits: PlanHabits = PX4_PLANS) -> None:
-        super().__init__(store, first_item=first_item, habits=habits)
+    def __init__(self, store: MissionStore, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
+        super().__init__(store, first_item=first_item, rules=rules)
         self._state = AircraftState()
         self._command = FlightCommand()
         self._path = GuidedPath()
@@ -104,7 +111,7 @@ class MissionTask(PlanTask):
         return LoiterTask(airspeed_m_s=self._airspeed_m_s)
 
     def _return_task(self) -> FlightTask:
-        return ReturnTask(self._store, first_item=self._first_item, habits=self._habits)
+        return ReturnTask(self._store, first_item=self._first_item, rules=self._rules)
 
     def _finish(self, ctx: FlightContext) -> None:
         sub, leg = self._sub, self._leg
@@ -153,7 +160,7 @@ class MissionTask(PlanTask):
             self._track_down_m = float(target[2])
         else:
             self._begin_leg(ctx, item, target, came_from)
-            hold_s = item.param1 if math.isfinite(item.param1) and self._habits.holds else 0.0
+            hold_s = item.param1 if math.isfinite(item.param1) and self._rules.holds else 0.0
             self._hold_s = max(0.0, hold_s)
         return True
 
@@ -184,7 +191,7 @@ class MissionTask(PlanTask):
         after = self._place_after(ctx)
         # an item's own radius holds whatever the turn behind it, as ArduPlane has it
         turn = math.nan if after is None or own > 0.0 else turn_angle(start, place, _place(after))
-        beyond_m = item.param3 if self._habits.passes_by and item.param3 > 0.0 else 0.0
+        beyond_m = item.param3 if self._rules.passes_by and item.param3 > 0.0 else 0.0
         if beyond_m > 0.0:
             place = _beyond(start, place, beyond_m)
         self._leg = Leg(

@@ -1,4 +1,4 @@
-"""Limits and habits of fixed-wing flight, in the meaning PX4 (FW_*, NPFG_*, RTL_*) and ArduPlane share."""
+"""Limits and rules of fixed-wing flight, in the meaning PX4 (FW_*, NPFG_*, RTL_*) and ArduPlane share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from autopilot_bridge.flight.fixed_wing.landing_parameters import (
     LandingParameters,
     SurfaceWindParameters,
 )
-from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
+from autopilot_bridge.flight.parameters import RallyRule, ReturnDestination
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
 

@@ -11,11 +11,9 @@ from autopilot_bridge.flight.fixed_wing.base import AircraftTask, LandingTask
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.plan_reading import landing_start
-from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
-from autopilot_bridge.flight.return_place import ReturnPlace, choose_return, plan_landing
-from autopilot_bridge.flight.return_plan import ReturnPlan
-from autopilot_bridge.flight.return_rules import ALONG_PLAN, ReturnDestination
+from autopilot_bridge.flight.parameters import ALONG_PLAN, ReturnDestination
+from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules, landing_start
+from autopilot_bridge.flight.return_place import ReturnPlace, ReturnPlan, choose_return, plan_landing
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionStore
 
@@ -55,22 +53,22 @@ class ReturnTask(AircraftTask):
     Args:
         store: the plan, whose landing sequence the parameters may send the return to; None: there is none.
         first_item: the first item that is flown, as the mission task has it.
-        habits: how the firmware goes through a plan.
+        rules: how the firmware goes through a plan.
 
     Attributes:
         phase: see `ReturnPhase`.
         place: where the return leads; None: nowhere.
     """
 
-    __slots__ = ("_first_item", "_habits", "_home", "_store", "_sub", "_wait_s", "phase", "place")
+    __slots__ = ("_first_item", "_home", "_rules", "_store", "_sub", "_wait_s", "phase", "place")
 
     def __init__(
-        self, store: MissionStore | None = None, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS
+        self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
     ) -> None:
         super().__init__()
         self._store = store
         self._first_item = first_item
-        self._habits = habits
+        self._rules = rules
         self.place: ReturnPlace | None = None
         self._sub: FlightTask | None = None
         self._home: Array = np.full(3, np.nan)
@@ -134,7 +132,7 @@ class ReturnTask(AircraftTask):
         if store is None or len(store.items) <= self._first_item:
             return False
         destination = ctx.fixed_wing.return_destination
-        plan = ReturnPlan.of(ctx, store, self._first_item, self._habits, destination, place)
+        plan = ReturnPlan.of(ctx, store, self._first_item, self._rules, destination, place)
         self.phase = ReturnPhase.LAND
         self._set_sub(ctx, plan.task(MissionTask))
         return True

@@ -9,7 +9,7 @@ import numpy as np
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
-from autopilot_bridge.flight.fixed_wing.launch_detector import LaunchDetector
+from autopilot_bridge.flight.fixed_wing.climb_out_checks import LaunchDetector
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, LaunchKind

@@ -4,9 +4,9 @@ import math
 from typing import Final
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.flight.follow_parameters import FollowHeight, FollowParameters, FollowYaw
-from autopilot_bridge.flight.multicopter.cruise import CruiseTask
+from autopilot_bridge.flight.multicopter.hold import CruiseTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
+from autopilot_bridge.flight.surroundings_parameters import FollowHeight, FollowParameters, FollowYaw
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 

@@ -9,9 +9,10 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.multicopter.avoidance import limited_velocity
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
+from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+from autopilot_bridge.flight.task import FlightTask, TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 from flightsim.foundation.rotations import quaternion_from_euler
 
@@ -183,3 +184,33 @@ class ManualTask:
         rate = self._turn(ctx, yaw)
         motion.heading.reset(self._yaw_rad, rate)
         motion.write(ctx)
+
+
+class LoiterTask:
+    """Flies by the sticks of a pilot, and holds without a pilot.
+
+    A simulated radio with untouched sticks does not count as a pilot: its throttle is down, and the vehicle
+    would descend to the ground.
+    """
+
+    __slots__ = ("_hold", "_pilot", "_task")
+
+    def __init__(self) -> None:
+        self._hold: FlightTask = HoldTask()
+        self._pilot: FlightTask = ManualTask(ManualMode.POSITION)
+        self._task: FlightTask = self._hold
+
+    def activate(self, ctx: FlightContext) -> None:
+        self._task = self._wanted(ctx)
+        self._task.activate(ctx)
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        wanted = self._wanted(ctx)
+        if wanted is not self._task:
+            self._task = wanted
+            wanted.activate(ctx)
+        self._task.update(ctx)
+        return TaskStatus.RUNNING
+
+    def _wanted(self, ctx: FlightContext) -> FlightTask:
+        return self._pilot if ctx.sticks.valid and not ctx.sticks.simulated else self._hold

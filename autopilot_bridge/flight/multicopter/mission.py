@@ -13,26 +13,27 @@ from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_in_d
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.multicopter.nose import Nose
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
 from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.spline import SplineCurve, SplineFlight
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.multicopter.trajectory import SPEED
+from autopilot_bridge.flight.multicopter.yaw import Nose
 from autopilot_bridge.flight.parameters import YawBehaviour
 from autopilot_bridge.flight.plan_reading import (
     JUMPS,
+    PX4_PLANS,
     Command,
+    PlanRules,
     is_navigation,
     is_passed_through,
     is_waypoint,
     target_of,
 )
-from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_task import PlanTask
-from autopilot_bridge.flight.precision_parameters import Precision
 from autopilot_bridge.flight.region_of_interest import heading_to
+from autopilot_bridge.flight.surroundings_parameters import Precision
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
@@ -73,13 +74,13 @@ class MissionTask(PlanTask):
     Args:
         store: the plan; its `current` is updated.
         first_item: 1 where item 0 is home (ArduPilot).
-        habits: how the firmware flies a plan.
+        rules: how the firmware flies a plan.
     """
 
     __slots__ = ("_leg", "_motion", "_nose", "_ramp", "_speed_m_s", "_turning")
 
-    def __init__(self, store: MissionStore, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS) -> None:
-        super().__init__(store, first_item=first_item, habits=habits)
+    def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
+        super().__init__(store, first_item=first_item, rules=rules)
         self._leg: _Leg | None = None
         self._motion: SmoothMotion | None = None
         self._ramp: TakeoffRamp | None = None
@@ -100,7 +101,7 @@ class MissionTask(PlanTask):
         return HoldTask()
 
     def _return_task(self) -> FlightTask:
-        return ReturnTask(self._store, first_item=self._first_item, habits=self._habits)
+        return ReturnTask(self._store, first_item=self._first_item, rules=self._rules)
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Fly at this speed until an item or a command changes it, the present leg included."""
@@ -164,7 +165,7 @@ class MissionTask(PlanTask):
 
     def _radius(self, ctx: FlightContext, item: MissionItem) -> float:
         """Acceptance radius of a waypoint."""
-        own = item.param2 if math.isfinite(item.param2) and self._habits.item_radius else 0.0
+        own = item.param2 if math.isfinite(item.param2) and self._rules.item_radius else 0.0
         return own if own > 0.0 and is_waypoint(item) else ctx.multicopter.acceptance_radius_m
 
     def _cruise(self, ctx: FlightContext) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, TaskFinished
-from autopilot_bridge.flight.multicopter.cruise import CruiseTask
+from autopilot_bridge.flight.multicopter.hold import CruiseTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout

@@ -15,7 +15,7 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.multicopter.land import LandTask, descent_speed
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.precision_parameters import Precision, PrecisionParameters, TargetLost
+from autopilot_bridge.flight.surroundings_parameters import Precision, PrecisionParameters, TargetLost
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 

@@ -9,11 +9,9 @@ from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
-from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
-from autopilot_bridge.flight.return_place import ReturnPlace, choose_return, plan_landing
-from autopilot_bridge.flight.return_plan import ReturnPlan
-from autopilot_bridge.flight.return_rules import ALONG_PLAN
+from autopilot_bridge.flight.parameters import ALONG_PLAN, FlightParameters
+from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules
+from autopilot_bridge.flight.return_place import ReturnPlace, ReturnPlan, choose_return, plan_landing
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
@@ -57,7 +55,7 @@ class ReturnTask:
     Args:
         store: the plan whose landing the return may use, by the parameters; None: there is none.
         first_item: the first item that is flown, as in the mission task.
-        habits: how the firmware flies a plan.
+        rules: how the firmware flies a plan.
 
     Attributes:
         phase: see `ReturnPhase`.
@@ -66,11 +64,11 @@ class ReturnTask:
 
     __slots__ = (
         "_first_item",
-        "_habits",
         "_land",
         "_motion",
         "_plan",
         "_ramp",
+        "_rules",
         "_store",
         "_target",
         "_wait_s",
@@ -79,13 +77,13 @@ class ReturnTask:
     )
 
     def __init__(
-        self, store: MissionStore | None = None, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS
+        self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
     ) -> None:
         self.phase = ReturnPhase.CLIMB
         self.place: ReturnPlace | None = None
         self._store = store
         self._first_item = first_item
-        self._habits = habits
+        self._rules = rules
         self._motion: SmoothMotion | None = None
         self._ramp: TakeoffRamp | None = None
         self._land: FlightTask | None = None
@@ -145,7 +143,7 @@ class ReturnTask:
         if store is None or len(store.items) <= self._first_item:
             return False
         plan = ReturnPlan.of(
-            ctx, store, self._first_item, self._habits, ctx.multicopter.return_destination, self.place
+            ctx, store, self._first_item, self._rules, ctx.multicopter.return_destination, self.place
         )
         self.phase = ReturnPhase.PLAN
         self._plan = plan.task(MissionTask)

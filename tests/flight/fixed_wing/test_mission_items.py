@@ -9,8 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightEvent, ItemCommanded, WaypointReached
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LoiterTask, MissionTask, TurnInRule
-from autopilot_bridge.flight.plan_reading import Command
-from autopilot_bridge.flight.plan_rules import ARDUPLANE_PLANS, PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_reading import ARDUPLANE_PLANS, PX4_PLANS, Command, PlanRules
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from tests.flight.fixed_wing.kinematic import PointMass
 
@@ -26,11 +25,11 @@ def do(command: int, **params: float) -> MissionItem:
 
 
 class Flight:
-    def __init__(self, *items: MissionItem, habits: PlanHabits = ARDUPLANE_PLANS) -> None:
+    def __init__(self, *items: MissionItem, rules: PlanRules = ARDUPLANE_PLANS) -> None:
         self.mass = PointMass(parameters=PLANE)
         self.store = MissionStore()
         self.store.replace(items, 1)
-        self.task = MissionTask(self.store, habits=habits)
+        self.task = MissionTask(self.store, rules=rules)
         self.mass.fly(self.task)
         self.times: list[tuple[float, FlightEvent]] = []
 
@@ -56,18 +55,18 @@ class Flight:
         return [event.seq for _, event in self.times if isinstance(event, ItemCommanded)]
 
 
-@pytest.mark.parametrize(("habits", "beyond_m"), [(ARDUPLANE_PLANS, 120.0), (PX4_PLANS, 0.0)])
-def test_passing_a_waypoint_by(habits: PlanHabits, beyond_m: float) -> None:
+@pytest.mark.parametrize(("rules", "beyond_m"), [(ARDUPLANE_PLANS, 120.0), (PX4_PLANS, 0.0)])
+def test_passing_a_waypoint_by(rules: PlanRules, beyond_m: float) -> None:
     """ArduPlane's param3: the next leg begins so far behind the waypoint. PX4 doesn't know it."""
-    flight = Flight(place(600.0, 0.0, param3=120.0), place(600.0, 800.0), habits=habits)
+    flight = Flight(place(600.0, 0.0, param3=120.0), place(600.0, 800.0), rules=rules)
     flight.run(flight.has_reached(0))
     assert flight.mass.place[0] == pytest.approx(600.0 + beyond_m, abs=28.0)
 
 
-@pytest.mark.parametrize(("habits", "waits"), [(PX4_PLANS, True), (ARDUPLANE_PLANS, False)])
-def test_hold_times(habits: PlanHabits, waits: bool) -> None:
+@pytest.mark.parametrize(("rules", "waits"), [(PX4_PLANS, True), (ARDUPLANE_PLANS, False)])
+def test_hold_times(rules: PlanRules, waits: bool) -> None:
     """PX4's aircraft circle at a waypoint with a hold time; ArduPlane has none."""
-    flight = Flight(place(500.0, 0.0, param1=40.0), place(1500.0, 0.0), habits=habits)
+    flight = Flight(place(500.0, 0.0, param1=40.0), place(1500.0, 0.0), rules=rules)
     flight.run(lambda: flight.mass.place[0] > 470.0)
     start = flight.time_s
     flight.run(flight.has_reached(0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot_bridge.flight.fixed_wing.power_check import PowerCheck
+from autopilot_bridge.flight.fixed_wing.climb_out_checks import PowerCheck
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
 DT_S = 0.02

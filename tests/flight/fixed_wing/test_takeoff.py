@@ -13,7 +13,7 @@ from autopilot_bridge.flight.fixed_wing import (
     TakeoffPhase,
     TakeoffTask,
 )
-from autopilot_bridge.flight.fixed_wing.launch_detector import LaunchDetector
+from autopilot_bridge.flight.fixed_wing.climb_out_checks import LaunchDetector
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as n

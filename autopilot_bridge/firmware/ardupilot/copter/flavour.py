@@ -19,7 +19,7 @@ from autopilot_bridge.firmware.gps_source import ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
-from autopilot_bridge.flight.plan_rules import ARDUCOPTER_PLANS
+from autopilot_bridge.flight.plan_reading import ARDUCOPTER_PLANS
 from flightsim.airframe import AirframeKind
 
 _FLOWN: Final = frozenset(

@@ -23,8 +23,7 @@ from autopilot_bridge.firmware.surroundings_mapping import (
     ardupilot_follow,
     ardupilot_precision,
 )
-from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
-from autopilot_bridge.flight.return_rules import RallyRule
+from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, YawBehaviour
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 

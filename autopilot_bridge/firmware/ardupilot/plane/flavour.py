@@ -20,7 +20,7 @@ from autopilot_bridge.firmware.ardupilot.texts import plane_notices
 from autopilot_bridge.firmware.flavour import SensorBits
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.fixed_wing import LandDetector
-from autopilot_bridge.flight.plan_rules import ARDUPLANE_PLANS
+from autopilot_bridge.flight.plan_reading import ARDUPLANE_PLANS
 from flightsim.airframe import AirframeKind, LaunchKind
 
 _FLOWN: Final = frozenset(

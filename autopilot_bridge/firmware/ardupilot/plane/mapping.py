@@ -39,7 +39,7 @@ from autopilot_bridge.flight.fixed_wing.parameters import (
     LaunchKind,
     TurnInRule,
 )
-from autopilot_bridge.flight.return_rules import ReturnDestination
+from autopilot_bridge.flight.parameters import ReturnDestination
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope

@@ -4,8 +4,7 @@ from importlib.resources import files
 from typing import Final
 
 from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
-from autopilot_bridge.firmware.table_rows import combined
-from autopilot_bridge.parameter_tables import load_table
+from autopilot_bridge.parameter_tables import combined, load_table
 from autopilot_bridge.parameters import ParameterDefinition
 
 _COPTER_ONLY: Final = (

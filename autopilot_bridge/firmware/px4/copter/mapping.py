@@ -17,8 +17,7 @@ from autopilot_bridge.firmware.surroundings_mapping import (
     px4_precision,
     px4_return_precision,
 )
-from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
-from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
+from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, ReturnDestination, YawBehaviour
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 

@@ -4,8 +4,7 @@ from importlib.resources import files
 from typing import Final
 
 from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
-from autopilot_bridge.firmware.table_rows import combined
-from autopilot_bridge.parameter_tables import load_table
+from autopilot_bridge.parameter_tables import combined, load_table
 from autopilot_bridge.parameters import ParameterDefinition
 
 _MULTICOPTER_ONLY: Final = (

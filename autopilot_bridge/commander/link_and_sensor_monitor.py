@@ -1,24 +1,43 @@
-"""Monitoring of airspeed, ground station and stick links, and GPS in the filter. Events, no actions."""
+"""Monitoring of the airspeed sensor, the links, and GPS in the filter. Events, no actions."""
 
 from typing import Final
 
-from autopilot_bridge.commander.airspeed import AirspeedWatch
-from autopilot_bridge.commander.events import Aid, AidChanged, Event
+from autopilot_bridge.commander.events import Aid, AidChanged, AirspeedChanged, Event
+from autopilot_bridge.commander.health import VehicleHealth
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.situation import Situation
 from autopilot_bridge.navigation.health import NavigationHealth
+
+
+class AirspeedMonitor:
+    """Reports when the sensor is disabled while armed, and when it is used again."""
+
+    __slots__ = ("_valid",)
+
+    def __init__(self) -> None:
+        self._valid = True
+
+    def update(self, health: VehicleHealth, *, armed: bool, time_us: int) -> AirspeedChanged | None:
+        """Check the newest health; returns the change, or None."""
+        if not armed or not health.has_airspeed:
+            self._valid = True
+        elif health.airspeed is not self._valid:
+            self._valid = health.airspeed
+            return AirspeedChanged(time_us=time_us, valid=health.airspeed)
+        return None
+
 
 _GPS_STOPPED_US: Final = 7_000_000
 """GPS that was not fused for this time counts as lost (PX4's EKF2 then stops using it)."""
 
 
-class AidsWatch:
+class LinkAndSensorMonitor:
     """Reports when a link or GPS that was present is lost, and when it is back."""
 
     __slots__ = ("_airspeed", "_lost_us")
 
     def __init__(self) -> None:
-        self._airspeed = AirspeedWatch()
+        self._airspeed = AirspeedMonitor()
         self._lost_us: dict[Aid, int | None] = {}  # None: not lost
 
     def update(
