@@ -50,8 +50,8 @@ def mean_us(call: Callable[[], object], repeats: int) -> float:
 def flying_context() -> FlightContext:
     """A context of a vehicle that hovers at the origin."""
     nav = np.zeros(NAV_SIZE)
-    nav[0] = 1.0
-    nav[24] = -9.81
+    nav[nav_layout.Q] = 1.0
+    nav[nav_layout.FORCE + 2] = -9.81
     ctx = FlightContext(nav=nav)
     health = NavigationHealth()
     health.position_horizontal_absolute = health.velocity_horizontal = True
@@ -67,8 +67,8 @@ def flying_context() -> FlightContext:
 def flying_aircraft() -> FixedWingController:
     """A controller of an aircraft that follows a course at a height."""
     nav = np.zeros(NAV_SIZE)
-    nav[0] = 1.0
-    nav[24] = -9.81
+    nav[nav_layout.Q] = 1.0
+    nav[nav_layout.FORCE + 2] = -9.81
     nav[nav_layout.VEL_NED_M_S] = (15.0, 2.0, 0.0)
     nav[nav_layout.AIRSPEED_M_S] = nav[nav_layout.AIRSPEED_TRUE_M_S] = 15.0
     controller = FixedWingController(physics_rate_hz=250.0, nav=nav)

@@ -10,51 +10,61 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-# imu.values
-IMU_GYRO_FRD_RAD_S: Final = slice(0, 3)
-IMU_ACCEL_FRD_M_S2: Final = slice(3, 6)  # specific force, (0, 0, -9.81) at rest
-IMU_TEMPERATURE_C: Final = 6
-IMU_SIZE: Final = 7
-# barometer.values
-BARO_PRESSURE_PA: Final = 0
-BARO_TEMPERATURE_C: Final = 1
-BARO_SIZE: Final = 2
-# magnetometer.values
-MAG_FRD_GAUSS: Final = slice(0, 3)
-MAG_SIZE: Final = 3
-# gps.values
-GPS_LAT_DEG: Final = 0
-GPS_LON_DEG: Final = 1
-GPS_ALT_M: Final = 2  # above mean sea level
-GPS_VEL_NED_M_S: Final = slice(3, 6)
-GPS_EPH_M: Final = 6  # 1-sigma horizontal accuracy the receiver reports
-GPS_EPV_M: Final = 7
-GPS_SPEED_ACCURACY_M_S: Final = 8
-GPS_FIX_TYPE: Final = 9  # MAVLink GPS_FIX_TYPE: 0 no GPS, 1 no fix, 3 3D, 6 RTK fixed
-GPS_SATELLITES: Final = 10
-GPS_HDOP: Final = 11
-GPS_VDOP: Final = 12
-GPS_SIZE: Final = 13
-# battery.values
-BATTERY_VOLTAGE_V: Final = 0
-BATTERY_CURRENT_A: Final = 1
-BATTERY_USED_AH: Final = 2
-BATTERY_REMAINING: Final = 3  # 0..1
-BATTERY_SIZE: Final = 4
-# rangefinder.values
-RANGE_DISTANCE_M: Final = 0  # NaN when out of range
-RANGE_MIN_M: Final = 1
-RANGE_MAX_M: Final = 2
-RANGE_SIZE: Final = 3
+from flightsim.foundation.layouts import Slots
 
+_imu = Slots()
+# imu.values
+IMU_GYRO_FRD_RAD_S: Final = _imu.vector(3)
+IMU_ACCEL_FRD_M_S2: Final = _imu.vector(3)  # specific force, (0, 0, -9.81) at rest
+IMU_TEMPERATURE_C: Final = _imu.place()
+IMU_SIZE: Final = _imu.size
+_barometer = Slots()
+# barometer.values
+BARO_PRESSURE_PA: Final = _barometer.place()
+BARO_TEMPERATURE_C: Final = _barometer.place()
+BARO_SIZE: Final = _barometer.size
+_magnetometer = Slots()
+# magnetometer.values
+MAG_FRD_GAUSS: Final = _magnetometer.vector(3)
+MAG_SIZE: Final = _magnetometer.size
+_gps = Slots()
+# gps.values
+GPS_LAT_DEG: Final = _gps.place()
+GPS_LON_DEG: Final = _gps.place()
+GPS_ALT_M: Final = _gps.place()  # above mean sea level
+GPS_VEL_NED_M_S: Final = _gps.vector(3)
+GPS_EPH_M: Final = _gps.place()  # 1-sigma horizontal accuracy the receiver reports
+GPS_EPV_M: Final = _gps.place()
+GPS_SPEED_ACCURACY_M_S: Final = _gps.place()
+GPS_FIX_TYPE: Final = _gps.place()  # MAVLink GPS_FIX_TYPE: 0 no GPS, 1 no fix, 3 3D, 6 RTK fixed
+GPS_SATELLITES: Final = _gps.place()
+GPS_HDOP: Final = _gps.place()
+GPS_VDOP: Final = _gps.place()
+GPS_SIZE: Final = _gps.size
+_battery = Slots()
+# battery.values
+BATTERY_VOLTAGE_V: Final = _battery.place()
+BATTERY_CURRENT_A: Final = _battery.place()
+BATTERY_USED_AH: Final = _battery.place()
+BATTERY_REMAINING: Final = _battery.place()  # 0..1
+BATTERY_SIZE: Final = _battery.size
+_rangefinder = Slots()
+# rangefinder.values
+RANGE_DISTANCE_M: Final = _rangefinder.place()  # NaN when out of range
+RANGE_MIN_M: Final = _rangefinder.place()
+RANGE_MAX_M: Final = _rangefinder.place()
+RANGE_SIZE: Final = _rangefinder.size
+
+_airspeed = Slots()
 # airspeed.values (pitot tube)
-AIRSPEED_DIFFERENTIAL_PRESSURE_PA: Final = 0  # total less static pressure
-AIRSPEED_TEMPERATURE_C: Final = 1
-AIRSPEED_SIZE: Final = 2
+AIRSPEED_DIFFERENTIAL_PRESSURE_PA: Final = _airspeed.place()  # total less static pressure
+AIRSPEED_TEMPERATURE_C: Final = _airspeed.place()
+AIRSPEED_SIZE: Final = _airspeed.size
+_vane = Slots()
 # flow_vane.values (angle-of-attack and sideslip vanes)
-VANE_ANGLE_OF_ATTACK_RAD: Final = 0
-VANE_SIDESLIP_RAD: Final = 1
-VANE_SIZE: Final = 2
+VANE_ANGLE_OF_ATTACK_RAD: Final = _vane.place()
+VANE_SIDESLIP_RAD: Final = _vane.place()
+VANE_SIZE: Final = _vane.size
 
 
 class Reading:

@@ -11,27 +11,30 @@ Frames: NED is the local geodetic frame at the vehicle; FRD is the body frame (x
 
 from typing import Final
 
-LAT_RAD: Final = 0  # geodetic latitude, WGS84
-LON_RAD: Final = 1  # longitude
-ALT_M: Final = 2  # height above mean sea level (JSBSim's geodetic altitude), m
-VEL_NED_M_S: Final = slice(3, 6)  # velocity over ground
-Q_NED_FROM_FRD: Final = slice(6, 10)  # Hamilton, w x y z
-RATES_FRD_RAD_S: Final = slice(10, 13)  # body rates against inertial space, what a perfect gyro reads
-SPECIFIC_FORCE_FRD_M_S2: Final = slice(13, 16)  # what a perfect accelerometer at the CG reads
-PRESSURE_PA: Final = 16  # static pressure at the vehicle
-TEMPERATURE_K: Final = 17  # air temperature at the vehicle
-DENSITY_KG_M3: Final = 18
-WIND_NED_M_S: Final = slice(19, 22)  # air's velocity over ground, turbulence and gusts included
-MAG_NED_GAUSS: Final = slice(22, 25)  # Earth's field at the vehicle
-HEIGHT_ABOVE_GROUND_M: Final = 25  # of the CG over the terrain below it
-AIRSPEED_TRUE_M_S: Final = 26
-BATTERY_VOLTAGE_V: Final = 27  # at the terminals, sag included
-BATTERY_CURRENT_A: Final = 28
-BATTERY_USED_AH: Final = 29
-BATTERY_CAPACITY_AH: Final = 30
-ON_GROUND: Final = 31  # 1.0 when any contact point carries weight
-ROTOR_RAD_S: Final = slice(32, 40)  # rotor or propeller speeds, unused ones zero
-ANGLE_OF_ATTACK_RAD: Final = 40  # of the body's x axis against the air; 0 without airspeed
-SIDESLIP_RAD: Final = 41
-DYNAMIC_PRESSURE_PA: Final = 42  # of the undisturbed flow, 1/2 rho V^2
-TRUTH_SIZE: Final = 43
+from flightsim.foundation.layouts import Slots
+
+_at = Slots()
+LAT_RAD: Final = _at.place()  # geodetic latitude, WGS84
+LON_RAD: Final = _at.place()  # longitude
+ALT_M: Final = _at.place()  # height above mean sea level (JSBSim's geodetic altitude), m
+VEL_NED_M_S: Final = _at.vector(3)  # velocity over ground
+Q_NED_FROM_FRD: Final = _at.vector(4)  # Hamilton, w x y z
+RATES_FRD_RAD_S: Final = _at.vector(3)  # body rates against inertial space, what a perfect gyro reads
+SPECIFIC_FORCE_FRD_M_S2: Final = _at.vector(3)  # what a perfect accelerometer at the CG reads
+PRESSURE_PA: Final = _at.place()  # static pressure at the vehicle
+TEMPERATURE_K: Final = _at.place()  # air temperature at the vehicle
+DENSITY_KG_M3: Final = _at.place()
+WIND_NED_M_S: Final = _at.vector(3)  # air's velocity over ground, turbulence and gusts included
+MAG_NED_GAUSS: Final = _at.vector(3)  # Earth's field at the vehicle
+HEIGHT_ABOVE_GROUND_M: Final = _at.place()  # of the CG over the terrain below it
+AIRSPEED_TRUE_M_S: Final = _at.place()
+BATTERY_VOLTAGE_V: Final = _at.place()  # at the terminals, sag included
+BATTERY_CURRENT_A: Final = _at.place()
+BATTERY_USED_AH: Final = _at.place()
+BATTERY_CAPACITY_AH: Final = _at.place()
+ON_GROUND: Final = _at.place()  # 1.0 when any contact point carries weight
+ROTOR_RAD_S: Final = _at.vector(8)  # rotor or propeller speeds, unused ones zero
+ANGLE_OF_ATTACK_RAD: Final = _at.place()  # of the body's x axis against the air; 0 without airspeed
+SIDESLIP_RAD: Final = _at.place()
+DYNAMIC_PRESSURE_PA: Final = _at.place()  # of the undisturbed flow, 1/2 rho V^2
+TRUTH_SIZE: Final = _at.size

@@ -11,6 +11,7 @@ import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim import truth as t
 from flightsim.airframe import Airframe, AirframeKind
 from flightsim.crash import (
     BREAKS_AT_M_S2,
@@ -28,6 +29,10 @@ from flightsim.jsbsim_model import find_property
 
 Array = NDArray[np.float64]
 
+_VEL: Final[int] = t.VEL_NED_M_S.start
+_RATES: Final[int] = t.RATES_FRD_RAD_S.start
+_FORCE: Final[int] = t.SPECIFIC_FORCE_FRD_M_S2.start
+_WIND: Final[int] = t.WIND_NED_M_S.start
 _FT: Final = 0.3048
 _PA_PER_PSF: Final = 47.88025898033584
 _KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
@@ -126,24 +131,24 @@ def write_truth(
     blow = height_m < NEAR_M and speed > MOVING_M_S and math.sqrt(force) > breaks_at_m_s2
     if blow or height_m < -DEEPEST_M:
         return _BROKEN
-    truth[0] = raw[0]
-    truth[1] = raw[1]
-    for i in range(2, 6):
-        truth[i] = raw[i] * _FT
-    quaternion_from_euler(raw[6], raw[7], raw[8], truth[6:10])
+    truth[t.LAT_RAD] = raw[0]
+    truth[t.LON_RAD] = raw[1]
+    truth[t.ALT_M] = raw[2] * _FT
+    quaternion_from_euler(raw[6], raw[7], raw[8], truth[t.Q_NED_FROM_FRD])
     for i in range(3):
-        truth[10 + i] = raw[9 + i]
-        truth[13 + i] = raw[12 + i] * accel_scale[i]
-        truth[19 + i] = raw[18 + i] * _FT
-    truth[16] = raw[15] * _PA_PER_PSF
-    truth[17] = raw[16] / 1.8
-    truth[18] = raw[17] * _KG_M3_PER_SLUG_FT3
-    truth[25] = raw[21] * _FT
-    truth[26] = raw[22] * _FT
-    truth[40] = raw[26]
-    truth[41] = raw[27]
-    truth[42] = raw[28] * _PA_PER_PSF
-    truth[31] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
+        truth[_VEL + i] = raw[3 + i] * _FT
+        truth[_RATES + i] = raw[9 + i]
+        truth[_FORCE + i] = raw[12 + i] * accel_scale[i]
+        truth[_WIND + i] = raw[18 + i] * _FT
+    truth[t.PRESSURE_PA] = raw[15] * _PA_PER_PSF
+    truth[t.TEMPERATURE_K] = raw[16] / 1.8
+    truth[t.DENSITY_KG_M3] = raw[17] * _KG_M3_PER_SLUG_FT3
+    truth[t.HEIGHT_ABOVE_GROUND_M] = raw[21] * _FT
+    truth[t.AIRSPEED_TRUE_M_S] = raw[22] * _FT
+    truth[t.ANGLE_OF_ATTACK_RAD] = raw[26]
+    truth[t.SIDESLIP_RAD] = raw[27]
+    truth[t.DYNAMIC_PRESSURE_PA] = raw[28] * _PA_PER_PSF
+    truth[t.ON_GROUND] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
     for i in range(extra.shape[0]):
         truth[extra[i]] = raw[STATE_SIZE + i] * scale[i]
     return _SOUND

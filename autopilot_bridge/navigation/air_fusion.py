@@ -34,25 +34,27 @@ from autopilot_bridge.navigation.states import (
     R,
 )
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.layouts import Slots
 
 Array = NDArray[np.float64]
 
+_air = Slots()
 # air: the measurements of one update
-AIRSPEED: Final = 0  # true, m/s
-AIRSPEED_VAR: Final = 1  # to fuse with
-AIRSPEED_GATE_VAR: Final = 2  # of one sample
-SIDESLIP_VAR: Final = 3  # (m/s)^2
-SIDESLIP_GATE_VAR: Final = 4
-GATE_AIRSPEED: Final = 5
-GATE_SIDESLIP: Final = 6
+AIRSPEED: Final = _air.place()  # true, m/s
+AIRSPEED_VAR: Final = _air.place()  # to fuse with
+AIRSPEED_GATE_VAR: Final = _air.place()  # of one sample
+SIDESLIP_VAR: Final = _air.place()  # (m/s)^2
+SIDESLIP_GATE_VAR: Final = _air.place()
+GATE_AIRSPEED: Final = _air.place()
+GATE_SIDESLIP: Final = _air.place()
 # results
-AIRSPEED_RATIO: Final = 7  # innovation over gate
-AIRSPEED_INNOVATION: Final = 8  # m/s
-AIRSPEED_STATE_VAR: Final = 9  # of the predicted airspeed
-SIDESLIP_RATIO: Final = 10
-SIDESLIP_INNOVATION: Final = 11
-SIDESLIP_STATE_VAR: Final = 12
-AIR_SIZE: Final = 13
+AIRSPEED_RATIO: Final = _air.place()  # innovation over gate
+AIRSPEED_INNOVATION: Final = _air.place()  # m/s
+AIRSPEED_STATE_VAR: Final = _air.place()  # of the predicted airspeed
+SIDESLIP_RATIO: Final = _air.place()
+SIDESLIP_INNOVATION: Final = _air.place()
+SIDESLIP_STATE_VAR: Final = _air.place()
+AIR_SIZE: Final = _air.size
 
 # what to do
 HAS_AIRSPEED: Final = 1

@@ -17,6 +17,7 @@ multirotor's tilting undoes itself, so it counts with its usual amplitude of som
 """
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,28 +45,30 @@ from autopilot_bridge.navigation.states import (
     Q,
 )
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.layouts import Slots
 
 Array = NDArray[np.float64]
 
+_process = Slots()
 # process: what `predict` needs of the parameters, one array
-NOISE_ATT = 0  # rad^2/s
-NOISE_VEL = 1  # m^2/s^3
-TURN_SCALE = 2  # about the vertical: rad^2 per rad turned
-GYRO_BIAS_VAR = 3  # stationary variances and time constants
-GYRO_BIAS_TAU = 4
-ACCEL_BIAS_VAR = 5
-ACCEL_BIAS_TAU = 6
-GPS_VAR_HORIZONTAL = 7
-GPS_VAR_VERTICAL = 8
-GPS_TAU = 9
-BARO_WALK = 10  # m^2/s
-MAG_BIAS_VAR = 11
-MAG_BIAS_TAU = 12
-MAG_BIAS_TURN = 13  # rad
-TURN_TILT = 14  # about the horizontal axes: rad^2 per rad turned about them
-TURN_CROSS = 15  # about the horizontal axes: rad^2 per rad turned about the vertical
-WIND_WALK = 16  # m^2/s^3, each way
-PROCESS_SIZE = 17
+NOISE_ATT: Final = _process.place()  # rad^2/s
+NOISE_VEL: Final = _process.place()  # m^2/s^3
+TURN_SCALE: Final = _process.place()  # about the vertical: rad^2 per rad turned
+GYRO_BIAS_VAR: Final = _process.place()  # stationary variances and time constants
+GYRO_BIAS_TAU: Final = _process.place()
+ACCEL_BIAS_VAR: Final = _process.place()
+ACCEL_BIAS_TAU: Final = _process.place()
+GPS_VAR_HORIZONTAL: Final = _process.place()
+GPS_VAR_VERTICAL: Final = _process.place()
+GPS_TAU: Final = _process.place()
+BARO_WALK: Final = _process.place()  # m^2/s
+MAG_BIAS_VAR: Final = _process.place()
+MAG_BIAS_TAU: Final = _process.place()
+MAG_BIAS_TURN: Final = _process.place()  # rad
+TURN_TILT: Final = _process.place()  # about the horizontal axes: rad^2 per rad turned about them
+TURN_CROSS: Final = _process.place()  # about the horizontal axes: rad^2 per rad turned about the vertical
+WIND_WALK: Final = _process.place()  # m^2/s^3, each way
+PROCESS_SIZE: Final = _process.size
 
 
 @kernel

@@ -19,26 +19,28 @@ from autopilot_bridge.navigation.states import (
     PH,
 )
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.layouts import Slots
 
 Array = NDArray[np.float64]
 
+_obs = Slots()
 # obs: one sample, NED
-EXT_POS: Final = 0
-EXT_VEL: Final = 3
-EXT_YAW: Final = 6
-EXT_POS_VAR: Final = 7
-EXT_VEL_VAR: Final = 10
-EXT_YAW_VAR: Final = 13
-EXT_DELAY_S: Final = 14
-EXT_GATE_POS: Final = 15
-EXT_GATE_VEL: Final = 16
-EXT_GATE_YAW: Final = 17
+EXT_POS: Final = _obs.place(3)
+EXT_VEL: Final = _obs.place(3)
+EXT_YAW: Final = _obs.place()
+EXT_POS_VAR: Final = _obs.place(3)
+EXT_VEL_VAR: Final = _obs.place(3)
+EXT_YAW_VAR: Final = _obs.place()
+EXT_DELAY_S: Final = _obs.place()
+EXT_GATE_POS: Final = _obs.place()
+EXT_GATE_VEL: Final = _obs.place()
+EXT_GATE_YAW: Final = _obs.place()
 # results: the innovation over its gate
-EXT_RATIO_POS: Final = 18
-EXT_RATIO_HEIGHT: Final = 19
-EXT_RATIO_VEL: Final = 20
-EXT_RATIO_YAW: Final = 21
-EXT_SIZE: Final = 22
+EXT_RATIO_POS: Final = _obs.place()
+EXT_RATIO_HEIGHT: Final = _obs.place()
+EXT_RATIO_VEL: Final = _obs.place()
+EXT_RATIO_YAW: Final = _obs.place()
+EXT_SIZE: Final = _obs.size
 
 # which parts are there, and which were accepted
 EXT_HAS_POS: Final = 1

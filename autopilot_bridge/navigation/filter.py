@@ -23,6 +23,7 @@ from autopilot_bridge.navigation.layout import (
     AIRSPEED_TRUE_M_S,
     HEIGHT_ABOVE_GROUND_M,
     NAV_SIZE,
+    Q_NED_FROM_FRD,
     WIND_NED_M_S,
 )
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -218,7 +219,7 @@ class NavigationFilter:
         self._aiding.restart()
         self.health.clear()
         self.state[:] = 0.0
-        self.state[0] = 1.0
+        self.state[Q_NED_FROM_FRD] = 1.0, 0.0, 0.0, 0.0
         self.state[HEIGHT_ABOVE_GROUND_M] = math.nan
         self.state[WIND_NED_M_S] = math.nan
         self.state[AIRSPEED_M_S] = self.state[AIRSPEED_TRUE_M_S] = math.nan

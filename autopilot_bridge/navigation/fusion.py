@@ -34,37 +34,39 @@ from autopilot_bridge.navigation.states import (
     R,
 )
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.layouts import Slots
 
 Array = NDArray[np.float64]
 
+_obs = Slots()
 # obs: the measurements of one update
-GPS_POS: Final = 0  # NED from the origin, m
-GPS_VEL: Final = 3
-GPS_POS_VAR: Final = 6
-GPS_VEL_VAR: Final = 9
-GPS_DELAY_S: Final = 12
-BARO_HEIGHT: Final = 13  # pressure altitude, m
-BARO_VAR: Final = 14
-BARO_DELAY_S: Final = 15
-MAG: Final = 16  # FRD, gauss
-MAG_VAR: Final = 19
-MAG_NED: Final = 20  # expected field
-HOLD: Final = 23  # held position, NED
-HOLD_VAR: Final = 26
-HOLD_HEIGHT_VAR: Final = 27
-REST_VEL_VAR: Final = 28
-REST_RATE_VAR: Final = 29
-GATE_GPS: Final = 30
-GATE_GPS_VEL: Final = 31
-GATE_BARO: Final = 32
-GATE_MAG: Final = 33
+GPS_POS: Final = _obs.place(3)  # NED from the origin, m
+GPS_VEL: Final = _obs.place(3)
+GPS_POS_VAR: Final = _obs.place(3)
+GPS_VEL_VAR: Final = _obs.place(3)
+GPS_DELAY_S: Final = _obs.place()
+BARO_HEIGHT: Final = _obs.place()  # pressure altitude, m
+BARO_VAR: Final = _obs.place()
+BARO_DELAY_S: Final = _obs.place()
+MAG: Final = _obs.place(3)  # FRD, gauss
+MAG_VAR: Final = _obs.place()
+MAG_NED: Final = _obs.place(3)  # expected field
+HOLD: Final = _obs.place(3)  # held position, NED
+HOLD_VAR: Final = _obs.place()
+HOLD_HEIGHT_VAR: Final = _obs.place()
+REST_VEL_VAR: Final = _obs.place()
+REST_RATE_VAR: Final = _obs.place()
+GATE_GPS: Final = _obs.place()
+GATE_GPS_VEL: Final = _obs.place()
+GATE_BARO: Final = _obs.place()
+GATE_MAG: Final = _obs.place()
 # results
-RATIO_VEL: Final = 34
-RATIO_POS: Final = 35
-RATIO_GPS_HEIGHT: Final = 36
-RATIO_BARO: Final = 37
-RATIO_MAG: Final = 38
-OBS_SIZE: Final = 39
+RATIO_VEL: Final = _obs.place()
+RATIO_POS: Final = _obs.place()
+RATIO_GPS_HEIGHT: Final = _obs.place()
+RATIO_BARO: Final = _obs.place()
+RATIO_MAG: Final = _obs.place()
+OBS_SIZE: Final = _obs.size
 
 # which measurements are there
 HAS_GPS: Final = 1

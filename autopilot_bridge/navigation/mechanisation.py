@@ -7,21 +7,12 @@ neglected: below 1e-6 rad/s here).
 """
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.navigation.layout import (
-    ACC_NED_M_S2,
-    ACCEL_BIAS_M_S2,
-    EULER_RAD,
-    GYRO_BIAS_RAD_S,
-    HEIGHT_ABOVE_GROUND_M,
-    POS_NED_M,
-    RATES_FRD_RAD_S,
-    SPECIFIC_FORCE_FRD_M_S2,
-    VEL_NED_M_S,
-)
+from autopilot_bridge.navigation import layout as n
 from autopilot_bridge.navigation.states import (
     ACCEL,
     CORRECTION_POS,
@@ -52,17 +43,14 @@ from autopilot_bridge.navigation.states import (
 )
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
+from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S
 
 Array = NDArray[np.float64]
 
-_N_RATES = RATES_FRD_RAD_S.start
-_N_VEL = VEL_NED_M_S.start
-_N_POS = POS_NED_M.start
-_N_ACC = ACC_NED_M_S2.start
-_N_GYRO_BIAS = GYRO_BIAS_RAD_S.start
-_N_ACCEL_BIAS = ACCEL_BIAS_M_S2.start
-_N_FORCE = SPECIFIC_FORCE_FRD_M_S2.start
-_N_EULER = EULER_RAD.start
+_IMU_GYRO: Final[int] = IMU_GYRO_FRD_RAD_S.start
+_IMU_ACCEL: Final[int] = IMU_ACCEL_FRD_M_S2.start
+_GYRO_BIAS: Final[int] = n.GYRO_BIAS_RAD_S.start
+_ACCEL_BIAS: Final[int] = n.ACCEL_BIAS_M_S2.start
 
 
 @kernel
@@ -71,11 +59,12 @@ def take_sample(core: Array, imu: Array, gyro_range: float, accel_range: float) 
     one."""
     good = True
     for i in range(3):
-        good = good and abs(imu[i]) <= gyro_range and abs(imu[3 + i]) <= accel_range  # False for NaN
+        good = good and abs(imu[_IMU_GYRO + i]) <= gyro_range  # False for NaN
+        good = good and abs(imu[_IMU_ACCEL + i]) <= accel_range
     if good:
         for i in range(3):
-            core[GYRO + i] = imu[i]
-            core[ACCEL + i] = imu[3 + i]
+            core[GYRO + i] = imu[_IMU_GYRO + i]
+            core[ACCEL + i] = imu[_IMU_ACCEL + i]
         core[SAMPLE_AGE_S] = 0.0
     else:
         core[INVALID_SAMPLES] += 1.0
@@ -160,20 +149,21 @@ def advance(core: Array, dt: float, sample_timeout_s: float) -> None:
 @kernel
 def write_navigation(core: Array, nav: Array) -> None:
     """The autopilot's navigation state (layout.py) from `core`."""
-    nav[0], nav[1], nav[2], nav[3] = core[Q], core[Q + 1], core[Q + 2], core[Q + 3]
+    for i in range(4):
+        nav[n.Q + i] = core[Q + i]
     for i in range(3):
-        nav[_N_RATES + i] = core[GYRO_LAST + i] - core[X_GYRO_BIAS + i]
-        nav[_N_VEL + i] = core[X_VEL + i]
-        nav[_N_POS + i] = core[X_POS + i]
-        nav[_N_ACC + i] = core[FORCE_NED + i]
-        nav[_N_GYRO_BIAS + i] = core[X_GYRO_BIAS + i]
-        nav[_N_ACCEL_BIAS + i] = core[X_ACCEL_BIAS + i]
-        nav[_N_FORCE + i] = core[ACCEL + i] - core[X_ACCEL_BIAS + i]
-    nav[_N_ACC + 2] += core[GRAVITY]
-    nav[_N_EULER] = math.atan2(core[R + 7], core[R + 8])
-    nav[_N_EULER + 1] = math.asin(min(1.0, max(-1.0, -core[R + 6])))
-    nav[_N_EULER + 2] = math.atan2(core[R + 3], core[R])
-    nav[HEIGHT_ABOVE_GROUND_M] = core[TERRAIN_DOWN] - core[X_POS + 2]
+        nav[n.RATES + i] = core[GYRO_LAST + i] - core[X_GYRO_BIAS + i]
+        nav[n.VEL + i] = core[X_VEL + i]
+        nav[n.POS + i] = core[X_POS + i]
+        nav[n.ACC + i] = core[FORCE_NED + i]
+        nav[_GYRO_BIAS + i] = core[X_GYRO_BIAS + i]
+        nav[_ACCEL_BIAS + i] = core[X_ACCEL_BIAS + i]
+        nav[n.FORCE + i] = core[ACCEL + i] - core[X_ACCEL_BIAS + i]
+    nav[n.ACC + 2] += core[GRAVITY]
+    nav[n.ROLL] = math.atan2(core[R + 7], core[R + 8])
+    nav[n.PITCH] = math.asin(min(1.0, max(-1.0, -core[R + 6])))
+    nav[n.YAW] = math.atan2(core[R + 3], core[R])
+    nav[n.HEIGHT_ABOVE_GROUND_M] = core[TERRAIN_DOWN] - core[X_POS + 2]
 
 
 @kernel

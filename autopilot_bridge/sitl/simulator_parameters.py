@@ -117,7 +117,8 @@ class SimulatorParameters:
 
     def _glitch(self, lat_deg: float, lon_deg: float, up_m: float) -> tuple[float, float, float]:
         """Offsets in degrees of latitude and longitude as metres north and east, where the vehicle is."""
-        lat_rad, lon_rad, alt_m = self._vehicle.truth[t.LAT_RAD : t.ALT_M + 1].tolist()
+        truth = self._vehicle.truth
+        lat_rad, lon_rad, alt_m = (float(truth[place]) for place in (t.LAT_RAD, t.LON_RAD, t.ALT_M))
         here = GeodeticPosition(lat_deg=math.degrees(lat_rad), lon_deg=math.degrees(lon_rad), alt_m=alt_m)
         lat_deg = clamp(here.lat_deg + lat_deg, -90.0, 90.0)
         north, east, _ = LocalFrame(here).ned_from_geodetic(lat_deg, here.lon_deg + lon_deg, alt_m)

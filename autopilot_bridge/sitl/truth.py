@@ -15,17 +15,21 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
+from flightsim import truth as t
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.home import Home
 from flightsim.payload import GroundTargets
-from flightsim.truth import TRUTH_SIZE
 
 SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
 TARGET_SYSTEM: Final = 251
 MAX_TARGETS: Final = 250
 TRUTH_RATE_HZ: Final = 50
 _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+_Q: Final[int] = t.Q_NED_FROM_FRD.start
+_RATES: Final[int] = t.RATES_FRD_RAD_S.start
+_VEL: Final[int] = t.VEL_NED_M_S.start
+_FORCE: Final[int] = t.SPECIFIC_FORCE_FRD_M_S2.start
 
 
 @kernel
@@ -34,21 +38,25 @@ def _fill(truth: NDArray[np.float64], out: NDArray[np.void], time_us: int) -> No
     r = out[0]
     r.time_usec = time_us
     for i in range(4):
-        r.attitude_quaternion[i] = truth[6 + i]
-    r.rollspeed, r.pitchspeed, r.yawspeed = truth[10], truth[11], truth[12]
-    r.lat = whole(math.degrees(truth[0]) * 1e7, 1.8e9)
-    r.lon = whole(math.degrees(truth[1]) * 1e7, 1.8e9)
-    r.alt = whole(truth[2] * 1e3, 2e9)
-    r.vx = whole(truth[3] * 100.0, 32767.0)
-    r.vy = whole(truth[4] * 100.0, 32767.0)
-    r.vz = whole(truth[5] * 100.0, 32767.0)
-    r.true_airspeed = whole(truth[26] * 100.0, 32767.0)
+        r.attitude_quaternion[i] = truth[_Q + i]
+    r.rollspeed, r.pitchspeed, r.yawspeed = truth[_RATES], truth[_RATES + 1], truth[_RATES + 2]
+    r.lat = whole(math.degrees(truth[t.LAT_RAD]) * 1e7, 1.8e9)
+    r.lon = whole(math.degrees(truth[t.LON_RAD]) * 1e7, 1.8e9)
+    r.alt = whole(truth[t.ALT_M] * 1e3, 2e9)
+    r.vx = whole(truth[_VEL] * 100.0, 32767.0)
+    r.vy = whole(truth[_VEL + 1] * 100.0, 32767.0)
+    r.vz = whole(truth[_VEL + 2] * 100.0, 32767.0)
+    airspeed = truth[t.AIRSPEED_TRUE_M_S]
+    r.true_airspeed = whole(airspeed * 100.0, 32767.0)
     r.ind_airspeed = whole(
-        truth[26] * 100.0 * math.sqrt(max(0.0, truth[18]) / SEA_LEVEL_DENSITY_KG_M3), 32767.0
+        truth[t.AIRSPEED_TRUE_M_S]
+        * 100.0
+        * math.sqrt(max(0.0, truth[t.DENSITY_KG_M3]) / SEA_LEVEL_DENSITY_KG_M3),
+        32767.0,
     )
-    r.xacc = whole(truth[13] * (1000.0 / GRAVITY_M_S2), 32767.0)
-    r.yacc = whole(truth[14] * (1000.0 / GRAVITY_M_S2), 32767.0)
-    r.zacc = whole(truth[15] * (1000.0 / GRAVITY_M_S2), 32767.0)
+    r.xacc = whole(truth[_FORCE] * (1000.0 / GRAVITY_M_S2), 32767.0)
+    r.yacc = whole(truth[_FORCE + 1] * (1000.0 / GRAVITY_M_S2), 32767.0)
+    r.zacc = whole(truth[_FORCE + 2] * (1000.0 / GRAVITY_M_S2), 32767.0)
 
 
 class TruthEncoder:
@@ -62,8 +70,8 @@ class TruthEncoder:
     __slots__ = ("_encoder", "_fill", "_record")
 
     def __init__(self, system_id: int, truth: NDArray[np.float64]) -> None:
-        if truth.shape != (TRUTH_SIZE,):
-            raise ValueError(f"truth has shape {truth.shape}; accepted: ({TRUTH_SIZE},)")
+        if truth.shape != (t.TRUTH_SIZE,):
+            raise ValueError(f"truth has shape {truth.shape}; accepted: ({t.TRUTH_SIZE},)")
         self._encoder = FrameEncoder(system_id, SIMULATOR_COMPONENT)
         self._record = np.zeros(1, record_type(definition(_MESSAGE_ID)))
         self._fill = bound(_fill, truth, self._record, then=(0,))

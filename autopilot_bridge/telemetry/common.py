@@ -236,7 +236,8 @@ class CommonMessages:
         context = self.sources.context
         if not context.armed or context.setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return None
-        return context.setpoint[: sp.YAW_RATE_RAD_S + 1].tolist()
+        values = context.setpoint.tolist()
+        return [*values[sp.MOTION], values[sp.YAW_RAD], values[sp.YAW_RATE_RAD_S]]
 
     def position_target_local_ned(self) -> Values | None:
         """POSITION_TARGET_LOCAL_NED (85)."""
@@ -265,7 +266,7 @@ class CommonMessages:
     def raw_scaled_imu(self) -> tuple[int, ...] | None:
         """Accelerometer (milli-g), gyro (mrad/s), magnetometer (mgauss) as integers."""
         imu = self.view.imu()
-        if not math.isfinite(imu[0]):
+        if not math.isfinite(imu[interface.IMU_GYRO_FRD_RAD_S.start]):
             return None
         milli_g = [round(value * (1000.0 / GRAVITY_M_S2)) for value in imu[interface.IMU_ACCEL_FRD_M_S2]]
         mrad = [round(value * 1000.0) for value in imu[interface.IMU_GYRO_FRD_RAD_S]]
@@ -346,7 +347,9 @@ class CommonMessages:
         reading = self.sources.readings.rangefinder
         if reading.time_us < 0:
             return None
-        distance_m, min_m, max_m = reading.values.tolist()
+        values = reading.values.tolist()
+        distance_m = values[interface.RANGE_DISTANCE_M]
+        min_m, max_m = values[interface.RANGE_MIN_M], values[interface.RANGE_MAX_M]
         in_range = math.isfinite(distance_m)
         beyond_cm = 0 if self.sources.context.on_ground else round(max_m * 100.0) + 1  # too near, or too far
         return (

@@ -18,9 +18,12 @@ from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.navigation.states import ATT, POS, VEL
 from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView, pressure_altitude_m
+from flightsim import interface
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.foundation.rotations import wrap_180
 from flightsim.interface import SensorReadings
@@ -39,6 +42,9 @@ _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covari
 _POSE_ATTITUDE: Final = (15, 18, 20)
 _HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
 _PLACE_SIZE: Final = 5
+_GYRO: Final[int] = interface.IMU_GYRO_FRD_RAD_S.start
+_ACCEL: Final[int] = interface.IMU_ACCEL_FRD_M_S2.start
+_MAG: Final[int] = interface.MAG_FRD_GAUSS.start
 _NEED_ATTITUDE: Final = 0b100011  # bits of MESSAGES
 _NEED_FRAME: Final = 0b001000
 _NEED_SENSORS: Final = 0b010000
@@ -57,56 +63,62 @@ def _fill(
     out: NDArray[np.void],
     time_us: int,
 ) -> None:
+    roll, pitch, yaw = nav[n.ROLL], nav[n.PITCH], nav[n.YAW]
+    north, east, down = nav[n.POS], nav[n.POS + 1], nav[n.POS + 2]
+    vn, ve, vd = nav[n.VEL], nav[n.VEL + 1], nav[n.VEL + 2]
+    wx, wy, wz = nav[n.RATES], nav[n.RATES + 1], nav[n.RATES + 2]
+    gx, gy, gz = imu[_GYRO], imu[_GYRO + 1], imu[_GYRO + 2]
+    ax, ay, az = imu[_ACCEL], imu[_ACCEL + 1], imu[_ACCEL + 2]
     r = out[0]
     time_ms = time_us // 1000
     r.attitude__time_boot_ms = time_ms
-    r.attitude__roll, r.attitude__pitch, r.attitude__yaw = nav[25], nav[26], nav[27]
-    r.attitude__rollspeed, r.attitude__pitchspeed, r.attitude__yawspeed = nav[4], nav[5], nav[6]
+    r.attitude__roll, r.attitude__pitch, r.attitude__yaw = roll, pitch, yaw
+    r.attitude__rollspeed, r.attitude__pitchspeed, r.attitude__yawspeed = wx, wy, wz
 
     r.attitude_quaternion__time_boot_ms = time_ms
-    r.attitude_quaternion__q1, r.attitude_quaternion__q2 = nav[0], nav[1]
-    r.attitude_quaternion__q3, r.attitude_quaternion__q4 = nav[2], nav[3]
-    r.attitude_quaternion__rollspeed = nav[4]
-    r.attitude_quaternion__pitchspeed = nav[5]
-    r.attitude_quaternion__yawspeed = nav[6]
+    r.attitude_quaternion__q1, r.attitude_quaternion__q2 = nav[n.Q], nav[n.Q + 1]
+    r.attitude_quaternion__q3, r.attitude_quaternion__q4 = nav[n.Q + 2], nav[n.Q + 3]
+    r.attitude_quaternion__rollspeed = wx
+    r.attitude_quaternion__pitchspeed = wy
+    r.attitude_quaternion__yawspeed = wz
 
     r.local_position_ned__time_boot_ms = time_ms
-    r.local_position_ned__x, r.local_position_ned__y, r.local_position_ned__z = nav[10], nav[11], nav[12]
-    r.local_position_ned__vx, r.local_position_ned__vy, r.local_position_ned__vz = nav[7], nav[8], nav[9]
+    r.local_position_ned__x, r.local_position_ned__y, r.local_position_ned__z = north, east, down
+    r.local_position_ned__vx, r.local_position_ned__vy, r.local_position_ned__vz = vn, ve, vd
 
     r.global_position_int__time_boot_ms = time_ms
-    longitude = wrap_180(place[1] + nav[11] / place[4])
-    r.global_position_int__lat = whole((place[0] + nav[10] / place[3]) * 1e7, 1.8e9)
+    longitude = wrap_180(place[1] + east / place[4])
+    r.global_position_int__lat = whole((place[0] + north / place[3]) * 1e7, 1.8e9)
     r.global_position_int__lon = whole(longitude * 1e7, 1.8e9)
-    r.global_position_int__alt = whole((place[2] - nav[12]) * 1e3, 2e9)
+    r.global_position_int__alt = whole((place[2] - down) * 1e3, 2e9)
     home_down_m = home_ned_m[2] if home_ned_m[2] == home_ned_m[2] else 0.0
-    r.global_position_int__relative_alt = whole((home_down_m - nav[12]) * 1e3, 2e9)
-    r.global_position_int__vx = whole(nav[7] * 100.0, 32767.0)
-    r.global_position_int__vy = whole(nav[8] * 100.0, 32767.0)
-    r.global_position_int__vz = whole(nav[9] * 100.0, 32767.0)
-    r.global_position_int__hdg = whole(math.degrees(nav[27]) % 360.0 * 100.0, 36000.0) % 36000
+    r.global_position_int__relative_alt = whole((home_down_m - down) * 1e3, 2e9)
+    r.global_position_int__vx = whole(vn * 100.0, 32767.0)
+    r.global_position_int__vy = whole(ve * 100.0, 32767.0)
+    r.global_position_int__vz = whole(vd * 100.0, 32767.0)
+    r.global_position_int__hdg = whole(math.degrees(yaw) % 360.0 * 100.0, 36000.0) % 36000
 
     r.highres_imu__time_usec = time_us
-    r.highres_imu__xacc, r.highres_imu__yacc, r.highres_imu__zacc = imu[3], imu[4], imu[5]
-    r.highres_imu__xgyro, r.highres_imu__ygyro, r.highres_imu__zgyro = imu[0], imu[1], imu[2]
-    field_known = mag[0] == mag[0]
-    r.highres_imu__xmag = mag[0] if field_known else 0.0
-    r.highres_imu__ymag = mag[1] if field_known else 0.0
-    r.highres_imu__zmag = mag[2] if field_known else 0.0
-    r.highres_imu__abs_pressure = baro[0] * 0.01
-    r.highres_imu__pressure_alt = _pressure_altitude_m(max(0.0, baro[0]))
-    r.highres_imu__temperature = imu[6]
+    r.highres_imu__xacc, r.highres_imu__yacc, r.highres_imu__zacc = ax, ay, az
+    r.highres_imu__xgyro, r.highres_imu__ygyro, r.highres_imu__zgyro = gx, gy, gz
+    field_known = mag[_MAG] == mag[_MAG]
+    r.highres_imu__xmag = mag[_MAG] if field_known else 0.0
+    r.highres_imu__ymag = mag[_MAG + 1] if field_known else 0.0
+    r.highres_imu__zmag = mag[_MAG + 2] if field_known else 0.0
+    r.highres_imu__abs_pressure = baro[interface.BARO_PRESSURE_PA] * 0.01
+    r.highres_imu__pressure_alt = _pressure_altitude_m(max(0.0, baro[interface.BARO_PRESSURE_PA]))
+    r.highres_imu__temperature = imu[interface.IMU_TEMPERATURE_C]
 
     r.odometry__time_usec = time_us
-    r.odometry__x, r.odometry__y, r.odometry__z = nav[10], nav[11], nav[12]
-    r.odometry__vx, r.odometry__vy, r.odometry__vz = nav[7], nav[8], nav[9]
-    r.odometry__rollspeed, r.odometry__pitchspeed, r.odometry__yawspeed = nav[4], nav[5], nav[6]
-    for i in range(4):
-        r.odometry__q[i] = nav[i]
-    for i in range(3):
-        r.odometry__pose_covariance[_POSE_POSITION[i]] = covariance[6 + i, 6 + i]
-        r.odometry__pose_covariance[_POSE_ATTITUDE[i]] = covariance[i, i]
-        r.odometry__velocity_covariance[_POSE_POSITION[i]] = covariance[3 + i, 3 + i]
+    r.odometry__x, r.odometry__y, r.odometry__z = north, east, down
+    r.odometry__vx, r.odometry__vy, r.odometry__vz = vn, ve, vd
+    r.odometry__rollspeed, r.odometry__pitchspeed, r.odometry__yawspeed = wx, wy, wz
+    for k in range(4):
+        r.odometry__q[k] = nav[n.Q + k]
+    for k in range(3):
+        r.odometry__pose_covariance[_POSE_POSITION[k]] = covariance[POS + k, POS + k]
+        r.odometry__pose_covariance[_POSE_ATTITUDE[k]] = covariance[ATT + k, ATT + k]
+        r.odometry__velocity_covariance[_POSE_POSITION[k]] = covariance[VEL + k, VEL + k]
 
 
 def _crc_table() -> NDArray[np.uint16]:

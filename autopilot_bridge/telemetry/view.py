@@ -105,7 +105,12 @@ class TelemetryView:
         if reading.time_us < 0:
             return None
         values = reading.values.tolist()
-        return values[0], values[1], values[2], values[3]
+        return (
+            values[interface.BATTERY_VOLTAGE_V],
+            values[interface.BATTERY_CURRENT_A],
+            values[interface.BATTERY_USED_AH],
+            values[interface.BATTERY_REMAINING],
+        )
 
     def imu(self) -> list[float]:
         """Newest gyro (rad/s), accelerometer (m/s^2), temperature (deg C)."""

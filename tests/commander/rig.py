@@ -48,7 +48,7 @@ class FollowerLandDetector:
             ctx.landed_state = LandedState.ON_GROUND if height_m <= 0.02 else LandedState.IN_AIR
             return ctx.landed_state
         resting = height_m <= 0.02 and not (
-            ctx.armed and ctx.setpoint[sp.LEVEL] > sp.IDLE and ctx.setpoint[5] < 0.0
+            ctx.armed and ctx.setpoint[sp.LEVEL] > sp.IDLE and ctx.setpoint[sp.VEL + 2] < 0.0
         )
         ctx.ground_contact = ctx.maybe_landed = resting
         if resting:

@@ -7,6 +7,7 @@ import pytest
 from autopilot_bridge.commander.events import ArmingDenied, SystemStatus
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.navigation import layout as nav_layout
 from flightsim import interface
 from tests.commander.rig import Rig
 
@@ -167,7 +168,7 @@ def test_low_battery_is_in_the_way() -> None:
 
 def test_leaning_is_in_the_way() -> None:
     rig = Rig("ardupilot")
-    rig.context.nav[25] = 0.7
+    rig.context.nav[nav_layout.ROLL] = 0.7
     assert Reason.LEANING in rig.commander.arm().reasons
 
 

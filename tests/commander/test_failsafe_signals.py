@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.autopilot.status import StatusReport
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.firmware.px4 import events as px4_events
+from autopilot_bridge.navigation import layout as nav_layout
 from tests.commander.rig import Rig
 from tests.commander.test_failsafes import battery, heartbeats
 
@@ -100,7 +101,7 @@ def mended(rig: Rig) -> None:
 
 def far(north_m: float) -> Callable[[Rig], None]:
     def go(rig: Rig) -> None:
-        rig.context.nav[10] = north_m
+        rig.context.nav[nav_layout.POS] = north_m
         rig.run(0.3)
 
     return go

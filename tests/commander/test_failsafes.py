@@ -17,6 +17,7 @@ from autopilot_bridge.commander.events import (
 )
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.navigation import layout as nav_layout
 from flightsim import interface
 from tests.commander.rig import PERIOD_US, Rig
 
@@ -266,7 +267,7 @@ def test_ardupilot_battery_needs_its_timer() -> None:
 def test_a_weaker_failsafe_does_not_end_an_ardupilot_landing() -> None:
     rig = guided(BATT_FS_LOW_ACT=1, FS_GCS_ENABLE=1)
     heartbeats(rig, 1.0)
-    rig.context.nav[12] = -60.0
+    rig.context.nav[nav_layout.POS + 2] = -60.0
     battery(rig, voltage_v=10.2)
     for _ in range(11):
         heartbeats(rig, 1.0)
@@ -278,7 +279,7 @@ def test_a_weaker_failsafe_does_not_end_an_ardupilot_landing() -> None:
 
 def test_a_landing_left_to_the_pilot_does_not_hold_up_the_next_ardupilot_failsafe() -> None:
     rig = guided(BATT_FS_LOW_ACT=1, FS_GCS_ENABLE=1)
-    rig.context.nav[12] = -60.0
+    rig.context.nav[nav_layout.POS + 2] = -60.0
     battery(rig, voltage_v=10.2)
     for _ in range(11):
         heartbeats(rig, 1.0)
@@ -353,7 +354,7 @@ def test_ardupilot_ekf_failsafe_lands_and_does_not_come_back() -> None:
 def test_px4_geofence(action: int, mode: FlightMode, place: tuple[float, float, float]) -> None:
     rig = Rig("px4", GF_MAX_HOR_DIST=50.0, GF_MAX_VER_DIST=20.0, GF_ACTION=action)
     rig.put_in_air(5.0)
-    rig.context.nav[10:13] = place
+    rig.context.nav[nav_layout.POS_NED_M] = place
     rig.run(0.1)
     assert activated(rig, FailsafeKind.GEOFENCE)
     assert rig.commander.mode is mode
@@ -385,7 +386,7 @@ def test_ardupilot_fence_from_the_plan() -> None:
 def test_disarmed_vehicles_have_no_failsafes(make: Callable[[], Rig]) -> None:
     rig = make()
     rig.commander.disarm(forced=True)
-    rig.context.nav[12] = 0.0
+    rig.context.nav[nav_layout.POS + 2] = 0.0
     heartbeats(rig, 1.0)
     rig.judgement.position_valid = False
     rig.run(20.0)

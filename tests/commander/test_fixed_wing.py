@@ -13,6 +13,7 @@ from autopilot_bridge.commander.events import (
 )
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import MissionFinished as PlanFinished
 from autopilot_bridge.flight.context import TaskFinished
 from autopilot_bridge.flight.fixed_wing import GuidedTask, LoiterTask, MissionTask, TakeoffTask
@@ -171,7 +172,7 @@ def test_arduplane_guided_requests() -> None:
     rig.run(0.5)
     task = rig.commander.tasks.task
     assert isinstance(task, GuidedTask)
-    assert rig.context.setpoint[0] == pytest.approx(1.0)  # COURSE_RAD
+    assert rig.context.setpoint[sp.COURSE_RAD] == pytest.approx(1.0)
     assert rig.commander.set_mode(FlightMode.HOLD).accepted
     assert not guidance.change_heading(1.0, course=True, acceleration_m_s2=1.0).accepted
     assert guidance.reposition(north_m=100.0, east_m=0.0, down_m=-80.0, radius_m=-90.0).accepted

@@ -18,6 +18,7 @@ from autopilot_bridge.commander.events import (
 )
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.navigation import layout as nav_layout
 from tests.commander.rig import Rig
 
 
@@ -61,7 +62,7 @@ def test_ardupilot_takes_off_in_guided_only_and_stays_in_rtl_after_landing() -> 
     rig.run(3.0)
     commander.guidance.reposition(north_m=15.0, east_m=5.0, down_m=-12.0)
     rig.run(15.0)
-    assert rig.context.nav[10] == pytest.approx(15.0, abs=0.5)
+    assert rig.context.nav[nav_layout.POS] == pytest.approx(15.0, abs=0.5)
     assert commander.guidance.return_home().accepted
     rig.run_until(lambda: not commander.armed, 120.0)
     assert commander.mode is FlightMode.RETURN
@@ -161,7 +162,7 @@ def test_home_is_set_when_the_position_is_good_and_again_at_arming() -> None:
     rig.run(0.2)
     assert rig.commander.home.position is not None
     rig.run(3.0)
-    rig.context.nav[10] = 3.0
+    rig.context.nav[nav_layout.POS] = 3.0
     before = len(rig.happened(HomeSet))
     assert rig.commander.arm().accepted
     rig.tick()
@@ -206,14 +207,14 @@ def test_pause_and_resume_a_mission() -> None:
     commander.set_mode(FlightMode.GUIDED)
     commander.arm()
     commander.guidance.start_mission()
-    rig.run_until(lambda: rig.context.nav[10] > 20.0, 60.0)
+    rig.run_until(lambda: rig.context.nav[nav_layout.POS] > 20.0, 60.0)
     assert commander.guidance.pause().accepted
     rig.run(6.0)
-    stopped_m = float(rig.context.nav[10])
+    stopped_m = float(rig.context.nav[nav_layout.POS])
     rig.run(2.0)
-    assert rig.context.nav[10] == pytest.approx(stopped_m, abs=0.05)
+    assert rig.context.nav[nav_layout.POS] == pytest.approx(stopped_m, abs=0.05)
     assert commander.guidance.resume().accepted
-    rig.run_until(lambda: rig.context.nav[10] > 97.0, 60.0)
+    rig.run_until(lambda: rig.context.nav[nav_layout.POS] > 97.0, 60.0)
     commander.set_mode(FlightMode.BRAKE)
     assert not commander.guidance.pause().accepted
 

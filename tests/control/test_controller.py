@@ -17,6 +17,7 @@ from autopilot_bridge.control.multicopter.attitude import (
 )
 from autopilot_bridge.control.multicopter.layout import PARAMETER_NAMES
 from autopilot_bridge.flight.multicopter import OffboardTask
+from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.environment import Environment, Turbulence
 from flightsim.foundation.rotations import euler_from_quaternion, quaternion_from_euler
@@ -157,7 +158,7 @@ def test_lissajous_path_error(
         task.set_trajectory(position, velocity, acceleration, 0.0)
         for _ in range(rig.slow_steps):
             rig.step()
-        errors.append(rig.nav[10:13] - position)
+        errors.append(rig.nav[nav_layout.POS_NED_M] - position)
     rms = math.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
     assert rms < limit_m
 
@@ -253,8 +254,8 @@ def test_no_input_makes_a_motor_command_unsafe(
     setpoint: list[float], level: float, nav_nan: list[int]
 ) -> None:
     nav = np.zeros(NAV_SIZE)
-    nav[0] = 1.0
-    nav[24] = -9.81
+    nav[nav_layout.Q] = 1.0
+    nav[nav_layout.FORCE + 2] = -9.81
     controller = MulticopterController(physics_rate_hz=250.0, nav=nav)
     nav[nav_nan] = math.nan
     controller.setpoint[:19] = setpoint
@@ -267,8 +268,8 @@ def test_no_input_makes_a_motor_command_unsafe(
         assert (controller.actuators[4:] == 0.0).all()
     # and afterwards it flies on: nothing of the bad input is left in its state
     nav[:] = 0.0
-    nav[0] = 1.0
-    nav[24] = -9.81
+    nav[nav_layout.Q] = 1.0
+    nav[nav_layout.FORCE + 2] = -9.81
     controller.setpoint[:] = math.nan
     controller.setpoint[sp.VEL_NED_M_S] = 0.0
     controller.setpoint[sp.LEVEL] = sp.TRAJECTORY
@@ -280,7 +281,7 @@ def test_no_input_makes_a_motor_command_unsafe(
 
 def test_off_stops_and_idle_idles() -> None:
     nav = np.zeros(NAV_SIZE)
-    nav[0] = 1.0
+    nav[nav_layout.Q] = 1.0
     controller = MulticopterController(physics_rate_hz=250.0, nav=nav)
     controller.step()
     assert (controller.actuators == 0.0).all()

@@ -15,6 +15,7 @@ from autopilot_bridge.flight.multicopter import (
     LandTask,
     OffboardTask,
 )
+from autopilot_bridge.navigation import layout as nav_layout
 from flightsim.environment import Environment, Turbulence
 from tests.flight.rig import Rig
 
@@ -48,8 +49,8 @@ def test_free_descent_is_flight() -> None:
     task.set_attitude((1.0, 0.0, 0.0, 0.0), 0.0)  # motors at idle: falls
     rig.fly(task)
     rig.run(3.5)
-    assert -rig.nav[12] > 30.0
-    assert rig.nav[9] > 10.0
+    assert -rig.nav[nav_layout.POS + 2] > 30.0
+    assert rig.nav[nav_layout.VEL + 2] > 10.0
     assert in_air(rig)
 
 
@@ -84,11 +85,11 @@ def test_disarmed_is_on_the_ground_unless_falling() -> None:
     ctx = FlightContext()
     ctx.nav[:] = 0.0
     detector = LandDetector(on_ground=False)
-    ctx.nav[9] = 5.0
+    ctx.nav[nav_layout.VEL + 2] = 5.0
     assert detector.update(ctx, 0.0) is not LandedState.ON_GROUND
-    ctx.nav[9] = 0.0
+    ctx.nav[nav_layout.VEL + 2] = 0.0
     assert detector.update(ctx, 0.0) is LandedState.ON_GROUND
-    assert np.isnan(ctx.setpoint[0])
+    assert np.isnan(ctx.setpoint[sp.POS])
 
 
 def test_parameters_refuse_nonsense() -> None:

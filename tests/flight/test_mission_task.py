@@ -12,6 +12,7 @@ from autopilot_bridge.flight.multicopter import MissionTask, TaskStatus
 from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_distance, turn_speed
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from autopilot_bridge.navigation import layout as nav_layout
 from tests.flight.rig import Rig, positions, velocities
 
 HEIGHT_M = 20.0
@@ -90,10 +91,10 @@ def test_set_current_and_a_new_plan_take_effect_in_flight() -> None:
     assert store.current == 0
     store.current = 1
     rig.run(11.5)
-    assert np.linalg.norm(rig.nav[10:12] - [0.0, 20.0]) < 2.0
+    assert np.linalg.norm(rig.nav[nav_layout.POS : nav_layout.POS + 2] - [0.0, 20.0]) < 2.0
     store.replace((waypoint(rig, -10.0, 20.0),), 2)
     rig.run(8.0)
-    assert np.linalg.norm(rig.nav[10:12] - [-10.0, 20.0]) < 1.0
+    assert np.linalg.norm(rig.nav[nav_layout.POS : nav_layout.POS + 2] - [-10.0, 20.0]) < 1.0
 
 
 def test_jump_repeats_and_unknown_items_are_passed_over() -> None:
@@ -138,7 +139,7 @@ def test_items_without_a_place_are_skipped(item: MissionItem) -> None:
     rig = Rig(height_m=HEIGHT_M)
     rig.fly(MissionTask(store_of(item, waypoint(rig, 3.0, 0.0))))
     rig.run(6.0)
-    assert rig.nav[10] == pytest.approx(3.0, abs=0.5)
+    assert rig.nav[nav_layout.POS] == pytest.approx(3.0, abs=0.5)
 
 
 def test_corner_geometry() -> None:

@@ -149,17 +149,17 @@ def test_ground_contact_takes_the_thrust_away() -> None:
     rig = flying(LandTask(), height_m=2.0)
     rig.run(0.5)
     assert rig.task is not None
-    assert rig.controller.setpoint[8] == 0.0
+    assert rig.controller.setpoint[sp.ACC + 2] == 0.0
     rig.ctx.ground_contact = True
     downwards = []
     for _ in range(150):
         rig.task.update(rig.ctx)
-        downwards.append(float(rig.controller.setpoint[8]))
+        downwards.append(float(rig.controller.setpoint[sp.ACC + 2]))
     assert np.all(np.diff(downwards) > 0.0) and max(np.diff(downwards)) < 0.1
     assert downwards[-1] > 9.81  # more than gravity: nothing is left
     rig.ctx.ground_contact = False
     rig.task.update(rig.ctx)
-    assert rig.controller.setpoint[8] == 0.0
+    assert rig.controller.setpoint[sp.ACC + 2] == 0.0
 
 
 def test_goto_settles_within_nine_seconds() -> None:
@@ -169,7 +169,7 @@ def test_goto_settles_within_nine_seconds() -> None:
     assert error[-1] < 0.2
     assert (error[-100:] < 0.6).all()
     assert positions(log)[:, 0].max() < 15.3
-    assert math.isclose(rig.nav[27], 0.0, abs_tol=0.1)
+    assert math.isclose(rig.nav[nav_layout.YAW], 0.0, abs_tol=0.1)
 
 
 def test_leg_of_thirty_metres_with_arducopter_limits_takes_eight_seconds() -> None:
@@ -179,7 +179,7 @@ def test_leg_of_thirty_metres_with_arducopter_limits_takes_eight_seconds() -> No
     arrival = np.argmax(np.abs(positions(log)[:, 1] - 30.0) < 0.7) * 0.02
     assert 6.5 < arrival < 8.5
     assert positions(log)[:, 1].max() < 30.7
-    assert rig.nav[27] == pytest.approx(math.pi / 2.0, abs=0.1)  # the nose turned to the target
+    assert rig.nav[nav_layout.YAW] == pytest.approx(math.pi / 2.0, abs=0.1)  # the nose turned to the target
 
 
 def test_reposition_keeps_what_is_nan_and_takes_off_when_asked_up() -> None:
@@ -187,11 +187,11 @@ def test_reposition_keeps_what_is_nan_and_takes_off_when_asked_up() -> None:
     task = RepositionTask(np.array([math.nan, math.nan, -4.0]))
     rig.fly(task)
     rig.run(11.0)
-    assert rig.nav[12] == pytest.approx(-4.0, abs=0.3)
-    assert np.abs(rig.nav[10:12]).max() < 0.2
+    assert rig.nav[nav_layout.POS + 2] == pytest.approx(-4.0, abs=0.3)
+    assert np.abs(rig.nav[nav_layout.POS : nav_layout.POS + 2]).max() < 0.2
     task.set_target(rig.ctx, np.array([5.0, 0.0, math.nan]))
     rig.run(8.0)
-    assert rig.nav[10:13] == pytest.approx([5.0, 0.0, -4.0], abs=0.3)
+    assert rig.nav[nav_layout.POS_NED_M] == pytest.approx([5.0, 0.0, -4.0], abs=0.3)
 
 
 @pytest.mark.parametrize("loiters_high", [False, True])
@@ -283,7 +283,7 @@ def test_guided_velocity_expires_and_position_stays() -> None:
     assert abs(velocities(log)[-1, 0]) < 0.3  # three seconds of time-out, then it brakes
     task.set_position(rig.ctx, (0.0, 0.0, -12.0))
     rig.run(9.0)
-    assert rig.nav[10:13] == pytest.approx([0.0, 0.0, -12.0], abs=0.3)
+    assert rig.nav[nav_layout.POS_NED_M] == pytest.approx([0.0, 0.0, -12.0], abs=0.3)
 
 
 def _yaws_deg(log: np.ndarray) -> np.ndarray:
@@ -342,7 +342,7 @@ def test_guided_position_lifts_nothing_off_the_ground() -> None:
     rig.fly(task)
     task.set_position(rig.ctx, (0.0, 0.0, -10.0))
     rig.run(3.0)
-    assert -rig.nav[12] < 0.2
+    assert -rig.nav[nav_layout.POS + 2] < 0.2
 
 
 @pytest.mark.parametrize("mode", list(ManualMode))
@@ -353,9 +353,9 @@ def test_manual_modes_answer_the_sticks(mode: ManualMode) -> None:
     assert log[-1, 7] > 0.3  # stick forward flies forward
     assert abs(log[-1, 8]) < 0.2
     rig.ctx.sticks = ManualInput(yaw=0.5, valid=True)
-    before = rig.nav[27]
+    before = rig.nav[nav_layout.YAW]
     rig.run(0.6)
-    assert rig.nav[27] > before + 0.03
+    assert rig.nav[nav_layout.YAW] > before + 0.03
 
 
 @pytest.mark.parametrize("mode", [ManualMode.ALTITUDE, ManualMode.POSITION])
@@ -389,13 +389,13 @@ def test_a_jump_of_the_position_estimate_does_not_jerk_the_vehicle() -> None:
     rig.run(4.0)
     health = rig.ctx.health
     assert health is not None
-    before = rig.controller.setpoint[0:3] - rig.nav[10:13]
-    rig.nav[10:13] += [3.0, -2.0, 0.0]
+    before = rig.controller.setpoint[sp.POS_NED_M] - rig.nav[nav_layout.POS_NED_M]
+    rig.nav[nav_layout.POS_NED_M] += [3.0, -2.0, 0.0]
     health.position_resets += 1
     health.position_reset_ne_m = (3.0, -2.0)
     assert rig.task is not None
     rig.task.update(rig.ctx)
-    after = rig.controller.setpoint[0:3] - rig.nav[10:13]
+    after = rig.controller.setpoint[sp.POS_NED_M] - rig.nav[nav_layout.POS_NED_M]
     assert after == pytest.approx(before, abs=0.15)
 
 
@@ -406,8 +406,8 @@ def test_filter_position_lost_and_found() -> None:
     assert health is not None
     health.position_horizontal_absolute = health.position_horizontal_relative = False
     rig.run(2.0)
-    assert np.isnan(rig.controller.setpoint[0:2]).all()
+    assert np.isnan(rig.controller.setpoint[sp.POS_HORIZONTAL]).all()
     health.position_horizontal_absolute = True
     log = rig.run(2.0)
-    assert np.isfinite(rig.controller.setpoint[0:3]).all()
+    assert np.isfinite(rig.controller.setpoint[sp.POS_NED_M]).all()
     assert np.linalg.norm(velocities(log), axis=1).max() < 0.5

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.multicopter.trajectory import TrajectoryGenerator, braking_speed
 from autopilot_bridge.flight.multicopter.yaw import YawSteering
 from autopilot_bridge.flight.parameters import FlightParameters
@@ -123,7 +124,7 @@ def test_a_vehicle_left_behind_is_waited_for() -> None:
     assert generator.position_ned_m == pytest.approx(before)
     setpoint = np.zeros(20)
     generator.write(setpoint)
-    assert setpoint[3] == 0.0
+    assert setpoint[sp.VEL] == 0.0
 
 
 @settings(max_examples=60, deadline=None)

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.services.commands.handlers import whole
 from tests.services.command_rig import NAN, ServiceRig
 
@@ -222,7 +223,7 @@ def test_px4_reposition_flies_there(frame: int) -> None:
         frame=frame,
     ) == [0]
     rig.run(20.0)
-    assert rig.context.nav[10:13] == pytest.approx((12.0, 7.0, -15.0), abs=0.1)
+    assert rig.context.nav[nav_layout.POS_NED_M] == pytest.approx((12.0, 7.0, -15.0), abs=0.1)
 
 
 def test_px4_reposition_takes_off_when_armed_on_the_ground() -> None:
@@ -337,11 +338,11 @@ def test_ardupilot_yaw_turns_and_the_place_stays() -> None:
     rig.run(1.0)
     assert rig.long(mavlink.MAV_CMD_CONDITION_YAW, 90, 30, 1, 0) == [0]
     rig.run(8.0)
-    assert rig.context.nav[27] == pytest.approx(math.pi / 2, abs=0.02)
+    assert rig.context.nav[nav_layout.YAW] == pytest.approx(math.pi / 2, abs=0.02)
     assert rig.long(mavlink.MAV_CMD_CONDITION_YAW, 45, 30, -1, 1) == [0]
     rig.run(8.0)
-    assert rig.context.nav[27] == pytest.approx(math.pi / 4, abs=0.02)
-    assert rig.context.nav[10:12] == pytest.approx((0.0, 0.0), abs=0.1)
+    assert rig.context.nav[nav_layout.YAW] == pytest.approx(math.pi / 4, abs=0.02)
+    assert rig.context.nav[nav_layout.POS : nav_layout.POS + 2] == pytest.approx((0.0, 0.0), abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -357,7 +358,7 @@ def test_ardupilot_turns_at_the_rate_and_in_the_direction_of_the_command(
     yaws = []
     for _ in range(40 * 50):
         rig.tick()
-        yaws.append(rig.context.nav[27])
+        yaws.append(rig.context.nav[nav_layout.YAW])
     turned = np.degrees(np.unwrap([0.0, *yaws]))
     assert np.abs(np.diff(turned)).max() * 50.0 >= rate_deg_s - 0.5
     assert turned[-1] == pytest.approx(turned_deg, abs=1.0)
@@ -373,9 +374,9 @@ def test_ardupilot_position_setpoints_turn_at_their_yaw_rate() -> None:
             0, 1, 1, 1, mask, 0.0, 0.0, -10.0, 0, 0, 0, 0, 0, 0, 0.0, 0.2
         )
     )
-    before = rig.context.nav[27]
+    before = rig.context.nav[nav_layout.YAW]
     rig.run(2.5)
-    assert 0.3 < rig.context.nav[27] - before < 0.55
+    assert 0.3 < rig.context.nav[nav_layout.YAW] - before < 0.55
 
 
 def test_ardupilot_starts_its_mission_when_the_throttle_is_raised() -> None:

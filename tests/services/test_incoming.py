@@ -17,6 +17,7 @@ from autopilot_bridge.flight.obstacles import SECTORS, ObstacleMap
 from autopilot_bridge.flight.target_motion import TargetMotion
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.external import (
     POSITION_M,
     Q_LOCAL_FROM_FRD,
@@ -247,7 +248,7 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
     service = next(more for more in autopilot._more if isinstance(more, LandingTargetService))
     service._navigation = _Pose(q)  # type: ignore[assignment]
     autopilot.context.health = type("Sound", (), {"position_horizontal_relative": True})()  # type: ignore[assignment]
-    autopilot.context.nav[28] = 10.0
+    autopilot.context.nav[nav_layout.HEIGHT_ABOVE_GROUND_M] = 10.0
     line = np.array((2.0, 1.0, 10.0))
     if by_gimbal:  # stabilised, looking straight down, turning with the vehicle
         gimbal_q = _euler(0.0, -0.5 * math.pi, 0.0)

@@ -10,6 +10,7 @@ from autopilot_bridge.autopilot.status import StatusReport
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.navigation import layout as nav_layout
 from tests.services.command_rig import NAN
 from tests.services.plane_rig import PlaneRig
 
@@ -427,7 +428,7 @@ def test_a_landing_can_be_broken_off(flavour: str) -> None:
     rig = rig_of(flavour, "flying")
     # on the approach: at its entry, along it
     rig.plan(rig.waypoint(-900.0, 0.0, 60.0), rig.waypoint(0.0, 0.0, 0.0, command=LAND))
-    rig.context.nav[10:13] = (-880.0, 0.0, -60.0)
+    rig.context.nav[nav_layout.POS_NED_M] = (-880.0, 0.0, -60.0)
     rig.missions.current = len(rig.missions.items) - 1
     assert rig.commander.set_mode(FlightMode.MISSION).accepted
     rig.run(0.1)

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
+from autopilot_bridge.navigation import layout as nav_layout
 from tests.services.command_rig import NAN, ServiceRig
 
 POSITION_ONLY = 0x0DF8
@@ -108,14 +109,14 @@ def test_px4_single_components_are_ignored_one_by_one() -> None:
     rig = ServiceRig("px4").fly()
     offboard(rig, local(1, 0x0DFF & ~4 & ~8), 0.3)  # height and north speed
     setpoint = rig.context.setpoint
-    assert math.isnan(setpoint[0]) and math.isnan(setpoint[4])
-    assert (setpoint[2], setpoint[3]) == pytest.approx((-12.0, 1.0))
+    assert math.isnan(setpoint[sp.POS]) and math.isnan(setpoint[sp.VEL + 1])
+    assert (setpoint[sp.POS + 2], setpoint[sp.VEL]) == pytest.approx((-12.0, 1.0))
 
 
 def test_px4_body_velocity_turns_with_the_heading() -> None:
     rig = ServiceRig("px4").fly()
     for _ in range(5):
-        rig.context.nav[27] = math.pi / 2
+        rig.context.nav[nav_layout.YAW] = math.pi / 2
         offboard(rig, local(8, VELOCITY_ONLY, vel=(3.0, 1.0, -0.5)), 0.02)
     assert rig.context.setpoint[sp.VEL_NED_M_S] == pytest.approx((-1.0, 3.0, -0.5), abs=1e-6)
 
@@ -203,7 +204,7 @@ def test_ardupilot_listens_in_guided_and_in_the_air_only() -> None:
     rig.commander.set_mode(FlightMode.HOLD)
     rig.handle(local(1, VELOCITY_ONLY))
     rig.run(1.0)
-    assert rig.context.nav[10] == pytest.approx(0.0, abs=0.05)
+    assert rig.context.nav[nav_layout.POS] == pytest.approx(0.0, abs=0.05)
 
 
 def test_ardupilot_offset_frame_starts_from_here() -> None:
@@ -212,7 +213,7 @@ def test_ardupilot_offset_frame_starts_from_here() -> None:
     rig.run(12.0)
     rig.handle(local(7, POSITION_ONLY, pos=(5.0, 5.0, -2.0)))
     rig.run(12.0)
-    assert rig.context.nav[10:13] == pytest.approx((15.0, 5.0, -12.0), abs=0.3)
+    assert rig.context.nav[nav_layout.POS_NED_M] == pytest.approx((15.0, 5.0, -12.0), abs=0.3)
 
 
 def test_ardupilot_velocity_ends_after_the_time_out() -> None:
@@ -220,13 +221,13 @@ def test_ardupilot_velocity_ends_after_the_time_out() -> None:
     for _ in range(100):
         rig.handle(local(1, VELOCITY_ONLY, vel=(2.0, 0.0, 0.0)))
         rig.tick()
-    before_m = float(rig.context.nav[10])
+    before_m = float(rig.context.nav[nav_layout.POS])
     rig.run(2.9)
-    assert float(rig.context.nav[10]) - before_m == pytest.approx(2.0 * 2.9, abs=0.6)
+    assert float(rig.context.nav[nav_layout.POS]) - before_m == pytest.approx(2.0 * 2.9, abs=0.6)
     rig.run(4.0)
-    stopped_m = float(rig.context.nav[10])
+    stopped_m = float(rig.context.nav[nav_layout.POS])
     rig.run(1.0)
-    assert float(rig.context.nav[10]) == pytest.approx(stopped_m, abs=0.05)
+    assert float(rig.context.nav[nav_layout.POS]) == pytest.approx(stopped_m, abs=0.05)
     assert rig.commander.mode is FlightMode.GUIDED
 
 
@@ -272,7 +273,7 @@ def test_a_guided_target_takes_over_from_the_takeoff() -> None:
     rig.run_until(lambda: rig.height_m > 5.0, 20.0)
     rig.handle(local(1, POSITION_ONLY, pos=(20.0, 0.0, -8.0)))
     rig.run(15.0)
-    assert rig.context.nav[10:13] == pytest.approx((20.0, 0.0, -8.0), abs=0.3)
+    assert rig.context.nav[nav_layout.POS_NED_M] == pytest.approx((20.0, 0.0, -8.0), abs=0.3)
 
 
 # sticks and ground stations

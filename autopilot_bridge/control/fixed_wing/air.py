@@ -12,16 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
 
 Array = NDArray[np.float64]
 
-_NAV_VEL: Final = 7  # navigation slots, as in navigation.layout
-_NAV_ACC: Final = 13
-_NAV_WIND: Final = 29
-_NAV_EAS: Final = 32
-_NAV_TAS: Final = 33
 _DIRECTION_SPEED_M_S: Final = 5.0  # below it the direction of the flow isn't taken from the velocity
 _RATIO_SPEED_M_S: Final = 3.0  # below it true over equivalent airspeed isn't taken from the two
 
@@ -33,26 +29,26 @@ def acceleration_along_flow(nav: Array) -> float:
     The body's x axis is off the flow by the angle of attack, and in a turn or a pull-up it then sees a part
     of the acceleration across the flow.
     """
-    north, east = nav[_NAV_VEL] - nav[_NAV_WIND], nav[_NAV_VEL + 1] - nav[_NAV_WIND + 1]
-    down = nav[_NAV_VEL + 2]
-    if math.isfinite(nav[_NAV_WIND + 2]):
-        down -= nav[_NAV_WIND + 2]
+    north, east = nav[n.VEL] - nav[n.WIND], nav[n.VEL + 1] - nav[n.WIND + 1]
+    down = nav[n.VEL + 2]
+    if math.isfinite(nav[n.WIND + 2]):
+        down -= nav[n.WIND + 2]
     speed = math.sqrt(north * north + east * east + down * down)
     if not speed > _DIRECTION_SPEED_M_S:  # true for NaN
-        north, east, down = body_axis(nav[0], nav[1], nav[2], nav[3], 0)
+        north, east, down = body_axis(nav[n.Q], nav[n.Q + 1], nav[n.Q + 2], nav[n.Q + 3], 0)
         speed = 1.0
-    return (north * nav[_NAV_ACC] + east * nav[_NAV_ACC + 1] + down * nav[_NAV_ACC + 2]) / speed
+    return (north * nav[n.ACC] + east * nav[n.ACC + 1] + down * nav[n.ACC + 2]) / speed
 
 
 @kernel
 def update_air(nav: Array, p: Array, s: Array, dt: float) -> None:
     """One step: writes EAS, EAS_RATE, EAS_TO_TAS and EAS_KNOWN."""
-    measured = nav[_NAV_EAS]
+    measured = nav[n.AIRSPEED_M_S]
     known = math.isfinite(measured)
     if s[c.EAS_TO_TAS] <= 0.0:
         s[c.EAS_TO_TAS] = 1.0
-    if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav[_NAV_TAS]):
-        s[c.EAS_TO_TAS] = min(3.0, max(0.8, nav[_NAV_TAS] / measured))
+    if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav[n.AIRSPEED_TRUE_M_S]):
+        s[c.EAS_TO_TAS] = min(3.0, max(0.8, nav[n.AIRSPEED_TRUE_M_S] / measured))
     if not known:
         s[c.EAS] = p[c.AIRSPEED_TRIM]
         s[c.EAS_RATE] = 0.0

@@ -15,20 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.lateral import ROLL_MAX_RAD, stall_speed
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_pi
 
 Array = NDArray[np.float64]
 
-_NAV_RATES: Final = 4  # navigation slots, as in navigation.layout
-_NAV_VEL: Final = 7
-_NAV_FORCE: Final = 22
-_NAV_ROLL: Final = 25
-_NAV_PITCH: Final = 26
-_NAV_YAW: Final = 27
-_STEERING_HEADING: Final = 15  # setpoint slot, as in control.fixed_wing_setpoint
 
 _WHEEL_SPEED_SHARE: Final = 0.6  # of the lowest airspeed: below it wheel gains stay as they are (PX4)
 _ROLLING_SPEED_SHARE: Final = 0.7  # of the stall speed: below it the surfaces give way in the take-off roll
@@ -39,7 +34,7 @@ _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 @kernel
 def attitude_control(nav: Array, p: Array, s: Array) -> None:
     """Write RATE_SETPOINT (FRD) for ROLL_SETPOINT and PITCH_SETPOINT."""
-    roll, pitch = nav[_NAV_ROLL], nav[_NAV_PITCH]
+    roll, pitch = nav[n.ROLL], nav[n.PITCH]
     roll_rate = wrap_pi(s[c.ROLL_SETPOINT] - roll) / p[c.ROLL_TC]
     pitch_rate = (s[c.PITCH_SETPOINT] - pitch) / p[c.PITCH_TC]
     airspeed = max(0.7 * p[c.AIRSPEED_MIN], s[c.EAS]) * s[c.EAS_TO_TAS]
@@ -52,7 +47,7 @@ def attitude_control(nav: Array, p: Array, s: Array) -> None:
     x = roll_rate - sin_pitch * turn_rate
     y = cos_roll * pitch_rate + cos_pitch * sin_roll * turn_rate
     z = -sin_roll * pitch_rate + cos_pitch * cos_roll * turn_rate
-    slip = nav[_NAV_FORCE + 1]
+    slip = nav[n.FORCE + 1]
     if s[c.GROUND_CONTACT] == 0.0 and math.isfinite(slip):
         z -= p[c.SIDESLIP_GAIN] * min(_SLIP_MAX_M_S2, max(-_SLIP_MAX_M_S2, slip))
     s[c.RATE_SETPOINT] = min(p[c.ROLL_RATE_MAX], max(-p[c.ROLL_RATE_MAX], x))
@@ -72,7 +67,7 @@ def rate_control(nav: Array, p: Array, s: Array, surfaces: Array, rolling: bool)
     alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
     for i in range(3):
         g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
-        rate = min(_RATE_LIMIT_RAD_S, max(-_RATE_LIMIT_RAD_S, nav[_NAV_RATES + i]))
+        rate = min(_RATE_LIMIT_RAD_S, max(-_RATE_LIMIT_RAD_S, nav[n.RATES + i]))
         wanted = s[c.RATE_SETPOINT + i]
         error = wanted - rate
         raw = (rate - s[c.RATE_PREVIOUS + i]) / dt
@@ -114,14 +109,14 @@ def limit_surfaces(p: Array, s: Array, yaw_stick: float, surfaces: Array) -> Non
 @kernel
 def wheel_control(nav: Array, sp: Array, p: Array, s: Array) -> float:
     """Steering -1..1 that holds the setpoint's heading on the ground; its yaw rate is the rudder's too."""
-    error = wrap_pi(sp[_STEERING_HEADING] - nav[_NAV_YAW])
+    error = wrap_pi(sp[to.STEERING_HEADING_RAD] - nav[n.YAW])
     limit = p[c.WHEEL_RATE_MAX]
     wanted = min(limit, max(-limit, error / p[c.WHEEL_TC]))
     s[c.RATE_SETPOINT + 2] = wanted
-    speed = math.sqrt(nav[_NAV_VEL] * nav[_NAV_VEL] + nav[_NAV_VEL + 1] * nav[_NAV_VEL + 1])
+    speed = math.sqrt(nav[n.VEL] * nav[n.VEL] + nav[n.VEL + 1] * nav[n.VEL + 1])
     slow = _WHEEL_SPEED_SHARE * p[c.AIRSPEED_MIN]
     scale = slow / speed if speed > slow else 1.0  # false for NaN
-    rate_error = wanted - nav[_NAV_RATES + 2]
+    rate_error = wanted - nav[n.RATES + 2]
     command = scale * (p[c.WHEEL_FF] * wanted + scale * (p[c.WHEEL_P] * rate_error + s[c.WHEEL_INTEGRAL]))
     if speed > 1.0 and abs(command) < 1.0:
         limit = p[c.WHEEL_INTEGRAL_MAX]

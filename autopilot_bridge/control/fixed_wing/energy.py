@@ -16,25 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
 from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
 from autopilot_bridge.control.fixed_wing.vertical_speed import pitch_for_climb
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 
-_DOWN: Final = 4  # setpoint slots, as in control.fixed_wing_setpoint
-_HEIGHT_RATE: Final = 5
-_AIRSPEED: Final = 6
-_PITCH: Final = 7
-_THROTTLE: Final = 8
-_PITCH_MIN: Final = 16
-_PITCH_MAX: Final = 17
-_THROTTLE_MAX: Final = 18
-_NAV_VEL_DOWN: Final = 9  # navigation slots, as in navigation.layout
-_NAV_POS_DOWN: Final = 12
 
 PITCH_LIMIT_RAD: Final = math.radians(80.0)  # of a pitch angle given past the energy control
 _MIN_SPEED_M_S: Final = 3.0  # for divisions
@@ -117,8 +109,8 @@ def _trim_pitch(airspeed: float, p: Array, s: Array) -> float:
 @kernel
 def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bool) -> float:
     """Climb rate to fly, m/s; NaN where nothing asks for one. `hold`: the present height unless told else."""
-    height, climb = -nav[_NAV_POS_DOWN], -nav[_NAV_VEL_DOWN]
-    wanted, rate = -sp[_DOWN], sp[_HEIGHT_RATE]
+    height, climb = -nav[n.POS + 2], -nav[n.VEL + 2]
+    wanted, rate = -sp[to.DOWN_M], sp[to.HEIGHT_RATE_M_S]
     if math.isfinite(wanted) or not (math.isfinite(rate) or not hold):
         if not math.isfinite(height):
             return 0.0 if not math.isfinite(rate) else rate
@@ -144,8 +136,8 @@ def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bo
 @kernel
 def _fly_pitch(sp: Array, p: Array, s: Array, dt: float, speed: float, under: float) -> None:
     """PITCH_SETPOINT that flies the rate of the energy balance; `speed` is the true airspeed."""
-    lowest = sp[_PITCH_MIN] if math.isfinite(sp[_PITCH_MIN]) else p[c.PITCH_MIN]
-    highest = sp[_PITCH_MAX] if math.isfinite(sp[_PITCH_MAX]) else p[c.PITCH_MAX]
+    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p[c.PITCH_MIN]
+    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p[c.PITCH_MAX]
     # a climb-out's least pitch gives way before the wing stalls
     lowest = (1.0 - under) * lowest + under * min(lowest, p[c.PITCH_MIN])
     highest = max(highest, lowest)
@@ -170,8 +162,8 @@ def _fly_pitch(sp: Array, p: Array, s: Array, dt: float, speed: float, under: fl
 @kernel
 def _fly_climb_by_pitch(nav: Array, sp: Array, p: Array, s: Array, dt: float, climb: float) -> None:
     """PITCH_SETPOINT that flies a climb rate whatever becomes of the airspeed."""
-    lowest = sp[_PITCH_MIN] if math.isfinite(sp[_PITCH_MIN]) else p[c.PITCH_MIN]
-    highest = sp[_PITCH_MAX] if math.isfinite(sp[_PITCH_MAX]) else p[c.PITCH_MAX]
+    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p[c.PITCH_MIN]
+    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p[c.PITCH_MAX]
     s[c.PITCH_SETPOINT] = pitch_for_climb(nav, p, s, dt, climb, lowest, max(lowest, highest))
 
 
@@ -179,8 +171,8 @@ def _fly_climb_by_pitch(nav: Array, sp: Array, p: Array, s: Array, dt: float, cl
 def _fly_throttle(sp: Array, p: Array, s: Array, dt: float, under: float) -> None:
     """THROTTLE that flies the rate of the total energy."""
     lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
-    if math.isfinite(sp[_THROTTLE_MAX]):
-        highest = _clip(sp[_THROTTLE_MAX], 0.0, highest)
+    if math.isfinite(sp[to.THROTTLE_MAX]):
+        highest = _clip(sp[to.THROTTLE_MAX], 0.0, highest)
         lowest = min(lowest, highest)
     rate_max, rate_min = GRAVITY_M_S2 * p[c.CLIMB_MAX], -GRAVITY_M_S2 * p[c.SINK_MIN]
     wanted = s[c.ENERGY_RATE_SETPOINT]
@@ -221,11 +213,11 @@ def _wanted_speed_rate(p: Array, s: Array, speed: float, weight: float) -> float
 @kernel
 def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
     """One guidance step: writes PITCH_SETPOINT, THROTTLE and what led to them."""
-    pitch_given, throttle_given = math.isfinite(sp[_PITCH]), math.isfinite(sp[_THROTTLE])
+    pitch_given, throttle_given = math.isfinite(sp[to.PITCH_RAD]), math.isfinite(sp[to.THROTTLE])
     powered, known = p[c.POWERED] != 0.0, s[c.EAS_KNOWN] != 0.0
-    climb = -nav[_NAV_VEL_DOWN] if math.isfinite(nav[_NAV_VEL_DOWN]) else 0.0
+    climb = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
     if entering or s[c.GROUND_CONTACT] != 0.0:
-        reset_height(-nav[_NAV_POS_DOWN], climb, s)
+        reset_height(-nav[n.POS + 2], climb, s)
         s[c.PITCH_INTEGRAL] = 0.0
         s[c.THROTTLE_INTEGRAL] = 0.0
     load_factor = _load_factor(s)
@@ -245,7 +237,7 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     powerless = _update_powerless(p, s, dt, energy_flown, potential_rate + inertial_rate)
 
     airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
-    airspeed = sp[_AIRSPEED] if math.isfinite(sp[_AIRSPEED]) else p[c.AIRSPEED_TRIM]
+    airspeed = sp[to.AIRSPEED_M_S] if math.isfinite(sp[to.AIRSPEED_M_S]) else p[c.AIRSPEED_TRIM]
     airspeed = max(airspeed, s[c.AIRSPEED_FLOOR])
     # a glide lasts longest, with room left over the stall, a little above the lowest airspeed
     airspeed -= powerless * max(0.0, airspeed - _GLIDE_SHARE * airspeed_min)
@@ -277,7 +269,7 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     )
 
     if pitch_given:
-        s[c.PITCH_SETPOINT] = _clip(sp[_PITCH], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
+        s[c.PITCH_SETPOINT] = _clip(sp[to.PITCH_RAD], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
     elif flare and known and p[c.LIFT_ANGLE] > 0.0:
         _fly_climb_by_pitch(nav, sp, p, s, dt, wanted_climb)
     else:
@@ -286,7 +278,7 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
             s[c.PITCH_INTEGRAL] = 0.0
         _fly_pitch(sp, p, s, dt, speed, under)
     if throttle_given:
-        s[c.THROTTLE] = _clip(sp[_THROTTLE], 0.0, 1.0)
+        s[c.THROTTLE] = _clip(sp[to.THROTTLE], 0.0, 1.0)
     elif powered:
         _fly_throttle(sp, p, s, dt, under)
     else:

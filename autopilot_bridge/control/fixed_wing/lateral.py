@@ -14,20 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing import setpoint as to
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_pi
 
 Array = NDArray[np.float64]
 
-_COURSE: Final = 0  # setpoint slots, as in control.fixed_wing_setpoint
-_HEADING: Final = 1
-_ACCELERATION: Final = 2
-_ROLL: Final = 3
-_ROLL_LIMIT: Final = 20
-_NAV_VEL: Final = 7  # navigation slots, as in navigation.layout
-_NAV_YAW: Final = 27
-_NAV_WIND: Final = 29
 
 ROLL_MAX_RAD: Final = math.radians(80.0)  # of a bank angle given past the guidance
 _BANK_ALWAYS_RAD: Final = math.radians(15.0)  # left for turning however slow the vehicle is
@@ -75,8 +69,8 @@ def airspeed_for_ground_speed(course: float, ground_speed: float, wind_n: float,
 def bank_limit(sp: Array, p: Array, s: Array) -> float:
     """Largest bank angle, rad: of parameters, setpoint, load factor, and stall at the present airspeed."""
     limit = min(p[c.ROLL_LIMIT], math.acos(1.0 / p[c.LOAD_FACTOR_MAX]))
-    if sp[_ROLL_LIMIT] >= 0.0:  # false for NaN
-        limit = min(limit, sp[_ROLL_LIMIT])
+    if sp[to.ROLL_LIMIT_RAD] >= 0.0:  # false for NaN
+        limit = min(limit, sp[to.ROLL_LIMIT_RAD])
     if p[c.STALL_PREVENTION] != 0.0 and s[c.EAS_KNOWN] != 0.0:
         ratio = s[c.EAS] / (p[c.STALL_MARGIN] * stall_speed(p))
         by_stall = math.acos(1.0 / (ratio * ratio)) if ratio > 1.0 else 0.0
@@ -93,31 +87,34 @@ def lateral_control(nav: Array, sp: Array, p: Array, s: Array, dt: float) -> Non
     s[c.HEADING_SETPOINT] = math.nan
     s[c.COURSE_SETPOINT] = math.nan
     s[c.AIRSPEED_FLOOR] = 0.0
-    if math.isfinite(sp[_ROLL]):
-        roll = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, sp[_ROLL]))
+    if math.isfinite(sp[to.ROLL_RAD]):
+        roll = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, sp[to.ROLL_RAD]))
         s[c.ROLL_SETPOINT] = roll
         s[c.LATERAL_ACCELERATION] = GRAVITY_M_S2 * math.tan(roll)
         return
-    acceleration = sp[_ACCELERATION] if math.isfinite(sp[_ACCELERATION]) else 0.0
+    acceleration = (
+        sp[to.LATERAL_ACCELERATION_M_S2] if math.isfinite(sp[to.LATERAL_ACCELERATION_M_S2]) else 0.0
+    )
     present, wanted = math.nan, math.nan
-    yaw = nav[_NAV_YAW]
-    if math.isfinite(sp[_COURSE]):
-        wind_n, wind_e = nav[_NAV_WIND], nav[_NAV_WIND + 1]
+    yaw = nav[n.YAW]
+    if math.isfinite(sp[to.COURSE_RAD]):
+        wind_n, wind_e = nav[n.WIND], nav[n.WIND + 1]
         if not math.isfinite(wind_n + wind_e):
             wind_n, wind_e = 0.0, 0.0
-        air_n, air_e = nav[_NAV_VEL] - wind_n, nav[_NAV_VEL + 1] - wind_e
+        air_n, air_e = nav[n.VEL] - wind_n, nav[n.VEL + 1] - wind_e
         if not math.isfinite(air_n + air_e):
             air_n, air_e = true_airspeed * math.cos(yaw), true_airspeed * math.sin(yaw)
         airspeed = max(1.0, math.sqrt(air_n * air_n + air_e * air_e))
         present = math.atan2(air_e, air_n)
-        wanted = heading_for_course(sp[_COURSE], airspeed, wind_n, wind_e)
-        s[c.COURSE_SETPOINT] = wrap_pi(sp[_COURSE])
+        wanted = heading_for_course(sp[to.COURSE_RAD], airspeed, wind_n, wind_e)
+        s[c.COURSE_SETPOINT] = wrap_pi(sp[to.COURSE_RAD])
         s[c.AIRSPEED_FLOOR] = (
-            airspeed_for_ground_speed(sp[_COURSE], p[c.GROUND_SPEED_MIN], wind_n, wind_e) / s[c.EAS_TO_TAS]
+            airspeed_for_ground_speed(sp[to.COURSE_RAD], p[c.GROUND_SPEED_MIN], wind_n, wind_e)
+            / s[c.EAS_TO_TAS]
         )
-    elif math.isfinite(sp[_HEADING]):
+    elif math.isfinite(sp[to.HEADING_RAD]):
         present = yaw
-        wanted = wrap_pi(sp[_HEADING])
+        wanted = wrap_pi(sp[to.HEADING_RAD])
     if math.isfinite(wanted):
         error = wrap_pi(wanted - present)
         # beyond a right angle: turn at full strength, whichever way is shorter

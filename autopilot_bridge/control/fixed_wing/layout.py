@@ -4,6 +4,7 @@ from dataclasses import fields
 from typing import Final
 
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
+from flightsim.foundation.layouts import Slots
 
 PARAMETER_NAMES: Final = tuple(field.name for field in fields(FixedWingParameters))
 
@@ -76,51 +77,52 @@ WHEEL_I: Final = _index("wheel_i")
 WHEEL_INTEGRAL_MAX: Final = _index("wheel_integral_max")
 WHEEL_FF: Final = _index("wheel_ff")
 
+_at = Slots()
 # state, kept until the physics rate changes
-DT: Final = 0  # physics step, s
-DIVISOR: Final = 1  # physics steps per guidance step
-GROUND_CONTACT: Final = 2  # 1.0 while the wheels or the launcher may carry the vehicle
+DT: Final = _at.place()  # physics step, s
+DIVISOR: Final = _at.place()  # physics steps per guidance step
+GROUND_CONTACT: Final = _at.place()  # 1.0 while the wheels or the launcher may carry the vehicle
 # state of a flight: zero at levels OFF and IDLE
-COUNTER: Final = 3  # physics steps since guidance ran
-LAST_LEVEL: Final = 4
-FLYING: Final = 5  # 1.0 once guidance has run since the level became FLY
+COUNTER: Final = _at.place()  # physics steps since guidance ran
+LAST_LEVEL: Final = _at.place()
+FLYING: Final = _at.place()  # 1.0 once guidance has run since the level became FLY
 # air
-EAS: Final = 6  # filtered equivalent airspeed, m/s; trim airspeed when it isn't known
-EAS_RATE: Final = 7  # its rate, m/s^2
-EAS_TO_TAS: Final = 8  # true over equivalent airspeed
-EAS_KNOWN: Final = 9  # 1.0 while the airspeed is known
+EAS: Final = _at.place()  # filtered equivalent airspeed, m/s; trim airspeed when it isn't known
+EAS_RATE: Final = _at.place()  # its rate, m/s^2
+EAS_TO_TAS: Final = _at.place()  # true over equivalent airspeed
+EAS_KNOWN: Final = _at.place()  # 1.0 while the airspeed is known
 # lateral
-HEADING_SETPOINT: Final = 10  # through the air, rad; NaN where none is flown
-COURSE_SETPOINT: Final = 11
-LATERAL_ACCELERATION: Final = 12  # wanted, m/s^2
-ROLL_SETPOINT: Final = 13
-ROLL_LIMITED: Final = 14  # bank limit in force
+HEADING_SETPOINT: Final = _at.place()  # through the air, rad; NaN where none is flown
+COURSE_SETPOINT: Final = _at.place()
+LATERAL_ACCELERATION: Final = _at.place()  # wanted, m/s^2
+ROLL_SETPOINT: Final = _at.place()
+ROLL_LIMITED: Final = _at.place()  # bank limit in force
 # longitudinal
-HEIGHT_REFERENCE: Final = 15  # up, local, m
-HEIGHT_RATE_REFERENCE: Final = 16  # of the height trajectory, m/s
-HEIGHT_CONTROLLED: Final = 17  # 1.0 while the reference is flown
-HEIGHT_RATE_SETPOINT: Final = 18  # wanted climb rate, m/s; NaN where none is flown
-AIRSPEED_SETPOINT: Final = 19  # equivalent, limits applied, m/s
-PITCH_INTEGRAL: Final = 20  # rad
-THROTTLE_INTEGRAL: Final = 21
-ENERGY_RATE: Final = 22  # specific total energy rate, low-passed, m^2/s^3
-ENERGY_RATE_SETPOINT: Final = 23
-BALANCE_RATE: Final = 24  # specific energy balance rate
-BALANCE_RATE_SETPOINT: Final = 25
-UNDERSPEED: Final = 26  # 0 none .. 1 full
-PITCH_SETPOINT: Final = 27
-THROTTLE: Final = 28
+HEIGHT_REFERENCE: Final = _at.place()  # up, local, m
+HEIGHT_RATE_REFERENCE: Final = _at.place()  # of the height trajectory, m/s
+HEIGHT_CONTROLLED: Final = _at.place()  # 1.0 while the reference is flown
+HEIGHT_RATE_SETPOINT: Final = _at.place()  # wanted climb rate, m/s; NaN where none is flown
+AIRSPEED_SETPOINT: Final = _at.place()  # equivalent, limits applied, m/s
+PITCH_INTEGRAL: Final = _at.place()  # rad
+THROTTLE_INTEGRAL: Final = _at.place()
+ENERGY_RATE: Final = _at.place()  # specific total energy rate, low-passed, m^2/s^3
+ENERGY_RATE_SETPOINT: Final = _at.place()
+BALANCE_RATE: Final = _at.place()  # specific energy balance rate
+BALANCE_RATE_SETPOINT: Final = _at.place()
+UNDERSPEED: Final = _at.place()  # 0 none .. 1 full
+PITCH_SETPOINT: Final = _at.place()
+THROTTLE: Final = _at.place()
 # attitude
-Q_SETPOINT: Final = 29  # q_ned_from_frd
-RATE_SETPOINT: Final = 33  # FRD, rad/s
-RATE_INTEGRAL: Final = 36  # surface
-RATE_PREVIOUS: Final = 39  # FRD, rad/s
-RATE_DERIVATIVE: Final = 42  # FRD, rad/s^2, low-passed
-UNALLOCATED: Final = 45  # surface command beyond the stops
-WHEEL_INTEGRAL: Final = 48
-VEL_SETPOINT: Final = 49  # NED, m/s; only the vertical one is flown
-AIRSPEED_FLOOR: Final = 52  # equivalent airspeed that the least ground speed asks for, m/s
-POWERLESS: Final = 53  # 0 the throttle does its work .. 1 the energy falls at full throttle
-CLIMB_FLOWN: Final = 54  # 1.0 while pitch alone flies the vertical speed
-LIFTLESS_PITCH: Final = 55  # pitch over the path without lift, rad, low-passed: downdraughts, trim not known
-STATE_SIZE: Final = 56
+Q_SETPOINT: Final = _at.place(4)  # q_ned_from_frd
+RATE_SETPOINT: Final = _at.place(3)  # FRD, rad/s
+RATE_INTEGRAL: Final = _at.place(3)  # surface
+RATE_PREVIOUS: Final = _at.place(3)  # FRD, rad/s
+RATE_DERIVATIVE: Final = _at.place(3)  # FRD, rad/s^2, low-passed
+UNALLOCATED: Final = _at.place(3)  # surface command beyond the stops
+WHEEL_INTEGRAL: Final = _at.place()
+VEL_SETPOINT: Final = _at.place(3)  # NED, m/s; only the vertical one is flown
+AIRSPEED_FLOOR: Final = _at.place()  # equivalent airspeed that the least ground speed asks for, m/s
+POWERLESS: Final = _at.place()  # 0 the throttle does its work .. 1 the energy falls at full throttle
+CLIMB_FLOWN: Final = _at.place()  # 1.0 while pitch alone flies the vertical speed
+LIFTLESS_PITCH: Final = _at.place()  # pitch over the path without lift, rad, low-passed
+STATE_SIZE: Final = _at.size

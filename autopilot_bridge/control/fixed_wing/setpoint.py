@@ -6,34 +6,37 @@ and FixedWingLongitudinalSetpoint do. NaN means "not given": lateral, the first 
 heading counts (lateral acceleration adds to course or heading, or stands alone); longitudinal, a given pitch
 or throttle goes past the total-energy control, and what is left is flown by it.
 
-`LEVEL` has the place and the values of `control.setpoint`; `TRAJECTORY` isn't flown by a fixed wing.
+`LEVEL` has the place and the values of `control.multicopter.setpoint`; `TRAJECTORY` isn't flown by a
+fixed wing.
 """
 
 from typing import Final
 
 from autopilot_bridge.control.multicopter import setpoint as multicopter
+from flightsim.foundation.layouts import Slots
 
-COURSE_RAD: Final = 0  # direction over ground to fly
-HEADING_RAD: Final = 1  # direction through the air (of the nose, without sideslip) to fly
-LATERAL_ACCELERATION_M_S2: Final = 2  # to the right; feed-forward of a curved path
-ROLL_RAD: Final = 3  # bank angle, past the lateral guidance
-DOWN_M: Final = 4  # height to fly, local NED
-HEIGHT_RATE_M_S: Final = 5  # climb rate, up; alone, or as the slope of the path `DOWN_M` is on
-AIRSPEED_M_S: Final = 6  # equivalent airspeed; NaN: the trim airspeed of the parameters
-PITCH_RAD: Final = 7  # pitch angle of the body, past the total-energy control
-THROTTLE: Final = 8  # 0..1, past the total-energy control; 0 stops the propeller
-RATES_FRD_RAD_S: Final = slice(9, 12)  # level RATES
-SURFACES: Final = slice(12, 15)  # level SURFACES: aileron, elevator, rudder, -1..1
-STEERING_HEADING_RAD: Final = 15  # the wheels and the rudder hold this heading on the ground; NaN: off
-PITCH_MIN_RAD: Final = 16  # limit of the total-energy control's pitch; NaN: the parameter's
-PITCH_MAX_RAD: Final = 17
-THROTTLE_MAX: Final = 18  # limit of the total-energy control's throttle; NaN: the parameter's
-LEVEL: Final = multicopter.LEVEL  # 19
-ROLL_LIMIT_RAD: Final = 20  # of the lateral guidance; NaN: the parameter's (wing tips near the ground)
-FLAPS: Final = 21  # 0..1; NaN: 0
-BRAKE: Final = 22  # 0..1; NaN: 0
-YAW_STICK: Final = 23  # -1..1, added to the coordinating rudder; NaN: 0
-SETPOINT_SIZE: Final = 24
+LEVEL: Final = multicopter.LEVEL
+_at = Slots(LEVEL + 1)
+COURSE_RAD: Final = _at.place()  # direction over ground to fly
+HEADING_RAD: Final = _at.place()  # direction through the air (of the nose, without sideslip) to fly
+LATERAL_ACCELERATION_M_S2: Final = _at.place()  # to the right; feed-forward of a curved path
+ROLL_RAD: Final = _at.place()  # bank angle, past the lateral guidance
+DOWN_M: Final = _at.place()  # height to fly, local NED
+HEIGHT_RATE_M_S: Final = _at.place()  # climb rate, up; alone, or as the slope of the path `DOWN_M` is on
+AIRSPEED_M_S: Final = _at.place()  # equivalent airspeed; NaN: the trim airspeed of the parameters
+PITCH_RAD: Final = _at.place()  # pitch angle of the body, past the total-energy control
+THROTTLE: Final = _at.place()  # 0..1, past the total-energy control; 0 stops the propeller
+RATES_FRD_RAD_S: Final = _at.vector(3)  # level RATES
+SURFACES: Final = _at.vector(3)  # level SURFACES: aileron, elevator, rudder, -1..1
+STEERING_HEADING_RAD: Final = _at.place()  # held on the ground by wheels and rudder; NaN: off
+PITCH_MIN_RAD: Final = _at.place()  # limit of the total-energy control's pitch; NaN: the parameter's
+PITCH_MAX_RAD: Final = _at.place()
+THROTTLE_MAX: Final = _at.place()  # limit of the total-energy control's throttle; NaN: the parameter's
+ROLL_LIMIT_RAD: Final = _at.place()  # of the lateral guidance; NaN: the parameter's (wing tips at the ground)
+FLAPS: Final = _at.place()  # 0..1; NaN: 0
+BRAKE: Final = _at.place()  # 0..1; NaN: 0
+YAW_STICK: Final = _at.place()  # -1..1, added to the coordinating rudder; NaN: 0
+SETPOINT_SIZE: Final = _at.size
 
 # values of LEVEL
 OFF: Final = multicopter.OFF  # propeller stopped, surfaces neutral

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
-from autopilot_bridge.control.fixed_wing import setpoint as sp_layout
+from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import update_air
 from autopilot_bridge.control.fixed_wing.attitude import (
     attitude_control,
@@ -18,24 +18,15 @@ from autopilot_bridge.control.fixed_wing.attitude import (
 )
 from autopilot_bridge.control.fixed_wing.energy import PITCH_LIMIT_RAD, energy_control
 from autopilot_bridge.control.fixed_wing.lateral import lateral_control
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, FLAPS, RUDDER, STEERING, THROTTLE
 
 Array = NDArray[np.float64]
 
-_NAV_RATES: Final = 4  # navigation slots, as in navigation.layout
-_NAV_ROLL: Final = 25
-_NAV_PITCH: Final = 26
-_NAV_YAW: Final = 27
-_SP_THROTTLE: Final = 8  # setpoint slots, as in control.fixed_wing_setpoint
-_SP_RATES: Final = 9
-_SP_SURFACES: Final = 12
-_SP_STEERING: Final = 15
-_SP_LEVEL: Final = 19
-_SP_FLAPS: Final = 21
-_SP_BRAKE: Final = 22
-_SP_YAW_STICK: Final = 23
+_RATES: Final[int] = to.RATES_FRD_RAD_S.start
+_SURFACES: Final[int] = to.SURFACES.start
 
 
 @kernel
@@ -57,7 +48,7 @@ def _rest(nav: Array, s: Array, actuators: Array) -> None:
     s[c.COURSE_SETPOINT] = math.nan
     for i in range(3):
         s[c.VEL_SETPOINT + i] = math.nan
-        rate = nav[_NAV_RATES + i]
+        rate = nav[n.RATES + i]
         s[c.RATE_PREVIOUS + i] = rate if math.isfinite(rate) else 0.0
 
 
@@ -77,22 +68,22 @@ def _guide(nav: Array, sp: Array, p: Array, s: Array, level: float) -> None:
     """The 50 Hz part: airspeed filter, lateral guidance, energy control."""
     dt = s[c.DT] * s[c.DIVISOR]
     update_air(nav, p, s, dt)
-    if level != sp_layout.FLY:
+    if level != to.FLY:
         s[c.FLYING] = 0.0
         s[c.VEL_SETPOINT + 2] = math.nan
         s[c.HEADING_SETPOINT] = math.nan
         s[c.COURSE_SETPOINT] = math.nan
         s[c.HEIGHT_CONTROLLED] = 0.0
         s[c.UNDERSPEED] = 0.0
-        s[c.ROLL_SETPOINT] = nav[_NAV_ROLL]
-        s[c.PITCH_SETPOINT] = nav[_NAV_PITCH]
-        s[c.THROTTLE] = _given(sp[_SP_THROTTLE], 0.0, 1.0)
+        s[c.ROLL_SETPOINT] = nav[n.ROLL]
+        s[c.PITCH_SETPOINT] = nav[n.PITCH]
+        s[c.THROTTLE] = _given(sp[to.THROTTLE], 0.0, 1.0)
         return
     entering = s[c.FLYING] == 0.0
     if entering:  # from the attitude flown so far, so that the switch isn't felt
         s[c.FLYING] = 1.0
-        s[c.ROLL_SETPOINT] = nav[_NAV_ROLL]
-        s[c.PITCH_SETPOINT] = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav[_NAV_PITCH]))
+        s[c.ROLL_SETPOINT] = nav[n.ROLL]
+        s[c.PITCH_SETPOINT] = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav[n.PITCH]))
     lateral_control(nav, sp, p, s, dt)
     energy_control(nav, sp, p, s, dt, entering)
     if not math.isfinite(_sum_of_guidance(s)):  # absurd inputs have overflowed: begin again
@@ -103,13 +94,15 @@ def _guide(nav: Array, sp: Array, p: Array, s: Array, level: float) -> None:
 @kernel
 def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) -> None:
     """Write the actuators (MAX_ACTUATORS,) from navigation state, setpoint, parameters and the state `s`."""
-    level = sp[_SP_LEVEL]
-    flown = level == sp_layout.FLY or level == sp_layout.RATES or level == sp_layout.SURFACES_DIRECT
+    level = sp[to.LEVEL]
+    flown = level == to.FLY or level == to.RATES or level == to.SURFACES_DIRECT
     known = True
-    for i in range(7):  # attitude and rates
-        known = known and math.isfinite(nav[i])
-    known = known and math.isfinite(nav[_NAV_ROLL] + nav[_NAV_PITCH] + nav[_NAV_YAW])
-    direct = level == sp_layout.SURFACES_DIRECT
+    for i in range(4):
+        known = known and math.isfinite(nav[n.Q + i])
+    for i in range(3):
+        known = known and math.isfinite(nav[n.RATES + i])
+    known = known and math.isfinite(nav[n.ROLL] + nav[n.PITCH] + nav[n.YAW])
+    direct = level == to.SURFACES_DIRECT
     if not flown or not (known or direct):
         _rest(nav, s, actuators)
         return
@@ -121,23 +114,23 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
     s[c.LAST_LEVEL] = level
 
     surfaces = actuators[0:3]  # in the kernels' order: aileron, elevator, rudder
-    yaw_stick = _given(sp[_SP_YAW_STICK], -1.0, 1.0)
+    yaw_stick = _given(sp[to.YAW_STICK], -1.0, 1.0)
     steering = yaw_stick
     if direct:
         for i in range(3):
-            surfaces[i] = _given(sp[_SP_SURFACES + i], -1.0, 1.0)
+            surfaces[i] = _given(sp[_SURFACES + i], -1.0, 1.0)
             s[c.RATE_INTEGRAL + i] = 0.0
             s[c.RATE_SETPOINT + i] = 0.0
-        s[c.THROTTLE] = _given(sp[_SP_THROTTLE], 0.0, 1.0)
+        s[c.THROTTLE] = _given(sp[to.THROTTLE], 0.0, 1.0)
         steering = surfaces[2]
     else:
-        if level == sp_layout.RATES:
+        if level == to.RATES:
             for i in range(3):
-                s[c.RATE_SETPOINT + i] = _given(sp[_SP_RATES + i], -20.0, 20.0)
-            s[c.THROTTLE] = _given(sp[_SP_THROTTLE], 0.0, 1.0)
+                s[c.RATE_SETPOINT + i] = _given(sp[_RATES + i], -20.0, 20.0)
+            s[c.THROTTLE] = _given(sp[to.THROTTLE], 0.0, 1.0)
         else:
             attitude_control(nav, p, s)
-        rolling = math.isfinite(sp[_SP_STEERING])
+        rolling = math.isfinite(sp[to.STEERING_HEADING_RAD])
         if rolling:
             steering = min(1.0, max(-1.0, wheel_control(nav, sp, p, s) + yaw_stick))
             yaw_stick = steering  # the rudder helps the wheels
@@ -152,9 +145,9 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
     actuators[ELEVATOR] = elevator
     actuators[THROTTLE] = s[c.THROTTLE]
     actuators[RUDDER] = rudder
-    actuators[FLAPS] = _given(sp[_SP_FLAPS], 0.0, 1.0)
+    actuators[FLAPS] = _given(sp[to.FLAPS], 0.0, 1.0)
     actuators[STEERING] = steering
-    actuators[BRAKE] = _given(sp[_SP_BRAKE], 0.0, 1.0)
+    actuators[BRAKE] = _given(sp[to.BRAKE], 0.0, 1.0)
     quaternion_from_euler(
-        s[c.ROLL_SETPOINT], s[c.PITCH_SETPOINT], nav[_NAV_YAW], s[c.Q_SETPOINT : c.Q_SETPOINT + 4]
+        s[c.ROLL_SETPOINT], s[c.PITCH_SETPOINT], nav[n.YAW], s[c.Q_SETPOINT : c.Q_SETPOINT + 4]
     )

@@ -16,15 +16,12 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 
-_NAV_VEL_DOWN: Final = 9  # navigation slots, as in navigation.layout
-_NAV_FORCE_FRD: Final = 22
-_NAV_PITCH: Final = 26
-_NAV_EAS: Final = 32
 _GAIN: Final = 1.5  # error of the vertical speed to vertical acceleration, times the pitch's time constant
 _HASTE: Final = 1.0  # the error of the pitch is added so often: it follows in half of its time constant
 _ACCELERATION_MAX: Final = 0.8  # of gravity
@@ -47,10 +44,10 @@ def pitch_for_climb(
     nav: Array, p: Array, s: Array, dt: float, climb: float, lowest: float, highest: float
 ) -> float:
     """Pitch setpoint, rad, that flies a climb rate within limits of the pitch."""
-    airspeed = nav[_NAV_EAS] if math.isfinite(nav[_NAV_EAS]) else s[c.EAS]
+    airspeed = nav[n.AIRSPEED_M_S] if math.isfinite(nav[n.AIRSPEED_M_S]) else s[c.EAS]
     airspeed = max(airspeed, stall_speed(p))
     speed = max(s[c.EAS], stall_speed(p)) * s[c.EAS_TO_TAS]
-    actual = -nav[_NAV_VEL_DOWN] if math.isfinite(nav[_NAV_VEL_DOWN]) else 0.0
+    actual = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
     missing = climb - actual
     share = min(_ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN / p[c.PITCH_TC] * missing / GRAVITY_M_S2))
     load_factor = (1.0 + share) / max(0.5, math.cos(s[c.ROLL_SETPOINT]))
@@ -59,12 +56,12 @@ def pitch_for_climb(
     if s[c.CLIMB_FLOWN] == 0.0:  # from the pitch flown so far
         s[c.CLIMB_FLOWN] = 1.0
         s[c.LIFTLESS_PITCH] = s[c.PITCH_SETPOINT] - pitch
-    felt = -nav[_NAV_FORCE_FRD + 2] / GRAVITY_M_S2
+    felt = -nav[n.FORCE + 2] / GRAVITY_M_S2
     if math.isfinite(felt):
-        liftless = nav[_NAV_PITCH] - path - _angle_of_attack(airspeed, felt, p)
+        liftless = nav[n.PITCH] - path - _angle_of_attack(airspeed, felt, p)
         lag_s = _GUST_LAG * p[c.PITCH_TC]
         s[c.LIFTLESS_PITCH] += dt / (dt + lag_s) * (liftless - s[c.LIFTLESS_PITCH])
     s[c.LIFTLESS_PITCH] = min(_GUST_MAX_RAD, max(-_GUST_MAX_RAD, s[c.LIFTLESS_PITCH]))
     wanted = pitch + s[c.LIFTLESS_PITCH]
-    wanted += _HASTE * (wanted - nav[_NAV_PITCH])
+    wanted += _HASTE * (wanted - nav[n.PITCH])
     return min(highest, max(lowest, wanted))

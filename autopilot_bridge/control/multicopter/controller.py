@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.multicopter import layout as c
-from autopilot_bridge.control.multicopter import setpoint as sp_layout
+from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import (
     attitude_control,
     body_z_of,
@@ -25,21 +25,13 @@ from autopilot_bridge.control.multicopter.position import (
     update_filters,
     vertical_control,
 )
-from autopilot_bridge.navigation.layout import NAV_SIZE
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import MAX_ACTUATORS
 
 Array = NDArray[np.float64]
 
 POSITION_RATE_HZ: Final = 62.5  # of the position loop, at least
-_NAV_POS_DOWN: Final = 12
-_NAV_YAW: Final = 27
-_NAV_RATES: Final = 4
-_Q: Final = 11
-_RATES: Final = 15
-_THRUST: Final = 18
-_YAW_RATE: Final = 10
-_LEVEL: Final = 19
 _MIN_COS_TILT: Final = 0.5  # collective isn't raised any more beyond 60 deg of tilt
 
 
@@ -62,9 +54,9 @@ def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
         s[i] = 0.0
     s[c.COUNTER] = s[c.DIVISOR]
     s[c.Q_SETPOINT] = 1.0
-    s[c.START_DOWN_M] = nav[_NAV_POS_DOWN] if math.isfinite(nav[_NAV_POS_DOWN]) else 0.0
+    s[c.START_DOWN_M] = nav[n.POS + 2] if math.isfinite(nav[n.POS + 2]) else 0.0
     for i in range(3):
-        rate = nav[_NAV_RATES + i]
+        rate = nav[n.RATES + i]
         s[c.RATE_PREVIOUS + i] = rate if math.isfinite(rate) else 0.0
     s[c.THRUST_GIVEN] = 0.0
     s[c.THRUST_LAGGED] = 0.0
@@ -73,34 +65,34 @@ def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
 @kernel
 def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
     """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
-    if math.isfinite(sp[_THRUST]):
+    if math.isfinite(sp[to.THRUST]):
         s[c.VEL_INTEGRAL + 2] = 0.0
         s[c.BUMP + 2] = 0.0
         s[c.ACC_SETPOINT + 2] = math.nan  # the vertical isn't controlled
-        return min(1.0, max(0.0, sp[_THRUST]))
+        return min(1.0, max(0.0, sp[to.THRUST]))
     # same speed limits and position P as in flight along a trajectory
-    vz = sp[5]
-    ez = sp[2] - nav[_NAV_POS_DOWN]
+    vz = sp[to.VEL + 2]
+    ez = sp[to.POS + 2] - nav[n.POS + 2]
     if math.isfinite(ez):
         vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
-    elif math.isnan(vz) and math.isnan(sp[8]):
+    elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
         vz = 0.0
     s[c.VEL_SETPOINT + 2] = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz)) if vz == vz else vz
     up = vertical_control(nav, sp, p, s, dt, entering)
-    _, _, cos_tilt = body_z_of(nav)
+    _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
     return min(p[c.THRUST_MAX], max(p[c.THRUST_MIN], up / max(_MIN_COS_TILT, cos_tilt)))
 
 
 @kernel
 def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: Array) -> None:
-    level = sp[_LEVEL]
+    level = sp[to.LEVEL]
     dt = s[c.DT]
-    if not level >= sp_layout.IDLE:  # OFF, and NaN
+    if not level >= to.IDLE:  # OFF, and NaN
         _rest(nav, s, 0.0, actuators)
         return
-    rates = nav[_NAV_RATES : _NAV_RATES + 3]
-    attitude_known = _finite4(nav, 0) and math.isfinite(rates[0] + rates[1] + rates[2])
-    if level < sp_layout.RATES or not attitude_known:
+    rates = nav[n.RATES_FRD_RAD_S]
+    attitude_known = _finite4(nav, n.Q) and math.isfinite(rates[0] + rates[1] + rates[2])
+    if level < to.RATES or not attitude_known:
         _rest(nav, s, p[c.MOTOR_IDLE], actuators)
         return
 
@@ -112,38 +104,38 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
         update_airborne(nav, s)
         estimate_hover_thrust(nav, p, s, dt_outer)
         update_filters(nav, p, s, dt_outer)
-        if level == sp_layout.TRAJECTORY:
+        if level == to.TRAJECTORY:
             trajectory_control(nav, sp, p, s, dt_outer, switched)
         else:
             s[c.VEL_INTEGRAL] = 0.0
             s[c.VEL_INTEGRAL + 1] = 0.0
             entering = math.isnan(s[c.ACC_SETPOINT + 2]) or s[c.LAST_LEVEL] == 0.0
             s[c.THRUST_SETPOINT] = _collective(nav, sp, p, s, dt_outer, entering)
-            s[c.YAW_RATE_FF] = sp[_YAW_RATE] if math.isfinite(sp[_YAW_RATE]) else 0.0
+            s[c.YAW_RATE_FF] = sp[to.YAW_RATE_RAD_S] if math.isfinite(sp[to.YAW_RATE_RAD_S]) else 0.0
     s[c.LAST_LEVEL] = level
 
     rate_sp = s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
-    if level == sp_layout.RATES:
+    if level == to.RATES:
         for i in range(3):
-            rate_sp[i] = sp[_RATES + i] if math.isfinite(sp[_RATES + i]) else 0.0
+            rate_sp[i] = sp[to.BODY_RATES + i] if math.isfinite(sp[to.BODY_RATES + i]) else 0.0
     else:
         q_sp = s[c.Q_SETPOINT : c.Q_SETPOINT + 4]
-        if level == sp_layout.ATTITUDE:
+        if level == to.ATTITUDE:
             norm = 0.0
             for i in range(4):
-                norm += sp[_Q + i] * sp[_Q + i]
+                norm += sp[to.Q + i] * sp[to.Q + i]
             if norm > 0.1 and math.isfinite(norm):
                 scale = 1.0 / math.sqrt(norm)
                 for i in range(4):
-                    q_sp[i] = sp[_Q + i] * scale
+                    q_sp[i] = sp[to.Q + i] * scale
             else:  # no attitude to fly: level, nose as it is
-                q_sp[0], q_sp[1], q_sp[2] = math.cos(0.5 * nav[_NAV_YAW]), 0.0, 0.0
-                q_sp[3] = math.sin(0.5 * nav[_NAV_YAW])
-        attitude_control(nav[0:4], q_sp, s[c.YAW_RATE_FF], p, rate_sp, scratch)
-        if level == sp_layout.ATTITUDE:
+                q_sp[0], q_sp[1], q_sp[2] = math.cos(0.5 * nav[n.YAW]), 0.0, 0.0
+                q_sp[3] = math.sin(0.5 * nav[n.YAW])
+        attitude_control(nav[n.Q_NED_FROM_FRD], q_sp, s[c.YAW_RATE_FF], p, rate_sp, scratch)
+        if level == to.ATTITUDE:
             for i in range(3):
-                if math.isfinite(sp[_RATES + i]):
-                    rate_sp[i] += sp[_RATES + i]
+                if math.isfinite(sp[to.BODY_RATES + i]):
+                    rate_sp[i] += sp[to.BODY_RATES + i]
     limit_rates(rate_sp, p)
 
     thrust = s[c.THRUST_SETPOINT]
@@ -201,14 +193,14 @@ class MulticopterController:
     ) -> None:
         if not 50.0 <= physics_rate_hz <= 4000.0:
             raise ValueError(f"physics_rate_hz = {physics_rate_hz} is not in 50..4000")
-        if nav.shape != (NAV_SIZE,) or nav.dtype != np.float64:
+        if nav.shape != (n.NAV_SIZE,) or nav.dtype != np.float64:
             raise ValueError(
-                f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({NAV_SIZE},) is accepted"
+                f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({n.NAV_SIZE},) is accepted"
             )
         self._packed: Array = np.zeros(len(c.PARAMETER_NAMES))
         self._state: Array = np.zeros(c.STATE_SIZE)
-        self.setpoint: Array = np.full(sp_layout.SETPOINT_SIZE, np.nan)
-        self.setpoint[sp_layout.LEVEL] = sp_layout.OFF
+        self.setpoint: Array = np.full(to.SETPOINT_SIZE, np.nan)
+        self.setpoint[to.LEVEL] = to.OFF
         self.actuators: Array = np.zeros(MAX_ACTUATORS)
         state = self._state
         state[c.DT] = 1.0 / physics_rate_hz

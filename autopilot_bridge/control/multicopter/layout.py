@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Final
 
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from flightsim.foundation.layouts import Slots
 
 PARAMETER_NAMES: Final = tuple(field.name for field in fields(MulticopterParameters))
 
@@ -44,31 +45,32 @@ THRUST_MODEL: Final = _index("thrust_model_factor")
 MOTOR_IDLE: Final = _index("motor_idle")
 ROTOR_TIME_CONSTANT: Final = _index("rotor_time_constant_s")
 
-DT: Final = 0  # physics step, s
-DIVISOR: Final = 1  # physics steps per position-loop step
-COUNTER: Final = 2  # physics steps since the position loop ran
-LAST_LEVEL: Final = 3
-AIRBORNE: Final = 4  # latched by motion after the motors started
-START_DOWN_M: Final = 5  # nav down coordinate when the motors started
-VEL_INTEGRAL: Final = 6  # NED, m/s^2
-ACC_FILTERED: Final = 9  # NED, m/s^2
-DRAG: Final = 12  # NED, m/s^2: measured acceleration across the thrust axis, low-passed
-BUMP: Final = 15  # NED, m/s^2: decaying offset that makes level switches smooth
-ACC_SETPOINT: Final = 18  # NED, m/s^2
-VEL_SETPOINT: Final = 21  # NED, m/s
-Q_SETPOINT: Final = 24  # q_ned_from_frd
-RATE_SETPOINT: Final = 28  # FRD, rad/s
-THRUST_SETPOINT: Final = 31  # collective, 0..1
-YAW_RATE_FF: Final = 32  # about NED down, rad/s
-RATE_INTEGRAL: Final = 33  # FRD, normalised torque
-RATE_PREVIOUS: Final = 36  # FRD, rad/s
-RATE_DERIVATIVE: Final = 39  # FRD, rad/s^2, low-passed
-UNALLOCATED: Final = 42  # normalised torque the mixer could not give
-YAW_TORQUE: Final = 45  # low-passed yaw torque
-HOVER: Final = 46  # hover thrust estimate
-HOVER_VARIANCE: Final = 47
-THRUST_LAGGED: Final = 48  # collective as the rotors should give it by now
-MOTOR_THRUST: Final = 49  # 4 normalised motor thrusts
-THRUST_GIVEN: Final = 53  # mean of the motor thrusts after desaturation
-GROUND_CONTACT: Final = 54  # 1.0 while something else than the rotors may carry the vehicle
-STATE_SIZE: Final = 55
+_at = Slots()
+DT: Final = _at.place()  # physics step, s
+DIVISOR: Final = _at.place()  # physics steps per position-loop step
+COUNTER: Final = _at.place()  # physics steps since the position loop ran
+LAST_LEVEL: Final = _at.place()
+AIRBORNE: Final = _at.place()  # latched by motion after the motors started
+START_DOWN_M: Final = _at.place()  # nav down coordinate when the motors started
+VEL_INTEGRAL: Final = _at.place(3)  # NED, m/s^2
+ACC_FILTERED: Final = _at.place(3)  # NED, m/s^2
+DRAG: Final = _at.place(3)  # NED, m/s^2: measured acceleration across the thrust axis, low-passed
+BUMP: Final = _at.place(3)  # NED, m/s^2: decaying offset that makes level switches smooth
+ACC_SETPOINT: Final = _at.place(3)  # NED, m/s^2
+VEL_SETPOINT: Final = _at.place(3)  # NED, m/s
+Q_SETPOINT: Final = _at.place(4)  # q_ned_from_frd
+RATE_SETPOINT: Final = _at.place(3)  # FRD, rad/s
+THRUST_SETPOINT: Final = _at.place()  # collective, 0..1
+YAW_RATE_FF: Final = _at.place()  # about NED down, rad/s
+RATE_INTEGRAL: Final = _at.place(3)  # FRD, normalised torque
+RATE_PREVIOUS: Final = _at.place(3)  # FRD, rad/s
+RATE_DERIVATIVE: Final = _at.place(3)  # FRD, rad/s^2, low-passed
+UNALLOCATED: Final = _at.place(3)  # normalised torque the mixer could not give
+YAW_TORQUE: Final = _at.place()  # low-passed yaw torque
+HOVER: Final = _at.place()  # hover thrust estimate
+HOVER_VARIANCE: Final = _at.place()
+THRUST_LAGGED: Final = _at.place()  # collective as the rotors should give it by now
+MOTOR_THRUST: Final = _at.place(4)  # 4 normalised motor thrusts
+THRUST_GIVEN: Final = _at.place()  # mean of the motor thrusts after desaturation
+GROUND_CONTACT: Final = _at.place()  # 1.0 while something else than the rotors may carry the vehicle
+STATE_SIZE: Final = _at.size

@@ -17,23 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.multicopter import layout as c
+from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import body_z_of, quaternion_from_thrust_axis
+from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
 
 Array = NDArray[np.float64]
 
-_POS: Final = 0  # setpoint slots, as in control.setpoint
-_VEL: Final = 3
-_ACC: Final = 6
-_YAW: Final = 9
-_YAW_RATE: Final = 10
-_NAV_VEL: Final = 7  # navigation slots, as in navigation.layout
-_NAV_POS: Final = 10
-_NAV_ACC: Final = 13
-_NAV_FORCE: Final = 22
-_NAV_YAW: Final = 27
 
 _MIN_HOVER: Final = 0.05
 _MAX_HOVER: Final = 0.9
@@ -64,7 +56,7 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
     s[c.THRUST_LAGGED] += (s[c.THRUST_GIVEN] - s[c.THRUST_LAGGED]) * min(
         1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT])
     )
-    measured = -nav[_NAV_FORCE + 2]
+    measured = -nav[n.FORCE + 2]
     if p[c.USE_HOVER_ESTIMATE] == 0.0 or s[c.AIRBORNE] == 0.0 or s[c.GROUND_CONTACT] != 0.0:
         return
     if not math.isfinite(measured):
@@ -93,8 +85,7 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
 def update_airborne(nav: Array, s: Array) -> None:
     """Latch AIRBORNE once the vehicle has moved vertically under power; OFF and IDLE clear it."""
     if s[c.AIRBORNE] == 0.0 and (
-        abs(nav[_NAV_VEL + 2]) > _AIRBORNE_SPEED_M_S
-        or s[c.START_DOWN_M] - nav[_NAV_POS + 2] > _AIRBORNE_CLIMB_M
+        abs(nav[n.VEL + 2]) > _AIRBORNE_SPEED_M_S or s[c.START_DOWN_M] - nav[n.POS + 2] > _AIRBORNE_CLIMB_M
     ):
         s[c.AIRBORNE] = 1.0
 
@@ -104,16 +95,17 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
     """Low-passed acceleration (the velocity derivative) and measured drag."""
     alpha = lowpass_gain(dt, p[c.VEL_D_CUTOFF])
     for i in range(3):
-        acc = nav[_NAV_ACC + i]
+        acc = nav[n.ACC + i]
         if math.isfinite(acc):
             s[c.ACC_FILTERED + i] += alpha * (acc - s[c.ACC_FILTERED + i])
     if p[c.DRAG_CUTOFF] <= 0.0 or s[c.AIRBORNE] == 0.0:
         s[c.DRAG] = 0.0
         s[c.DRAG + 1] = 0.0
         return
-    x_north, x_east, _ = body_axis(nav[0], nav[1], nav[2], nav[3], 0)
-    y_north, y_east, _ = body_axis(nav[0], nav[1], nav[2], nav[3], 1)
-    fx, fy = nav[_NAV_FORCE], nav[_NAV_FORCE + 1]
+    w, x, y, z = nav[n.Q], nav[n.Q + 1], nav[n.Q + 2], nav[n.Q + 3]
+    x_north, x_east, _ = body_axis(w, x, y, z, 0)
+    y_north, y_east, _ = body_axis(w, x, y, z, 1)
+    fx, fy = nav[n.FORCE], nav[n.FORCE + 1]
     north, east = x_north * fx + y_north * fy, x_east * fx + y_east * fy
     if s[c.GROUND_CONTACT] != 0.0:
         # a sideways force of the ground is no drag: tilting against it would overturn the vehicle
@@ -133,17 +125,17 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
 def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
     """VEL_SETPOINT from position P and feed-forward, limited; NaN where the velocity isn't controlled."""
     px, py = 0.0, 0.0  # share of the position loop, which keeps its right of way under the speed limit
-    vx, vy = sp[_VEL], sp[_VEL + 1]
-    ex, ey = sp[_POS] - nav[_NAV_POS], sp[_POS + 1] - nav[_NAV_POS + 1]
+    vx, vy = sp[to.VEL], sp[to.VEL + 1]
+    ex, ey = sp[to.POS] - nav[n.POS], sp[to.POS + 1] - nav[n.POS + 1]
     if math.isfinite(ex):
         px = p[c.POS_XY_P] * ex
         vx = vx if math.isfinite(vx) else 0.0
-    elif math.isnan(vx) and math.isnan(sp[_ACC]):
+    elif math.isnan(vx) and math.isnan(sp[to.ACC]):
         vx = 0.0  # not commanded: stand still
     if math.isfinite(ey):
         py = p[c.POS_XY_P] * ey
         vy = vy if math.isfinite(vy) else 0.0
-    elif math.isnan(vy) and math.isnan(sp[_ACC + 1]):
+    elif math.isnan(vy) and math.isnan(sp[to.ACC + 1]):
         vy = 0.0
     limit = p[c.SPEED_XY_MAX]
     size = math.sqrt(px * px + py * py)
@@ -164,11 +156,11 @@ def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
     s[c.VEL_SETPOINT] = px + fx if math.isfinite(vx) else math.nan
     s[c.VEL_SETPOINT + 1] = py + fy if math.isfinite(vy) else math.nan
 
-    vz = sp[_VEL + 2]
-    ez = sp[_POS + 2] - nav[_NAV_POS + 2]
+    vz = sp[to.VEL + 2]
+    ez = sp[to.POS + 2] - nav[n.POS + 2]
     if math.isfinite(ez):
         vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
-    elif math.isnan(vz) and math.isnan(sp[_ACC + 2]):
+    elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
         vz = 0.0
     if math.isfinite(vz):
         vz = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz))
@@ -185,8 +177,8 @@ def _acceleration_axis(
     axis: int, nav: Array, sp: Array, kp: float, kd: float, s: Array
 ) -> tuple[float, float, bool]:
     """(acceleration, velocity error, controlled) of one NED axis."""
-    acc = _finite_or_zero(sp[_ACC + axis])
-    error = s[c.VEL_SETPOINT + axis] - nav[_NAV_VEL + axis]
+    acc = _finite_or_zero(sp[to.ACC + axis])
+    error = s[c.VEL_SETPOINT + axis] - nav[n.VEL + axis]
     if not math.isfinite(error):
         s[c.VEL_INTEGRAL + axis] = 0.0
         return acc, 0.0, False
@@ -204,7 +196,7 @@ def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enter
     hover = s[c.HOVER]
     if entering and s[c.AIRBORNE] != 0.0:
         # start from the thrust flown so far, so that the switch isn't felt
-        _, _, cos_tilt = body_z_of(nav)
+        _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
         present = GRAVITY_M_S2 * (1.0 - s[c.THRUST_GIVEN] * max(0.3, cos_tilt) / hover)
         s[c.BUMP + 2] = min(5.0, max(-5.0, present - acc))
     acc += s[c.BUMP + 2]
@@ -231,7 +223,7 @@ def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, ent
     hover = s[c.HOVER]
     thrust_max = p[c.THRUST_MAX]
     if entering and s[c.AIRBORNE] != 0.0:
-        zx, zy, _ = body_z_of(nav)
+        zx, zy, _ = body_z_of(nav[n.Q_NED_FROM_FRD])
         pull = GRAVITY_M_S2 * s[c.THRUST_GIVEN] / hover
         s[c.BUMP] = -zx * pull + s[c.DRAG] - ax
         s[c.BUMP + 1] = -zy * pull + s[c.DRAG + 1] - ay
@@ -292,8 +284,8 @@ def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, ent
     if thrust > 1e-6:
         zx, zy, zz = -tx / thrust, -ty / thrust, up / thrust
     s[c.THRUST_SETPOINT] = max(thrust, p[c.THRUST_MIN])
-    yaw = sp[_YAW]
+    yaw = sp[to.YAW_RAD]
     if not math.isfinite(yaw):
-        yaw = nav[_NAV_YAW]
-    s[c.YAW_RATE_FF] = _finite_or_zero(sp[_YAW_RATE])
+        yaw = nav[n.YAW]
+    s[c.YAW_RATE_FF] = _finite_or_zero(sp[to.YAW_RATE_RAD_S])
     quaternion_from_thrust_axis(zx, zy, zz, yaw, s[c.Q_SETPOINT : c.Q_SETPOINT + 4])

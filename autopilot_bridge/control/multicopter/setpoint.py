@@ -7,16 +7,31 @@ velocity feeds acceleration, and given velocity and acceleration add as feed-for
 
 from typing import Final
 
-POS_NED_M: Final = slice(0, 3)
-VEL_NED_M_S: Final = slice(3, 6)
-ACC_NED_M_S2: Final = slice(6, 9)
-YAW_RAD: Final = 9  # NaN: hold by yaw rate only
-YAW_RATE_RAD_S: Final = 10
-Q_NED_FROM_FRD: Final = slice(11, 15)  # level ATTITUDE
-RATES_FRD_RAD_S: Final = slice(15, 18)  # level RATES; feed-forward at level ATTITUDE (NaN: none)
-THRUST: Final = 18  # collective, 0..1 (levels ATTITUDE and RATES); NaN: the vertical part of the trajectory
-LEVEL: Final = 19
-SETPOINT_SIZE: Final = 20
+from flightsim.foundation.layouts import Slots
+
+_at = Slots()
+LEVEL: Final = _at.place()
+POS_NED_M: Final = _at.vector(3)
+VEL_NED_M_S: Final = _at.vector(3)
+ACC_NED_M_S2: Final = _at.vector(3)
+YAW_RAD: Final = _at.place()  # NaN: hold by yaw rate only
+YAW_RATE_RAD_S: Final = _at.place()
+Q_NED_FROM_FRD: Final = _at.vector(4)  # level ATTITUDE
+RATES_FRD_RAD_S: Final = _at.vector(3)  # level RATES; feed-forward at level ATTITUDE (NaN: none)
+# collective, 0..1 (levels ATTITUDE and RATES); NaN: the vertical part of the trajectory
+THRUST: Final = _at.place()
+SETPOINT_SIZE: Final = _at.size
+
+# First places of the vectors, for kernels and single components
+POS: Final[int] = POS_NED_M.start
+VEL: Final[int] = VEL_NED_M_S.start
+ACC: Final[int] = ACC_NED_M_S2.start
+Q: Final[int] = Q_NED_FROM_FRD.start
+BODY_RATES: Final[int] = RATES_FRD_RAD_S.start
+POS_HORIZONTAL: Final = slice(POS, POS + 2)
+VEL_HORIZONTAL: Final = slice(VEL, VEL + 2)
+ACC_HORIZONTAL: Final = slice(ACC, ACC + 2)
+MOTION: Final = slice(POS, ACC + 3)
 
 # values of LEVEL
 OFF: Final = 0.0  # motors stopped

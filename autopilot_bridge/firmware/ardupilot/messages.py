@@ -8,6 +8,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.navigation import NavigationHealth
+from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.common import NAN, CommonMessages
 from autopilot_bridge.telemetry.streams import Builder, Values
 from flightsim.foundation.vectors import euler_of
@@ -166,7 +167,7 @@ class ArdupilotMessages(CommonMessages):
 
     def ahrs(self) -> Values:
         """AHRS (163): gyro bias estimate."""
-        bias = self.sources.navigation.state[16:19].tolist()
+        bias = self.sources.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
         return (*bias, 0.0, 0.0, 0.0, 0.0)
 
     def ahrs2(self) -> Values | None:

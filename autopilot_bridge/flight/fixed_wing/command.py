@@ -55,29 +55,23 @@ class FlightCommand:
                 self.pitch_rad = p.trim_pitch_rad
             if self.throttle != self.throttle:
                 self.throttle = p.trim_throttle
-        ctx.setpoint[:] = (
-            self.course_rad,
-            self.heading_rad,
-            self.lateral_acceleration_m_s2,
-            self.roll_rad,
-            self.down_m,
-            self.height_rate_m_s,
-            self.airspeed_m_s,
-            self.pitch_rad,
-            self.throttle,
-            _NAN,
-            _NAN,
-            _NAN,
-            _NAN,
-            _NAN,
-            _NAN,
-            self.steering_heading_rad,
-            self.pitch_min_rad,
-            self.pitch_max_rad,
-            self.throttle_max,
-            sp.FLY,
-            self.roll_limit_rad,
-            self.flaps,
-            self.brake,
-            self.yaw_stick,
-        )
+        setpoint = ctx.setpoint
+        setpoint[:] = _NAN
+        setpoint[sp.LEVEL] = sp.FLY
+        setpoint[sp.COURSE_RAD] = self.course_rad
+        setpoint[sp.HEADING_RAD] = self.heading_rad
+        setpoint[sp.LATERAL_ACCELERATION_M_S2] = self.lateral_acceleration_m_s2
+        setpoint[sp.ROLL_RAD] = self.roll_rad
+        setpoint[sp.DOWN_M] = self.down_m
+        setpoint[sp.HEIGHT_RATE_M_S] = self.height_rate_m_s
+        setpoint[sp.AIRSPEED_M_S] = self.airspeed_m_s
+        setpoint[sp.PITCH_RAD] = self.pitch_rad
+        setpoint[sp.THROTTLE] = self.throttle
+        setpoint[sp.STEERING_HEADING_RAD] = self.steering_heading_rad
+        setpoint[sp.PITCH_MIN_RAD] = self.pitch_min_rad
+        setpoint[sp.PITCH_MAX_RAD] = self.pitch_max_rad
+        setpoint[sp.THROTTLE_MAX] = self.throttle_max
+        setpoint[sp.ROLL_LIMIT_RAD] = self.roll_limit_rad
+        setpoint[sp.FLAPS] = self.flaps
+        setpoint[sp.BRAKE] = self.brake
+        setpoint[sp.YAW_STICK] = self.yaw_stick

@@ -18,10 +18,6 @@ from flightsim.foundation.checks import check_fields, require_positive
 from flightsim.foundation.kernels import kernel
 
 _IDLE_THROTTLE: Final = 0.1
-_VELOCITY: Final = nav_layout.VEL_NED_M_S.start
-_ACCELERATION: Final = nav_layout.ACC_NED_M_S2.start
-_RATES: Final = nav_layout.RATES_FRD_RAD_S.start
-_AIRSPEED: Final = nav_layout.AIRSPEED_M_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,17 +44,19 @@ def _smooth(nav: Array, keep: float, smoothed: Array) -> None:
 
     An unknown value leaves what was known. Behind them: the rate of turn and the vertical speed of now.
     """
-    vertical = abs(nav[_VELOCITY + 2])
+    vertical = abs(nav[nav_layout.VEL + 2])
     newest = (
-        math.hypot(nav[_VELOCITY], nav[_VELOCITY + 1]),
+        math.hypot(nav[nav_layout.VEL], nav[nav_layout.VEL + 1]),
         vertical,
-        nav[_AIRSPEED],
-        math.hypot(nav[_ACCELERATION], nav[_ACCELERATION + 1]),
+        nav[nav_layout.AIRSPEED_M_S],
+        math.hypot(nav[nav_layout.ACC], nav[nav_layout.ACC + 1]),
     )
     for i in range(4):
         if not math.isnan(newest[i]):
             smoothed[i] = newest[i] + (smoothed[i] - newest[i]) * keep
-    smoothed[4] = math.sqrt(nav[_RATES] ** 2 + nav[_RATES + 1] ** 2 + nav[_RATES + 2] ** 2)
+    smoothed[4] = math.sqrt(
+        nav[nav_layout.RATES] ** 2 + nav[nav_layout.RATES + 1] ** 2 + nav[nav_layout.RATES + 2] ** 2
+    )
     smoothed[5] = vertical
 
 

@@ -8,12 +8,6 @@ from autopilot_bridge.navigation import layout as nav_layout
 
 _SLOW_M_S: Final = 1.0  # below this speed over ground the course means nothing: the nose's direction counts
 
-_POS: Final = nav_layout.POS_NED_M.start
-_VEL: Final = nav_layout.VEL_NED_M_S.start
-_EULER: Final = nav_layout.EULER_RAD.start
-_WIND: Final = nav_layout.WIND_NED_M_S.start
-_FORCE: Final = nav_layout.SPECIFIC_FORCE_FRD_M_S2.start
-
 
 class AircraftState:
     """Navigation state of one update, local NED, as floats.
@@ -60,13 +54,13 @@ class AircraftState:
     def read(self, ctx: FlightContext) -> None:
         """Take over the newest navigation state."""
         nav = ctx.nav.tolist()
-        self.north_m, self.east_m, self.down_m = nav[_POS : _POS + 3]
-        self.vel_north_m_s, self.vel_east_m_s, self.vel_down_m_s = nav[_VEL : _VEL + 3]
-        self.roll_rad, self.pitch_rad, self.yaw_rad = nav[_EULER : _EULER + 3]
-        self.forward_force_m_s2 = nav[_FORCE]
+        self.north_m, self.east_m, self.down_m = nav[nav_layout.POS_NED_M]
+        self.vel_north_m_s, self.vel_east_m_s, self.vel_down_m_s = nav[nav_layout.VEL_NED_M_S]
+        self.roll_rad, self.pitch_rad, self.yaw_rad = nav[nav_layout.EULER_RAD]
+        self.forward_force_m_s2 = nav[nav_layout.FORCE]
         self.airspeed_m_s = nav[nav_layout.AIRSPEED_M_S]
         self.height_above_ground_m = nav[nav_layout.HEIGHT_ABOVE_GROUND_M]
-        wind_north, wind_east = nav[_WIND], nav[_WIND + 1]
+        wind_north, wind_east = nav[nav_layout.WIND], nav[nav_layout.WIND + 1]
         wind_known = wind_north == wind_north and wind_east == wind_east
         if not wind_known:
             wind_north = wind_east = 0.0

@@ -84,8 +84,8 @@ class TakeoffRamp:
         part = 1.0 if ramp_time_s <= 0.0 else min(1.0, self._since_s / ramp_time_s)
         clear_setpoint(ctx.setpoint, sp.TRAJECTORY)
         # level until lift-off: on the ground any tilt would cause a slide
-        ctx.setpoint[6:8] = 0.0
-        ctx.setpoint[5] = _RAMP_START_M_S * (1.0 - part) - climb_speed_m_s * part
+        ctx.setpoint[sp.ACC_HORIZONTAL] = 0.0
+        ctx.setpoint[sp.VEL + 2] = _RAMP_START_M_S * (1.0 - part) - climb_speed_m_s * part
         ctx.setpoint[sp.YAW_RAD] = math.nan
         ctx.setpoint[sp.YAW_RATE_RAD_S] = 0.0
         return False

@@ -230,8 +230,8 @@ class GuidedTask:
             self._hover_down_m = down
         self._hover_down_m -= self._climb_m_s * ctx.dt_s
         self._hover_down_m = min(down + 1.0, max(down - 1.0, self._hover_down_m))
-        setpoint[2] = self._hover_down_m
-        setpoint[5] = -self._climb_m_s
+        setpoint[sp.POS + 2] = self._hover_down_m
+        setpoint[sp.VEL + 2] = -self._climb_m_s
 
     def _fly_motion(self, ctx: FlightContext, motion: SmoothMotion) -> None:
         motion.synchronise(ctx)

@@ -88,17 +88,17 @@ class LandTask:
         motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
         motion.write(ctx)
         if self._down:
-            ctx.setpoint[2] = math.nan  # by speed alone: the height of the ground is not known
-            ctx.setpoint[8] = 0.0
+            ctx.setpoint[sp.POS + 2] = math.nan  # by speed alone: the height of the ground is not known
+            ctx.setpoint[sp.ACC + 2] = 0.0
             self._contact_s = self._contact_s + ctx.dt_s if ctx.ground_contact else 0.0
             if ctx.ground_contact:
-                ctx.setpoint[0:2] = math.nan
-                ctx.setpoint[3:5] = math.nan
-                ctx.setpoint[6:8] = 0.0
-                ctx.setpoint[8] = min(_THRUST_GONE_M_S2, _RELIEF_M_S3 * self._contact_s)
+                ctx.setpoint[sp.POS_HORIZONTAL] = math.nan
+                ctx.setpoint[sp.VEL_HORIZONTAL] = math.nan
+                ctx.setpoint[sp.ACC_HORIZONTAL] = 0.0
+                ctx.setpoint[sp.ACC + 2] = min(_THRUST_GONE_M_S2, _RELIEF_M_S3 * self._contact_s)
             if ctx.maybe_landed:
-                ctx.setpoint[5] = math.nan
-                ctx.setpoint[8] = _THRUST_GONE_M_S2
+                ctx.setpoint[sp.VEL + 2] = math.nan
+                ctx.setpoint[sp.ACC + 2] = _THRUST_GONE_M_S2
         return TaskStatus.RUNNING
 
     def _sink(self, ctx: FlightContext, motion: SmoothMotion, speed_m_s: float) -> None:

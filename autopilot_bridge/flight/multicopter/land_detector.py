@@ -68,7 +68,7 @@ class LandDetector:
         idle = bool(setpoint[sp.LEVEL] <= sp.IDLE)
         low_thrust = idle or thrust < p.low_thrust * ctx.hover_thrust
         vertical = abs(float(velocity[2])) > p.vertical_speed_max_m_s
-        wanted_down = float(setpoint[5])
+        wanted_down = float(setpoint[sp.VEL + 2])
         descending = (
             bool(setpoint[sp.LEVEL] == sp.TRAJECTORY)
             and math.isfinite(wanted_down)

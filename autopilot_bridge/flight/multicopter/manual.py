@@ -18,7 +18,6 @@ from flightsim.foundation.rotations import quaternion_from_euler
 
 _STICK_UP = 0.15  # throttle above the middle that means "take off"
 _STICK_DOWN = -0.9
-_NAV_YAW = 27
 
 
 class ManualMode(IntEnum):
@@ -69,7 +68,7 @@ class ManualTask:
         ctx.phase = FlightPhase.CRUISE
         self._motion = SmoothMotion(ctx)
         self._ramp = TakeoffRamp(ctx)
-        self._yaw_rad = float(ctx.nav[_NAV_YAW])
+        self._yaw_rad = float(ctx.nav[nav_layout.YAW])
         self._hold_down_m = math.nan
 
     def update(self, ctx: FlightContext) -> TaskStatus:
@@ -87,7 +86,7 @@ class ManualTask:
             return TaskStatus.RUNNING
         if not ramp.update(ctx, sticks.valid and throttle > _STICK_UP, ctx.multicopter.takeoff_speed_m_s):
             motion.restart(ctx)
-            self._yaw_rad = float(ctx.nav[_NAV_YAW])
+            self._yaw_rad = float(ctx.nav[nav_layout.YAW])
             self._hold_down_m = math.nan
             return TaskStatus.RUNNING
         climb = stick(throttle, ctx.multicopter)
@@ -105,9 +104,9 @@ class ManualTask:
         """
         rate = yaw * ctx.multicopter.manual_yaw_rate_rad_s
         self._yaw_rad += rate * ctx.dt_s
-        lead = math.remainder(self._yaw_rad - float(ctx.nav[_NAV_YAW]), 2.0 * math.pi)
+        lead = math.remainder(self._yaw_rad - float(ctx.nav[nav_layout.YAW]), 2.0 * math.pi)
         if abs(lead) > 0.5 and rate != 0.0:
-            self._yaw_rad = float(ctx.nav[_NAV_YAW]) + math.copysign(0.5, lead)
+            self._yaw_rad = float(ctx.nav[nav_layout.YAW]) + math.copysign(0.5, lead)
         return rate
 
     def _write_tilt(self, ctx: FlightContext, roll: float, pitch: float, yaw: float) -> None:
@@ -127,7 +126,7 @@ class ManualTask:
             return
         if ctx.on_ground and throttle < _STICK_DOWN:
             clear_setpoint(ctx.setpoint, sp.IDLE)
-            self._yaw_rad = float(ctx.nav[_NAV_YAW])
+            self._yaw_rad = float(ctx.nav[nav_layout.YAW])
             return
         if self.kind is ManualMode.ACRO:
             clear_setpoint(ctx.setpoint, sp.RATES)
@@ -156,8 +155,8 @@ class ManualTask:
             self._hold_down_m = math.nan
         elif math.isnan(self._hold_down_m) and abs(speed_down) < 0.3:
             self._hold_down_m = down + 0.3 * speed_down
-        ctx.setpoint[2] = self._hold_down_m if ctx.altitude_valid else math.nan
-        ctx.setpoint[5] = -climb_m_s
+        ctx.setpoint[sp.POS + 2] = self._hold_down_m if ctx.altitude_valid else math.nan
+        ctx.setpoint[sp.VEL + 2] = -climb_m_s
         motion.trajectory.reset(ctx.nav[nav_layout.POS_NED_M], ctx.nav[nav_layout.VEL_NED_M_S])
 
     def _fly_velocity(
@@ -172,7 +171,7 @@ class ManualTask:
         p = ctx.multicopter
         motion.synchronise(ctx)
         scale = p.manual_speed_m_s * min(1.0, 1.0 / max(1e-9, math.hypot(roll, pitch)))
-        heading = float(ctx.nav[_NAV_YAW])
+        heading = float(ctx.nav[nav_layout.YAW])
         c, s = math.cos(heading), math.sin(heading)
         north = scale * (pitch * c - roll * s)
         east = scale * (pitch * s + roll * c)

@@ -42,7 +42,6 @@ from flightsim.foundation.vectors import wrap_pi
 _LOOK_AHEAD_ITEMS: Final = 40
 _LOOK_AHEAD_M: Final = 150.0
 _YAW_REACHED_RAD: Final = math.radians(5.0)
-_NAV_YAW: Final = 27
 _SAME_PLACE_M: Final = 0.1
 _SLOW_M_S: Final = 0.3  # a curve that ends at less than twice this speed ends in a stop
 _WIDE_M: Final = 1e3  # no corner at the end of a curve: the next leg continues straight
@@ -155,7 +154,7 @@ class MissionTask(PlanTask):
     def _turned(self, ctx: FlightContext) -> bool:
         if self._turning is None:
             return True
-        behind = wrap_pi(float(ctx.setpoint[sp.YAW_RAD]) - float(ctx.nav[_NAV_YAW]))
+        behind = wrap_pi(float(ctx.setpoint[sp.YAW_RAD]) - float(ctx.nav[nav_layout.YAW]))
         return self._turning.done and abs(behind) < _YAW_REACHED_RAD
 
     def _item_yaw(self, ctx: FlightContext, item: MissionItem) -> float | None:

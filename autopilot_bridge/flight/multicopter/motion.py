@@ -28,7 +28,6 @@ _MIN_COURSE_SPEED_M_S: Final = 0.7
 _SLOWEST_TURN_M_S: Final = 0.5
 _SHORTEST_LEG_M: Final = 0.1
 _SLOWEST_LEG_M_S: Final = 0.05
-_NAV_YAW: Final = 27
 
 
 class SmoothMotion:
@@ -63,21 +62,21 @@ class SmoothMotion:
         """Continue from the trajectory flown until now, or from the vehicle's own state."""
         setpoint, nav = ctx.setpoint, ctx.nav
         position, velocity = nav[nav_layout.POS_NED_M], nav[nav_layout.VEL_NED_M_S]
-        old = setpoint[0:9]
+        old = [setpoint[part].copy() for part in (sp.POS_NED_M, sp.VEL_NED_M_S, sp.ACC_NED_M_S2)]
         if (
             setpoint[sp.LEVEL] == sp.TRAJECTORY
-            and math.isfinite(float(old.sum()))
-            and float(np.abs(old[0:3] - position).max()) < _CONTINUE_WITHIN_M
-            and float(np.abs(old[3:6] - velocity).max()) < _CONTINUE_WITHIN_M_S
+            and math.isfinite(float(setpoint[sp.MOTION].sum()))
+            and float(np.abs(old[0] - position).max()) < _CONTINUE_WITHIN_M
+            and float(np.abs(old[1] - velocity).max()) < _CONTINUE_WITHIN_M_S
         ):
-            self.trajectory.reset(old[0:3].copy(), old[3:6].copy(), old[6:9].copy())
+            self.trajectory.reset(*old)
         else:
             self.trajectory.reset(position, velocity)
         if setpoint[sp.LEVEL] == sp.TRAJECTORY and math.isfinite(float(setpoint[sp.YAW_RAD])):
             rate = float(setpoint[sp.YAW_RATE_RAD_S])
             self.heading.reset(float(setpoint[sp.YAW_RAD]), rate if math.isfinite(rate) else 0.0)
         else:
-            self.heading.reset(float(nav[_NAV_YAW]), float(nav[nav_layout.RATES_FRD_RAD_S][2]))
+            self.heading.reset(float(nav[nav_layout.YAW]), float(nav[nav_layout.RATES_FRD_RAD_S][2]))
         self.begin_leg()
         self._synchronised = ctx.position_valid
         if ctx.health is not None:
@@ -204,8 +203,8 @@ class SmoothMotion:
         setpoint[sp.YAW_RAD] = self.heading.yaw_rad
         setpoint[sp.YAW_RATE_RAD_S] = self.heading.rate_rad_s
         if not ctx.position_valid:
-            setpoint[0:2] = math.nan
-            setpoint[3:5] = 0.0 if ctx.velocity_valid else math.nan
-            setpoint[6:8] = 0.0
+            setpoint[sp.POS_HORIZONTAL] = math.nan
+            setpoint[sp.VEL_HORIZONTAL] = 0.0 if ctx.velocity_valid else math.nan
+            setpoint[sp.ACC_HORIZONTAL] = 0.0
         if not ctx.altitude_valid:
-            setpoint[2] = math.nan
+            setpoint[sp.POS + 2] = math.nan

@@ -30,7 +30,7 @@ class OrbitYaw(IntEnum):
 def circle_ahead(ctx: FlightContext, radius_m: float) -> Array:
     """Centre of the circle that starts at the vehicle and lies ahead (ArduPilot CIRCLE), local NED (3,)."""
     position = ctx.nav[nav_layout.POS_NED_M]
-    yaw = float(ctx.nav[27])
+    yaw = float(ctx.nav[nav_layout.YAW])
     return np.array(
         [
             float(position[0]) + radius_m * math.cos(yaw),

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.parameters import FlightParameters
 from flightsim.foundation.kernels import kernel
 
@@ -317,7 +318,7 @@ class TrajectoryGenerator:
 
     def write(self, setpoint: Array) -> None:
         """Write position, velocity and acceleration into the trajectory fields of a control setpoint."""
-        setpoint[0:9] = self._state
+        setpoint[sp.MOTION] = self._state
         if self.stretch < 1.0:
-            setpoint[3:5] *= self.stretch
-            setpoint[6:8] *= self.stretch
+            setpoint[sp.VEL_HORIZONTAL] *= self.stretch
+            setpoint[sp.ACC_HORIZONTAL] *= self.stretch

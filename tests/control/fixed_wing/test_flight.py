@@ -219,15 +219,15 @@ def test_a_glide_slope_is_followed() -> None:
     start = flown.nav[n.POS_NED_M].copy()
     errors = []
     for _ in range(round(12.0 * 50)):
-        run_m = float(flown.nav[10] - start[0])
+        run_m = float(flown.nav[n.POS] - start[0])
         flown.set(
             heading_rad=0.0,
             down_m=float(start[2]) + run_m * slope,
-            height_rate_m_s=-float(flown.nav[7]) * slope,
+            height_rate_m_s=-float(flown.nav[n.VEL]) * slope,
             airspeed_m_s=20.0,
         )
         flown.run(0.02)
-        errors.append(float(flown.nav[12] - start[2]) - run_m * slope)
+        errors.append(float(flown.nav[n.POS + 2] - start[2]) - run_m * slope)
     assert np.abs(errors).max() < 1.5
     assert np.abs(errors[-100:]).max() < 0.4
 

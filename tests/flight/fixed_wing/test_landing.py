@@ -108,12 +108,12 @@ def test_without_a_leg_it_circles_down_and_lands_against_the_wind(
 
 def test_go_around_climbs_comes_back_and_lands() -> None:
     rig, task = flaring((-3.0, 2.0))
-    lowest = -rig.nav[12]
+    lowest = -rig.nav[n.POS + 2]
     assert task.go_around(rig.ctx)
     log = rig.run(5.0)
     assert log[:, 12].max() < -0.5 * lowest  # it doesn't touch
-    assert -rig.nav[12] > 15.0
-    assert abs(rig.nav[11]) < 5.0  # straight on
+    assert -rig.nav[n.POS + 2] > 15.0
+    assert abs(rig.nav[n.POS + 1]) < 5.0  # straight on
     along, right = finish(rig, task)
     assert abs(along) < 15.0 and abs(right) < 3.0
 
@@ -140,7 +140,7 @@ def test_beside_the_runway_on_short_final_it_goes_around() -> None:
     rig = flying((0.0, 0.0))
     task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
     rig.fly(task)
-    rig.run_until(lambda: -rig.nav[12] < 11.0, 60.0)
+    rig.run_until(lambda: -rig.nav[n.POS + 2] < 11.0, 60.0)
     origin = rig.frame.origin  # GPS finds itself aside
     rig.frame = LocalFrame(replace(origin, lon_deg=origin.lon_deg + 30.0 / 75_000.0))
     rig.run(0.2)
@@ -227,7 +227,7 @@ def test_carried_too_far_in_the_flare_it_goes_around_three_times_and_then_comes_
         _carried_on(rig, 60.0)
         rig.run_until(lambda: task.phase is not LandPhase.FLARE, 3.0)
         assert task.phase is LandPhase.GO_AROUND
-        lowest = -rig.nav[12]
+        lowest = -rig.nav[n.POS + 2]
         log = rig.run(5.0)
         assert log[:, 12].max() < -0.5 * lowest  # it doesn't touch
     rig.run_until(lambda: task.phase is LandPhase.FLARE, 200.0)
@@ -301,7 +301,7 @@ def test_position_lost_on_short_final_it_goes_straight_on() -> None:
     rig = flying((0.0, 0.0))
     task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
     rig.fly(task)
-    rig.run_until(lambda: -rig.nav[12] < 12.0, 60.0)
+    rig.run_until(lambda: -rig.nav[n.POS + 2] < 12.0, 60.0)
     assert rig.ctx.health is not None
     rig.ctx.health.position_horizontal_relative = rig.ctx.health.position_horizontal_absolute = False
     rig.run_until(lambda: task.phase is LandPhase.LANDED, 60.0)
@@ -319,7 +319,7 @@ def test_position_lost_high_up_it_descends_and_takes_the_approach_up_again() -> 
     health.position_horizontal_relative = health.position_horizontal_absolute = False
     rig.run(10.0)
     assert task.phase is LandPhase.BLIND
-    assert 97.0 > -rig.nav[12] > 80.0
+    assert 97.0 > -rig.nav[n.POS + 2] > 80.0
     health.position_horizontal_relative = health.position_horizontal_absolute = True
     rig.run(1.0)
     assert task.phase is LandPhase.CIRCLE

@@ -127,7 +127,7 @@ def test_on_the_ground_without_throttle_nothing_moves(mode: ManualMode) -> None:
     rig.sticks(throttle=-1.0)
     rig.run(3.0)
     assert rig.ctx.on_ground
-    assert np.hypot(*rig.nav[10:12]) < 0.5
+    assert np.hypot(*rig.nav[n.POS : n.POS + 2]) < 0.5
     rig.ctx.sticks = ManualInput()
     rig.run(0.1)
     assert rig.controller.setpoint[sp.LEVEL] == sp.IDLE

@@ -310,14 +310,14 @@ def test_go_around_in_a_plan_comes_back_to_the_landing() -> None:
     assert not task.go_around(rig.ctx)
 
     def on_slope() -> bool:
-        return isinstance(task.sub_task, LandTask) and -float(rig.nav[12]) < 15.0
+        return isinstance(task.sub_task, LandTask) and -float(rig.nav[n.POS + 2]) < 15.0
 
     rig.run_until(on_slope, 120.0)
     assert task.go_around(rig.ctx)
     landing = task.sub_task
     rig.run(20.0)
     assert isinstance(landing, LandTask) and task.sub_task is landing
-    assert -rig.nav[12] > 30.0
+    assert -rig.nav[n.POS + 2] > 30.0
     rig.run_until(lambda: landing.phase is LandPhase.LANDED, 200.0)
     assert abs(rig.touch_ned_m[0] - 900.0) < 15.0
 

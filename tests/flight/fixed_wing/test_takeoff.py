@@ -59,7 +59,7 @@ def test_takes_off_and_reaches_its_height(launch: str, wind: tuple[float, float,
     assert rig.ctx.landed_state is LandedState.TAKEOFF
     rig.run(5.0)
     assert rig.ctx.landed_state is LandedState.IN_AIR
-    assert -rig.nav[12] + rig.ctx.home_ned_m[2] == pytest.approx(60.0, abs=3.0)
+    assert -rig.nav[n.POS + 2] + rig.ctx.home_ned_m[2] == pytest.approx(60.0, abs=3.0)
     assert task.update(rig.ctx) is TaskStatus.DONE
 
 
@@ -151,4 +151,4 @@ def test_without_airspeed_a_climb_rate_is_flown() -> None:
 
     rig.observe = blind  # type: ignore[method-assign]
     rig.run_until(lambda: task.phase is TakeoffPhase.REACHED, 40.0)
-    assert -rig.nav[12] > 45.0
+    assert -rig.nav[n.POS + 2] > 45.0

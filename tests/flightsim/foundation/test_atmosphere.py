@@ -14,7 +14,7 @@ from flightsim.foundation.atmosphere import (
 
 # geopotential altitude m, pressure Pa, density kg/m^3
 STANDARD_ATMOSPHERE = [
-    (-500.0, 107_477.0, 1.28494),
+    (-500.0, 107_477.0, 1.2849),
     (0.0, 101_325.0, 1.22500),
     (500.0, 95_461.2, 1.16727),
     (1000.0, 89_874.6, 1.11164),
