@@ -174,7 +174,7 @@ def _frames(record: NDArray[np.uint8], out: NDArray[np.uint8], due: int, sender:
             out[end + 10 + i] = record[first + i]
         crc = 0xFFFF
         for i in range(end + 1, end + 10 + size):
-            crc = crc >> 8 ^ int(_CRC_TABLE[(crc ^ out[i]) & 0xFF])
+            crc = crc >> 8 ^ int(_CRC_TABLE[(crc ^ int(out[i])) & 0xFF])
         crc = crc >> 8 ^ int(_CRC_TABLE[(crc ^ _PARTS[part, 3]) & 0xFF])
         end += 10 + size
         out[end] = crc & 0xFF
