@@ -22,6 +22,7 @@ EARTH_CONSTANTS = (
     *(6378137.0, 6356752.3142, 6371000.0, 6371008.8, 298.257223563, 6.69437999014e-3, 7.292115e-5),
     *(9.80665, 9.7803253359, 8.314462618, 287.05287, 288.15, 273.15, 101325.0, 1013.25, 1.225),
 )
+LAID_OUT = ("nav", "sp", "setpoint", "truth", "readings")
 ANGLE_FUNCTIONS = (
     *("wrap_pi", "wrap_180", "normalize_angle", "euler_of"),
     *("quaternion_from_euler", "euler_from_quaternion", "from_euler", "rotate_inverse", "conjugate"),
@@ -262,6 +263,31 @@ def test_the_foundation_alone_defines_the_earth_and_the_atmosphere():
         "flightsim.foundation.atmosphere",
         "flightsim.foundation.geodesy",
     }
+
+
+def bare_places(source):
+    """Numbers and number ranges that index an array with a layout of its own."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Subscript):
+            continue
+        array = node.value.attr if isinstance(node.value, ast.Attribute) else getattr(node.value, "id", "")
+        parts = [node.slice.lower, node.slice.upper] if isinstance(node.slice, ast.Slice) else [node.slice]
+        if array in LAID_OUT and any(isinstance(part, ast.Constant) for part in parts):
+            found.append(ast.unparse(node))
+    return found
+
+
+@pytest.mark.parametrize(
+    "name", sorted(name for name in MODULES if is_in(name, ("flightsim", "autopilot_bridge")))
+)
+def test_places_of_shared_arrays_have_names(name):
+    assert bare_places(MODULES[name].read_text(encoding="utf-8")) == []
+
+
+def test_the_test_sees_bare_places():
+    found = bare_places("nav[27] + ctx.setpoint[3:5] + nav[n.YAW] + truth[t.ROTOR_RAD_S] + q[3] + sp[-1]")
+    assert found == ["nav[27]", "ctx.setpoint[3:5]"]
 
 
 def test_one_module_wraps_angles_and_one_multiplies_quaternions():
