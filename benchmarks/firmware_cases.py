@@ -14,7 +14,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.plan_files.wpl import format_wpl
-from missions.vehicle.fixed_wing import Approach
+from missions.vehicle.wing import Approach
 
 PLAN: Final = "PLAN"
 SCRIPT: Final = "SCRIPT"
@@ -61,14 +61,14 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 async def fly(vehicle, options):
     await vehicle.wait_ready()
-    vehicle.note_runway()
+    vehicle.wing.note_runway()
     await vehicle.takeoff(80.0)
     frame = LocalFrame(vehicle.home)
     lat, lon, alt = frame.geodetic_from_ned(250.0, 250.0, -90.0)
     place = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
-    await vehicle.loiter(place, radius_m=120.0, clockwise=False)
+    await vehicle.wing.loiter(place, radius_m=120.0, clockwise=False)
     await vehicle.clock.sleep(40.0)
-    await vehicle.land_along()
+    await vehicle.wing.land_along()
 """,
 }
 

@@ -211,8 +211,8 @@ def _fly(given: dict[str, Any]) -> int:
     from missions.runs.request import REGAIN_S
     from missions.runs.session import RunRequest as Request
     from missions.runs.session import fly as fly_mission
-    from missions.vehicle.adapter import Mode
     from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.vehicle.firmware import Mode
 
     line = ProgressLine()
     confirm = None

@@ -56,7 +56,7 @@ class ProgressLine:
         mode, height, progress = "waiting", "", 0.0
         if heard:
             mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in heard))
-            if any(vehicle.link_lost for vehicle in heard):
+            if any(vehicle.link.lost for vehicle in heard):
                 mode = "LINK LOST"
             positions = [vehicle.latest(Position) for vehicle in heard]
             height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"

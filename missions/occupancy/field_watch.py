@@ -123,7 +123,7 @@ class FieldWatch:
         vehicle = self._vehicle
         self._stops = [
             vehicle.payload.on_total_field(self.placer.add_reading),
-            vehicle.connection.listen("GLOBAL_POSITION_INT", self._on_position),
+            vehicle.link.connection.listen("GLOBAL_POSITION_INT", self._on_position),
         ]
 
     def stop(self) -> None:

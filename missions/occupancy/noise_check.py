@@ -46,12 +46,12 @@ async def require_quiet(vehicle: "Vehicle", *, threshold_nt: float) -> float:
 
     stop = vehicle.payload.on_total_field(take)
     try:
-        async with vehicle.deadline(_LONGEST_S, "readings of the survey magnetometer"):
+        async with vehicle.link.deadline(_LONGEST_S, "readings of the survey magnetometer"):
             await enough.wait()
     except TimeoutError:
         raise VehicleTimeout(
             f"the survey magnetometer gave {len(readings_nt)} readings in {_LONGEST_S:g} s, fewer than "
-            f"{_READINGS}; {vehicle.heard()}"
+            f"{_READINGS}; {vehicle.link.last_received()}"
         ) from None
     finally:
         stop()

@@ -122,7 +122,7 @@ async def steering(
         rate_hz: setpoints per vehicle second.
     """
     if vehicle.kind is VehicleKind.FIXED_WING:
-        async with vehicle.heading_flight(altitude_m=altitude_m, airspeed_m_s=speed_m_s) as flight:
+        async with vehicle.wing.heading_flight(altitude_m=altitude_m, airspeed_m_s=speed_m_s) as flight:
             yield flight
         return
     limits = await vehicle.limits()

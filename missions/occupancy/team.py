@@ -16,8 +16,8 @@ from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
 from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
-from missions.vehicle.adapter import Mode
 from missions.vehicle.concurrency import run_concurrently
+from missions.vehicle.firmware import Mode
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 from missions.vehicle.telemetry import Attitude, Position
 
@@ -146,7 +146,7 @@ class SearchTeam:
                 flying=True,
             )
         if vehicle.kind is VehicleKind.FIXED_WING:
-            await vehicle.land_along()
+            await vehicle.wing.land_along()
         else:
             await vehicle.return_to_launch(timeout_s=_LANDING_S)
         traffic.down(index)
@@ -160,7 +160,7 @@ class SearchTeam:
         await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
         await require_quiet(vehicle, threshold_nt=own.threshold_nt)
         if vehicle.kind is VehicleKind.FIXED_WING:
-            await vehicle.prepare_piloting()
+            await vehicle.wing.prepare_piloting()
 
     async def _wait(
         self,
@@ -175,11 +175,13 @@ class SearchTeam:
 
         def look() -> bool:
             if flying and not vehicle.armed:
-                raise MissionError(f"the vehicle disarmed while it waited for {what}; {vehicle.heard()}")
+                raise MissionError(
+                    f"the vehicle disarmed while it waited for {what}; {vehicle.link.last_received()}"
+                )
             return ready()
 
         searching_s = 0.0 if flying else self._options[0].search_time_s
-        await vehicle.wait_until(
+        await vehicle.link.wait_until(
             look, what=what, on=("HEARTBEAT",), timeout_s=searching_s + one_s * len(self._vehicles)
         )
 
@@ -192,17 +194,17 @@ class SearchTeam:
             self.search.begin(self.began_us)
         searcher.began_us = clock.time_us
         watch = searcher.watch = self._watch(index)
-        guided = vehicle.adapter.modes[Mode.GUIDED]
+        guided = vehicle.firmware.modes[Mode.GUIDED]
         watch.start()
         try:
-            with vehicle.messages("GLOBAL_POSITION_INT") as stream:
-                async with vehicle.link_guard("the end of the search"):
+            with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
+                async with vehicle.link.guard("the end of the search"):
                     async for _ in stream:
                         if self.over:
                             break
                         settled = clock.time_us - searcher.began_us > _MODE_AGE_US
-                        if not vehicle.armed or (settled and vehicle.custom_mode != guided):
-                            raise MissionError(f"the vehicle left the search; {vehicle.heard()}")
+                        if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
+                            raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
                         command = searcher.pilot.update(self._motion(vehicle))
                         if command is not None:
                             await flight.turn_to(command.heading_rad)
@@ -244,10 +246,11 @@ class SearchTeam:
     def _motion(self, vehicle: "Vehicle") -> Motion:
         place, attitude = vehicle.latest(Position), vehicle.latest(Attitude)
         if place is None or attitude is None:
-            raise MissionError(f"the vehicle reports no position or attitude; {vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no position or attitude; {vehicle.link.last_received()}")
         wings = vehicle.kind is VehicleKind.FIXED_WING
-        wind = vehicle.wind_ne_m_s() if wings else None
-        airspeed_m_s = vehicle.pilot.airspeed_true_m_s if vehicle.pilot is not None else math.nan
+        wind = vehicle.wing.wind_ne_m_s() if wings else None
+        pilot = vehicle.wing.pilot if wings else None
+        airspeed_m_s = math.nan if pilot is None else pilot.airspeed_true_m_s
         north_m, east_m, _ = self._frame.ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
         return Motion(
             time_us=place.time_us,
@@ -255,7 +258,7 @@ class SearchTeam:
             east_m=east_m,
             vel_ne_m_s=place.vel_ned_m_s[:2],
             yaw_rad=attitude.yaw_rad,
-            airspeed_m_s=airspeed_m_s if wings and math.isfinite(airspeed_m_s) else 0.0,
+            airspeed_m_s=airspeed_m_s if math.isfinite(airspeed_m_s) else 0.0,
             wind_ne_m_s=(0.0, 0.0) if wind is None else wind,
         )
 

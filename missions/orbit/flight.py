@@ -17,8 +17,8 @@ from missions.orbit.target_observer import TICK_HZ, TargetObserver
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
-from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
+from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.vehicle import Vehicle
 
 _GIMBAL_HZ: Final = 25.0
@@ -79,7 +79,7 @@ class OrbitFlight:
             self._gps = await GpsSwitch.find(vehicle, options.gps_off)
         vehicle.payload.take_gimbal_control()
         vehicle.payload.set_gimbal_rate(_GIMBAL_HZ)
-        pilot = self._pilot = await vehicle.prepare_piloting()
+        pilot = self._pilot = await vehicle.wing.prepare_piloting()
         await pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
         stops = self._observer.listen_to_attitude()
         try:
@@ -99,7 +99,7 @@ class OrbitFlight:
             for stop in stops:
                 stop()
         self._begin("landing")
-        await vehicle.land_along()
+        await vehicle.wing.land_along()
         vehicle.notes.end(self._stamp_us)
 
     # the flight
@@ -139,7 +139,7 @@ class OrbitFlight:
             elif self._now_us - placed_us > 600_000_000:
                 raise MissionError(
                     f"the entry of the orbit was not reached within 600 s: still {off_m:.0f} m away; "
-                    f"{vehicle.heard()}"
+                    f"{vehicle.link.last_received()}"
                 )
             elif options.target_speed_m_s and (self._now_us - placed_us) % 20_000_000 < 100_000:
                 await self._circle_for_entry(home, course, radius_m)  # the aircraft has moved on
@@ -154,17 +154,19 @@ class OrbitFlight:
             north + radius_m * math.cos(right), east + radius_m * math.sin(right), -options.own_altitude_m
         )
         place = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
-        await self._vehicle.loiter(place, radius_m=radius_m, clockwise=True, wait=False)
+        await self._vehicle.wing.loiter(place, radius_m=radius_m, clockwise=True, wait=False)
 
     def _told_attitude(self) -> telemetry.Attitude:
         attitude = self._vehicle.latest(telemetry.Attitude)
         if attitude is None:
-            raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {self._vehicle.heard()}")
+            raise MissionError(
+                f"the vehicle reports no attitude (ATTITUDE); {self._vehicle.link.last_received()}"
+            )
         return attitude
 
     def _require_flying(self) -> None:
         if not self._vehicle.armed:
-            raise MissionError(f"the vehicle disarmed in flight; {self._vehicle.heard()}")
+            raise MissionError(f"the vehicle disarmed in flight; {self._vehicle.link.last_received()}")
 
     async def _orbit_without_gps(self, looking: "asyncio.Task[None]") -> None:
         vehicle = self._vehicle
@@ -176,7 +178,7 @@ class OrbitFlight:
             self._tracker.count_anew()  # the target may have been out of sight on the way here
             async with vehicle.guided(TICK_HZ) as guided:
                 entered_us = self._now_us
-                begun = not vehicle.adapter.roll_alone
+                begun = not vehicle.firmware.roll_alone
 
                 def source(_time_s: float) -> AttitudeSetpoint | None:
                     _raise_if_ended(looking)
@@ -209,17 +211,17 @@ class OrbitFlight:
             raise MissionError(
                 f"the vehicle's airspeed is {airspeed_m_s:.1f} m/s in flight (VFR_HUD), so the orbit "
                 "can't be flown "
-                f"without GPS; is its airspeed sensor sound? {self._vehicle.heard()}"
+                f"without GPS; is its airspeed sensor sound? {self._vehicle.link.last_received()}"
             )
 
     async def _give_altitude(self, following: "asyncio.Future[None]") -> None:
         """Send altitude and airspeed, in guided mode, to an autopilot that holds them itself."""
-        from missions.vehicle.adapter import Mode
+        from missions.vehicle.firmware import Mode
 
         vehicle = self._vehicle
         assert self._pilot is not None
-        await vehicle.wait_until(
-            lambda: following.done() or vehicle.custom_mode == vehicle.adapter.modes[Mode.GUIDED],
+        await vehicle.link.wait_until(
+            lambda: following.done() or vehicle.link.custom_mode == vehicle.firmware.modes[Mode.GUIDED],
             what="guided mode",
             on=("HEARTBEAT",),
             timeout_s=10.0,
@@ -236,7 +238,7 @@ class OrbitFlight:
         unseen_s = tracker.unseen_s(stamp_us)
         if min(unseen_s, (now_us - entered_us) * 1e-6) > options.lost_limit_s:
             seen = "never seen" if math.isinf(unseen_s) else f"lost {unseen_s:.0f} s ago"
-            raise MissionError(f"the target was {seen}; {self._vehicle.heard()}")
+            raise MissionError(f"the target was {seen}; {self._vehicle.link.last_received()}")
         # Without inertial messages no target is seen either, and the flight ends by `lost_limit_s`; until
         # then
         # the autopilot's roll is better than an old one.
@@ -265,7 +267,7 @@ class OrbitFlight:
                 raise MissionError(
                     f"the circle was not reached within {_CAPTURE_LIMIT_S:g} s: believed "
                     f"{command.radius_m:.0f} m from "
-                    f"the target; {self._vehicle.heard()}"
+                    f"the target; {self._vehicle.link.last_received()}"
                 )
             return
         if not self._done():

@@ -72,7 +72,7 @@ class TargetObserver:
                 message = read_message(frame)
                 self._estimator.take(self._time.stamp(message), message)
 
-        return self._vehicle.connection.listen(name, take)
+        return self._vehicle.link.connection.listen(name, take)
 
     async def start_filter(self) -> None:
         """Start our filter, if it is used, while the aircraft is still on the ground, where it estimates its
@@ -84,13 +84,13 @@ class TargetObserver:
         for name in _INERTIAL:
             # an autopilot that refuses the second as too fast has already accepted the first
             for rate_hz in _INERTIAL_HZ:
-                await vehicle.set_message_rate(name, rate_hz)
+                await vehicle.commands.set_message_rate(name, rate_hz)
             await vehicle.clock.sleep(_FILTER_START_S)
             if self.filter.newest is not None:
                 return
         raise MissionError(
             f"the attitude filter receives neither {' nor '.join(_INERTIAL)}; fly with `attitude=autopilot`; "
-            f"{vehicle.heard()}"
+            f"{vehicle.link.last_received()}"
         )
 
     async def keep_looking(self, pilot: AttitudePilot) -> None:
@@ -153,7 +153,7 @@ class TargetObserver:
             o.target_speed_m_s * math.cos(o.target_heading_rad),
             o.target_speed_m_s * math.sin(o.target_heading_rad),
         )
-        since_s = (time_us - self._vehicle.first_heard_us) * 1e-6
+        since_s = (time_us - self._vehicle.link.first_heartbeat_us) * 1e-6
         return (
             o.target_ne_m[0] + since_s * velocity[0],
             o.target_ne_m[1] + since_s * velocity[1],

@@ -244,7 +244,7 @@ def waypoint_plan(
     """The plan to upload: takeoff, waypoints with their speeds, and return."""
     home = vehicle.home
     frame = LocalFrame(home)
-    unset = vehicle.adapter.unset
+    unset = vehicle.firmware.unset
     altitude_m = options.own_altitude_m
     waypoint, land = dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LAND
 
@@ -254,7 +254,7 @@ def waypoint_plan(
             command=command, param2=options.acceptance_m, param4=unset, x=lat, y=lon, z=height_m
         )
 
-    items = [vehicle.adapter.takeoff_item(home, altitude_m)]
+    items = [vehicle.firmware.takeoff_item(home, altitude_m)]
     current_m_s = 0.0
     first = None
     for (north_m, east_m), speed_m_s in zip(points, speeds_m_s, strict=True):
@@ -320,7 +320,7 @@ async def _fly_waypoints(
 ) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     length_m = _length_m(options)
-    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+    acceptance_m = await vehicle.adapter.acceptance_m(options.acceptance_m)
     points, plan = _points_and_plan(vehicle, options, curve, trajectory, centre)
     down_m = -options.own_altitude_m
     offset = np.array(centre)
@@ -331,13 +331,13 @@ async def _fly_waypoints(
         acceptance_m=acceptance_m,
     )
     notes.begin("upload", clock.stamp_us)
-    start = await vehicle.upload_mission(plan.items)
+    start = await vehicle.plans.upload_mission(plan.items)
     first, last = start + plan.first, start + plan.last
     notes.begin("takeoff", clock.stamp_us)
     await vehicle.start_mission()
     route_m = float(np.linalg.norm(np.diff(notes.commanded.points_ned_m, axis=0), axis=1).sum())
     reach_m = float(np.linalg.norm(notes.commanded.points_ned_m, axis=1).max())
-    await vehicle.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
+    await vehicle.plans.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
     notes.begin(PATTERN, clock.stamp_us)
 
     def progress(done: int) -> None:
@@ -347,14 +347,14 @@ async def _fly_waypoints(
     if options.search_time_s is not None:
         limit_s = min(limit_s, options.search_time_s)
     try:
-        await vehicle.wait_item_reached(last, limit_s, progress)
+        await vehicle.plans.wait_item_reached(last, limit_s, progress)
     except VehicleTimeout:
         if options.search_time_s is None:
             raise
         notes.cut_short = True
         await vehicle.return_to_launch(wait=False)  # the search time has ended
     notes.begin("return", clock.stamp_us)
-    await vehicle.wait_disarmed(300.0 + 2.0 * reach_m)
+    await vehicle.link.wait_disarmed(300.0 + 2.0 * reach_m)
     notes.end(clock.stamp_us)
 
 

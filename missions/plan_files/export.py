@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from missions.errors import MissionError, PlanError
+from missions.kind import VehicleKind
 from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.plan_files.files import check_suffix, write_mission_file
@@ -83,7 +84,8 @@ class _Exported(Mission[MissionOptions]):
         self._mission.check_place(options, limits, home)
 
     async def fly(self, vehicle: "Vehicle", options: MissionOptions) -> None:
-        vehicle.note_runway()
+        if vehicle.kind is VehicleKind.FIXED_WING:
+            vehicle.wing.note_runway()
         items = await self._mission.plan_items(vehicle, options)
         write_mission_file(
             self._path,

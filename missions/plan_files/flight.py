@@ -66,13 +66,14 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
             acceptance_m=acceptance_m,
         )
     notes.begin("upload", clock.stamp_us)
-    vehicle.note_runway()
+    if wings:
+        vehicle.wing.note_runway()
     if document.fence:
-        await vehicle.upload_plan(MissionType.FENCE, document.fence)
+        await vehicle.plans.upload_plan(MissionType.FENCE, document.fence)
     if document.rally:
-        await vehicle.upload_plan(MissionType.RALLY, document.rally)
-    items = placed(document.items, home, vehicle.adapter.unset)
-    first = await vehicle.upload_mission(items)
+        await vehicle.plans.upload_plan(MissionType.RALLY, document.rally)
+    items = placed(document.items, home, vehicle.firmware.unset)
+    first = await vehicle.plans.upload_mission(items)
     notes.begin("takeoff", clock.stamp_us)
     watch = MissionWatch(vehicle, document, stops, first, acceptance_m)
     expected_s = route.duration_s(own_speed_m_s(document, vehicle.kind))
@@ -90,10 +91,10 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
         notes.begin("return", clock.stamp_us)
     if not (ended and watch.lands):
         if options.then is Then.LAND:
-            await (vehicle.land_along(wait=False) if wings else vehicle.land(wait=False))
+            await (vehicle.wing.land_along(wait=False) if wings else vehicle.land(wait=False))
         else:
             await vehicle.return_to_launch(wait=False)
-    await vehicle.wait_disarmed(_LANDING_S + 2.0 * expected_s)
+    await vehicle.link.wait_disarmed(_LANDING_S + 2.0 * expected_s)
     notes.end(clock.stamp_us)
 
 
@@ -105,9 +106,7 @@ async def _acceptance_m(vehicle: Vehicle, document: MissionDocument, stops: tupl
         if document.items[stop.index].command == NAV_WAYPOINT
     }
     radii = [
-        await vehicle.adapter.acceptance_m(
-            vehicle, a if a > 0.0 else await vehicle.adapter.own_acceptance_m(vehicle)
-        )
+        await vehicle.adapter.acceptance_m(a if a > 0.0 else await vehicle.adapter.own_acceptance_m())
         for a in sorted(asked or {0.0}, key=lambda a: (math.isnan(a), a))
     ]
     return max(radii)

@@ -7,7 +7,7 @@ from missions.errors import MissionError, VehicleTimeout
 from missions.notes import PATTERN
 from missions.plan_files.document import MissionDocument
 from missions.plan_files.route import Stop, has_curves, placed
-from missions.vehicle.adapter import Mode
+from missions.vehicle.firmware import Mode
 from missions.vehicle.item_tracker import FlownOrder, ItemTracker, MissionModeWatch, mission_steps
 from missions.vehicle.vehicle import Vehicle
 
@@ -45,7 +45,7 @@ class MissionWatch:
         self._endless = order.endless
         self._scored_from = scored[0].index if scored else -1
         self._phase = CURVED if has_curves(scored) else PATTERN
-        self._mode = MissionModeWatch(vehicle.adapter.modes[Mode.MISSION])
+        self._mode = MissionModeWatch(vehicle.firmware.modes[Mode.MISSION])
 
     @property
     def lands(self) -> bool:
@@ -60,14 +60,14 @@ class MissionWatch:
             VehicleTimeout: the mission took too long.
         """
         vehicle = self._vehicle
-        with vehicle.messages(*_NAMES) as stream:
+        with vehicle.link.messages(*_NAMES) as stream:
             try:
-                async with vehicle.deadline(limit_s, self._awaited):
+                async with vehicle.link.deadline(limit_s, self._awaited):
                     while not self._take(await anext(stream)):
                         pass
             except TimeoutError:
                 raise VehicleTimeout(
-                    f"no {self._awaited()} within {limit_s:.0f} s; {vehicle.heard()}"
+                    f"no {self._awaited()} within {limit_s:.0f} s; {vehicle.link.last_received()}"
                 ) from None
 
     def _awaited(self) -> str:
@@ -103,14 +103,14 @@ class MissionWatch:
 
     def _heartbeat(self, message: Any) -> bool:
         vehicle, tracker = self._vehicle, self._tracker
-        modes = vehicle.adapter.modes
-        if not vehicle.armed and not vehicle.may_be_armed:
+        modes = vehicle.firmware.modes
+        if not vehicle.armed and not vehicle.commands.may_be_armed:
             if self._flown and self.lands:
                 return True
-            raise MissionError(f"the vehicle disarmed at {self._here()}; {vehicle.heard()}")
+            raise MissionError(f"the vehicle disarmed at {self._here()}; {vehicle.link.last_received()}")
         if message.custom_mode == modes[Mode.RETURN] and self._flown and self.lands:
             return True  # the mission's own return
-        if self._flown and self.lands and vehicle.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
+        if self._flown and self.lands and vehicle.link.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
             return False  # PX4 holds after the touch-down, and disarms later
         if not self._mode.left(message.custom_mode):
             return False
@@ -118,7 +118,7 @@ class MissionWatch:
         ended = (modes[Mode.RETURN],) if self.lands else (modes[Mode.HOLD], modes[Mode.RETURN])
         if message.custom_mode in ended and tracker.at_the_last_place:
             return True
-        mode = vehicle.adapter.mode_name(message.custom_mode)
+        mode = vehicle.firmware.mode_name(message.custom_mode)
         raise MissionError(
-            f"the vehicle left the mission for mode {mode} at {self._here()}; {vehicle.heard()}"
+            f"the vehicle left the mission for mode {mode} at {self._here()}; {vehicle.link.last_received()}"
         )

@@ -91,21 +91,21 @@ async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
 
 async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
     for name in (*_ASKED, FILTER_STATUS[vehicle.autopilot]):
-        if vehicle.message(name) is None:
-            await vehicle.set_message_rate(name, 2.0)
+        if vehicle.link.message(name) is None:
+            await vehicle.commands.set_message_rate(name, 2.0)
     told: list[Mapping[str, Any]] = []  # reports of the navigation filter
-    with vehicle.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
+    with vehicle.link.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)
         try:
-            fence_items = await vehicle.download_plan(MissionType.FENCE)
+            fence_items = await vehicle.plans.download_plan(MissionType.FENCE)
         except MissionError:  # an autopilot without a fence
             fence_items = []
         while (status := stream.take()) is not None:
             told.append(status.to_dict())
     messages: dict[str, Mapping[str, Any]] = {}
     for name in _SHOWN:
-        message = vehicle.message(name)
+        message = vehicle.link.message(name)
         if message is not None:
             messages[name] = message.to_dict()
     if told:
@@ -114,7 +114,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
         flavour=vehicle.autopilot,
         kind=vehicle.kind,
         messages=messages,
-        texts=tuple(text.text for text in vehicle.status_texts),
+        texts=tuple(text.text for text in vehicle.link.status_texts),
         parameters=parameters,
         fence_items=len(fence_items),
     ), fence_items
@@ -133,7 +133,7 @@ async def _parameters(vehicle: Vehicle) -> dict[str, float]:
 
     async def read(name: str) -> float | None:
         async with gate:
-            value = await vehicle.parameter_or(name, math.nan)
+            value = await vehicle.parameters.read_or(name, math.nan)
         return None if math.isnan(value) else value
 
     values = await asyncio.gather(*(read(name) for name in names))

@@ -13,7 +13,7 @@ from missions.runs.vehicle_opening import Stage
 from missions.options import MissionOptions
 from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
 from missions.runs.request import RunRequest
-from missions.vehicle.link_view import ADAPTERS
+from missions.vehicle.firmware_records import FIRMWARES
 
 if TYPE_CHECKING:
     from flightsim.world_spec import VehicleSpec
@@ -80,8 +80,8 @@ def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> Non
     if stage.parameters is None or stage.home is None:
         return
     for index, spec in enumerate(request.embedded_world.vehicles):
-        adapter = ADAPTERS[spec.autopilot, _kind(spec.model)]()
-        limits = adapter.limits(stage.parameters(index, list(adapter.limiting_parameters)))
+        firmware = FIRMWARES[spec.autopilot, _kind(spec.model)]
+        limits = firmware.limits(stage.parameters(index, list(firmware.limiting_parameters)))
         mission.check_place(
             _check_with(mission, request, index, limits, stage.home.alt_m), limits, stage.home
         )
@@ -97,8 +97,8 @@ def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> N
     except ValueError as error:
         raise PlanError(str(error)) from error
     try:
-        adapter = ADAPTERS[world.vehicles[index].autopilot, VehicleKind.FIXED_WING]()
-        limits = adapter.limits(sitl.parameters(0, list(adapter.limiting_parameters)))
+        firmware = FIRMWARES[world.vehicles[index].autopilot, VehicleKind.FIXED_WING]
+        limits = firmware.limits(sitl.parameters(0, list(firmware.limiting_parameters)))
         ground_alt_m = sitl.home.alt_m
     finally:
         sitl.close()
@@ -149,12 +149,12 @@ def _kind_limits(spec: "VehicleSpec") -> Limits:
     kind = _kind(spec.model)
     if kind is VehicleKind.FIXED_WING:
         return WIDEST_FIXED_WING_LIMITS
-    if (spec.autopilot, kind) not in ADAPTERS:
+    if (spec.autopilot, kind) not in FIRMWARES:
         return WIDEST_LIMITS
-    adapter = ADAPTERS[spec.autopilot, kind]()
+    firmware = FIRMWARES[spec.autopilot, kind]
     given: Mapping[str, float] = spec.parameters
-    names: Sequence[str] = list(adapter.limiting_parameters)
+    names: Sequence[str] = list(firmware.limiting_parameters)
     for name in names:
         if not given.get(name, 1.0) > 0.0:
             raise PlanError(f"parameter {name} = {given[name]:g} is not possible; it must be more than 0")
-    return adapter.limits({name: given[name] for name in names if name in given})
+    return firmware.limits({name: given[name] for name in names if name in given})

@@ -10,7 +10,7 @@ from missions.vehicle.connection import GROUND_STATION
 from missions.errors import PlanError
 from missions.options import FlightOptions, MissionOptions
 from missions.planning.limits import FORECAST_WIND_M_S
-from missions.vehicle.adapter import Mode
+from missions.vehicle.firmware import Mode
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec

@@ -99,7 +99,7 @@ class Flight:
         """
         if self.clock is None:
             return 0.0
-        begun_us = self.vehicles[0].first_heard_us if self.elsewhere else self.started_us
+        begun_us = self.vehicles[0].link.first_heartbeat_us if self.elsewhere else self.started_us
         return max(0, self.clock.time_us - begun_us) * 1e-6
 
     def require_log(self) -> None:
@@ -254,7 +254,7 @@ async def _fly(
             for vehicle in flight.vehicles:
                 vehicle.notes.end(vehicle.clock.stamp_us)
             if request.connect:
-                flight.started_us = flight.vehicles[0].first_heard_us
+                flight.started_us = flight.vehicles[0].link.first_heartbeat_us
             reporter.cancel()
             await asyncio.gather(reporter, return_exceptions=True)
 
@@ -266,9 +266,9 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     except MissionError as error:
         where = f" on {', '.join(request.connect)}" if request.connect else ""
         which = "" if wanted is None else f" with system id {wanted}"
-        others = ", ".join(map(str, vehicle.connection.autopilots_heard))
+        others = ", ".join(map(str, vehicle.link.connection.autopilots_heard))
         heard = f" (received: vehicle {others})" if others else ""
-        signing = vehicle.connection.signing
+        signing = vehicle.link.connection.signing
         if signing is not None and signing.counters.refused_frames:
             heard += f" (refused by the signing key: {signing.counters.reasons})"
         asked = "is it on, and sending there?"
@@ -276,7 +276,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
             asked += " Does it ask for signatures (`signing_key`)?"
         raise MissionError(f"no vehicle{which} was received{where}{heard}: {error}; {asked}") from error
     vehicle.notes.system_id = vehicle.system_id
-    vehicle.regain_s = request.regain_s if request.connect else 0.0
+    vehicle.link.regain_s = request.regain_s if request.connect else 0.0
     vehicle.notes.autopilot = vehicle.autopilot
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:

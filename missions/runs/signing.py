@@ -51,7 +51,7 @@ async def require_key(request: "RunRequest", vehicle: "Vehicle") -> None:
     Raises:
         VehicleTimeout: it does not answer, and no key was specified.
     """
-    if request.signing_key is not None or not vehicle.signs:
+    if request.signing_key is not None or not vehicle.link.signs:
         return
     version = float(definition("AUTOPILOT_VERSION").message_id)
     try:

@@ -1,150 +1,100 @@
-"""The interface of missions to ArduPilot's copter (4.6 behaviour)."""
+"""The actions of ArduPilot's copter and plane (4.6 behaviour)."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.planning.limits import Limits, MulticopterLimits
-from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
+from missions.vehicle.adapter import missing_basics
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.firmware import Mode
+from missions.vehicle.parameters import VehicleParameters
 
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
-
-_NAMES: Final[Mapping[int, str]] = MappingProxyType(
-    {
-        0: "Stabilize",
-        1: "Acro",
-        2: "Alt Hold",
-        3: "Auto",
-        4: "Guided",
-        5: "Loiter",
-        6: "RTL",
-        7: "Circle",
-        9: "Land",
-        11: "Drift",
-        13: "Sport",
-        14: "Flip",
-        15: "AutoTune",
-        16: "PosHold",
-        17: "Brake",
-        18: "Throw",
-        19: "Avoid ADSB",
-        20: "Guided NoGPS",
-        21: "Smart RTL",
-        22: "FlowHold",
-        23: "Follow",
-        24: "ZigZag",
-        25: "SystemID",
-        26: "Autorotate",
-        27: "Auto RTL",
-        28: "Turtle",
-    }
-)
 _EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
 _EKF_CONST_POS: Final = 0x80
+_PLANE_RADIUS_M: Final = 255.0  # largest value of param2 of a plane's waypoint
 
 
-class ArduCopter:
-    """ArduPilot copter: it sends nothing until requested, numbers home as mission item 0, and uses
-    PARAM_FLOAT.
+class ArduPilot:
+    """ArduPilot: it sends nothing until requested. The plane takes off in TAKEOFF and lands only in AUTO.
+
+    Args:
+        commands: commands to the vehicle.
+        parameters: its parameters.
     """
 
-    name = "ardupilot"
-    kind = VehicleKind.MULTICOPTER
-    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would follow (throttle low:
-    # descend)
-    modes: Mapping[Mode, int] = MappingProxyType(
-        {
-            Mode.HOLD: 17,
-            Mode.TAKEOFF: 4,
-            Mode.GUIDED: 4,
-            Mode.MISSION: 3,
-            Mode.RETURN: 6,
-            Mode.LAND: 9,
-            Mode.POSITION: 5,
-        }
-    )
-    stream_rates_hz: Mapping[str, float] = MappingProxyType(
-        {
-            "GLOBAL_POSITION_INT": 10.0,
-            "LOCAL_POSITION_NED": 20.0,
-            "ATTITUDE": 20.0,
-            "ATTITUDE_TARGET": 20.0,
-            "POSITION_TARGET_LOCAL_NED": 10.0,
-            "EXTENDED_SYS_STATE": 5.0,
-        }
-    )
-    bytewise_parameters = False
-    setpoints_before_guided = False
-    first_mission_item_is_home = True
-    goto_mode = Mode.GUIDED
-    resting_mode = Mode.GUIDED
-    unset = 0.0  # NaN is refused
-    roll_alone = False
-    limiting_parameters: Mapping[str, float] = MappingProxyType({"WPNAV_SPEED": 1000.0, "WPNAV_ACCEL": 250.0})
+    def __init__(self, commands: VehicleCommands, parameters: VehicleParameters) -> None:
+        self._link = commands.link
+        self._commands = commands
+        self._parameters = parameters
 
-    def mode_name(self, custom_mode: int) -> str:
-        return _NAMES.get(custom_mode, f"mode {custom_mode}")
+    @property
+    def _plane(self) -> bool:
+        return self._link.kind is VehicleKind.FIXED_WING
 
-    def mode_command(self, mode: Mode) -> ModeCommand:
-        return ModeCommand(main=self.modes[mode])
-
-    def readiness(self, vehicle: "Vehicle") -> list[str]:
-        missing = missing_basics(vehicle)
-        ekf = vehicle.message("EKF_STATUS_REPORT")
+    def readiness(self) -> list[str]:
+        missing = missing_basics(self._link)
+        ekf = self._link.message("EKF_STATUS_REPORT")
         if ekf is None or ekf.flags & _EKF_NEEDED != _EKF_NEEDED or ekf.flags & _EKF_CONST_POS:
             missing.append("navigation filter on GPS")
         return missing
 
-    async def prepare_arming(self, vehicle: "Vehicle") -> None:
-        if vehicle.custom_mode != self.modes[Mode.GUIDED]:
-            await vehicle.set_mode(Mode.GUIDED)
+    async def prepare_arming(self) -> None:
+        if self._link.custom_mode != self._link.firmware.modes[Mode.GUIDED]:
+            await self._commands.set_mode(Mode.GUIDED)
 
-    async def take_off(self, vehicle: "Vehicle", altitude_m: float) -> None:
-        if vehicle.custom_mode != self.modes[Mode.GUIDED]:
-            await vehicle.set_mode(Mode.GUIDED)
-        await vehicle.command(dialect.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, altitude_m)
+    async def take_off(self, altitude_m: float) -> None:
+        if self._plane:
+            await self._parameters.write("TKOFF_ALT", altitude_m)
+            await self._commands.set_mode(Mode.TAKEOFF)
+            return
+        await self.prepare_arming()
+        await self._commands.command(dialect.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, altitude_m)
 
-    async def start_streams(self, vehicle: "Vehicle") -> None:
-        vehicle.send(
+    async def start_streams(self) -> None:
+        self._link.send(
             dialect.MAVLink_request_data_stream_message(
-                vehicle.system_id, 1, dialect.MAV_DATA_STREAM_ALL, 4, 1
+                self._link.system_id, 1, dialect.MAV_DATA_STREAM_ALL, 4, 1
             )
         )
-        for name, rate_hz in self.stream_rates_hz.items():
-            await vehicle.set_message_rate(name, rate_hz)
+        for name, rate_hz in self._link.firmware.stream_rates_hz.items():
+            await self._commands.set_message_rate(name, rate_hz)
 
-    async def start_mission(self, vehicle: "Vehicle") -> None:
-        if not vehicle.armed:
-            await vehicle.arm()  # AUTO is not a mode for arming: arm in GUIDED
-        await vehicle.set_mode(Mode.MISSION)
-        await vehicle.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
+    async def start_mission(self) -> None:
+        if self._plane:
+            await self._commands.set_mode(Mode.MISSION)
+            if not self._link.armed:
+                await self._commands.arm()  # the takeoff roll begins with arming
+            return
+        if not self._link.armed:
+            await self.prepare_arming()  # AUTO is not a mode for arming: arm in GUIDED
+            await self._commands.arm()
+        await self._commands.set_mode(Mode.MISSION)
+        await self._commands.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
 
-    def limits(self, parameters: Mapping[str, float]) -> Limits:
-        values = {**self.limiting_parameters, **parameters}
-        return MulticopterLimits(
-            speed_m_s=0.01 * values["WPNAV_SPEED"], acceleration_m_s2=0.01 * values["WPNAV_ACCEL"]
-        )
+    async def acceptance_m(self, asked_m: float) -> float:
+        if self._plane:
+            return min(asked_m, _PLANE_RADIUS_M)
+        return 0.01 * await self._parameters.read_or("WPNAV_RADIUS", 100.0 * asked_m)  # param2 is not used
 
-    async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
-        return 0.01 * await vehicle.parameter_or("WPNAV_RADIUS", 100.0 * asked_m)  # param2 is not used
+    async def own_acceptance_m(self) -> float:
+        if self._plane:
+            return await self._parameters.read_or("WP_RADIUS", 90.0)
+        return 0.01 * await self._parameters.read_or("WPNAV_RADIUS", 200.0)
 
-    async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
-        return 0.01 * await vehicle.parameter_or("WPNAV_RADIUS", 200.0)
-
-    async def loiter(
-        self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
-    ) -> None:
-        raise PlanError("a multicopter does not circle a place by itself: use goto, or an orbit of your own")
-
-    async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
-        position = await vehicle.position()
-        await vehicle.command_int(
+    async def change_altitude(self, altitude_m: float) -> None:
+        if self._plane:
+            await self._commands.command_int(
+                dialect.MAV_CMD_GUIDED_CHANGE_ALTITUDE,
+                dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+                (0.0, 0.0, 0.0, 0.0),
+                0,
+                0,
+                altitude_m,
+            )
+            return
+        position = await self._link.position()
+        await self._commands.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
             (-1.0, 1.0, 0.0, 0.0),
@@ -153,8 +103,22 @@ class ArduCopter:
             altitude_m,
         )
 
-    async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
-        raise PlanError("a multicopter has no airspeed to hold: use set_speed")
+    async def loiter(self, place: GeodeticPosition, radius_m: float | None, clockwise: bool) -> None:
+        await self._commands.command_int(
+            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_FRAME_GLOBAL,
+            (-1.0, 1.0, radius_m or 0.0, 0.0 if clockwise else 1.0),
+            round(place.lat_deg * 1e7),
+            round(place.lon_deg * 1e7),
+            place.alt_m,
+        )
 
-    def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
-        return MissionItem(command=dialect.MAV_CMD_NAV_TAKEOFF, x=home.lat_deg, y=home.lon_deg, z=altitude_m)
+    async def change_airspeed(self, airspeed_m_s: float) -> None:
+        await self._commands.command_int(
+            dialect.MAV_CMD_GUIDED_CHANGE_SPEED,
+            dialect.MAV_FRAME_GLOBAL,
+            (0.0, airspeed_m_s, 0.0, 0.0),
+            0,
+            0,
+            0.0,
+        )

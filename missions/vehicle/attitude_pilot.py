@@ -7,18 +7,19 @@ climb rate. Neither needs a position.
 
 import math
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from estimators.pressure_height import PressureHeight
 from flightsim.foundation.atmosphere import air_density_ratio
 from missions.errors import MissionError, VehicleTimeout
 from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
-from missions.vehicle import telemetry
-from missions.vehicle.attitude_setpoint import AttitudeSetpoint
+from missions.vehicle.adapter import Adapter
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.link import VehicleLink
+from missions.vehicle.parameters import VehicleParameters
+from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.stream_room import make_room
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.telemetry import AirData, Attitude, Pressure
 
 _RATES_HZ: Final = {"ATTITUDE": 40.0, "VFR_HUD": 20.0, "SCALED_PRESSURE": 20.0}
 _STEP_S: Final = 0.02
@@ -32,52 +33,61 @@ class AttitudePilot:
     It is created on the ground, because heights are relative to the pressure there.
 
     Args:
-        vehicle: a fixed wing.
+        link: messages of a fixed wing.
+        adapter: its actions.
+        parameters: its parameters.
         ground_pa: static pressure on the ground.
     """
 
-    def __init__(self, vehicle: "Vehicle", ground_pa: float) -> None:
-        self._vehicle = vehicle
+    def __init__(
+        self, link: VehicleLink, adapter: Adapter, parameters: VehicleParameters, ground_pa: float
+    ) -> None:
+        self._link = link
+        self._adapter = adapter
+        self._parameters = parameters
         self._pressure = PressureHeight(ground_pa)
         self._energy: EnergyController | None = None
         self._altitude_m = math.nan
         self._airspeed_m_s = math.nan
         self._last_us = -1
-        self._stop = vehicle.connection.listen("SCALED_PRESSURE", lambda _frame: self._on_pressure())
+        self._stop = link.connection.listen("SCALED_PRESSURE", lambda _frame: self._on_pressure())
 
     @classmethod
-    async def on_ground(cls, vehicle: "Vehicle") -> "AttitudePilot":
+    async def on_ground(
+        cls, commands: VehicleCommands, adapter: Adapter, parameters: VehicleParameters
+    ) -> "AttitudePilot":
         """Request the needed streams, and measure the pressure on the ground.
 
         Raises:
             MissionError: the vehicle reports no pressure, or is in the air.
         """
+        link = commands.link
         for name, rate_hz in _RATES_HZ.items():
-            await vehicle.set_message_rate(name, rate_hz)
-        await make_room(vehicle, {**vehicle.adapter.stream_rates_hz, **_RATES_HZ})
-        position = await vehicle.position()
-        if vehicle.armed and position.height_m > 5.0:
+            await commands.set_message_rate(name, rate_hz)
+        await make_room(commands, {**link.firmware.stream_rates_hz, **_RATES_HZ})
+        position = await link.position()
+        if link.armed and position.height_m > 5.0:
             raise MissionError("the pressure on the ground must be taken before takeoff")
         total, count = 0.0, 0
-        with vehicle.messages("SCALED_PRESSURE") as stream, suppress(TimeoutError):
-            async with vehicle.deadline(_GROUND_S, "static pressure"):
+        with link.messages("SCALED_PRESSURE") as stream, suppress(TimeoutError):
+            async with link.deadline(_GROUND_S, "static pressure"):
                 while count < _GROUND_SAMPLES:
                     message = await anext(stream)
                     total, count = total + 100.0 * message.press_abs, count + 1
         if not count:
             raise VehicleTimeout(
                 f"the vehicle reports no static pressure (SCALED_PRESSURE) within {_GROUND_S:g} s; "
-                f"{vehicle.heard()}"
+                f"{link.last_received()}"
             )
-        return cls(vehicle, total / count)
+        return cls(link, adapter, parameters, total / count)
 
     def close(self) -> None:
         """Stop receiving messages."""
         self._stop()
 
     def _on_pressure(self) -> None:
-        pressure = self._vehicle.latest(telemetry.Pressure)
-        air = self._vehicle.latest(telemetry.AirData)
+        pressure = self._link.latest(Pressure)
+        air = self._link.latest(AirData)
         if pressure is not None and air is not None:
             self._pressure.add(pressure.time_us, pressure.static_pa, air.climb_m_s)
 
@@ -89,8 +99,8 @@ class AttitudePilot:
     @property
     def airspeed_true_m_s(self) -> float:
         """True airspeed; NaN when it is not reported."""
-        pressure = self._vehicle.latest(telemetry.Pressure)
-        air = self._vehicle.latest(telemetry.AirData)
+        pressure = self._link.latest(Pressure)
+        air = self._link.latest(AirData)
         if pressure is None or air is None:
             return math.nan
         return air.airspeed_m_s / math.sqrt(air_density_ratio(pressure.static_pa))
@@ -98,7 +108,7 @@ class AttitudePilot:
     @property
     def climb_m_s(self) -> float:
         """Climb rate reported by the autopilot; 0 when it is not reported."""
-        air = self._vehicle.latest(telemetry.AirData)
+        air = self._link.latest(AirData)
         return 0.0 if air is None else air.climb_m_s
 
     async def prepare(self, altitude_m: float, airspeed_m_s: float | None) -> None:
@@ -109,20 +119,18 @@ class AttitudePilot:
             altitude_m: height above the ground at the start.
             airspeed_m_s: equivalent airspeed; None: the autopilot's default.
         """
-        vehicle = self._vehicle
-        limits = await vehicle.limits()
+        limits = await self._parameters.limits()
         trim_m_s = getattr(limits, "airspeed_trim_m_s", math.nan)
         self._altitude_m = altitude_m
         self._airspeed_m_s = trim_m_s if airspeed_m_s is None else airspeed_m_s
-        if not vehicle.adapter.roll_alone:
-            self._energy = EnergyController(await _energy_parameters(vehicle))
+        if not self._link.firmware.roll_alone:
+            self._energy = EnergyController(await _energy_parameters(self._parameters))
 
     async def begin(self) -> None:
         """Send altitude and airspeed to an autopilot that holds them itself and is in its guided mode."""
-        vehicle = self._vehicle
-        if vehicle.adapter.roll_alone:
-            await vehicle.change_altitude(self._altitude_m)
-            await vehicle.change_airspeed(self._airspeed_m_s)
+        if self._link.firmware.roll_alone:
+            await self._adapter.change_altitude(self._altitude_m)
+            await self._adapter.change_airspeed(self._airspeed_m_s)
 
     def hold(self, *, altitude_m: float | None = None, airspeed_m_s: float | None = None) -> None:
         """Change the altitude or the airspeed of the mission's loop (PX4)."""
@@ -133,14 +141,14 @@ class AttitudePilot:
         """The attitude setpoint for a roll angle."""
         if self._energy is None:
             return AttitudeSetpoint(roll_rad=roll_rad)
-        air = self._vehicle.latest(telemetry.AirData)
-        attitude = self._vehicle.latest(telemetry.Attitude)
+        air = self._link.latest(AirData)
+        attitude = self._link.latest(Attitude)
         height_m = self.height_m
         if air is None or attitude is None or not math.isfinite(height_m):
             raise MissionError(
                 "the vehicle reports no airspeed, attitude or pressure (VFR_HUD, ATTITUDE, "
                 "SCALED_PRESSURE), so "
-                f"altitude can't be held; {self._vehicle.heard()}"
+                f"altitude can't be held; {self._link.last_received()}"
             )
         dt_s = _STEP_S if self._last_us < 0 else min(0.2, max(0.0, (time_us - self._last_us) * 1e-6))
         self._last_us = time_us
@@ -160,9 +168,9 @@ class AttitudePilot:
         )
 
 
-async def _energy_parameters(vehicle: "Vehicle") -> EnergyParameters:
+async def _energy_parameters(parameters: VehicleParameters) -> EnergyParameters:
     """Parameters of the energy loop, from PX4's parameters of this aircraft."""
-    get = vehicle.parameter_or
+    get = parameters.read_or
     least, most = await get("FW_THR_MIN", 0.0), await get("FW_THR_MAX", 1.0)
     trim = min(max(await get("FW_THR_TRIM", 0.5), least + 0.02), most - 0.02)
     pitch_trim = math.radians(await get("FW_PSP_OFF", 0.0))

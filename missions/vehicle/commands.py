@@ -5,52 +5,62 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
 from missions.errors import CommandRejected, VehicleTimeout
-from missions.vehicle.adapter import Mode
-from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection
-from missions.vehicle.link_view import VehicleView, describe_ack
+from missions.vehicle.connection import AUTOPILOT_COMPONENT
+from missions.vehicle.firmware import Mode, ModeCommand
+from missions.vehicle.link import VehicleLink, describe_ack
 
-_ACK_S: Final = 1.0
+ACK_S: Final = 1.0
 _SENDINGS: Final = 5
 _MODE_AGAIN_S: Final = 1.5
 HEARTBEAT_AGE_US: Final = 500_000
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
+_MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
-class VehicleCommands(VehicleView):
-    """The commanding half of a vehicle."""
+class VehicleCommands:
+    """The command protocol of one vehicle, its modes and its arming.
 
-    def __init__(self, connection: Connection, system_id: int | None = None) -> None:
-        super().__init__(connection, system_id)
+    Args:
+        link: messages of the vehicle.
+
+    Attributes:
+        link: as passed to the constructor.
+        modes_requested: custom modes that were requested since this set was cleared.
+    """
+
+    def __init__(self, link: VehicleLink) -> None:
+        self.link = link
+        self.modes_requested: set[int] = set()
         self._rates_hz: dict[str, float] = {}  # rates requested by this mission
-
-    _arming_us: int | None = None  # time at which arming was requested or accepted
+        self._arming_us: int | None = None  # time at which arming was requested or accepted
 
     # sending
-
-    def send(self, message: MAVLinkMessage) -> None:
-        """Send any message."""
-        self.connection.send(message)
 
     def send_command(self, command: int, *params: float) -> None:
         """Send a COMMAND_LONG once, without waiting for an answer."""
         values = (*params, *(0.0,) * (7 - len(params)))
-        self.send(
-            dialect.MAVLink_command_long_message(self.system_id, AUTOPILOT_COMPONENT, command, 0, *values)
+        self.link.send(
+            dialect.MAVLink_command_long_message(
+                self.link.system_id, AUTOPILOT_COMPONENT, command, 0, *values
+            )
         )
 
-    def _request_message(self, name: str) -> None:
+    def request_once(self, name: str) -> None:
+        """Request one message (REQUEST_MESSAGE) without waiting for it."""
         self.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, float(definition(name).message_id))
 
     async def request(self, name: str, timeout_s: float = 2.0) -> MAVLinkMessage:
         """Request one message (REQUEST_MESSAGE) and wait for it."""
-        with self.messages(name) as stream:
-            self._request_message(name)
+        with self.link.messages(name) as stream:
+            self.request_once(name)
             try:
-                async with self.deadline(timeout_s, name):
+                async with self.link.deadline(timeout_s, name):
                     return await anext(stream)
             except TimeoutError:
-                raise VehicleTimeout(f"no {name} within {timeout_s:g} s of asking; {self.heard()}") from None
+                raise VehicleTimeout(
+                    f"no {name} within {timeout_s:g} s of asking; {self.link.last_received()}"
+                ) from None
 
     async def set_message_rate(self, name: str, rate_hz: float) -> None:
         """Request a message at a rate; a vehicle that refuses keeps its present rate."""
@@ -60,7 +70,12 @@ class VehicleCommands(VehicleView):
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(definition(name).message_id), interval_us
         )
 
-    async def command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> None:
+    async def request_rates_again(self) -> None:
+        """Repeat the requests of message rates."""
+        for name, rate_hz in tuple(self._rates_hz.items()):
+            await self.set_message_rate(name, rate_hz)
+
+    async def command(self, command: int, *params: float, timeout_s: float = ACK_S) -> None:
         """Send a COMMAND_LONG repeatedly until it is answered.
 
         Raises:
@@ -70,20 +85,20 @@ class VehicleCommands(VehicleView):
         result = await self.try_command(command, *params, timeout_s=timeout_s)
         self.require(command, result)
 
-    async def try_command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> int:
+    async def try_command(self, command: int, *params: float, timeout_s: float = ACK_S) -> int:
         """As `command`, but returns the MAV_RESULT."""
         values = (*params, *(0.0,) * (7 - len(params)))
 
         def message(attempt: int) -> MAVLinkMessage:
             return dialect.MAVLink_command_long_message(
-                self.system_id, AUTOPILOT_COMPONENT, command, attempt, *values
+                self.link.system_id, AUTOPILOT_COMPONENT, command, attempt, *values
             )
 
         if command != dialect.MAV_CMD_COMPONENT_ARM_DISARM or not values[0]:
             return await self._send_command(command, message, timeout_s)
-        before_us, self._arming_us = self._arming_us, self.clock.time_us
+        before_us, self._arming_us = self._arming_us, self.link.clock.time_us
         result = await self._send_command(command, message, timeout_s)
-        self._arming_us = self.clock.time_us if result == _ACCEPTED else before_us
+        self._arming_us = self.link.clock.time_us if result == _ACCEPTED else before_us
         return result
 
     @property
@@ -92,11 +107,11 @@ class VehicleCommands(VehicleView):
 
         A heartbeat received within half a second of the request may have been sent before it.
         """
-        if self.armed:
+        if self.link.armed:
             return True
-        if self._arming_us is None or self._heard_us is None:
+        if self._arming_us is None or self.link.heartbeat_us is None:
             return False
-        return self._heard_us < self._arming_us + HEARTBEAT_AGE_US
+        return self.link.heartbeat_us < self._arming_us + HEARTBEAT_AGE_US
 
     async def command_int(
         self,
@@ -109,16 +124,16 @@ class VehicleCommands(VehicleView):
     ) -> None:
         """Send a COMMAND_INT repeatedly until it is answered; raises as `command`."""
         message = dialect.MAVLink_command_int_message(
-            self.system_id, AUTOPILOT_COMPONENT, frame, command, 0, 0, *params, x, y, z
+            self.link.system_id, AUTOPILOT_COMPONENT, frame, command, 0, 0, *params, x, y, z
         )
-        self.require(command, await self._send_command(command, lambda _attempt: message, _ACK_S))
+        self.require(command, await self._send_command(command, lambda _attempt: message, ACK_S))
 
     async def _send_command(
         self, command: int, message: Callable[[int], MAVLinkMessage], timeout_s: float
     ) -> int:
-        with self.messages("COMMAND_ACK") as acks:
+        with self.link.messages("COMMAND_ACK") as acks:
             for attempt in range(_SENDINGS):
-                self.send(message(attempt))
+                self.link.send(message(attempt))
                 wait_s = timeout_s
                 try:
                     while True:
@@ -129,21 +144,23 @@ class VehicleCommands(VehicleView):
                 except TimeoutError:
                     continue
         raise VehicleTimeout(
-            f"no answer to {command_name(command)} after {_SENDINGS} attempts; {self.heard()}"
+            f"no answer to {command_name(command)} after {_SENDINGS} attempts; {self.link.last_received()}"
         )
 
     async def _next_ack(self, acks: Any, command: int, timeout_s: float) -> Any:
-        async with self.deadline(timeout_s, f"the answer to {command_name(command)}"):
+        async with self.link.deadline(timeout_s, f"the answer to {command_name(command)}"):
             while True:
                 ack = await anext(acks)
-                if ack.command == command and self.addressed_here(ack):
+                if ack.command == command and self.link.addressed_here(ack):
                     return ack
 
     def require(self, command: int, result: int) -> None:
         """Raise CommandRejected unless a command's result is ACCEPTED."""
         if result != _ACCEPTED:
             ack = dialect.MAVLink_command_ack_message(command, result)
-            raise CommandRejected(f"the vehicle refused {describe_ack(ack)}; {self.heard()}", result)
+            raise CommandRejected(
+                f"the vehicle refused {describe_ack(ack)}; {self.link.last_received()}", result
+            )
 
     # modes and arming
 
@@ -154,19 +171,19 @@ class VehicleCommands(VehicleView):
         After a refusal it tries again until the deadline, because some causes are temporary (a mission that
         was just uploaded, an estimator that settles).
         """
-        target = self.adapter.modes[mode]
-        asked = self.adapter.mode_command(mode)
-        self._modes_asked.add(target)
+        target = self.link.firmware.modes[mode]
+        command = self.link.firmware.mode_command(mode)
+        self.modes_requested.add(target)
         refused: Any = None
-        with self.messages("COMMAND_ACK", "HEARTBEAT") as replies:
+        with self.link.messages("COMMAND_ACK", "HEARTBEAT") as replies:
             try:
-                async with self.deadline(timeout_s, f"mode {mode}"):
+                async with self.link.deadline(timeout_s, f"mode {mode}"):
                     while True:
-                        self._send_mode(asked.main, asked.sub)
-                        sent_us = self.clock.time_us
+                        self._send_mode(command)
+                        sent_us = self.link.clock.time_us
                         refused = None
                         while True:
-                            left_s = _MODE_AGAIN_S - (self.clock.time_us - sent_us) * 1e-6
+                            left_s = _MODE_AGAIN_S - (self.link.clock.time_us - sent_us) * 1e-6
                             reply = await self._next_within(replies, left_s)
                             if reply is None:
                                 break
@@ -179,33 +196,35 @@ class VehicleCommands(VehicleView):
                 pass
         if refused is not None:
             raise CommandRejected(
-                f"the vehicle refused mode {mode}: {describe_ack(refused)}; {self.heard()}",
+                f"the vehicle refused mode {mode}: {describe_ack(refused)}; {self.link.last_received()}",
                 int(refused.result),
             )
-        raise VehicleTimeout(f"mode {mode} was not entered within {timeout_s:g} s; {self.heard()}")
+        raise VehicleTimeout(
+            f"mode {mode} was not entered within {timeout_s:g} s; {self.link.last_received()}"
+        )
 
     async def _next_within(self, replies: Any, seconds: float) -> Any:
         if seconds <= 0.0:
             return None
         try:
-            async with self.clock.timeout(seconds):
+            async with self.link.clock.timeout(seconds):
                 return await anext(replies)
         except TimeoutError:
             return None
 
-    def _send_mode(self, main: float, sub: float) -> None:
+    def _send_mode(self, command: ModeCommand) -> None:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (
-            dialect.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
+            dialect.MAV_MODE_FLAG_SAFETY_ARMED if self.link.armed else 0
         )
-        self.send(
+        self.link.send(
             dialect.MAVLink_command_long_message(
-                self.system_id,
+                self.link.system_id,
                 AUTOPILOT_COMPONENT,
                 dialect.MAV_CMD_DO_SET_MODE,
                 0,
                 float(base),
-                main,
-                sub,
+                command.main,
+                command.sub,
                 0.0,
                 0.0,
                 0.0,
@@ -213,8 +232,17 @@ class VehicleCommands(VehicleView):
             )
         )
 
-    async def wait_disarmed(self, timeout_s: float = 300.0) -> None:
-        """Wait until the vehicle is disarmed."""
-        await self.wait_until(
-            lambda: not self.armed, what="disarmed heartbeat", on=("HEARTBEAT",), timeout_s=timeout_s
-        )
+    async def arm(self, timeout_s: float = 15.0) -> None:
+        """Arm in the present mode and wait for it in a heartbeat; after a temporary refusal it tries again
+        until the deadline.
+        """
+        link = self.link
+        end_us = link.clock.time_us + round(timeout_s * 1e6)
+        while not link.armed:
+            result = await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+            if result == _ACCEPTED:
+                break
+            if result not in _MAY_PASS or link.clock.time_us >= end_us:
+                self.require(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
+            await link.clock.sleep(1.0)
+        await link.wait_until(lambda: link.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=5.0)

@@ -2,25 +2,22 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from missions.errors import MissionError, PlanError
-from missions.vehicle.adapter import Mode
-from missions.vehicle.attitude_setpoint import AttitudeSetpoint
-from missions.vehicle.setpoint import Setpoint, Vector
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.errors import MissionError, PlanError, VehicleTimeout
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.firmware import Mode
+from missions.vehicle.setpoint import AnySetpoint, Setpoint, Vector
+from missions.vehicle.telemetry import LocalPosition, Position
 
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
-
-AnySetpoint = Setpoint | AttitudeSetpoint
 SetpointSource = Callable[[float], AnySetpoint | None]
 """Vehicle seconds since the start -> setpoint NED from home (or an attitude), or None at the end."""
 
 _BEFORE_ENTRY_S: Final = 0.6
 _SLOWEST_HZ: Final = 2.5
-_LEAD: Final = (
-    0.5  # of a period: a setpoint is valid until the next one, so it is computed for the middle of that time
-)
+# of a period: a setpoint is valid until the next one, so it is computed for the middle of that time
+_LEAD: Final = 0.5
 
 
 class GuidedSession:
@@ -30,12 +27,13 @@ class GuidedSession:
     vehicle is still in the guided mode, the source continues from there.
     """
 
-    def __init__(self, vehicle: "Vehicle", rate_hz: float, home_offset_ned_m: Vector) -> None:
+    def __init__(self, commands: VehicleCommands, rate_hz: float, home_offset_ned_m: Vector) -> None:
         if not _SLOWEST_HZ <= rate_hz <= 200.0:
             raise MissionError(
                 f"a setpoint rate of {rate_hz:g} Hz does not keep a vehicle guided: {_SLOWEST_HZ:g}..200"
             )
-        self._vehicle = vehicle
+        self._commands = commands
+        self._link = commands.link
         self._period_us = round(1e6 / rate_hz)
         self._offset = home_offset_ned_m
         self._source: SetpointSource | None = None
@@ -59,7 +57,7 @@ class GuidedSession:
             self._last = first
             await self._enter()
         self._done.clear()
-        self._start_us = self._vehicle.clock.time_us + self._period_us
+        self._start_us = self._link.clock.time_us + self._period_us
         self._source = source
         assert self._task is not None
         await self._until_done(self._task)
@@ -69,7 +67,7 @@ class GuidedSession:
         gap.
         """
         if self._entered:
-            await self._vehicle.set_mode(Mode.HOLD)
+            await self._commands.set_mode(Mode.HOLD)
 
     async def stop(self) -> None:
         """Stop streaming."""
@@ -79,20 +77,20 @@ class GuidedSession:
             self._task = None
 
     async def _enter(self) -> None:
-        vehicle = self._vehicle
-        if not vehicle.adapter.setpoints_before_guided:
-            await vehicle.set_mode(Mode.GUIDED)
+        firmware = self._link.firmware
+        if not firmware.setpoints_before_guided:
+            await self._commands.set_mode(Mode.GUIDED)
         self._task = asyncio.get_running_loop().create_task(self._stream())
-        if vehicle.adapter.setpoints_before_guided:
-            await vehicle.clock.sleep(_BEFORE_ENTRY_S)
-            await vehicle.set_mode(Mode.GUIDED)
+        if firmware.setpoints_before_guided:
+            await self._link.clock.sleep(_BEFORE_ENTRY_S)
+            await self._commands.set_mode(Mode.GUIDED)
         self._entered = True
 
     async def _stream(self) -> None:
-        vehicle, clock = self._vehicle, self._vehicle.clock
+        link, clock = self._link, self._link.clock
         due_us = clock.time_us
         while True:
-            if vehicle.link_quiet:  # the vehicle's position is not known: hold the setpoint
+            if link.quiet:  # the vehicle's position is not known: hold the setpoint
                 self._start_us += self._period_us
                 self._last = _held(self._last)
             elif self._source is not None:
@@ -104,7 +102,7 @@ class GuidedSession:
                 else:
                     self._last = setpoint
             if self._last is not None:
-                vehicle.send(self._last.message(due_us, vehicle.system_id, self._offset))
+                link.send(self._last.message(due_us, link.system_id, self._offset))
             due_us += self._period_us
             # too late: continue from the present time, without a burst
             if due_us < clock.time_us - self._period_us:
@@ -112,31 +110,78 @@ class GuidedSession:
             await clock.sleep_until(due_us)
 
     async def _until_done(self, stream: asyncio.Task[None]) -> None:
-        target = self._vehicle.adapter.modes[Mode.GUIDED]
+        target = self._link.firmware.modes[Mode.GUIDED]
         left = asyncio.get_running_loop().create_future()
 
         def look(_frame: object) -> None:
-            if self._vehicle.link_just_back:
+            if self._link.just_back:
                 return  # PX4 returns to OFFBOARD by itself when setpoints are received again
-            if not left.done() and self._vehicle.custom_mode != target:
-                left.set_result(self._vehicle.mode)
+            if not left.done() and self._link.custom_mode != target:
+                left.set_result(self._link.mode)
 
-        stop = self._vehicle.connection.listen("HEARTBEAT", look)
+        stop = self._link.connection.listen("HEARTBEAT", look)
         done = asyncio.ensure_future(self._done.wait())
         try:
-            async with self._vehicle.link_guard("the end of the setpoints"):
+            async with self._link.guard("the end of the setpoints"):
                 await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
             if stream.done():
                 await stream  # raises the error that ended it
             if left.done() and not done.done():
                 raise MissionError(
-                    f"the vehicle left the guided mode for {left.result()}; {self._vehicle.heard()}"
+                    f"the vehicle left the guided mode for {left.result()}; {self._link.last_received()}"
                 )
         finally:
             stop()
             done.cancel()
             left.cancel()
             self._source = None
+
+
+class LocalOrigin:
+    """The origin of the autopilot's local frame (LOCAL_POSITION_NED, local setpoints).
+
+    Args:
+        commands: commands to the vehicle.
+    """
+
+    def __init__(self, commands: VehicleCommands) -> None:
+        self._commands = commands
+        self._link = commands.link
+        self._origin: GeodeticPosition | None = None
+
+    async def find(self) -> GeodeticPosition:
+        """The origin, from GPS_GLOBAL_ORIGIN or, when a vehicle doesn't report that, from positions in both
+        frames.
+        """
+        if self._origin is None:
+            try:
+                m = await self._commands.request("GPS_GLOBAL_ORIGIN", 1.5)
+                self._origin = GeodeticPosition(
+                    lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3
+                )
+            except VehicleTimeout:
+                self._origin = await self._from_positions()
+        return self._origin
+
+    async def _from_positions(self) -> GeodeticPosition:
+        def both() -> tuple[Position, LocalPosition] | None:
+            p, q = self._link.latest(Position), self._link.latest(LocalPosition)
+            return (p, q) if p and q and abs(p.time_us - q.time_us) <= 50_000 else None
+
+        p, q = await self._link.wait_until(
+            both,
+            what="global and local position of one moment",
+            on=("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),
+            timeout_s=5.0,
+        )
+        here = GeodeticPosition(lat_deg=p.lat_deg, lon_deg=p.lon_deg, alt_m=p.alt_m)
+        lat, lon, alt = LocalFrame(here).geodetic_from_ned(*(-value for value in q.pos_ned_m))
+        return GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+
+    async def home_ned_m(self) -> Vector:
+        """Home as a point of the autopilot's local frame."""
+        home = self._link.home
+        return LocalFrame(await self.find()).ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
 
 
 def _held(setpoint: AnySetpoint | None) -> AnySetpoint | None:

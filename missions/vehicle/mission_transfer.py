@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import command_name, dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_from_message, item_message
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
-
-if TYPE_CHECKING:
-    from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.link import VehicleLink
 
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
@@ -44,7 +42,7 @@ def _result_name(result: int) -> str:
 
 
 async def upload(
-    vehicle: "VehicleCommands",
+    link: VehicleLink,
     items: Sequence[MissionItem],
     mission_type: MissionType = MissionType.MISSION,
     *,
@@ -64,7 +62,7 @@ async def upload(
     """
     for sending in range(_SENDINGS):
         try:
-            await _send_plan(vehicle, items, mission_type, before)
+            await _send_plan(link, items, mission_type, before)
         except VehicleTimeout:
             if sending + 1 == _SENDINGS:
                 raise
@@ -73,20 +71,20 @@ async def upload(
 
 
 async def _send_plan(
-    vehicle: "VehicleCommands", items: Sequence[MissionItem], mission_type: MissionType, before: int
+    link: VehicleLink, items: Sequence[MissionItem], mission_type: MissionType, before: int
 ) -> None:
     what = _NAMES[mission_type]
     names = ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK")
     asked = -1
-    with vehicle.messages(*names) as replies:
-        count = dialect.MAVLink_mission_count_message(vehicle.system_id, 1, len(items), int(mission_type))
-        vehicle.send(count)
+    with link.messages(*names) as replies:
+        count = dialect.MAVLink_mission_count_message(link.system_id, 1, len(items), int(mission_type))
+        link.send(count)
         attempts = 0
         errors = 0
         while True:
             all_sent = asked + 1 >= len(items)
             try:
-                async with vehicle.deadline(
+                async with link.deadline(
                     _RETRY_S if asked < 0 or all_sent else _STUCK_S, f"a request for an item of the {what}"
                 ):
                     reply = await anext(replies)
@@ -95,14 +93,14 @@ async def _send_plan(
                 if attempts > _RETRIES or not (asked < 0 or all_sent):
                     raise VehicleTimeout(
                         f"the vehicle stopped asking for items of the {what} after {asked + 1} of "
-                        f"{len(items)}; {vehicle.heard()}"
+                        f"{len(items)}; {link.last_received()}"
                     ) from None
                 if asked < 0:
-                    vehicle.send(count)
+                    link.send(count)
                 else:  # the acknowledgement was lost: PX4 repeats it
-                    vehicle.send(_item_message(items[-1], len(items) - 1, vehicle.system_id, mission_type))
+                    link.send(_item_message(items[-1], len(items) - 1, link.system_id, mission_type))
                 continue
-            if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
+            if not link.addressed_here(reply) or reply.mission_type != mission_type:
                 continue
             if reply.get_type() == "MISSION_ACK":
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
@@ -113,13 +111,15 @@ async def _send_plan(
                     continue  # answers an item that was sent twice: the transfer stays open (ArduPilot)
                 if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
                     # "no transfer": it has ended, and the message with its result was lost
-                    raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
+                    raise VehicleTimeout(
+                        f"how the vehicle took the {what} is not known; {link.last_received()}"
+                    )
                 if reply.type in _GIVEN_UP and asked >= 0:
                     # long silence: PX4 (after 5 s) reports the timeout at the next item, ArduPilot (after 8
                     # s) immediately
                     raise VehicleTimeout(
                         f"the vehicle gave the {what} up after {asked + 1} of {len(items)} items: "
-                        f"{_result_name(reply.type)}; {vehicle.heard()}"
+                        f"{_result_name(reply.type)}; {link.last_received()}"
                     )
                 errors += 1
                 if reply.type in _GIVEN_UP and asked < 0 and errors <= _ERRORS_BORNE:
@@ -128,78 +128,79 @@ async def _send_plan(
                 if asked >= 0:
                     where = f" at item {asked - before + 1} ({command_name(items[asked].command)})"
                 raise CommandRejected(
-                    f"the vehicle refused the {what}{where}: {_result_name(reply.type)}; {vehicle.heard()}",
+                    f"the vehicle refused the {what}{where}: {_result_name(reply.type)}; "
+                    f"{link.last_received()}",
                     reply.type,
                 )
             if reply.seq < len(items):
                 asked = max(asked, reply.seq)
-                vehicle.send(_item_message(items[reply.seq], reply.seq, vehicle.system_id, mission_type))
+                link.send(_item_message(items[reply.seq], reply.seq, link.system_id, mission_type))
 
 
 async def _ask(
-    vehicle: "VehicleCommands",
+    link: VehicleLink,
     message: Any,
     name: str,
     mission_type: MissionType,
     sequence: int | None = None,
 ) -> Any:
     """Send a request repeatedly until its answer is received."""
-    with vehicle.messages(name) as replies:
+    with link.messages(name) as replies:
         for _ in range(_RETRIES):
-            vehicle.send(message)
+            link.send(message)
             try:
-                async with vehicle.deadline(_RETRY_S, name):
+                async with link.deadline(_RETRY_S, name):
                     async for reply in replies:
                         if (
-                            vehicle.addressed_here(reply)
+                            link.addressed_here(reply)
                             and reply.mission_type == mission_type
                             and (sequence is None or reply.seq == sequence)
                         ):
                             return reply
             except TimeoutError:
                 continue
-    raise VehicleTimeout(f"no {name} came while downloading the {_NAMES[mission_type]}; {vehicle.heard()}")
+    raise VehicleTimeout(
+        f"no {name} came while downloading the {_NAMES[mission_type]}; {link.last_received()}"
+    )
 
 
-async def _ask_count(vehicle: "VehicleCommands", mission_type: MissionType) -> int:
-    message = dialect.MAVLink_mission_request_list_message(vehicle.system_id, 1, int(mission_type))
-    return int((await _ask(vehicle, message, "MISSION_COUNT", mission_type)).count)
+async def _ask_count(link: VehicleLink, mission_type: MissionType) -> int:
+    message = dialect.MAVLink_mission_request_list_message(link.system_id, 1, int(mission_type))
+    return int((await _ask(link, message, "MISSION_COUNT", mission_type)).count)
 
 
-def _end_download(vehicle: "VehicleCommands", mission_type: MissionType) -> None:
-    vehicle.send(
+def _end_download(link: VehicleLink, mission_type: MissionType) -> None:
+    link.send(
         dialect.MAVLink_mission_ack_message(
-            vehicle.system_id, 1, dialect.MAV_MISSION_ACCEPTED, int(mission_type)
+            link.system_id, 1, dialect.MAV_MISSION_ACCEPTED, int(mission_type)
         )
     )
 
 
-async def download(
-    vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION
-) -> list[MissionItem]:
+async def download(link: VehicleLink, mission_type: MissionType = MissionType.MISSION) -> list[MissionItem]:
     """Download the whole plan from the vehicle, in the vehicle's numbering."""
     items = []
-    for k in range(await _ask_count(vehicle, mission_type)):
-        request = dialect.MAVLink_mission_request_int_message(vehicle.system_id, 1, k, int(mission_type))
-        items.append(item_from_message(await _ask(vehicle, request, "MISSION_ITEM_INT", mission_type, k)))
-    _end_download(vehicle, mission_type)
+    for k in range(await _ask_count(link, mission_type)):
+        request = dialect.MAVLink_mission_request_int_message(link.system_id, 1, k, int(mission_type))
+        items.append(item_from_message(await _ask(link, request, "MISSION_ITEM_INT", mission_type, k)))
+    _end_download(link, mission_type)
     return items
 
 
-async def clear(vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION) -> None:
+async def clear(link: VehicleLink, mission_type: MissionType = MissionType.MISSION) -> None:
     """Delete the plan that the vehicle holds, and verify that it is deleted.
 
     An acknowledgement does not state which request it answers: one of an earlier upload may arrive late.
     """
     what = _NAMES[mission_type]
     errors = 0
-    with vehicle.messages("MISSION_ACK") as replies:
+    with link.messages("MISSION_ACK") as replies:
         for _ in range(_RETRIES):
-            vehicle.send(dialect.MAVLink_mission_clear_all_message(vehicle.system_id, 1, int(mission_type)))
+            link.send(dialect.MAVLink_mission_clear_all_message(link.system_id, 1, int(mission_type)))
             try:
-                async with vehicle.deadline(_RETRY_S, f"the clearing of the {what}"):
+                async with link.deadline(_RETRY_S, f"the clearing of the {what}"):
                     async for reply in replies:
-                        if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
+                        if not link.addressed_here(reply) or reply.mission_type != mission_type:
                             continue
                         if reply.type == dialect.MAV_MISSION_ACCEPTED:
                             break
@@ -211,8 +212,8 @@ async def clear(vehicle: "VehicleCommands", mission_type: MissionType = MissionT
                             )
             except TimeoutError:
                 continue
-            left = await _ask_count(vehicle, mission_type)
-            _end_download(vehicle, mission_type)
+            left = await _ask_count(link, mission_type)
+            _end_download(link, mission_type)
             if left == 0:
                 return
-    raise VehicleTimeout(f"clearing the {what} was not answered; {vehicle.heard()}")
+    raise VehicleTimeout(f"clearing the {what} was not answered; {link.last_received()}")

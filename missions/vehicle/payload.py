@@ -6,14 +6,12 @@ messages are used as they arrive; only requested messages are sent.
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import decode, dialect
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.errors import VehicleTimeout
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.link import VehicleLink
 
 CAMERA_COMPONENT: Final = 100
 GIMBAL_COMPONENT: Final = 154
@@ -30,11 +28,11 @@ class Payload:
     """The payload components of one vehicle.
 
     Args:
-        vehicle: the vehicle that carries them.
+        link: messages of the vehicle that carries them.
     """
 
-    def __init__(self, vehicle: "Vehicle") -> None:
-        self._vehicle = vehicle
+    def __init__(self, link: VehicleLink) -> None:
+        self._link = link
         self._control_since_us: int | None = None  # time at which control of the gimbal was requested
 
     # receiving
@@ -68,7 +66,7 @@ class Payload:
         convert: Callable[[Any], Any],
         listener: Callable[[Any], None],
     ) -> Callable[[], None]:
-        system_id = self._vehicle.system_id
+        system_id = self._link.system_id
 
         def look(frame: Any) -> None:
             if frame.system_id == system_id and frame.component_id == component_id:
@@ -76,7 +74,7 @@ class Payload:
                 if value is not None:
                     listener(value)
 
-        return self._vehicle.connection.listen(name, look)
+        return self._link.connection.listen(name, look)
 
     async def require(self, *components: int, timeout_s: float = 5.0) -> None:
         """Wait until a message of each of these components was received.
@@ -84,7 +82,7 @@ class Payload:
         Raises:
             VehicleTimeout: a component was not received; the message names it.
         """
-        vehicle = self._vehicle
+        link = self._link
         names = {
             CAMERA_COMPONENT: "camera",
             GIMBAL_COMPONENT: "gimbal",
@@ -95,11 +93,11 @@ class Payload:
             return [
                 f"{names.get(c, 'component')} ({c})"
                 for c in components
-                if vehicle.connection.latest("HEARTBEAT", vehicle.system_id, c) is None
+                if link.connection.latest("HEARTBEAT", link.system_id, c) is None
             ]
 
         try:
-            await vehicle.wait_until(
+            await link.wait_until(
                 lambda: not missing(), what="payload", on=("HEARTBEAT",), timeout_s=timeout_s
             )
         except VehicleTimeout:
@@ -113,8 +111,8 @@ class Payload:
         """(lowest pitch, highest pitch, leftmost yaw, rightmost yaw) relative to the vehicle, reported by the
         gimbal manager; None before it was received (`request_gimbal_information`).
         """
-        vehicle = self._vehicle
-        m = vehicle.connection.latest("GIMBAL_MANAGER_INFORMATION", vehicle.system_id, GIMBAL_COMPONENT)
+        link = self._link
+        m = link.connection.latest("GIMBAL_MANAGER_INFORMATION", link.system_id, GIMBAL_COMPONENT)
         return None if m is None else (m.pitch_min, m.pitch_max, m.yaw_min, m.yaw_max)
 
     async def request_gimbal_information(self, timeout_s: float = 3.0) -> tuple[float, float, float, float]:
@@ -123,11 +121,11 @@ class Payload:
         Raises:
             VehicleTimeout: the gimbal manager does not report it.
         """
-        vehicle = self._vehicle
+        link = self._link
         self._command(
             dialect.MAV_CMD_REQUEST_MESSAGE, float(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
         )
-        return await vehicle.wait_until(
+        return await link.wait_until(
             self.gimbal_range_rad,
             what="range of the gimbal",
             on=("GIMBAL_MANAGER_INFORMATION",),
@@ -136,8 +134,8 @@ class Payload:
 
     def take_gimbal_control(self) -> None:
         """Request the primary control of the gimbal."""
-        connection = self._vehicle.connection
-        self._control_since_us = self._vehicle.clock.time_us
+        connection = self._link.connection
+        self._control_since_us = self._link.clock.time_us
         self._command(
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
             float(connection.system_id),
@@ -153,20 +151,20 @@ class Payload:
         From GIMBAL_MANAGER_STATUS. While another component has the control, the gimbal ignores this mission's
         commands.
         """
-        vehicle = self._vehicle
-        m = vehicle.connection.latest("GIMBAL_MANAGER_STATUS", vehicle.system_id, GIMBAL_COMPONENT)
+        link = self._link
+        m = link.connection.latest("GIMBAL_MANAGER_STATUS", link.system_id, GIMBAL_COMPONENT)
         if m is None or not m.primary_control_sysid:
             return None
         other = (int(m.primary_control_sysid), int(m.primary_control_compid))
-        return None if other == (vehicle.connection.system_id, vehicle.connection.component_id) else other
+        return None if other == (link.connection.system_id, link.connection.component_id) else other
 
     def _warn_when_taken(self) -> None:
         since_us = self._control_since_us
-        if since_us is None or self._vehicle.clock.time_us - since_us < _CONTROL_TOLD_US:
+        if since_us is None or self._link.clock.time_us - since_us < _CONTROL_TOLD_US:
             return
         other = self.gimbal_taken_by()
         if other is not None:
-            self._vehicle.notes.warn(
+            self._link.notes.warn(
                 f"the gimbal is controlled by system {other[0]}, component {other[1]}: it takes no notice of "
                 "this mission's pointing"
             )
@@ -196,10 +194,10 @@ class Payload:
 
     def point_gimbal_at(self, lat_deg: float, lon_deg: float, alt_m: float) -> None:
         """Command the gimbal to point at a place continuously (region of interest)."""
-        vehicle = self._vehicle
-        vehicle.send(
+        link = self._link
+        link.send(
             dialect.MAVLink_command_int_message(
-                vehicle.system_id,
+                link.system_id,
                 GIMBAL_COMPONENT,
                 dialect.MAV_FRAME_GLOBAL,
                 dialect.MAV_CMD_DO_SET_ROI_LOCATION,
@@ -216,17 +214,15 @@ class Payload:
         )
 
     def _set_pitchyaw(self, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float) -> None:
-        vehicle = self._vehicle
+        link = self._link
         self._warn_when_taken()
-        vehicle.send(
+        link.send(
             dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
-                vehicle.system_id, GIMBAL_COMPONENT, _IN_VEHICLE_FRAME, 0, pitch, yaw, pitch_rate, yaw_rate
+                link.system_id, GIMBAL_COMPONENT, _IN_VEHICLE_FRAME, 0, pitch, yaw, pitch_rate, yaw_rate
             )
         )
 
     def _command(self, command: int, *params: float) -> None:
-        vehicle = self._vehicle
+        link = self._link
         values = (*params, *(0.0,) * (7 - len(params)))
-        vehicle.send(
-            dialect.MAVLink_command_long_message(vehicle.system_id, GIMBAL_COMPONENT, command, 0, *values)
-        )
+        link.send(dialect.MAVLink_command_long_message(link.system_id, GIMBAL_COMPONENT, command, 0, *values))

@@ -1,149 +1,91 @@
-"""The interface of missions to PX4 (v1.16 behaviour)."""
+"""The actions of PX4 (v1.16 behaviour), for multicopters and fixed wings."""
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.planning.limits import Limits, MulticopterLimits
-from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
+from missions.vehicle.adapter import missing_basics
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.firmware import Mode
+from missions.vehicle.parameters import VehicleParameters
 
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
-
-_AUTO: Final = 4
 _HERE: Final = 0x7FFFFFFF
-_SUB_MODES: Final = {Mode.TAKEOFF: 2, Mode.HOLD: 3, Mode.MISSION: 4, Mode.RETURN: 5, Mode.LAND: 6}
-_NAMES: Final = {
-    (1, 0): "Manual",
-    (2, 0): "Altitude",
-    (3, 0): "Position",
-    (3, 1): "Orbit",
-    (3, 2): "Position Slow",
-    (4, 2): "Takeoff",
-    (4, 3): "Hold",
-    (4, 4): "Mission",
-    (4, 5): "Return",
-    (4, 6): "Land",
-    (4, 8): "Follow",
-    (4, 9): "Precision Land",
-    (5, 0): "Acro",
-    (6, 0): "Offboard",
-    (7, 0): "Stabilized",
-    (10, 0): "Termination",
-}
-
-
-def _custom_mode(mode: Mode) -> int:
-    if mode is Mode.GUIDED:
-        return 6 << 16
-    if mode is Mode.POSITION:
-        return 3 << 16
-    return _AUTO << 16 | _SUB_MODES[mode] << 24
 
 
 class Px4:
-    """PX4: OFFBOARD needs setpoints before entry and continuously; mode commands are acknowledged twice."""
+    """PX4: it streams by default, takes off by NAV_TAKEOFF, and circles by DO_ORBIT.
 
-    name = "px4"
-    kind = VehicleKind.MULTICOPTER
-    modes: Mapping[Mode, int] = MappingProxyType({mode: _custom_mode(mode) for mode in Mode})
-    stream_rates_hz: Mapping[str, float] = MappingProxyType(
-        {
-            "GLOBAL_POSITION_INT": 10.0,
-            "LOCAL_POSITION_NED": 10.0,
-            "ATTITUDE": 20.0,
-            "ATTITUDE_TARGET": 10.0,
-            "SYS_STATUS": 2.0,
-            "EXTENDED_SYS_STATE": 5.0,
-            "GPS_RAW_INT": 2.0,
-            "MISSION_CURRENT": 1.0,
-        }
-    )
-    bytewise_parameters = True
-    setpoints_before_guided = True
-    first_mission_item_is_home = False
-    goto_mode = Mode.HOLD
-    resting_mode = Mode.HOLD
-    unset = math.nan
-    roll_alone = False
-    limiting_parameters: Mapping[str, float] = MappingProxyType({"MPC_XY_VEL_MAX": 12.0, "MPC_ACC_HOR": 3.0})
+    Args:
+        commands: commands to the vehicle.
+        parameters: its parameters.
+    """
 
-    def mode_name(self, custom_mode: int) -> str:
-        main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
-        return _NAMES.get((main, sub), f"mode {main}.{sub}")
+    def __init__(self, commands: VehicleCommands, parameters: VehicleParameters) -> None:
+        self._link = commands.link
+        self._commands = commands
+        self._parameters = parameters
 
-    def mode_command(self, mode: Mode) -> ModeCommand:
-        if mode is Mode.GUIDED:
-            return ModeCommand(main=6)
-        if mode is Mode.POSITION:
-            return ModeCommand(main=3)
-        return ModeCommand(main=_AUTO, sub=_SUB_MODES[mode])
+    def readiness(self) -> list[str]:
+        return missing_basics(self._link)
 
-    def readiness(self, vehicle: "Vehicle") -> list[str]:
-        return missing_basics(vehicle)
+    async def prepare_arming(self) -> None:
+        modes = self._link.firmware.modes
+        if self._link.custom_mode not in (modes[Mode.HOLD], modes[Mode.MISSION]):
+            await self._commands.set_mode(Mode.HOLD)
 
-    async def prepare_arming(self, vehicle: "Vehicle") -> None:
-        if vehicle.custom_mode not in (self.modes[Mode.HOLD], self.modes[Mode.MISSION]):
-            await vehicle.set_mode(Mode.HOLD)
-
-    async def take_off(self, vehicle: "Vehicle", altitude_m: float) -> None:
+    async def take_off(self, altitude_m: float) -> None:
         nan = math.nan
-        height_amsl = vehicle.home.alt_m + altitude_m
-        await vehicle.command(dialect.MAV_CMD_NAV_TAKEOFF, -1.0, nan, nan, nan, nan, nan, height_amsl)
+        height_amsl = self._link.home.alt_m + altitude_m
+        await self._commands.command(dialect.MAV_CMD_NAV_TAKEOFF, -1.0, nan, nan, nan, nan, nan, height_amsl)
 
-    async def start_streams(self, vehicle: "Vehicle") -> None:
+    async def start_streams(self) -> None:
         """Request only the messages that are missing in the link's set, because PX4 streams by default."""
-        await vehicle.clock.sleep(1.2)
-        for name, rate_hz in self.stream_rates_hz.items():
-            if vehicle.message(name) is None:
-                await vehicle.set_message_rate(name, rate_hz)
+        await self._link.clock.sleep(1.2)
+        for name, rate_hz in self._link.firmware.stream_rates_hz.items():
+            if self._link.message(name) is None:
+                await self._commands.set_message_rate(name, rate_hz)
 
-    async def start_mission(self, vehicle: "Vehicle") -> None:
+    async def start_mission(self) -> None:
         # the uploaded mission becomes available shortly after its acknowledgement: set_mode tries again
-        await vehicle.set_mode(Mode.MISSION)
-        if not vehicle.armed:
-            await vehicle.arm()
+        await self._commands.set_mode(Mode.MISSION)
+        if not self._link.armed:
+            await self.prepare_arming()
+            await self._commands.arm()
 
-    def limits(self, parameters: Mapping[str, float]) -> Limits:
-        values = {**self.limiting_parameters, **parameters}
-        return MulticopterLimits(speed_m_s=values["MPC_XY_VEL_MAX"], acceleration_m_s2=values["MPC_ACC_HOR"])
+    async def acceptance_m(self, asked_m: float) -> float:
+        if self._link.kind is VehicleKind.MULTICOPTER:
+            return asked_m  # a waypoint's param2 is used
+        return max(asked_m, await self.own_acceptance_m())
 
-    async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
-        return asked_m  # a waypoint's param2 is used
+    async def own_acceptance_m(self) -> float:
+        return await self._parameters.read_or("NAV_ACC_RAD", 10.0)
 
-    async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
-        return await vehicle.parameter_or("NAV_ACC_RAD", 10.0)
-
-    async def loiter(
-        self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
-    ) -> None:
-        raise PlanError("a multicopter does not circle a place by itself: use goto, or an orbit of your own")
-
-    async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
+    async def change_altitude(self, altitude_m: float) -> None:
         # INT32_MAX as latitude and longitude means the present place
-        await vehicle.command_int(
+        await self._commands.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,
             (-1.0, 1.0, math.nan, math.nan),
             _HERE,
             _HERE,
-            vehicle.home.alt_m + altitude_m,
+            self._link.home.alt_m + altitude_m,
         )
 
-    async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
-        raise PlanError("a multicopter has no airspeed to hold: use set_speed")
-
-    def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
-        return MissionItem(
-            command=dialect.MAV_CMD_NAV_TAKEOFF,
-            param4=math.nan,
-            x=home.lat_deg,
-            y=home.lon_deg,
-            z=altitude_m,
+    async def loiter(self, place: GeodeticPosition, radius_m: float | None, clockwise: bool) -> None:
+        if radius_m is None:
+            radius_m = abs(await self._parameters.read_or("NAV_LOITER_RAD", 80.0))
+        # PX4 1.16.1 ignores the radius of DO_REPOSITION: it circles clockwise with NAV_LOITER_RAD.
+        # DO_ORBIT takes a signed radius, and an aircraft stays in Hold with it
+        await self._commands.command_int(
+            dialect.MAV_CMD_DO_ORBIT,
+            dialect.MAV_FRAME_GLOBAL,
+            (radius_m if clockwise else -radius_m, math.nan, 0.0, math.nan),
+            round(place.lat_deg * 1e7),
+            round(place.lon_deg * 1e7),
+            place.alt_m,
         )
+
+    async def change_airspeed(self, airspeed_m_s: float) -> None:
+        await self._commands.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, airspeed_m_s, -1.0)

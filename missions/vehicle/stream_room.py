@@ -6,25 +6,24 @@ also comes at a fifth of its rate. Instead, messages that are not needed are slo
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import DEFINITIONS
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.link import VehicleLink
 
 ENOUGH: Final = 0.8
 """Share of the requested rate that is sufficient."""
 SLOW_HZ: Final = 1.0
 """Rate that is requested for messages that are not needed: for the log, and for display."""
-_LOOKS: Final = 10
-_LOOK_S: Final = 0.2
+_CHECKS: Final = 10
+_CHECK_S: Final = 0.2
 _SLOWED_HZ: Final = 1.5
-_LEFT_ALONE: Final = frozenset({"HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "EVENT"})
+_UNCHANGED: Final = frozenset({"HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "EVENT"})
 """Messages whose rates are not requested, and answers."""
 
 
-async def make_room(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> list[str]:
+async def make_room(commands: VehicleCommands, needed_hz: Mapping[str, float]) -> list[str]:
     """Measure the message rates on a serial line. When a needed message is too slow, reduce the rates of all
     messages that are not needed, and request the needed ones at the needed rates.
 
@@ -37,42 +36,43 @@ async def make_room(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> list[
     Returns:
         The messages whose rates were reduced.
     """
-    if vehicle.connection.bytes_per_s is None:
+    link = commands.link
+    if link.connection.bytes_per_s is None:
         return []
-    heard, changed = await _listen(vehicle, needed_hz)
-    seconds = _LOOKS * _LOOK_S
-    if all(heard[name] >= ENOUGH * rate_hz * seconds for name, rate_hz in needed_hz.items()):
+    received, changed = await _count(link, needed_hz)
+    seconds = _CHECKS * _CHECK_S
+    if all(received[name] >= ENOUGH * rate_hz * seconds for name, rate_hz in needed_hz.items()):
         return []
     slowed = [
         name
         for name, times in changed.items()
-        if times > _SLOWED_HZ * seconds and name not in needed_hz and name not in _LEFT_ALONE
+        if times > _SLOWED_HZ * seconds and name not in needed_hz and name not in _UNCHANGED
     ]
     for name in slowed:
-        await vehicle.set_message_rate(name, SLOW_HZ)
+        await commands.set_message_rate(name, SLOW_HZ)
     for name, rate_hz in needed_hz.items():  # the autopilot's own set may have a higher rate for some
-        await vehicle.set_message_rate(name, rate_hz)
+        await commands.set_message_rate(name, rate_hz)
     return slowed
 
 
-async def _listen(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> tuple[Counter[str], Counter[str]]:
+async def _count(link: VehicleLink, needed_hz: Mapping[str, float]) -> tuple[Counter[str], Counter[str]]:
     """Count needed messages, and for each message in how many of ten checks it had changed."""
-    heard: Counter[str] = Counter()
+    received: Counter[str] = Counter()
     changed: Counter[str] = Counter()
 
     def counting(name: str) -> Callable[[Any], None]:
         def count(frame: Any) -> None:
-            if (frame.system_id, frame.component_id) == (vehicle.system_id, 1):
-                heard[name] += 1
+            if (frame.system_id, frame.component_id) == (link.system_id, 1):
+                received[name] += 1
 
         return count
 
-    stops = [vehicle.connection.listen(name, counting(name)) for name in needed_hz]
+    stops = [link.connection.listen(name, counting(name)) for name in needed_hz]
     try:
-        before = vehicle.connection.newest(vehicle.system_id)
-        for _ in range(_LOOKS):
-            await vehicle.clock.sleep(_LOOK_S)
-            now = vehicle.connection.newest(vehicle.system_id)
+        before = link.connection.newest(link.system_id)
+        for _ in range(_CHECKS):
+            await link.clock.sleep(_CHECK_S)
+            now = link.connection.newest(link.system_id)
             for number, frame in now.items():
                 if before.get(number) is not frame:
                     changed[DEFINITIONS[number].name] += 1
@@ -80,4 +80,4 @@ async def _listen(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> tuple[C
     finally:
         for stop in stops:
             stop()
-    return heard, changed
+    return received, changed

@@ -19,7 +19,7 @@ from autopilot_bridge.mavlink import definition, dialect
 from missions.errors import MissionError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
-from missions.vehicle.link_view import ADAPTERS
+from missions.vehicle.firmware_records import FIRMWARES
 from missions.vehicle_client.addresses import mavsdk_url
 from missions.vehicle_client.listening import listen
 
@@ -118,9 +118,9 @@ class VehicleClient:
     def mode(self) -> str:
         """Flight mode, with the firmware's name."""
         custom_mode = int(self.messages.get("HEARTBEAT", {}).get("custom_mode", 0))
-        if self.kind is None or (self.flavour, self.kind) not in ADAPTERS:
+        if self.kind is None or (self.flavour, self.kind) not in FIRMWARES:
             return f"mode {custom_mode}"
-        return ADAPTERS[self.flavour, self.kind]().mode_name(custom_mode)
+        return FIRMWARES[self.flavour, self.kind].mode_name(custom_mode)
 
     def snapshot(
         self, parameters: Mapping[str, float] | None = None, fence_items: int | None = None

@@ -148,7 +148,7 @@ def test_a_crowd_of_components_is_forgotten_and_the_vehicle_is_not():
             connection.latest("ATTITUDE", 2 + k % 200, 1 + k // 200)
         assert len(connection._newest) == MAX_COMPONENTS
         assert len(connection._newest._decoded) <= MAX_COMPONENTS
-        assert vehicle.message("ATTITUDE").time_boot_ms == 7
+        assert vehicle.link.message("ATTITUDE").time_boot_ms == 7
         assert connection.latest("ATTITUDE", 2) is None
         assert connection.latest("ATTITUDE", 201, 3).time_boot_ms == 9
 

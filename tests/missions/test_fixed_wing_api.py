@@ -16,11 +16,11 @@ from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle import Mode, Vehicle
-from missions.vehicle.arduplane import ArduPlane
+from missions.vehicle.ardupilot import ArduPilot
 from missions.vehicle.connection import Connection
-from missions.vehicle.fixed_wing import Approach
-from missions.vehicle.px4_plane import Px4Plane
+from missions.vehicle.px4 import Px4
 from missions.vehicle.telemetry import AirData, Attitude, Position
+from missions.vehicle.wing import Approach
 from tests.slow import slow_after
 
 HEIGHT = 80.0
@@ -67,18 +67,18 @@ def test_an_aircraft_is_flown_by_circles_headings_and_an_approach(flavour):
         limits = await vehicle.limits()
         assert isinstance(limits, FixedWingLimits)
         assert limits.airspeed_trim_m_s == pytest.approx(25.0)
-        with pytest.raises(PlanError, match="use loiter"):
+        with pytest.raises(PlanError, match=r"use wing\.loiter"):
             await vehicle.goto(vehicle.home)
-        await vehicle.prepare_piloting()
+        await vehicle.wing.prepare_piloting()
         await vehicle.takeoff(HEIGHT)
-        assert vehicle.pilot.height_m == pytest.approx((await vehicle.position()).height_m, abs=4.0)
+        assert vehicle.wing.pilot.height_m == pytest.approx((await vehicle.position()).height_m, abs=4.0)
 
         # a circle to the left, 120 m around a place
         home = LocalFrame(vehicle.home)
         lat, lon, alt = home.geodetic_from_ned(300.0, 400.0, -HEIGHT)
         place = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
         around = LocalFrame(place)
-        await vehicle.loiter(place, radius_m=120.0, clockwise=False)
+        await vehicle.wing.loiter(place, radius_m=120.0, clockwise=False)
         await vehicle.clock.sleep(25.0)
 
         def offset():
@@ -93,7 +93,7 @@ def test_an_aircraft_is_flown_by_circles_headings_and_an_approach(flavour):
         assert bearing[-1] < bearing[0] - 1.0  # counter-clockwise seen from above
 
         # headings, through the air: within 5 degrees when settled, in wind
-        async with vehicle.heading_flight(altitude_m=HEIGHT + 15.0) as flight:
+        async with vehicle.wing.heading_flight(altitude_m=HEIGHT + 15.0) as flight:
             for heading in (0.0, 2.0, -2.5):
                 await flight.turn_to(heading, wait=True)
                 await vehicle.clock.sleep(6.0)
@@ -105,9 +105,9 @@ def test_an_aircraft_is_flown_by_circles_headings_and_an_approach(flavour):
             assert speed.mean() == pytest.approx(22.0, abs=0.8)
             height = await watch(vehicle, 5.0, lambda: vehicle.latest(Position).height_m)
             assert height.mean() == pytest.approx(HEIGHT + 15.0, abs=4.0)
-        assert vehicle.custom_mode == vehicle.adapter.modes[Mode.HOLD]
+        assert vehicle.link.custom_mode == vehicle.firmware.modes[Mode.HOLD]
 
-        await vehicle.land_along()
+        await vehicle.wing.land_along()
         p = vehicle.latest(Position)
         return home.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
 
@@ -143,12 +143,14 @@ def test_approaches_that_are_none_are_refused(values, words):
 
 
 class CommandRecorder:
-    """A vehicle of which an adapter needs no more than parameters and commands."""
+    """The commands and parameters of a vehicle, as far as a circle needs them."""
+
+    link = None
 
     def __init__(self):
         self.sent = []
 
-    async def parameter_or(self, name, default):
+    async def read_or(self, name, default):
         return {"NAV_LOITER_RAD": 70.0}.get(name, default)
 
     async def command_int(self, command, frame, params, x, y, z):
@@ -159,19 +161,19 @@ class CommandRecorder:
     ("adapter", "radius_m", "clockwise", "command", "given"),
     [
         # PX4 1.16.1 reads no radius in DO_REPOSITION; in DO_ORBIT its sign is the direction
-        (Px4Plane(), 120.0, True, dialect.MAV_CMD_DO_ORBIT, {0: 120.0}),
-        (Px4Plane(), 120.0, False, dialect.MAV_CMD_DO_ORBIT, {0: -120.0}),
-        (Px4Plane(), None, False, dialect.MAV_CMD_DO_ORBIT, {0: -70.0}),
+        (Px4, 120.0, True, dialect.MAV_CMD_DO_ORBIT, {0: 120.0}),
+        (Px4, 120.0, False, dialect.MAV_CMD_DO_ORBIT, {0: -120.0}),
+        (Px4, None, False, dialect.MAV_CMD_DO_ORBIT, {0: -70.0}),
         # ArduPlane 4.6.3 ignores a negative radius; the direction is param4
-        (ArduPlane(), 120.0, True, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 120.0, 3: 0.0}),
-        (ArduPlane(), 120.0, False, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 120.0, 3: 1.0}),
-        (ArduPlane(), None, False, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 0.0, 3: 1.0}),
+        (ArduPilot, 120.0, True, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 120.0, 3: 0.0}),
+        (ArduPilot, 120.0, False, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 120.0, 3: 1.0}),
+        (ArduPilot, None, False, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 0.0, 3: 1.0}),
     ],
 )
 def test_a_circle_is_commanded_by_what_the_firmware_obeys(adapter, radius_m, clockwise, command, given):
     vehicle = CommandRecorder()
     place = GeodeticPosition(lat_deg=47.0, lon_deg=8.0, alt_m=500.0)
-    asyncio.run(adapter.loiter(vehicle, place, radius_m, clockwise))
+    asyncio.run(adapter(vehicle, vehicle).loiter(place, radius_m, clockwise))
     [(sent, frame, params, x, y, z)] = vehicle.sent
     assert sent == command
     assert {k: params[k] for k in given} == given

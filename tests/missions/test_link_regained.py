@@ -11,7 +11,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import LinkClosed, MissionError
 from missions.vehicle import Setpoint
-from missions.vehicle.adapter import Mode
+from missions.vehicle.firmware import Mode
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
@@ -47,12 +47,12 @@ def leg_items(autopilot, *norths_m):
 @both
 def test_an_uploaded_mission_goes_on(flown, flavour):
     async def script(vehicle, autopilot):
-        vehicle.regain_s = 60.0
-        first = await vehicle.upload_mission(leg_items(autopilot, 100.0, 200.0, 300.0))
+        vehicle.link.regain_s = 60.0
+        first = await vehicle.plans.upload_mission(leg_items(autopilot, 100.0, 200.0, 300.0))
         await vehicle.start_mission()
-        await vehicle.wait_item_reached(first, 60.0)
+        await vehicle.plans.wait_item_reached(first, 60.0)
         cut(vehicle, autopilot, after_s=3.0, for_s=25.0)
-        await vehicle.wait_item_reached(first + 3, 300.0)
+        await vehicle.plans.wait_item_reached(first + 3, 300.0)
         return vehicle.notes
 
     notes = flown(script, flavour)
@@ -66,13 +66,13 @@ def test_an_uploaded_mission_goes_on(flown, flavour):
 @both
 def test_a_link_that_does_not_come_back_in_time_ends_the_mission(flown, flavour):
     async def script(vehicle, autopilot):
-        vehicle.regain_s = 20.0
+        vehicle.link.regain_s = 20.0
         await vehicle.takeoff(10.0)
         lost_us = autopilot.time_us + 3_000_000
         cut(vehicle, autopilot, after_s=3.0, for_s=500.0)
         with pytest.raises(LinkClosed, match=r"^link lost: no heartbeat for 3\d s while waiting for landing"):
-            await vehicle.wait_landed(900.0)
-        assert vehicle.link_lost
+            await vehicle.link.wait_landed(900.0)
+        assert vehicle.link.lost
         assert vehicle.notes.link_losses[-1].end_us is None
         return (autopilot.time_us - lost_us) * 1e-6
 
@@ -83,7 +83,7 @@ def test_setpoints_wait_where_they_were_and_go_on(flown):
     """The vehicle still hears us and stays guided; it is not led on while nobody sees where it is."""
 
     async def script(vehicle, autopilot):
-        vehicle.regain_s = 60.0
+        vehicle.link.regain_s = 60.0
         await vehicle.takeoff(10.0)
         asked = []
 
@@ -114,7 +114,7 @@ def test_setpoints_wait_where_they_were_and_go_on(flown):
 
 def test_setpoints_end_when_the_mode_is_no_longer_ours(flown):
     async def script(vehicle, autopilot):
-        vehicle.regain_s = 60.0
+        vehicle.link.regain_s = 60.0
         await vehicle.takeoff(10.0)
         cut(vehicle, autopilot, after_s=10.0, for_s=20.0)
         asyncio.get_running_loop().call_later(15.0, lambda: setattr(autopilot, "mode", 0x05040000))
@@ -132,15 +132,15 @@ def test_what_is_asked_in_the_silence_is_answered_after_it(flown, flavour, askin
     """A command is sent five times, a second apart, and nobody hears it for much longer."""
 
     async def script(vehicle, autopilot):
-        vehicle.regain_s = 60.0
+        vehicle.link.regain_s = 60.0
         await vehicle.takeoff(10.0)
         cut(vehicle, autopilot, after_s=0.0, for_s=25.0)
         await vehicle.clock.sleep(4.0)
         begun_us = autopilot.time_us
         if asking == "command":
-            await vehicle.set_message_rate("VFR_HUD", 10.0)
+            await vehicle.commands.set_message_rate("VFR_HUD", 10.0)
         elif asking == "mode":
-            await vehicle.set_mode(Mode.LAND)
+            await vehicle.commands.set_mode(Mode.LAND)
         else:
             await vehicle.parameter("MPC_XY_VEL_MAX" if flavour == "px4" else "WPNAV_SPEED")
         return (autopilot.time_us - begun_us) * 1e-6
@@ -150,13 +150,13 @@ def test_what_is_asked_in_the_silence_is_answered_after_it(flown, flavour, askin
 
 def test_streams_are_asked_for_again(flown):
     async def script(vehicle, autopilot):
-        vehicle.regain_s = 60.0
-        await vehicle.set_message_rate("VFR_HUD", 10.0)
+        vehicle.link.regain_s = 60.0
+        await vehicle.commands.set_message_rate("VFR_HUD", 10.0)
         cut(vehicle, autopilot, after_s=1.0, for_s=15.0)
         asyncio.get_running_loop().call_later(5.0, autopilot.streams.clear)
         asyncio.get_running_loop().call_later(15.5, lambda: autopilot.streams.update(HEARTBEAT=1.0))
         with pytest.raises(MissionError):
-            await vehicle.wait_until(lambda: False, what="nothing", on=("HEARTBEAT",), timeout_s=40.0)
+            await vehicle.link.wait_until(lambda: False, what="nothing", on=("HEARTBEAT",), timeout_s=40.0)
         return dict(autopilot.streams)
 
     assert math.isclose(flown(script, "ardupilot")["VFR_HUD"], 10.0)
@@ -168,6 +168,6 @@ def test_without_patience_nothing_changes(flown, flavour):
         await vehicle.takeoff(10.0)
         cut(vehicle, autopilot, after_s=3.0, for_s=25.0)
         with pytest.raises(LinkClosed):
-            await vehicle.wait_landed(60.0)
+            await vehicle.link.wait_landed(60.0)
 
     flown(script, flavour)

@@ -13,8 +13,8 @@ from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.limits_before_flight import adapted
 from missions.vehicle import Vehicle
-from missions.vehicle.adapter import Mode
 from missions.vehicle.connection import Connection
+from missions.vehicle.firmware import Mode
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
@@ -75,7 +75,7 @@ def test_a_vehicle_in_the_mode_of_its_last_mission_leaves_it_before_it_is_ready(
         autopilot.items, autopilot.current = [None] * 5, 4
         autopilot.unready_in_mission = True
         await vehicle.wait_ready(20.0)
-        assert vehicle.custom_mode == vehicle.adapter.modes[vehicle.adapter.resting_mode]
+        assert vehicle.link.custom_mode == vehicle.firmware.modes[vehicle.firmware.resting_mode]
         return autopilot.current
 
     assert flown(script, flavour, ready=False) == 0
@@ -84,9 +84,9 @@ def test_a_vehicle_in_the_mode_of_its_last_mission_leaves_it_before_it_is_ready(
 def test_one_that_only_observes_leaves_the_mode_alone(flown) -> None:
     async def script(vehicle, autopilot):
         await vehicle.wait_ready()
-        await vehicle.set_mode(Mode.MISSION)
+        await vehicle.commands.set_mode(Mode.MISSION)
         await vehicle.wait_ready(leave_mission=False)
-        assert vehicle.custom_mode == vehicle.adapter.modes[Mode.MISSION]
+        assert vehicle.link.custom_mode == vehicle.firmware.modes[Mode.MISSION]
 
     flown(script)
 
@@ -99,7 +99,7 @@ def test_an_uploaded_mission_begins_anew(flown, flavour) -> None:
         items = [
             MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=home.lat_deg, y=home.lon_deg, z=10.0)
         ] * 3
-        await vehicle.upload_mission(items)
+        await vehicle.plans.upload_mission(items)
         return autopilot.current, vehicle.notes.warnings
 
     assert flown(script, flavour) == (0, [])
@@ -120,7 +120,7 @@ def test_a_loop_that_never_waits_lets_time_go_on(flown) -> None:
 def test_a_full_queue_gives_other_tasks_a_turn(flown) -> None:
     async def script(vehicle, autopilot):
         over = asyncio.Event()
-        with vehicle.messages("COMMAND_ACK") as stream:
+        with vehicle.link.messages("COMMAND_ACK") as stream:
             autopilot.ack(400, 0)
             asyncio.get_running_loop().call_later(0.1, over.set)
             while not over.is_set():

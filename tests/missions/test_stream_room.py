@@ -54,9 +54,9 @@ def heard(flavour: str, *, told: bool, room: bool) -> tuple[list[str], Counter[s
             vehicle = Vehicle(connection)
             await vehicle.wait_ready()
             for name, rate_hz in NEEDED_HZ.items():
-                await vehicle.set_message_rate(name, rate_hz)
+                await vehicle.commands.set_message_rate(name, rate_hz)
             await vehicle.clock.sleep(3.0)
-            slowed = await make_room(vehicle, NEEDED_HZ) if room else []
+            slowed = await make_room(vehicle.commands, NEEDED_HZ) if room else []
             await vehicle.clock.sleep(3.0)
             line.counts.clear()
             await vehicle.clock.sleep(SECONDS)

@@ -122,9 +122,9 @@ def test_px4_first_mode_acknowledgement_is_not_believed(flown):
         await vehicle.takeoff(5.0)
         autopilot.refuse_modes.add("return")
         with pytest.raises(CommandRejected, match="refused mode return: DO_SET_MODE: TEMPORARILY_REJECTED"):
-            await vehicle.set_mode(Mode.RETURN, timeout_s=4.0)
+            await vehicle.commands.set_mode(Mode.RETURN, timeout_s=4.0)
         autopilot.refuse_modes.clear()
-        await vehicle.set_mode(Mode.RETURN)
+        await vehicle.commands.set_mode(Mode.RETURN)
         assert vehicle.mode == "Return"
 
     flown(script)
@@ -134,7 +134,7 @@ def test_px4_first_mode_acknowledgement_is_not_believed(flown):
 def test_follows_setpoints_from_home_whatever_the_local_origin(flown, flavour):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(10.0)
-        offset = await vehicle.home_in_local_frame()
+        offset = await vehicle.local_origin.home_ned_m()
         assert offset == pytest.approx((1.5, -2.0, 0.3), abs=0.03)
 
         def circle(t):
@@ -156,7 +156,7 @@ def test_follows_setpoints_from_home_whatever_the_local_origin(flown, flavour):
         gaps = [b - a for a, b in itertools.pairwise(times)]
         assert max(gaps) <= 60_000
         assert sum(gaps) / len(gaps) == pytest.approx(40_000, rel=0.02)
-        assert not any("Failsafe" in text.text for text in vehicle.status_texts)
+        assert not any("Failsafe" in text.text for text in vehicle.link.status_texts)
         assert autopilot.setpoints[-1][1].type_mask == 0x800
 
     flown(script, flavour)
@@ -183,23 +183,23 @@ def test_mission_upload_download_clear_and_flight(flown, flavour):
     async def script(vehicle, autopilot):
         home = vehicle.home
         points = [(home.lat_deg + 2e-4, home.lon_deg), (home.lat_deg + 2e-4, home.lon_deg + 3e-4)]
-        items = [vehicle.adapter.takeoff_item(home, 10.0)]
+        items = [vehicle.firmware.takeoff_item(home, 10.0)]
         items += [
             MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0, param2=2.0)
             for lat, lon in points
         ]
         items.append(MissionItem(command=dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2))
-        first = await vehicle.upload_mission(items)
+        first = await vehicle.plans.upload_mission(items)
         assert first == (1 if flavour == "ardupilot" else 0)
-        back = await vehicle.download_mission()
+        back = await vehicle.plans.download_mission()
         assert [item.command for item in back] == [22, 16, 16, 20]
         assert back[1].x == pytest.approx(points[0][0], abs=1e-7)
         seen = []
         await vehicle.start_mission()
-        await vehicle.wait_item_reached(first + 2, 120.0, seen.append)
+        await vehicle.plans.wait_item_reached(first + 2, 120.0, seen.append)
         assert max(seen) >= first + 2
-        await vehicle.wait_disarmed(120.0)
-        await vehicle.clear_mission()
+        await vehicle.link.wait_disarmed(120.0)
+        await vehicle.plans.clear_mission()
         assert autopilot.items == []
 
     flown(script, flavour)
@@ -209,7 +209,7 @@ def test_refused_mission_names_the_item(flown):
     async def script(vehicle, autopilot):
         items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=47.0, y=8.0, z=10.0)] * 4
         with pytest.raises(CommandRejected, match=r"at item 3 \(NAV_WAYPOINT\): UNSUPPORTED"):
-            await vehicle.upload_mission(items)
+            await vehicle.plans.upload_mission(items)
 
     def refuse(autopilot):
         autopilot.mission_result = 3
@@ -309,7 +309,7 @@ def test_a_refused_arming_leaves_nothing_in_doubt(flown):
         autopilot.arm_refusals = 1000
         with pytest.raises(CommandRejected):
             await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-        return vehicle.may_be_armed
+        return vehicle.commands.may_be_armed
 
     assert flown(script) is False
 
@@ -318,9 +318,9 @@ def test_a_disarmed_heartbeat_long_after_arming_is_believed(flown):
     async def script(vehicle, autopilot):
         await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         autopilot.armed = False
-        doubts = [vehicle.may_be_armed]
+        doubts = [vehicle.commands.may_be_armed]
         await asyncio.sleep(2.0)
-        return [*doubts, vehicle.may_be_armed]
+        return [*doubts, vehicle.commands.may_be_armed]
 
     assert flown(script) == [True, False]
 
@@ -361,7 +361,7 @@ def test_long_status_texts_are_joined(flown):
             chunk = text[k : k + 50].encode()
             autopilot.send(dialect.MAVLink_statustext_message(3, chunk, 7, k // 50))
         await asyncio.sleep(0.1)
-        assert vehicle.status_texts[-1].text == text
+        assert vehicle.link.status_texts[-1].text == text
 
     flown(script)
 
@@ -398,7 +398,7 @@ def test_numbers_that_are_none_make_no_telemetry(nothing):
 
 def test_an_attitude_that_is_none_is_passed_over_and_then_not_known(flown):
     async def script(vehicle, autopilot):
-        await vehicle.set_message_rate("ATTITUDE", 25.0)
+        await vehicle.commands.set_message_rate("ATTITUDE", 25.0)
         await vehicle.clock.sleep(1.0)
         before = vehicle.latest(Attitude)
         autopilot.yaw = math.nan

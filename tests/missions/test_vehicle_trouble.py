@@ -28,14 +28,14 @@ def later(seconds, action):
 
 WAITS = {
     "arrival": lambda v: v.goto_ned(5000.0, 0.0, -10.0),
-    "landing": lambda v: v.wait_landed(),
-    "disarmed heartbeat": lambda v: v.wait_disarmed(),
+    "landing": lambda v: v.link.wait_landed(),
+    "disarmed heartbeat": lambda v: v.link.wait_disarmed(),
     "the end of the setpoints": lambda v: v.follow(
         lambda t: Setpoint(position_ned_m=(0.0, 0.0, -10.0)) if t < 500.0 else None
     ),
-    "mission item 9": lambda v: v.wait_item_reached(9, 900.0),
+    "mission item 9": lambda v: v.plans.wait_item_reached(9, 900.0),
     "the answer to DO_SET_HOME": lambda v: v.command(dialect.MAV_CMD_DO_SET_HOME, 1.0, timeout_s=60.0),
-    "mode land": lambda v: v.set_mode(Mode.LAND, 60.0),
+    "mode land": lambda v: v.commands.set_mode(Mode.LAND, 60.0),
 }
 
 
@@ -45,7 +45,7 @@ def test_a_lost_link_ends_every_wait(flown, flavour, awaited):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(10.0)
         if awaited == "mission item 9":
-            await vehicle.set_mode(Mode.MISSION)
+            await vehicle.commands.set_mode(Mode.MISSION)
         autopilot.mute_commands.add(dialect.MAV_CMD_DO_SET_HOME)
         if awaited == "mode land":
             autopilot.mute_commands.add(dialect.MAV_CMD_DO_SET_MODE)
@@ -180,7 +180,7 @@ def test_a_vehicle_elsewhere_that_is_killed_is_missed():
             vehicle = Vehicle(connection)
             theirs.send(encoder.encode(dialect.MAVLink_heartbeat_message(2, 12, 129, 0x03040000, 4, 3)))
             await vehicle.wait_heartbeat()
-            task = loop.create_task(vehicle.wait_disarmed())
+            task = loop.create_task(vehicle.link.wait_disarmed())
             for _ in range(60):  # steps too small to count as a stall
                 await asyncio.sleep(0)
                 skipped[0] += 0.2
@@ -247,7 +247,7 @@ def test_a_mode_the_mission_itself_asks_for_meanwhile_is_no_failsafe(flown):
         await vehicle.takeoff(10.0)
         task = asyncio.get_running_loop().create_task(vehicle.goto_ned(100.0, 0.0, -10.0))
         await asyncio.sleep(3.0)
-        await vehicle.set_mode(Mode.LAND)
+        await vehicle.commands.set_mode(Mode.LAND)
         await asyncio.sleep(3.0)
         assert not task.done()
         task.cancel()

@@ -24,8 +24,7 @@ from missions.patterns import named_lissajous
 from missions.planning.flyable import FlyablePath, flyable_path
 from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import roll_in_m
-from missions.vehicle.arduplane import ArduPlane
-from missions.vehicle.px4_plane import Px4Plane
+from missions.vehicle.firmware_records import ARDUPLANE, PX4_PLANE
 
 STOCK_PLANE = {"AIRSPEED_CRUISE": 22.0, "ROLL_LIMIT_DEG": 65.0, "NAVL1_PERIOD": 15.0, "RLL2SRV_TCONST": 0.25}
 """What ArduPilot 4.6.3's simulated plane reports, where it is not the firmware's default."""
@@ -62,7 +61,7 @@ def followed(
 def planned(name: str) -> tuple[FlightOptions, FixedWingLimits, FlyablePath]:
     mission = find_mission(name)
     assert isinstance(mission, PatternMission)
-    limits = ArduPlane().limits(STOCK_PLANE)
+    limits = ARDUPLANE.limits(STOCK_PLANE)
     assert isinstance(limits, FixedWingLimits)
     options = mission.adapted(FlightOptions(), limits)
     curve = mission.curve(options)
@@ -92,11 +91,11 @@ def test_a_radius_that_the_user_chose_is_kept() -> None:
 
 
 def test_bends_are_no_tighter_than_the_guidance_follows() -> None:
-    slow, quick = (ArduPlane().limits({**STOCK_PLANE, "NAVL1_PERIOD": period}) for period in (25.0, 5.0))
+    slow, quick = (ARDUPLANE.limits({**STOCK_PLANE, "NAVL1_PERIOD": period}) for period in (25.0, 5.0))
     assert isinstance(slow, FixedWingLimits) and isinstance(quick, FixedWingLimits)
     assert slow.path_radius_m(22.0) == pytest.approx(22.0 * 0.75 * 25.0 / math.pi)
     assert quick.path_radius_m(22.0) == quick.turn_radius_m(22.0)  # the bank decides
-    px4 = Px4Plane().limits({"NPFG_PERIOD": 40.0, "FW_AIRSPD_TRIM": 15.0})
+    px4 = PX4_PLANE.limits({"NPFG_PERIOD": 40.0, "FW_AIRSPD_TRIM": 15.0})
     assert isinstance(px4, FixedWingLimits)
     assert px4.path_radius_m(15.0) == pytest.approx(15.0 * 0.7 * 40.0 / math.pi)
     assert px4.waypoint_lead_s == 0.0  # an aircraft of PX4 1.16.1 does not read a waypoint's radius
@@ -104,7 +103,7 @@ def test_bends_are_no_tighter_than_the_guidance_follows() -> None:
 
 def test_setpoints_bend_as_tightly_as_the_aircraft_can_bank() -> None:
     mission = find_mission("lissajous")
-    limits = ArduPlane().limits(STOCK_PLANE)
+    limits = ARDUPLANE.limits(STOCK_PLANE)
     chosen = FlightOptions(
         width_m=1000.0, height_m=1000.0, given=frozenset({"width_m", "height_m", "via"}), via=Via.SETPOINTS
     )

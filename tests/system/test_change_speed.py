@@ -10,7 +10,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
-from missions.vehicle.adapter import Mode
+from missions.vehicle.firmware import Mode
 from missions.vehicle.vehicle import Vehicle
 from tests.system.flying import Flying
 
@@ -58,13 +58,13 @@ def test_in_a_mission(flavour: str, leg_m: float) -> None:
     async def script(vehicle: Vehicle) -> list[float]:
         await vehicle.wait_ready()
         await vehicle.takeoff(10.0)
-        items = [vehicle.adapter.takeoff_item(vehicle.home, 10.0)]
+        items = [vehicle.firmware.takeoff_item(vehicle.home, 10.0)]
         for i in range(1, round(400.0 / leg_m) + 1):
             there = place(vehicle, i * leg_m)
             items.append(
                 MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=there.lat_deg, y=there.lon_deg, z=10.0)
             )
-        await vehicle.upload_mission(items)
+        await vehicle.plans.upload_mission(items)
         await vehicle.start_mission()
         await vehicle.clock.sleep(12.0)
         speeds = await change_and_watch(flying, vehicle)
@@ -102,7 +102,7 @@ def test_on_the_way_home(flavour: str) -> None:
         await vehicle.wait_ready()
         await vehicle.takeoff(35.0)
         await vehicle.goto(place(vehicle, 220.0, 35.0))
-        await vehicle.set_mode(Mode.RETURN)
+        await vehicle.commands.set_mode(Mode.RETURN)
         await vehicle.clock.sleep(9.0)
         return await change_and_watch(flying, vehicle)
 

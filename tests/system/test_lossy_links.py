@@ -68,7 +68,7 @@ def plan(vehicle: Vehicle, count: int, height_m: float) -> list[MissionItem]:
         MissionItem(command=WAYPOINT, x=home.lat_deg + 1e-5 * k, y=home.lon_deg, z=height_m)
         for k in range(1, count)
     ]
-    return [vehicle.adapter.takeoff_item(home, height_m), *away]
+    return [vehicle.firmware.takeoff_item(home, height_m), *away]
 
 
 def heights(items: tuple[MissionItem, ...] | list[MissionItem]) -> list[float]:
@@ -87,11 +87,11 @@ def test_everything_is_done_over_a_poor_radio(flavour: str, seed: int) -> None:
             await vehicle.set_parameter(speed, 5.0 + k)
             await vehicle.set_parameter(acceleration, 3.0 + k)
         assert [await vehicle.parameter(name) for name in (speed, acceleration)] == [9.0, 7.0]
-        await vehicle.upload_mission(plan(vehicle, 25, 30.0))
-        await vehicle.clear_mission()
+        await vehicle.plans.upload_mission(plan(vehicle, 25, 30.0))
+        await vehicle.plans.clear_mission()
         assert radio.stored == ()
-        await vehicle.upload_mission(plan(vehicle, 25, 40.0))
-        return await vehicle.download_mission()
+        await vehicle.plans.upload_mission(plan(vehicle, 25, 40.0))
+        return await vehicle.plans.download_mission()
 
     assert heights(radio.mission(script)) == [40.0] * 25
     assert heights(radio.stored) == [40.0] * 25
@@ -155,13 +155,13 @@ def test_nothing_is_done_by_half_over_a_bad_radio(flavour: str, seed: int) -> No
             assert kept == after if done else kept in (before, after)
         for k in range(3):
             before_items = radio.stored
-            done = await attempt(vehicle.upload_mission(plan(vehicle, 12 + k, 20.0 + k)))
+            done = await attempt(vehicle.plans.upload_mission(plan(vehicle, 12 + k, 20.0 + k)))
             stored = heights(radio.stored)
             new = [20.0 + k] * (12 + k)
             assert stored == new if done else stored in (heights(before_items), new)
             await asyncio.sleep(10.0)  # what an unfinished transfer leaves is over
             try:
-                down = await vehicle.download_mission()
+                down = await vehicle.plans.download_mission()
             except MissionError as error:
                 failures.append(str(error))
             else:
@@ -208,7 +208,7 @@ def test_an_upload_that_the_vehicle_gave_up_is_done_anew(flavour: str, seconds: 
         async with Connection(link, LoopClock()) as connection:  # type: ignore[arg-type]
             vehicle = Vehicle(connection)
             await vehicle.wait_ready()
-            await vehicle.upload_mission(plan(vehicle, 8, 30.0))
+            await vehicle.plans.upload_mission(plan(vehicle, 8, 30.0))
 
     run(main(), VirtualTimeLoop(sitl.advance, lambda: sitl.time_us, max_time_us=round(LIMIT_S * 1e6)))
     items = flying.autopilot.commander.missions.items

@@ -17,12 +17,12 @@ def test_uploads_a_plan(flavour: str) -> None:
     async def script(vehicle: Vehicle) -> list[MissionItem]:
         await vehicle.wait_ready()
         home = vehicle.home
-        plan = [vehicle.adapter.takeoff_item(home, 10.0)]
+        plan = [vehicle.firmware.takeoff_item(home, 10.0)]
         for k in range(COUNT):
             x = home.lat_deg + 1e-6 * k
             plan.append(MissionItem(command=WAYPOINT, x=x, y=home.lon_deg, z=10.0))
-        await vehicle.upload_mission(plan)
-        return await vehicle.download_mission()
+        await vehicle.plans.upload_mission(plan)
+        return await vehicle.plans.download_mission()
 
     items = flying.mission(script, sendings=2)
     assert len(items) == COUNT + 1

@@ -9,8 +9,8 @@ from missions.notes import CommandedPath
 from missions.options import FlightOptions
 from missions.planning.flyable import FlyablePath
 from missions.planning.limits import FixedWingLimits
-from missions.vehicle.fixed_wing import Approach
 from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.wing import Approach
 
 _APPROACH_HEIGHT_M: Final = 40.0
 _APPROACH_LAYER_M: Final = 15.0
@@ -63,7 +63,7 @@ class PatternFlight:
         """Approach to the runway of the takeoff; the circles of a team are in layers."""
         return Approach(
             place=vehicle.home,
-            heading_rad=vehicle.landing_heading_rad(),
+            heading_rad=vehicle.wing.landing_heading_rad(),
             height_m=_APPROACH_HEIGHT_M + _APPROACH_LAYER_M * self.options.index,
             circle_radius_m=max(_APPROACH_CIRCLE_M, self.turn_radius_m),
         )

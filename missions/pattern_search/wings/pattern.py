@@ -57,7 +57,7 @@ async def fly_pattern_with_wings(
 ) -> None:
     """Fly the pattern, including takeoff and landing; see `missions.pattern_search.flight.fly_pattern`."""
     flight = pattern_flight_of(vehicle, options, curve, limits)
-    vehicle.note_runway()
+    vehicle.wing.note_runway()
     if options.via is Via.SETPOINTS:
         await fly_setpoints(vehicle, flight)
     else:

@@ -13,9 +13,7 @@ from missions.pattern_search.wings.guidance import PathRoll, PathRollParameters,
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.planning.flyable import FlyablePath
 from missions.vehicle import telemetry
-from missions.vehicle.attitude_setpoint import AttitudeSetpoint
-from missions.vehicle.guided import AnySetpoint
-from missions.vehicle.setpoint import Setpoint
+from missions.vehicle.setpoint import AnySetpoint, AttitudeSetpoint, Setpoint
 from missions.vehicle.vehicle import Vehicle
 
 _ENTRY_S: Final = 0.8  # delay from the decision to leave the circle to the first flown setpoint
@@ -36,12 +34,12 @@ async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     effect = TurnEffect()
     await _to_the_start(vehicle, flight, effect)
     stream = _Stream(vehicle, flight, gains, effect)
-    if vehicle.adapter.roll_alone:
+    if vehicle.firmware.roll_alone:
         await vehicle.change_altitude(options.own_altitude_m)
         await vehicle.follow(stream.roll, options.rate_hz)
     else:
         await vehicle.follow(stream.point, options.rate_hz)
-    await vehicle.land_along(flight.approach(vehicle))
+    await vehicle.wing.land_along(flight.approach(vehicle))
     notes.end(clock.stamp_us)
 
 
@@ -56,19 +54,19 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight, effect: TurnEff
     north, east, _ = frame.ned_from_geodetic(here.lat_deg, here.lon_deg, here.alt_m)
     entry = Entry.to(flight.route, flight.turn_radius_m, (north, east))
     lat, lon, alt = frame.geodetic_from_ned(*entry.centre_m, -flight.options.own_altitude_m)
-    await vehicle.loiter(
+    await vehicle.wing.loiter(
         GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt),
         radius_m=entry.radius_m,
         clockwise=entry.clockwise,
         wait=False,
     )
-    await vehicle.change_airspeed(flight.options.speed_m_s)
+    await vehicle.wing.change_airspeed(flight.options.speed_m_s)
 
     def leaving() -> bool:
         _measure(vehicle, effect)
         return entry.leaving(vehicle, _ENTRY_S)
 
-    await vehicle.wait_until(
+    await vehicle.link.wait_until(
         leaving,
         what="the way into the pattern",
         on=("GLOBAL_POSITION_INT",),
@@ -113,12 +111,12 @@ async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
     guidance.
     """
     bank_max_rad = _BANK_SHARE * flight.limits.bank_max_rad
-    if not vehicle.adapter.roll_alone:
-        period_s = max(1.0, await vehicle.parameter_or("NPFG_PERIOD", 10.0))
-        damping = max(0.1, await vehicle.parameter_or("NPFG_DAMPING", 0.7))
+    if not vehicle.firmware.roll_alone:
+        period_s = max(1.0, await vehicle.parameters.read_or("NPFG_PERIOD", 10.0))
+        damping = max(0.1, await vehicle.parameters.read_or("NPFG_DAMPING", 0.7))
         return PathRollParameters(lead_s=period_s / (4.0 * math.pi * damping), bank_max_rad=bank_max_rad)
-    period_s = max(1.0, await vehicle.parameter_or("NAVL1_PERIOD", 17.0))
-    roll_s = min(3.0, max(0.1, await vehicle.parameter_or("RLL2SRV_TCONST", 0.5)))
+    period_s = max(1.0, await vehicle.parameters.read_or("NAVL1_PERIOD", 17.0))
+    roll_s = min(3.0, max(0.1, await vehicle.parameters.read_or("RLL2SRV_TCONST", 0.5)))
     return PathRollParameters(
         frequency_rad_s=min(_QUICKEST_RAD_S, math.tau / period_s),
         lead_s=roll_s + _STREAM_S,
@@ -169,7 +167,7 @@ class _Stream:
             return None
         attitude = vehicle.latest(telemetry.Attitude)
         if attitude is None:
-            raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {vehicle.link.last_received()}")
         _measure(vehicle, self._effect)
         return AttitudeSetpoint(
             roll_rad=self._law.roll_rad(self._place, attitude.yaw_rad, vehicle.clock.time_us)

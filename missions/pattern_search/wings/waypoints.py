@@ -57,19 +57,21 @@ def mission_items(vehicle: Vehicle, flight: PatternFlight) -> PatternItems:
 async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     """Fly the pattern, including takeoff and landing."""
     notes, clock, options = vehicle.notes, vehicle.clock, flight.options
-    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+    acceptance_m = await vehicle.adapter.acceptance_m(options.acceptance_m)
     plan = mission_items(vehicle, flight)
     first, last = plan.first, plan.last
     notes.commanded = flight.commanded(vehicle, plan.waypoints, acceptance_m)
     notes.begin("upload", clock.stamp_us)
-    start = await vehicle.upload_mission(plan.items)
+    start = await vehicle.plans.upload_mission(plan.items)
     notes.begin("takeoff", clock.stamp_us)
     await vehicle.start_mission()
     place = PlaceOnPath(vehicle, flight.route, -options.speed_m_s)
-    await vehicle.wait_item_reached(start + first - 1, 180.0 + 2.0 * options.own_altitude_m + flight.away_s)
+    await vehicle.plans.wait_item_reached(
+        start + first - 1, 180.0 + 2.0 * options.own_altitude_m + flight.away_s
+    )
     notes.begin("transit", clock.stamp_us)
     lead_s = -float(flight.route.arc_m[0]) / flight.slow_m_s
-    await vehicle.wait_item_reached(start + first, 60.0 + lead_s)
+    await vehicle.plans.wait_item_reached(start + first, 60.0 + lead_s)
     await _passed(vehicle, place, 0.0)
     notes.begin(PATTERN, clock.stamp_us)
 
@@ -79,7 +81,7 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
 
     limit_s = 60.0 + flight.path.length_m / flight.slow_m_s
     try:
-        await vehicle.wait_item_reached(
+        await vehicle.plans.wait_item_reached(
             start + last, min(limit_s, options.search_time_s or limit_s), progress
         )
         place.arc_m = max(place.arc_m, flight.path.length_m - 4.0 * acceptance_m)
@@ -88,9 +90,9 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
         if options.search_time_s is None:
             raise
         notes.cut_short = True
-        await vehicle.land_along(flight.approach(vehicle), wait=False)  # the search time has ended
+        await vehicle.wing.land_along(flight.approach(vehicle), wait=False)  # the search time has ended
     notes.begin("return", clock.stamp_us)
-    await vehicle.wait_disarmed(600.0 + 2.0 * flight.away_s)
+    await vehicle.link.wait_disarmed(600.0 + 2.0 * flight.away_s)
     notes.end(clock.stamp_us)
 
 
@@ -126,7 +128,7 @@ def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
     entry = Entry.to(flight.route, flight.turn_radius_m)
     lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(*entry.centre_m, 0.0)
     return [
-        vehicle.adapter.takeoff_item(vehicle.home, options.own_altitude_m),
+        vehicle.firmware.takeoff_item(vehicle.home, options.own_altitude_m),
         MissionItem(
             command=dialect.MAV_CMD_DO_CHANGE_SPEED,
             frame=dialect.MAV_FRAME_MISSION,
@@ -153,7 +155,7 @@ def _waypoint(
     return MissionItem(
         command=dialect.MAV_CMD_NAV_WAYPOINT,
         param2=radius_m,
-        param4=vehicle.adapter.unset,
+        param4=vehicle.firmware.unset,
         x=lat,
         y=lon,
         z=options.own_altitude_m,
@@ -167,4 +169,6 @@ async def _passed(vehicle: Vehicle, place: PlaceOnPath, arc_m: float) -> None:
         place.update()
         return place.arc_m >= arc_m
 
-    await vehicle.wait_until(there, what="the waypoint abeam", on=("GLOBAL_POSITION_INT",), timeout_s=60.0)
+    await vehicle.link.wait_until(
+        there, what="the waypoint abeam", on=("GLOBAL_POSITION_INT",), timeout_s=60.0
+    )

@@ -211,6 +211,7 @@ class Magnetometer:
 
     def __init__(self, readings_nt):
         self.payload = SimpleNamespace(on_total_field=self.listen)
+        self.link = SimpleNamespace(deadline=self.deadline)
         self.readings_nt = readings_nt
 
     def listen(self, listener):

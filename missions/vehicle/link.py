@@ -1,13 +1,12 @@
 """The data that a vehicle's messages contain: identity, newest values, streams, and waits with deadlines.
 
-This is the lower half of `Vehicle`: it receives, and sends only the messages that it is given.
+It receives, and sends only the messages that it is given.
 """
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock, TelemetryClock
@@ -16,40 +15,23 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes, LinkLoss
-from missions.vehicle.adapter import Adapter
-from missions.vehicle.ardupilot import ArduCopter
-from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
+from missions.vehicle.firmware import Firmware
+from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
 from missions.vehicle.link_watch import LinkWatch
-from missions.vehicle.px4 import Px4
-from missions.vehicle.px4_plane import Px4Plane
 from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 
 T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
 _HEARTBEAT: Final = definition("HEARTBEAT").message_id
-_SOUND_FOR_US: Final = 1_000_000
-_DEAF_AFTER_US: Final = 3_000_000
-_DEAF_LOOK_S: Final = 0.5
-ADAPTERS: Final[Mapping[tuple[str, VehicleKind], Callable[[], Adapter]]] = MappingProxyType(
-    {
-        ("px4", VehicleKind.MULTICOPTER): Px4,
-        ("px4", VehicleKind.FIXED_WING): Px4Plane,
-        ("ardupilot", VehicleKind.MULTICOPTER): ArduCopter,
-        ("ardupilot", VehicleKind.FIXED_WING): ArduPlane,
-    }
-)
-"""Adapters by firmware and class of vehicle."""
-
-_FIRMWARES: Final = {
-    dialect.MAV_AUTOPILOT_PX4: "px4",
-    dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
-}
+_USABLE_FOR_US: Final = 1_000_000
+_SILENT_AFTER_US: Final = 3_000_000
+_SILENT_CHECK_S: Final = 0.5
 
 
-class VehicleView:
-    """The receiving half of a vehicle.
+class VehicleLink:
+    """The messages of one vehicle: its identity, newest values, streams, and waits on vehicle time.
 
     Args:
         connection: a started connection.
@@ -59,7 +41,9 @@ class VehicleView:
         connection: the connection that was given.
         notes: the mission's record of its phases, its progress and its commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
-        first_heard_us: vehicle time of the first heartbeat that was received when vehicle time was known.
+        first_heartbeat_us: vehicle time of the first heartbeat that was received when vehicle time was known.
+        heartbeat_us: vehicle time of the newest heartbeat; None before the first.
+        on_regained: called when a link that counted as lost is back.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -67,18 +51,18 @@ class VehicleView:
         self.notes = FlightNotes()
         self.status_texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
         self._system_id = system_id
-        self._adapter: Adapter | None = None
+        self._firmware: Firmware | None = None
         self._last_ack: Any = None
-        self._modes_asked: set[int] = set()  # custom modes that were requested since the present `goto` began
-        self._heard_us: int | None = None
+        self.heartbeat_us: int | None = None
+        self.on_regained: Callable[[], None] = lambda: None
         # newest usable telemetry, and the time at which it was examined
-        self._sound: dict[type, tuple[Any, int]] = {}
-        self.first_heard_us = 0
+        self._usable: dict[type, tuple[Any, int]] = {}
+        self.first_heartbeat_us = 0
         self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
-        self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
-        self._watch.on_lost = self._link_lost
-        self._watch.on_regained = self._link_regained
+        self._watch = LinkWatch(connection.clock, lambda: self.last_received(silence=False))
+        self._watch.on_lost = self._note_loss
+        self._watch.on_regained = self._note_regained
         connection.listen("STATUSTEXT", self._on_status_text)
         connection.listen("COMMAND_ACK", self._on_ack)
         connection.listen("HEARTBEAT", self._on_heartbeat)
@@ -94,19 +78,19 @@ class VehicleView:
         return self._known(self._system_id)
 
     @property
-    def adapter(self) -> Adapter:
-        """The adapter of the vehicle's firmware."""
-        return self._known(self._adapter)
+    def identified(self) -> bool:
+        """Whether a heartbeat of an autopilot was received, so that firmware and system id are known."""
+        return self._firmware is not None
 
     @property
-    def autopilot(self) -> str:
-        """Firmware: "px4" or "ardupilot"."""
-        return self.adapter.name
+    def firmware(self) -> Firmware:
+        """The conventions of the vehicle's firmware, known from its first heartbeat on."""
+        return self._known(self._firmware)
 
     @property
     def kind(self) -> VehicleKind:
         """Class of vehicle: multicopter or fixed wing."""
-        return self.adapter.kind
+        return self.firmware.kind
 
     @staticmethod
     def _known(value: T | None) -> T:
@@ -119,20 +103,20 @@ class VehicleView:
             return
         if self._system_id is not None and frame.system_id != self._system_id:
             return
-        if self._adapter is None:
+        if self._firmware is None:
             heartbeat = decode(frame)
-            firmware = _FIRMWARES.get(heartbeat.autopilot)
+            name = FIRMWARE_NAMES.get(heartbeat.autopilot)
             kind = KIND_OF_TYPE.get(heartbeat.type)
-            if firmware is None or kind is None:
+            if name is None or kind is None:
                 return
-            self._adapter = ADAPTERS[firmware, kind]()
+            self._firmware = FIRMWARES[name, kind]
             self._system_id = frame.system_id
             self.connection.keep(frame.system_id)
         if not self._timed:
             clock = self.clock
             self._timed = not isinstance(clock, TelemetryClock) or clock.vehicle_time_us is not None
-            self.first_heard_us = clock.time_us
-        self._heard_us = self.clock.time_us
+            self.first_heartbeat_us = clock.time_us
+        self.heartbeat_us = self.clock.time_us
         self._watch.on_heartbeat()
 
     @property
@@ -158,31 +142,32 @@ class VehicleView:
         self._watch.regain_s = seconds
 
     @property
-    def link_quiet(self) -> bool:
+    def quiet(self) -> bool:
         """Whether no message was received from the vehicle for three seconds, while a task waits for one."""
         return self._watch.quiet
 
     @property
-    def link_lost(self) -> bool:
+    def lost(self) -> bool:
         """Whether the link counts as lost, and may still come back."""
         return self._watch.lost
 
     @property
-    def link_just_back(self) -> bool:
+    def just_back(self) -> bool:
         """Whether a silence of the vehicle ended a moment ago."""
         return self._watch.just_back
 
-    def _link_lost(self) -> None:
-        since_us = self.clock.time_us if self._heard_us is None else self._heard_us
+    def _note_loss(self) -> None:
+        since_us = self.clock.time_us if self.heartbeat_us is None else self.heartbeat_us
         self.notes.link_losses.append(LinkLoss(start_us=since_us))
 
-    def _link_regained(self) -> None:
+    def _note_regained(self) -> None:
         loss = self.notes.link_losses[-1]
         self.notes.link_losses[-1] = LinkLoss(start_us=loss.start_us, end_us=self.clock.time_us)
         lost_s = (self.clock.time_us - loss.start_us) * 1e-6
         self.notes.warn(
             f"the link was lost for {lost_s:.0f} s at {loss.start_us * 1e-6:.0f} s, and came back"
         )
+        self.on_regained()
 
     def _on_status_text(self, frame: Any) -> None:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
@@ -193,6 +178,10 @@ class VehicleView:
     def _on_ack(self, frame: Any) -> None:
         if frame.system_id == self._system_id:
             self._last_ack = decode(frame)
+
+    def send(self, message: MAVLinkMessage) -> None:
+        """Send any message."""
+        self.connection.send(message)
 
     # newest values
 
@@ -214,10 +203,10 @@ class VehicleView:
         value: T | None = convert(message)
         now_us = self.clock.time_us
         if value is not None:
-            self._sound[kind] = (value, now_us)
+            self._usable[kind] = (value, now_us)
             return value
-        before = self._sound.get(kind)
-        return before[0] if before is not None and now_us - before[1] <= _SOUND_FOR_US else None
+        before = self._usable.get(kind)
+        return before[0] if before is not None and now_us - before[1] <= _USABLE_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
         """Home as reported by the vehicle, or None."""
@@ -269,7 +258,7 @@ class VehicleView:
     @property
     def mode(self) -> str:
         """Flight mode of the newest heartbeat, with the firmware's name."""
-        return self.adapter.mode_name(self.custom_mode)
+        return self.firmware.mode_name(self.custom_mode)
 
     @property
     def landed_state(self) -> int:
@@ -284,17 +273,17 @@ class VehicleView:
             self.connection.component_id,
         )
 
-    def heard(self, *, silence: bool = True) -> str:
+    def last_received(self, *, silence: bool = True) -> str:
         """What was received last, as text for error messages; with `silence`, also how long ago, when that is
         long.
         """
-        if self._adapter is None or self._heard_us is None:
+        if self._firmware is None or self.heartbeat_us is None:
             return "nothing was received from an autopilot"
         parts = [f"last received: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
         position = self.message("GLOBAL_POSITION_INT")
         if position is not None:
             parts.append(f"{position.relative_alt * 1e-3:.1f} m above home")
-        silent_s = (self.clock.time_us - self._heard_us) * 1e-6
+        silent_s = (self.clock.time_us - self.heartbeat_us) * 1e-6
         if silence and silent_s > 3.0:
             parts.append(f"no heartbeat for {silent_s:.0f} s")
         if self._last_ack is not None:
@@ -308,7 +297,7 @@ class VehicleView:
 
     # waiting
 
-    def link_guard(self, awaited: str | Callable[[], str]) -> AbstractAsyncContextManager[None]:
+    def guard(self, awaited: str | Callable[[], str]) -> AbstractAsyncContextManager[None]:
         """`async with`: raises LinkClosed when the heartbeats stop while the block waits for `awaited`."""
         return self._watch.guard(awaited if callable(awaited) else lambda: awaited)
 
@@ -319,10 +308,10 @@ class VehicleView:
         When a lost link may come back, the time without received messages does not count.
         """
         if not self.regain_s:
-            async with self.link_guard(awaited), self.clock.timeout(seconds):
+            async with self.guard(awaited), self.clock.timeout(seconds):
                 yield
             return
-        async with self.link_guard(awaited), asyncio.timeout(None) as scope:
+        async with self.guard(awaited), asyncio.timeout(None) as scope:
             running_out = asyncio.ensure_future(self._run_out(scope, seconds))
             try:
                 yield
@@ -334,16 +323,16 @@ class VehicleView:
         received.
         """
         await self.clock.sleep(seconds)
-        while self._deaf:
-            while self._deaf:
-                await self.clock.sleep(_DEAF_LOOK_S)
+        while self._silent:
+            while self._silent:
+                await self.clock.sleep(_SILENT_CHECK_S)
             await self.clock.sleep(seconds)
         scope.reschedule(asyncio.get_running_loop().time())
 
     @property
-    def _deaf(self) -> bool:
+    def _silent(self) -> bool:
         """Whether no heartbeat was received for three seconds of vehicle time."""
-        return self._heard_us is not None and self.clock.time_us - self._heard_us > _DEAF_AFTER_US
+        return self.heartbeat_us is not None and self.clock.time_us - self.heartbeat_us > _SILENT_AFTER_US
 
     async def wait_until(
         self,
@@ -382,10 +371,25 @@ class VehicleView:
                         return value
         except TimeoutError:
             awaited = what if isinstance(what, str) else what()
-            raise VehicleTimeout(f"no {awaited} within {timeout_s:g} s; {self.heard()}") from None
+            raise VehicleTimeout(f"no {awaited} within {timeout_s:g} s; {self.last_received()}") from None
         finally:
             for stop in stops:
                 stop()
+
+    async def wait_disarmed(self, timeout_s: float = 300.0) -> None:
+        """Wait until the vehicle is disarmed."""
+        await self.wait_until(
+            lambda: not self.armed, what="disarmed heartbeat", on=("HEARTBEAT",), timeout_s=timeout_s
+        )
+
+    async def wait_landed(self, timeout_s: float = 300.0) -> None:
+        """Wait until the vehicle reports that it is landed."""
+        await self.wait_until(
+            lambda: self.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND,
+            what="landing",
+            on=("EXTENDED_SYS_STATE",),
+            timeout_s=timeout_s,
+        )
 
 
 def describe_ack(ack: Any) -> str:

@@ -1,26 +1,24 @@
-"""The functions of a vehicle that only fixed wings have."""
+"""What only fixed wings do: circles, flight by headings and rolls, and landing along an approach."""
 
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, cast
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError, PlanError
-from missions.kind import VehicleKind
-from missions.planning.limits import FORECAST_WIND_M_S
-from missions.vehicle import telemetry
-from missions.vehicle.adapter import Mode
-from missions.vehicle.payload import Payload
-from missions.vehicle.store import VehicleStore
-
-if TYPE_CHECKING:
-    from missions.vehicle.attitude_pilot import AttitudePilot
-    from missions.vehicle.heading_flight import HeadingFlight
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.adapter import Adapter
+from missions.vehicle.attitude_pilot import AttitudePilot
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.firmware import Mode
+from missions.vehicle.heading_flight import HeadingFlight, open_heading_flight
+from missions.vehicle.mission_transfer import upload
+from missions.vehicle.parameters import VehicleParameters
+from missions.vehicle.plans import VehiclePlans
+from missions.vehicle.telemetry import Attitude, Position
 
 _GLIDE_SLOPE_RAD: Final = math.radians(3.5)  # PX4 refuses more than FW_LND_ANG, 5 deg
 _APPROACH_HEIGHT_M: Final = 40.0
@@ -87,55 +85,51 @@ class Approach:
         ]
 
 
-class FixedWingFlight(VehicleStore):
-    """The part of a vehicle for fixed wings only; for a multicopter the functions raise PlanError."""
+class FixedWing:
+    """The functions of a fixed wing that a multicopter does not have; see `Vehicle.wing`.
 
-    runway_heading_rad: float | None = None
-    """Heading on the ground before the last takeoff: along the runway."""
+    Args:
+        commands: commands to the aircraft.
+        adapter: its firmware's actions.
+        parameters: its parameters.
+        plans: its plans.
 
-    forecast_wind_m_s: float = FORECAST_WIND_M_S
-    """Wind that turns are planned for: the user's forecast, not the measured wind."""
+    Attributes:
+        runway_heading_rad: heading on the ground before the last takeoff: along the runway. None: not known.
+        pilot: flies the aircraft by attitude; None before `prepare_piloting`.
+    """
 
-    pilot: "AttitudePilot | None" = None
-    """The object that flies the aircraft by attitude; see `prepare_piloting`."""
-
-    _payload: Payload | None = None
-
-    @property
-    def _whole(self) -> "Vehicle":
-        """This object as a complete vehicle."""
-        return cast("Vehicle", self)
-
-    @property
-    def payload(self) -> Payload:
-        """Camera, gimbal and survey magnetometer of this vehicle (also of a multicopter)."""
-        if self._payload is None:
-            self._payload = Payload(self._whole)
-        return self._payload
+    def __init__(
+        self,
+        commands: VehicleCommands,
+        adapter: Adapter,
+        parameters: VehicleParameters,
+        plans: VehiclePlans,
+    ) -> None:
+        self.runway_heading_rad: float | None = None
+        self.pilot: AttitudePilot | None = None
+        self._link = commands.link
+        self._commands = commands
+        self._adapter = adapter
+        self._parameters = parameters
+        self._plans = plans
 
     def note_runway(self) -> None:
         """Store the heading of the aircraft on the ground; it will land in that direction or the opposite
         one.
         """
-        attitude = self.latest(telemetry.Attitude)
-        if attitude is not None and not self.armed:
+        attitude = self._link.latest(Attitude)
+        if attitude is not None and not self._link.armed:
             self.runway_heading_rad = attitude.yaw_rad
 
-    async def prepare_piloting(self) -> "AttitudePilot":
+    async def prepare_piloting(self) -> AttitudePilot:
         """On the ground: prepare for flight by headings or rolls; heights are relative to this place."""
-        from missions.vehicle.attitude_pilot import AttitudePilot
-
-        self._require_wings("prepare_piloting")
         if self.pilot is not None:
             self.pilot.close()
-        self.pilot = await AttitudePilot.on_ground(self._whole)
+        self.pilot = await AttitudePilot.on_ground(self._commands, self._adapter, self._parameters)
         return self.pilot
 
-    def _require_wings(self, what: str) -> None:
-        if self.kind is not VehicleKind.FIXED_WING:
-            raise PlanError(f"{what} is for aircraft with wings; this is a {self.kind}")
-
-    # circles and changes
+    # circles and airspeed
 
     async def loiter(
         self,
@@ -155,12 +149,11 @@ class FixedWingFlight(VehicleStore):
             wait: whether to wait until it circles there, near the altitude.
 
         Raises:
-            PlanError: not a fixed wing, or too far away; nothing was sent.
+            PlanError: the radius is not possible, or the place is too far away; nothing was sent.
         """
-        self._require_wings("loiter")
         if radius_m is not None and not (math.isfinite(radius_m) and radius_m > 0.0):
             raise PlanError(f"a circle of radius {radius_m:g} m can't be flown; ask for more than 0 m")
-        here = await self.position()
+        here = await self._link.position()
         if place is None:
             place = GeodeticPosition(lat_deg=here.lat_deg, lon_deg=here.lon_deg, alt_m=here.alt_m)
         frame = LocalFrame(place)
@@ -170,43 +163,38 @@ class FixedWingFlight(VehicleStore):
                 f"the place {place} is {away_m * 1e-3:.1f} km away; accepted: at most "
                 f"{_FARTHEST_M * 1e-3:g} km"
             )
-        await self.adapter.loiter(self._whole, place, radius_m, clockwise)
+        await self._adapter.loiter(place, radius_m, clockwise)
         if not wait:
             return
         near_m = 1.5 * (radius_m or 120.0) + 20.0
 
         def there() -> bool:
-            if not self.armed:
-                raise MissionError(f"the vehicle disarmed on its way; {self.heard()}")
-            p = self.latest(telemetry.Position)
+            if not self._link.armed:
+                raise MissionError(f"the vehicle disarmed on its way; {self._link.last_received()}")
+            p = self._link.latest(Position)
             if p is None:
                 return False
             north, east, down = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
             return math.hypot(north, east) < near_m and abs(down) < 10.0
 
-        await self.wait_until(
+        await self._link.wait_until(
             there,
             what="arrival at the circle",
             on=("GLOBAL_POSITION_INT",),
             timeout_s=timeout_s or 120.0 + 0.2 * away_m,
         )
 
-    async def change_altitude(self, altitude_m: float) -> None:
-        """Change the height above home."""
-        await self.adapter.change_altitude(self._whole, altitude_m)
-
     async def change_airspeed(self, airspeed_m_s: float) -> None:
         """Change the airspeed."""
-        self._require_wings("change_airspeed")
-        await self.adapter.change_airspeed(self._whole, airspeed_m_s)
+        await self._adapter.change_airspeed(airspeed_m_s)
 
     # headings and rolls
 
     @asynccontextmanager
     async def heading_flight(
         self, *, altitude_m: float, airspeed_m_s: float | None = None
-    ) -> AsyncIterator["HeadingFlight"]:
-        """Fly headings: `async with vehicle.heading_flight(altitude_m=100) as flight`, then
+    ) -> AsyncIterator[HeadingFlight]:
+        """Fly headings: `async with vehicle.wing.heading_flight(altitude_m=100) as flight`, then
         `await flight.turn_to(1.57)`.
 
         Altitude and airspeed are held; `prepare_piloting` must have been called on the ground. ArduPilot's
@@ -217,10 +205,11 @@ class FixedWingFlight(VehicleStore):
             altitude_m: height above home.
             airspeed_m_s: airspeed; None: the autopilot's default.
         """
-        from missions.vehicle.heading_flight import open_heading_flight
-
-        self._require_wings("heading_flight")
-        async with open_heading_flight(self._whole, altitude_m, airspeed_m_s) as flight:
+        if self.pilot is None:
+            raise PlanError("call `await vehicle.wing.prepare_piloting()` on the ground, before takeoff")
+        async with open_heading_flight(
+            self._commands, self._adapter, self._parameters, self.pilot, altitude_m, airspeed_m_s
+        ) as flight:
             yield flight
 
     # coming down
@@ -233,9 +222,9 @@ class FixedWingFlight(VehicleStore):
         """
         heading = self.runway_heading_rad
         if heading is None:
-            attitude = self.latest(telemetry.Attitude)
+            attitude = self._link.latest(Attitude)
             if attitude is None:
-                raise MissionError(f"no direction to land in is known; {self.heard()}")
+                raise MissionError(f"no direction to land in is known; {self._link.last_received()}")
             heading = attitude.yaw_rad
         wind = self.wind_ne_m_s()
         if wind is not None and wind[0] * math.cos(heading) + wind[1] * math.sin(heading) > _TAIL_WIND_M_S:
@@ -246,10 +235,10 @@ class FixedWingFlight(VehicleStore):
         """The autopilot's estimate of the velocity of the air (WIND_COV or WIND), north and east; None: not
         reported.
         """
-        m = self.message("WIND_COV")
+        m = self._link.message("WIND_COV")
         if m is not None and math.isfinite(m.wind_x) and math.isfinite(m.wind_y):
             return float(m.wind_x), float(m.wind_y)
-        m = self.message("WIND")
+        m = self._link.message("WIND")
         if m is not None and math.isfinite(m.speed) and math.isfinite(m.direction):
             source = math.radians(m.direction)
             return -m.speed * math.cos(source), -m.speed * math.sin(source)
@@ -264,17 +253,14 @@ class FixedWingFlight(VehicleStore):
             approach: the approach; None: at home, along the runway.
             wait: whether to wait until the vehicle is disarmed.
         """
-        from missions.vehicle import mission_transfer
-
-        self._require_wings("land_along")
         if approach is None:
-            approach = Approach(place=self.home, heading_rad=self.landing_heading_rad())
+            approach = Approach(place=self._link.home, heading_rad=self.landing_heading_rad())
         items = approach.items()
-        if self.adapter.first_mission_item_is_home:
+        if self._link.firmware.first_mission_item_is_home:
             items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=approach.place.lat_deg,
                                  y=approach.place.lon_deg, z=approach.place.alt_m), *items]  # fmt: skip
-        await mission_transfer.upload(self._whole, items)
-        await self.rewind_mission()
-        await self.set_mode(Mode.MISSION)
+        await upload(self._link, items)
+        await self._plans.rewind_mission()
+        await self._commands.set_mode(Mode.MISSION)
         if wait:
-            await self.wait_disarmed(timeout_s)
+            await self._link.wait_disarmed(timeout_s)

@@ -1,15 +1,13 @@
-"""The data that a vehicle stores for a mission: plans and parameters."""
+"""The plans that a vehicle stores (mission, geofence, rally points), and the progress of its mission."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import MissionError, VehicleTimeout
-from missions.vehicle import mission_transfer, parameter_client
-from missions.vehicle.adapter import Mode
-from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
+from missions.vehicle.firmware import Mode
 from missions.vehicle.item_tracker import (
     FlownOrder,
     ItemTracker,
@@ -17,6 +15,8 @@ from missions.vehicle.item_tracker import (
     MissionStep,
     mission_steps,
 )
+from missions.vehicle.link import VehicleLink
+from missions.vehicle.mission_transfer import clear, download, renumbered, upload
 
 _REWINDS: Final = 4
 _REWIND_S: Final = 1.5
@@ -24,12 +24,16 @@ _ACCEPTANCE_M: Final = 2.0
 """Distance at which a position shows that a waypoint was passed, if the waypoint specifies none."""
 
 
-class VehicleStore(VehicleCommands):
-    """The part of a vehicle for stored data: plans are uploaded and followed, parameters read and set."""
+class VehiclePlans:
+    """The plans of one vehicle: they are uploaded, downloaded and followed.
 
-    _tracker: ItemTracker | None = None  # tracker of the mission that was uploaded last
+    Args:
+        link: messages of the vehicle.
+    """
 
-    # missions
+    def __init__(self, link: VehicleLink) -> None:
+        self._link = link
+        self._tracker: ItemTracker | None = None  # tracker of the mission that was uploaded last
 
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
         """Upload a plan; returns the sequence number of its first item on the link (1 for ArduPilot, whose
@@ -37,13 +41,13 @@ class VehicleStore(VehicleCommands):
 
         The flight starts at its first item. Jumps name items by their index in `items`.
         """
-        first = 1 if self.adapter.first_mission_item_is_home else 0
-        home = self.home
+        first = 1 if self._link.firmware.first_mission_item_is_home else 0
+        home = self._link.home
         marker = MissionItem(
             command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m
         )
-        own = mission_transfer.renumbered(items, first)
-        await mission_transfer.upload(self, [marker, *own] if first else own, before=first)
+        own = renumbered(items, first)
+        await upload(self._link, [marker, *own] if first else own, before=first)
         await self.rewind_mission()
         order = FlownOrder.of(items)
         steps = mission_steps(items, order, home, _ACCEPTANCE_M)
@@ -55,37 +59,39 @@ class VehicleStore(VehicleCommands):
 
         If the vehicle does not confirm it (MISSION_CURRENT), the notes get a warning.
         """
-        first = 1 if self.adapter.first_mission_item_is_home else 0
-        with self.messages("MISSION_CURRENT") as stream:
+        first = 1 if self._link.firmware.first_mission_item_is_home else 0
+        with self._link.messages("MISSION_CURRENT") as stream:
             for _ in range(_REWINDS):
-                self.send(dialect.MAVLink_mission_set_current_message(self.system_id, AUTOPILOT_COMPONENT, 0))
+                self._link.send(
+                    dialect.MAVLink_mission_set_current_message(self._link.system_id, AUTOPILOT_COMPONENT, 0)
+                )
                 try:
-                    async with self.deadline(_REWIND_S, "the mission's first item"):
+                    async with self._link.deadline(_REWIND_S, "the mission's first item"):
                         while (await anext(stream)).seq > first:
                             pass
                         return
                 except TimeoutError:
                     continue
-        self.notes.warn("the vehicle did not confirm (MISSION_CURRENT) that its mission begins anew")
+        self._link.notes.warn("the vehicle did not confirm (MISSION_CURRENT) that its mission begins anew")
 
     async def upload_plan(self, mission_type: MissionType, items: Sequence[MissionItem]) -> None:
         """Upload a geofence or rally points, which replace those on the vehicle."""
-        await mission_transfer.upload(self, items, mission_type)
+        await upload(self._link, items, mission_type)
 
     async def download_plan(self, mission_type: MissionType) -> list[MissionItem]:
         """Download the geofence or the rally points from the vehicle."""
-        return await mission_transfer.download(self, mission_type)
+        return await download(self._link, mission_type)
 
     async def download_mission(self) -> list[MissionItem]:
         """Download the plan from the vehicle (without ArduPilot's home item)."""
-        items = await mission_transfer.download(self)
-        if not self.adapter.first_mission_item_is_home:
+        items = await download(self._link)
+        if not self._link.firmware.first_mission_item_is_home:
             return items
-        return mission_transfer.renumbered(items[1:], -1)
+        return renumbered(items[1:], -1)
 
     async def clear_mission(self) -> None:
         """Delete the plan on the vehicle."""
-        await mission_transfer.clear(self)
+        await clear(self._link)
 
     async def wait_item_reached(
         self, sequence: int, timeout_s: float, progress: Callable[[int], None] | None = None
@@ -101,7 +107,7 @@ class VehicleStore(VehicleCommands):
             MissionError: the vehicle left the mission before that.
         """
         tracker = self._tracker or ItemTracker([MissionStep(index=k) for k in range(sequence + 1)])
-        mode = MissionModeWatch(self.adapter.modes[Mode.MISSION])
+        mode = MissionModeWatch(self._link.firmware.modes[Mode.MISSION])
         wanted = tracker.place_of(sequence - tracker.first)
         told = 0
 
@@ -114,44 +120,22 @@ class VehicleStore(VehicleCommands):
             return tracker.behind > wanted
 
         names = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "GLOBAL_POSITION_INT", "HEARTBEAT")
-        with self.messages(*names) as stream:
+        with self._link.messages(*names) as stream:
             try:
-                async with self.deadline(timeout_s, f"mission item {sequence}"):
+                async with self._link.deadline(timeout_s, f"mission item {sequence}"):
                     while not there():
                         message = await anext(stream)
                         if message.get_type() == "HEARTBEAT":
                             if mode.left(message.custom_mode) and not tracker.at_the_last_place:
-                                name = self.adapter.mode_name(message.custom_mode)
+                                name = self._link.firmware.mode_name(message.custom_mode)
                                 raise MissionError(
                                     f"the vehicle left the mission for mode {name} "
-                                    f"before item {sequence}; {self.heard()}"
+                                    f"before item {sequence}; {self._link.last_received()}"
                                 )
                         else:
-                            tracker.on_message(message, self.clock.stamp_us)
+                            tracker.on_message(message, self._link.clock.stamp_us)
             except TimeoutError:
                 raise VehicleTimeout(
-                    f"mission item {sequence} was not reached within {timeout_s:g} s; {self.heard()}"
+                    f"mission item {sequence} was not reached within {timeout_s:g} s; "
+                    f"{self._link.last_received()}"
                 ) from None
-
-    # parameters
-
-    async def parameter(self, name: str) -> float:
-        """Read a parameter."""
-        value, _ = await parameter_client.read(self, name)
-        return value
-
-    async def parameter_or(self, name: str, default: float) -> float:
-        """Read a parameter; returns `default` when the vehicle doesn't answer."""
-        try:
-            return await self.parameter(name)
-        except VehicleTimeout:
-            return default
-
-    async def set_parameter(self, name: str, value: float) -> None:
-        """Set a parameter and wait for the confirmation."""
-        await parameter_client.write(self, name, value)
-
-    async def set_parameters(self, values: Mapping[str, float]) -> None:
-        """Set several parameters in order."""
-        for name, value in values.items():
-            await self.set_parameter(name, value)

@@ -1,0 +1,98 @@
+"""Waiting until a vehicle could be armed, and the reasons when it could not."""
+
+from typing import Final
+
+from autopilot_bridge.mavlink import dialect
+from missions.errors import VehicleTimeout
+from missions.preflight.health import not_ready_because
+from missions.vehicle.adapter import PREARM, Adapter
+from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.firmware import Mode
+from missions.vehicle.plans import VehiclePlans
+
+# at the end of a wait for readiness: time in which the autopilot reports what is missing
+_REASONS_S: Final = 5.0
+
+
+class Readiness:
+    """The readiness of a vehicle to be armed.
+
+    Args:
+        commands: commands to the vehicle.
+        adapter: its firmware's actions.
+        plans: its plans.
+    """
+
+    def __init__(self, commands: VehicleCommands, adapter: Adapter, plans: VehiclePlans) -> None:
+        self._commands = commands
+        self._link = commands.link
+        self._adapter = adapter
+        self._plans = plans
+
+    async def wait(self, timeout_s: float, *, leave_mission: bool) -> None:
+        """Start the streams and wait until the vehicle could be armed; see `Vehicle.wait_ready`."""
+        await self._adapter.start_streams()
+        if self._link.message("HOME_POSITION") is None:
+            self._commands.request_once("HOME_POSITION")
+        await self._wait(timeout_s, leave_mission)
+        if leave_mission and self._in_mission:
+            await self._commands.set_mode(self._link.firmware.resting_mode)
+            await self._plans.rewind_mission()
+            await self._wait(timeout_s, leave_mission)
+
+    @property
+    def _in_mission(self) -> bool:
+        """Whether the vehicle is disarmed, in the mode of a mission."""
+        link = self._link
+        return not link.armed and link.custom_mode == link.firmware.modes[Mode.MISSION]
+
+    async def _wait(self, timeout_s: float, leave_mission: bool) -> None:
+        """Wait until the vehicle is ready, or only its mission's mode may prevent it. In the last seconds the
+        autopilot is commanded to run its checks, so that it reports what is missing.
+
+        Raises:
+            VehicleTimeout: it is not ready; the message contains the reasons that the autopilot reported.
+        """
+        link = self._link
+
+        def ready() -> bool:
+            missing = self._adapter.readiness()
+            return not missing or (missing == [PREARM] and leave_mission and self._in_mission)
+
+        async def wait(seconds: float) -> None:
+            await link.wait_until(
+                ready,
+                what=lambda: f"readiness to fly (missing: {', '.join(self._adapter.readiness())})",
+                on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
+                timeout_s=seconds,
+            )
+
+        reasons_s = min(_REASONS_S, 0.5 * timeout_s)
+        try:
+            await wait(timeout_s - reasons_s)
+            return
+        except VehicleTimeout:
+            known = {id(text) for text in link.status_texts}
+            self._commands.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
+        try:
+            await wait(reasons_s)
+        except VehicleTimeout:
+            missing = self._adapter.readiness()
+            why = ""
+            if PREARM in missing:
+                texts = tuple(text.text for text in link.status_texts if id(text) not in known)
+                because = not_ready_because(texts, self._sensors_unhealthy)
+                why = (
+                    f"; the autopilot says: {because}" if because else ", and the autopilot does not say why"
+                )
+            raise VehicleTimeout(
+                f"no readiness to fly (missing: {', '.join(missing)}) within {timeout_s:g} s{why}; "
+                f"{link.last_received()}"
+            ) from None
+
+    @property
+    def _sensors_unhealthy(self) -> int:
+        status = self._link.message("SYS_STATUS")
+        if status is None:
+            return 0
+        return int(status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health)
