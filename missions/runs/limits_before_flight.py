@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Mission
-from missions.runs.vehicle_opening import Stage
+from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.options import MissionOptions
 from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
 from missions.runs.request import RunRequest
@@ -51,7 +51,7 @@ def _at(limits: FixedWingLimits, alt_m: float) -> FixedWingLimits:
     return replace(limits, air_altitude_m=alt_m if math.isfinite(alt_m) else 0.0)
 
 
-def check_request(mission: Mission[Any], request: RunRequest) -> None:
+def check_request(mission: Mission[Any], request: RunRequest, opener: VehicleOpener) -> None:
     """Refuse a request that no vehicle of the kind could fly, before anything is started.
 
     A request that every aircraft would refuse is checked with the limits of the requested aircraft, so that
@@ -66,7 +66,8 @@ def check_request(mission: Mission[Any], request: RunRequest) -> None:
         if world is None:
             _check_any(mission, request, own)
             continue
-        limits = _kind_limits(world.vehicles[index])
+        spec = world.vehicles[index]
+        limits = _kind_limits(spec, opener.kind_of(spec.model))
         try:
             mission.check(mission.adapted(own, limits), limits)
         except PlanError:
@@ -75,12 +76,12 @@ def check_request(mission: Mission[Any], request: RunRequest) -> None:
             raise
 
 
-def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> None:
+def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage, opener: VehicleOpener) -> None:
     """Refuse what the vehicles of an embedded world can't fly. Their parameters and their place are known."""
     if stage.parameters is None or stage.home is None:
         return
     for index, spec in enumerate(request.embedded_world.vehicles):
-        firmware = FIRMWARES[spec.autopilot, _kind(spec.model)]
+        firmware = FIRMWARES[spec.autopilot, opener.kind_of(spec.model)]
         limits = firmware.limits(stage.parameters(index, list(firmware.limiting_parameters)))
         mission.check_place(
             _check_with(mission, request, index, limits, stage.home.alt_m), limits, stage.home
@@ -133,20 +134,10 @@ def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptio
     raise PlanError(f"{refusals[0]} (that is for any vehicle; the limits of this one may ask for more)")
 
 
-def _kind(model: str | Path) -> VehicleKind:
-    from missions.embedded import model_kind
-
-    try:
-        return model_kind(model)
-    except ValueError as error:
-        raise PlanError(str(error)) from error
-
-
-def _kind_limits(spec: "VehicleSpec") -> Limits:
+def _kind_limits(spec: "VehicleSpec", kind: VehicleKind) -> Limits:
     """Limits from the firmware's defaults and the specified parameters. For a fixed wing the widest limits
     are returned, because its own limits come with the aircraft.
     """
-    kind = _kind(spec.model)
     if kind is VehicleKind.FIXED_WING:
         return WIDEST_FIXED_WING_LIMITS
     if (spec.autopilot, kind) not in FIRMWARES:

@@ -23,7 +23,7 @@ from missions.runs.limits_before_flight import adapted, check_request, check_sta
 from missions.library import find_mission
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
-from missions.runs.vehicle_opening import Stage, open_vehicles, open_world
+from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.options import MissionOptions
 from missions.runs.records import FlightRecorder, FlightRecords
 from missions.runs.request import RunRequest
@@ -122,6 +122,8 @@ def fly(
     mission: Mission[Any] | str,
     request: RunRequest | None = None,
     on_progress: ProgressListener | None = None,
+    *,
+    opener: VehicleOpener | None = None,
 ) -> RunResult:
     """Fly a mission and write its run folder. Blocks until the run is finished.
 
@@ -132,6 +134,7 @@ def fly(
         mission: a mission, its name, or the path of a user's own or of a mission file.
         request: settings of the run; None: the defaults.
         on_progress: called each second of vehicle time.
+        opener: opens the vehicles; None: the embedded world or the links of the request.
 
     Raises:
         KeyboardInterrupt: the run was interrupted before it began, or while its results were written.
@@ -139,15 +142,20 @@ def fly(
         MissionError: a file of the embedded world cannot be written; nothing was started.
         BridgeError: a link can't be opened.
     """
+    opener = VehicleOpener() if opener is None else opener
     flown = find_mission(mission) if isinstance(mission, str) else mission
     with EndingSignals() as ending:
-        return _fly_interruptible(flown, request or RunRequest(), on_progress, ending)
+        return _fly_interruptible(flown, request or RunRequest(), on_progress, ending, opener)
 
 
 def _fly_interruptible(
-    mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None, ending: EndingSignals
+    mission: Mission[Any],
+    request: RunRequest,
+    on_progress: ProgressListener | None,
+    ending: EndingSignals,
+    opener: VehicleOpener,
 ) -> RunResult:
-    check_request(mission, request)
+    check_request(mission, request, opener)
     if request.connect and len(request.connect) != request.options.vehicles:
         raise PlanError(
             f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
@@ -158,11 +166,11 @@ def _fly_interruptible(
     folder = claimed.path
     stage = None
     try:
-        stage = open_vehicles(request) if request.connect else open_world(request, claimed)
+        stage = opener.open_vehicles(request) if request.connect else opener.open_world(request, claimed)
         if stage.published_map is not None:
             request = replace(request, options=mission.with_map(request.options, stage.published_map))
         request.on_open()
-        check_stage(mission, request, stage)
+        check_stage(mission, request, stage, opener)
     except BaseException:
         if stage is not None:
             stage.close()

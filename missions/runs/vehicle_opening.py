@@ -10,11 +10,13 @@ from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.runs.claimed_folder import ClaimedFolder
 from missions.errors import PlanError
+from missions.kind import VehicleKind
 from missions.runs.request import RunRequest
 from missions.runs.run_folder import EPOCH_UNIX_US
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Link
+    from missions.embedded import EmbeddedSitl
 
 
 MAP_NAME: Final = "magnetic_map.npz"
@@ -50,22 +52,8 @@ class Stage:
     published_map: Path | None = None
 
 
-def open_world(request: RunRequest, folder: ClaimedFolder) -> Stage:
-    """Open an embedded SITL.
-
-    Raises:
-        PlanError: a value is not accepted; the message names it and what is accepted.
-        MissionError: a file that the world publishes cannot be written.
-    """
-    from missions.embedded import EmbeddedSitl
-
-    folder.published.append(folder.path / MAP_NAME)
-    try:
-        sitl = EmbeddedSitl(
-            request.embedded_world, publish_to=folder.path / MAP_NAME, speedup=request.speedup
-        )
-    except ValueError as error:
-        raise PlanError(str(error)) from error
+def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
+    """The links, clocks and event loop of an embedded SITL."""
     return Stage(
         loop=sitl.loop,
         links=list(sitl.links),
@@ -80,40 +68,74 @@ def open_world(request: RunRequest, folder: ClaimedFolder) -> Stage:
     )
 
 
-def open_vehicles(request: RunRequest) -> Stage:
-    """Open links to vehicles that are not embedded.
+class VehicleOpener:
+    """Opens the vehicles of a flight: an embedded world, or links. A subclass may open others."""
 
-    Raises:
-        PlanError: an address cannot be that of a vehicle.
-        BridgeError: a link can't be opened.
-    """
-    from autopilot_bridge.links import VEHICLE_FORMS, ReplayLog, open_link, parse_address
+    def kind_of(self, model: str | Path) -> VehicleKind:
+        """Class of vehicle of a model of the embedded world.
 
-    addresses = [parse_address(text, VEHICLE_FORMS) for text in request.connect]
-    for address in addresses:
-        if isinstance(address, ReplayLog):
-            raise PlanError(f"`connect` {address}: a log can't be flown; give the link of a vehicle")
-    links: list[Link] = []
-    try:
-        links.extend(open_link(address) for address in addresses)
-    except BaseException:
-        for link in links:
-            link.close()
-        raise
-    clocks = [TelemetryClock() for _ in links]
+        Raises:
+            PlanError: the model does not exist.
+        """
+        from missions.embedded import model_kind
 
-    def close() -> None:
-        for link in links:
-            link.close()
+        try:
+            return model_kind(model)
+        except ValueError as error:
+            raise PlanError(str(error)) from error
 
-    return Stage(
-        loop=asyncio.new_event_loop(),
-        links=links,
-        clocks=list(clocks),
-        epoch_us=None,
-        time_us=lambda: max(clock.time_us for clock in clocks),
-        on_truth=lambda _listener: None,
-        parameters=None,
-        home=None,
-        close=close,
-    )
+    def open_world(self, request: RunRequest, folder: ClaimedFolder) -> Stage:
+        """Open an embedded SITL.
+
+        Raises:
+            PlanError: a value is not accepted; the message names it and what is accepted.
+            MissionError: a file that the world publishes cannot be written.
+        """
+        from missions.embedded import EmbeddedSitl
+
+        folder.published.append(folder.path / MAP_NAME)
+        try:
+            sitl = EmbeddedSitl(
+                request.embedded_world, publish_to=folder.path / MAP_NAME, speedup=request.speedup
+            )
+        except ValueError as error:
+            raise PlanError(str(error)) from error
+        return embedded_stage(sitl)
+
+    def open_vehicles(self, request: RunRequest) -> Stage:
+        """Open links to vehicles that are not embedded.
+
+        Raises:
+            PlanError: an address cannot be that of a vehicle.
+            BridgeError: a link can't be opened.
+        """
+        from autopilot_bridge.links import VEHICLE_FORMS, ReplayLog, open_link, parse_address
+
+        addresses = [parse_address(text, VEHICLE_FORMS) for text in request.connect]
+        for address in addresses:
+            if isinstance(address, ReplayLog):
+                raise PlanError(f"`connect` {address}: a log can't be flown; give the link of a vehicle")
+        links: list[Link] = []
+        try:
+            links.extend(open_link(address) for address in addresses)
+        except BaseException:
+            for link in links:
+                link.close()
+            raise
+        clocks = [TelemetryClock() for _ in links]
+
+        def close() -> None:
+            for link in links:
+                link.close()
+
+        return Stage(
+            loop=asyncio.new_event_loop(),
+            links=links,
+            clocks=list(clocks),
+            epoch_us=None,
+            time_us=lambda: max(clock.time_us for clock in clocks),
+            on_truth=lambda _listener: None,
+            parameters=None,
+            home=None,
+            close=close,
+        )

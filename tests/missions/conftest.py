@@ -8,6 +8,8 @@ import resource
 import struct
 import sys
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -15,7 +17,10 @@ from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition, dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.runs.vehicle_opening import Stage
+from missions.errors import PlanError
+from missions.kind import VehicleKind
+from missions.runs import session
+from missions.runs.vehicle_opening import VehicleOpener, embedded_stage
 from missions.vehicle import Vehicle
 from missions.vehicle.connection import Connection
 
@@ -468,25 +473,50 @@ def little_room(monkeypatch):
     return room
 
 
+class ScriptedWorlds(list, VehicleOpener):
+    """Opens scripted autopilots in place of embedded worlds, and lists them.
+
+    Attributes:
+        make: creates one from flavour and number of vehicles.
+    """
+
+    make = FakeSitl
+
+    def kind_of(self, model):
+        if model != "iris":
+            raise PlanError(f"vehicle model {model!r} is unknown")
+        return VehicleKind.MULTICOPTER
+
+    def open_world(self, request, folder):
+        vehicles = request.embedded_world.vehicles
+        self.append(self.make(vehicles[0].autopilot, len(vehicles)))
+        return embedded_stage(self[-1])
+
+
 @pytest.fixture
-def elsewhere(monkeypatch):
+def fly_with(monkeypatch):
+    """Makes flights open their vehicles with an opener, those of the command line too."""
+    return lambda opener: monkeypatch.setattr(session, "fly", partial(session.fly, opener=opener))
+
+
+@pytest.fixture
+def scripted(fly_with):
+    """Embedded worlds are scripted autopilots; gives the list of those that were opened."""
+    worlds = ScriptedWorlds()
+    fly_with(worlds)
+    return worlds
+
+
+@pytest.fixture
+def elsewhere(fly_with):
     """What `--connect` leads to: a scripted autopilot; its time is a virtual loop's."""
     sitl = FakeSitl(truth=False)
 
-    def stage(_request):
-        return Stage(
-            loop=sitl.loop,
-            links=list(sitl.links),
-            clocks=[LoopClock() for _ in sitl.links],
-            epoch_us=None,
-            time_us=lambda: sitl.time_us,
-            on_truth=sitl.on_truth,
-            parameters=None,
-            home=None,
-            close=sitl.close,
-        )
+    class Opener(VehicleOpener):
+        def open_vehicles(self, request):
+            return replace(embedded_stage(sitl), epoch_us=None, parameters=None, home=None)
 
-    monkeypatch.setattr("missions.runs.session.open_vehicles", stage)
+    fly_with(Opener())
     return sitl.autopilots[0]
 
 

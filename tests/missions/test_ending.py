@@ -12,10 +12,10 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from missions.cli import main as cli
-from missions.library import find_mission
 from missions.options import FlightOptions
+from missions.runs import session
 from missions.runs.ending import EndedBySignal, EndingSignals
-from missions.runs.session import Flight, RunRequest, RunResult, fly
+from missions.runs.session import Flight, RunRequest, RunResult
 
 OPTIONS = FlightOptions(width_m=40.0, height_m=30.0, pattern="L2")
 ENDING = [signal.SIGTERM, signal.SIGHUP]
@@ -34,7 +34,7 @@ def sending(*numbers: signal.Signals) -> Callable[[Flight], None]:
 
 def flown(folder: Path, on_progress: Callable[[Flight], None]) -> RunResult:
     request = RunRequest(options=OPTIONS, connect=["udpin:127.0.0.1:1"], out=folder, picture=False)
-    return fly(find_mission("lissajous"), request, on_progress)
+    return session.fly("lissajous", request, on_progress)
 
 
 @pytest.fixture(autouse=True)
@@ -161,7 +161,7 @@ def test_before_anything_has_begun_nothing_stays(
         on_open=lambda: signal.raise_signal(number),
     )
     with pytest.raises(EndedBySignal) as ended:
-        fly(find_mission("lissajous"), request)
+        session.fly("lissajous", request)
     assert ended.value.number == number
     assert list(tmp_path.iterdir()) == []
 

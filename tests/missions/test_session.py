@@ -8,7 +8,6 @@ import socket
 import struct
 import subprocess
 import sys
-import types
 from dataclasses import replace
 
 import numpy as np
@@ -22,41 +21,20 @@ from flightsim.world_spec import WorldSpec
 from missions.cli import fly as cli_fly
 from missions.cli import main as cli
 from missions.errors import MissionError, PlanError
-from missions.kind import VehicleKind
 from missions.library import MISSIONS, find_mission
 from missions.mission import Mission
 from missions.options import FlightOptions, Via, parameters_from_file, parse_pair, parse_wind
 from missions.pattern_search.mission import PatternMission
+from missions.runs import session
 from missions.runs.records import FlightRecords
 from missions.runs.run_folder import create_run_folder
-from missions.runs.session import RunRequest, fly
+from missions.runs.session import RunRequest
 
 REQUIRED = {
     "mission", "vehicle", "autopilot", "seed", "outcome", "sim_time_s", "wall_time_s", "speedup",
     "distance_m", "path_rms_error_m", "path_max_error_m", "max_attitude_error_deg", "message_counts",
     "versions",
 }  # fmt: skip
-
-
-@pytest.fixture
-def embedded(monkeypatch, make_sitl):
-    """Embedded worlds are scripted autopilots; gives the list of those that were opened."""
-    opened = []
-    module = types.ModuleType("missions.embedded")
-
-    def model_kind(model):
-        if model != "iris":
-            raise ValueError(f"vehicle model {model!r} is unknown")
-        return VehicleKind.MULTICOPTER
-
-    def open_embedded(world, **_options):
-        opened.append(make_sitl(world.vehicles[0].autopilot, len(world.vehicles)))
-        return opened[-1]
-
-    module.EmbeddedSitl = open_embedded
-    module.model_kind = model_kind
-    monkeypatch.setitem(sys.modules, "missions.embedded", module)
-    return opened
 
 
 def small(**changes):
@@ -66,21 +44,21 @@ def small(**changes):
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("via", list(Via))
 @pytest.mark.parametrize("name", [n for n, m in MISSIONS.items() if isinstance(m, PatternMission)])
-def test_every_mission_on_both_firmwares_by_both_ways(embedded, tmp_path, name, via, flavour):
+def test_every_mission_on_both_firmwares_by_both_ways(scripted, tmp_path, name, via, flavour):
     request = RunRequest(
         options=small(via=via),
         world=WorldSpec.of_team(autopilot=flavour, seed=7),
         out=tmp_path / "run",
         picture=False,
     )
-    result = fly(find_mission(name), request)
+    result = session.fly(find_mission(name), request)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert result.outcome == summary["outcome"] == "completed", result.reason
     assert set(summary) >= REQUIRED
     assert summary["autopilot"] == flavour
     assert summary["path_rms_error_m"] < (0.05 if via is Via.SETPOINTS else 1.0)
     assert summary["message_counts"]["HIL_STATE_QUATERNION"] > 1000
-    vehicle = embedded[0].autopilots[0]
+    vehicle = scripted[0].autopilots[0]
     assert not vehicle.armed
     assert abs(vehicle.pos[0]) < 1.0
     assert abs(vehicle.pos[1]) < 1.0
@@ -91,8 +69,8 @@ def test_every_mission_on_both_firmwares_by_both_ways(embedded, tmp_path, name, 
     assert phases[-2:] == ["pattern", "return"]
 
 
-def test_log_is_read_by_pymavlink_and_holds_both_directions_and_truth(embedded, tmp_path):
-    fly(find_mission("sector"), RunRequest(options=small(), out=tmp_path / "run"))
+def test_log_is_read_by_pymavlink_and_holds_both_directions_and_truth(scripted, tmp_path):
+    session.fly("sector", RunRequest(options=small(), out=tmp_path / "run"))
     log = mavutil.mavlink_connection(str(tmp_path / "run" / "flight.tlog"))
     senders, first = set(), None
     while (message := log.recv_match()) is not None:
@@ -105,8 +83,8 @@ def test_log_is_read_by_pymavlink_and_holds_both_directions_and_truth(embedded, 
     assert FlightRecords.from_tlog(tmp_path / "run" / "flight.tlog").message_counts == counts
 
 
-def test_picture_is_a_png_of_some_size(embedded, tmp_path):
-    fly(find_mission("lissajous"), RunRequest(options=small(vehicles=2), out=tmp_path / "run"))
+def test_picture_is_a_png_of_some_size(scripted, tmp_path):
+    session.fly("lissajous", RunRequest(options=small(vehicles=2), out=tmp_path / "run"))
     data = (tmp_path / "run" / "track.png").read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     width, height = struct.unpack(">II", data[16:24])
@@ -114,18 +92,18 @@ def test_picture_is_a_png_of_some_size(embedded, tmp_path):
     assert height > 1000
 
 
-def test_same_flight_same_log(embedded, tmp_path):
+def test_same_flight_same_log(scripted, tmp_path):
     for name in ("a", "b"):
         options = small(via=Via.SETPOINTS, vehicles=2)
-        fly(find_mission("lissajous"), RunRequest(options=options, out=tmp_path / name, picture=False))
+        session.fly("lissajous", RunRequest(options=options, out=tmp_path / name, picture=False))
     logs = [(tmp_path / name / "flight.tlog").read_bytes() for name in ("a", "b")]
     assert logs[0] == logs[1]
 
 
 @pytest.mark.parametrize("via", list(Via))
-def test_a_team_shares_the_pattern_in_layers(embedded, tmp_path, via):
+def test_a_team_shares_the_pattern_in_layers(scripted, tmp_path, via):
     options = small(via=via, vehicles=2, pattern="L1")
-    result = fly(find_mission("lissajous"), RunRequest(options=options, out=tmp_path / "run", picture=False))
+    result = session.fly("lissajous", RunRequest(options=options, out=tmp_path / "run", picture=False))
     assert result.outcome == "completed", result.reason
     blocks = result.summary["vehicles"]
     assert [block["system_id"] for block in blocks] == [1, 2]
@@ -142,17 +120,17 @@ def test_a_team_shares_the_pattern_in_layers(embedded, tmp_path, via):
     assert abs(centre[0] - centre[1]) * 0.0111 < 1.5
 
 
-def test_search_time_ends_the_pattern(embedded, tmp_path):
+def test_search_time_ends_the_pattern(scripted, tmp_path):
     for via in Via:
         options = small(via=via, search_time_s=90.0)
         out = tmp_path / str(via)
-        result = fly(find_mission("lissajous"), RunRequest(options=options, out=out, picture=False))
+        result = session.fly("lissajous", RunRequest(options=options, out=out, picture=False))
         assert result.outcome == "completed", result.reason
         phases = {p["name"]: p for p in result.summary["vehicles"][0]["phases"]}
         assert phases["pattern"]["end_s"] - phases["pattern"]["start_s"] == pytest.approx(90.0, abs=8.0)
 
 
-def test_a_failing_mission_returns_the_vehicle_and_keeps_the_log(embedded, tmp_path):
+def test_a_failing_mission_returns_the_vehicle_and_keeps_the_log(scripted, tmp_path):
     class Broken(Mission):
         name = "broken"
 
@@ -160,14 +138,14 @@ def test_a_failing_mission_returns_the_vehicle_and_keeps_the_log(embedded, tmp_p
             await vehicle.takeoff(10.0)
             raise MissionError("the camera fell off")
 
-    result = fly(Broken(), RunRequest(options=small(), out=tmp_path / "run"))
+    result = session.fly(Broken(), RunRequest(options=small(), out=tmp_path / "run"))
     assert (result.outcome, result.reason) == ("failed", "the camera fell off")
-    assert embedded[0].autopilots[0].kind == "return"
+    assert scripted[0].autopilots[0].kind == "return"
     assert result.summary["outcome"] == "failed"
     assert (tmp_path / "run" / "flight.tlog").stat().st_size > 10_000
 
 
-def test_an_interrupted_mission_returns_the_vehicle_and_keeps_the_log(embedded, tmp_path):
+def test_an_interrupted_mission_returns_the_vehicle_and_keeps_the_log(scripted, tmp_path):
     sent = []
 
     def press(flight):
@@ -175,14 +153,14 @@ def test_an_interrupted_mission_returns_the_vehicle_and_keeps_the_log(embedded, 
             sent.append(True)
             os.kill(os.getpid(), signal.SIGINT)
 
-    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"), press)
+    result = session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"), press)
     assert result.outcome == "interrupted"
-    assert embedded[0].autopilots[0].kind == "return"
+    assert scripted[0].autopilots[0].kind == "return"
     assert FlightRecords.from_tlog(tmp_path / "run" / "flight.tlog").message_counts["HEARTBEAT"] > 50
     assert (tmp_path / "run" / "track.png").exists()
 
 
-def test_users_own_mission(embedded, tmp_path):
+def test_users_own_mission(scripted, tmp_path):
     script = tmp_path / "my_mission.py"
     script.write_text(
         "async def fly(vehicle, options):\n"
@@ -200,14 +178,14 @@ def test_users_own_mission(embedded, tmp_path):
     assert summary["distance_m"] > 25.0
 
 
-def test_a_mistake_in_a_users_mission_is_one_line_and_the_vehicle_returns(embedded, tmp_path, capsys):
+def test_a_mistake_in_a_users_mission_is_one_line_and_the_vehicle_returns(scripted, tmp_path, capsys):
     script = tmp_path / "mine.py"
     script.write_text("async def fly(vehicle, options):\n    await vehicle.takeoff(8.0)\n    1 / 0\n")
     code, _out, err = command_line(capsys, "fly", str(script), "--out", str(tmp_path / "run"))
     assert code == 1
     assert len(err.splitlines()) == 1
     assert "mine.py, line 3: ZeroDivisionError: division by zero" in err
-    assert embedded[0].autopilots[0].kind == "return"
+    assert scripted[0].autopilots[0].kind == "return"
 
 
 def test_run_folders_are_numbered_and_never_overwritten(tmp_path):
@@ -220,11 +198,11 @@ def test_run_folders_are_numbered_and_never_overwritten(tmp_path):
         create_run_folder(given, "x")
 
 
-def test_a_refused_run_folder_opens_nothing(embedded, tmp_path):
+def test_a_refused_run_folder_opens_nothing(scripted, tmp_path):
     (tmp_path / "mine").write_text("x")
     with pytest.raises(PlanError, match="not empty"):
-        fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path))
-    assert embedded == []
+        session.fly("lissajous", RunRequest(options=small(), out=tmp_path))
+    assert scripted == []
 
 
 def test_the_folder_of_a_run_whose_link_cannot_be_opened_is_removed_again(tmp_path):
@@ -235,34 +213,34 @@ def test_the_folder_of_a_run_whose_link_cannot_be_opened_is_removed_again(tmp_pa
         connect = [f"udpin:127.0.0.1:{taken.getsockname()[1]}"]
         for folder in (out, mine):
             with pytest.raises(BridgeError):
-                fly(find_mission("lissajous"), RunRequest(options=small(), connect=connect, out=folder))
+                session.fly("lissajous", RunRequest(options=small(), connect=connect, out=folder))
     assert not out.parent.exists()
     assert mine.exists()
 
 
-def test_where_no_log_can_be_made_nothing_is_opened(embedded, tmp_path, monkeypatch):
+def test_where_no_log_can_be_made_nothing_is_opened(scripted, tmp_path, monkeypatch):
     def full(_path):
         raise TlogError("disk full")
 
     monkeypatch.setattr("missions.runs.claimed_folder.TlogWriter", full)
     with pytest.raises(TlogError, match="disk full"):
-        fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
-    assert embedded == []
+        session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"))
+    assert scripted == []
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_that_fails_at_once_leaves_what_is_not_its_own(embedded, tmp_path):
+def test_a_run_that_fails_at_once_leaves_what_is_not_its_own(scripted, tmp_path):
     def open_badly():
         (tmp_path / "notes.txt").write_text("mine")
         raise PlanError("enough")
 
     request = RunRequest(options=small(), out=tmp_path, picture=False)
     with pytest.raises(PlanError, match="enough"):
-        fly(find_mission("lissajous"), replace(request, on_open=open_badly))
+        session.fly("lissajous", replace(request, on_open=open_badly))
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
-def test_a_folder_is_one_run_s_from_its_beginning(embedded, tmp_path, monkeypatch):
+def test_a_folder_is_one_run_s_from_its_beginning(scripted, tmp_path, monkeypatch):
     request = RunRequest(options=small(), out=tmp_path, picture=False)
     refused = []
 
@@ -271,10 +249,10 @@ def test_a_folder_is_one_run_s_from_its_beginning(embedded, tmp_path, monkeypatc
             "missions.runs.claimed_folder.create_run_folder", lambda out, name: out
         )  # just empty
         with pytest.raises(PlanError, match=r"another run has begun in .*; choose another `out`") as error:
-            fly(find_mission("sector"), request)
+            session.fly("sector", request)
         refused.append(error)
 
-    result = fly(find_mission("lissajous"), replace(request, on_open=fly_another))
+    result = session.fly("lissajous", replace(request, on_open=fly_another))
     assert refused
     assert result.outcome == "completed", result.reason
     assert {path.name for path in tmp_path.iterdir()} == {"flight.tlog", "summary.json"}
@@ -291,43 +269,43 @@ class FillingDisk(TlogWriter):
         super().flush()
 
 
-def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(embedded, tmp_path, monkeypatch):
+def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(scripted, tmp_path, monkeypatch):
     monkeypatch.setattr("missions.runs.claimed_folder.TlogWriter", FillingDisk)
     monkeypatch.setattr(FillingDisk, "room", 100_000)
-    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    result = session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk; it was flown on without a log" in result.reason
     (vehicle,) = result.summary["vehicles"]
     assert vehicle["phases"][-1]["name"] == "return" and vehicle["waypoints"]["passed"] > 0
-    assert not embedded[0].autopilots[0].armed
+    assert not scripted[0].autopilots[0].armed
     assert len(list(TlogReader(tmp_path / "run" / "flight.tlog"))) > 1000
 
 
-def test_nothing_is_flown_on_a_full_disk(embedded, tmp_path, monkeypatch):
+def test_nothing_is_flown_on_a_full_disk(scripted, tmp_path, monkeypatch):
     monkeypatch.setattr("missions.runs.claimed_folder.TlogWriter", FillingDisk)
-    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    result = session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk; nothing was flown" in result.reason
     assert all(phase["name"] != "takeoff" for phase in result.summary["vehicles"][0]["phases"])
 
 
-def test_a_summary_that_finds_no_room_is_told(embedded, tmp_path, monkeypatch):
+def test_a_summary_that_finds_no_room_is_told(scripted, tmp_path, monkeypatch):
     def full(folder, summary):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("missions.runs.session.write_summary", full)
-    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    result = session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk" in result.reason
 
 
-def test_a_picture_that_finds_no_room_is_told_in_the_summary_too(embedded, tmp_path, monkeypatch):
+def test_a_picture_that_finds_no_room_is_told_in_the_summary_too(scripted, tmp_path, monkeypatch):
     def full(_mission, path, _title, _debriefing):
         path.write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Mission, "draw", full)
-    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    result = session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk" in result.reason
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -345,7 +323,7 @@ def command_line(capsys, *arguments):
     return code, captured.out, captured.err
 
 
-def test_a_flight_from_the_command_line(embedded, tmp_path, capsys):
+def test_a_flight_from_the_command_line(scripted, tmp_path, capsys):
     code, out, err = command_line(
         capsys, "fly", "lissajous", "--pattern", "L1", "--size", "40x30", "--via", "setpoints",
         "--out", str(tmp_path / "run"), "--no-picture",
@@ -359,12 +337,12 @@ def test_a_flight_from_the_command_line(embedded, tmp_path, capsys):
     assert lines[-1] == f"run: {tmp_path / 'run'}"
 
 
-def test_a_failed_flight_exits_1_with_one_line(embedded, tmp_path, capsys, monkeypatch, make_sitl):
+def test_a_failed_flight_exits_1_with_one_line(scripted, tmp_path, capsys, make_sitl):
     class Deaf(make_sitl):
         def advance(self):
             self.time_us += 20_000
 
-    monkeypatch.setattr(sys.modules["missions.embedded"], "EmbeddedSitl", lambda *_, **__: Deaf())
+    scripted.make = lambda *_: Deaf()
     code, _out, err = command_line(capsys, "fly", "sector", "--out", str(tmp_path / "run"))
     assert code == 1
     assert len(err.splitlines()) == 1
@@ -380,7 +358,7 @@ def lissajous_off_by(monkeypatch, offset_m):
 
 
 @pytest.mark.parametrize(("offset_m", "word"), [(1.9, "within the acceptance radius"), (2.1, "poor")])
-def test_poor_tracking_is_told(embedded, tmp_path, capsys, monkeypatch, offset_m, word):
+def test_poor_tracking_is_told(scripted, tmp_path, capsys, monkeypatch, offset_m, word):
     lissajous_off_by(monkeypatch, offset_m)
     code, out, _err = command_line(
         capsys, "fly", "lissajous", "--size", "40", "--via", "setpoints", "--out", str(tmp_path / "run"),
@@ -394,7 +372,7 @@ def test_poor_tracking_is_told(embedded, tmp_path, capsys, monkeypatch, offset_m
 
 
 @pytest.mark.parametrize(("bound", "code"), [("1.5", 1), ("2", 0)])
-def test_a_bound_of_the_path_error_is_a_check(embedded, tmp_path, capsys, monkeypatch, bound, code):
+def test_a_bound_of_the_path_error_is_a_check(scripted, tmp_path, capsys, monkeypatch, bound, code):
     lissajous_off_by(monkeypatch, 1.9)
     given = command_line(
         capsys, "fly", "lissajous", "--size", "40", "--via", "setpoints", "--out", str(tmp_path / "run"),
@@ -406,7 +384,7 @@ def test_a_bound_of_the_path_error_is_a_check(embedded, tmp_path, capsys, monkey
     assert outcome == ("failed" if code else "completed")
 
 
-def test_a_bound_of_a_path_error_that_nobody_measures_is_no_success(embedded, tmp_path, capsys):
+def test_a_bound_of_a_path_error_that_nobody_measures_is_no_success(scripted, tmp_path, capsys):
     script = tmp_path / "idle.py"
     script.write_text("async def fly(vehicle, options):\n    await vehicle.clock.sleep(1.0)\n")
     code, _out, err = command_line(
@@ -416,7 +394,7 @@ def test_a_bound_of_a_path_error_that_nobody_measures_is_no_success(embedded, tm
     assert "flew no path whose error --max-error could limit" in err
 
 
-def test_warnings_are_told_once(embedded, tmp_path, capsys):
+def test_warnings_are_told_once(scripted, tmp_path, capsys):
     script = tmp_path / "wary.py"
     script.write_text(
         "async def fly(vehicle, options):\n    for _ in range(3):\n        vehicle.notes.warn('low sun')\n"

@@ -9,11 +9,11 @@ import pytest
 
 from flightsim.world_spec import WorldSpec
 from missions.kind import VehicleKind
-from missions.library import find_mission
 from missions.notes import PATTERN, CommandedPath, FlightNotes
 from missions.options import FlightOptions, Via
+from missions.runs import session
 from missions.runs.score import Track
-from missions.runs.session import RunRequest, fly
+from missions.runs.session import RunRequest
 from missions.runs.verdict import path_verdict
 from tests.missions.conftest import HOME
 
@@ -99,7 +99,7 @@ def test_with_a_time_limit_the_rest_need_not_be_flown() -> None:
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("via", Via)
 def test_a_mission_that_is_reported_and_not_flown_has_failed(
-    monkeypatch, make_sitl, tmp_path: Path, flavour, via
+    scripted, make_sitl, tmp_path: Path, flavour, via
 ):
     """The vehicle reports every item and takes every setpoint, and stands still at its altitude."""
 
@@ -123,7 +123,7 @@ def test_a_mission_that_is_reported_and_not_flown_has_failed(
 
             autopilot._fly = stay
 
-    monkeypatch.setattr("missions.embedded.EmbeddedSitl", lambda world, **_: Idle())
+    scripted.make = lambda *_: Idle()
     options = FlightOptions(pattern="sector", width_m=60.0, height_m=60.0, via=via)
     request = RunRequest(
         options=options,
@@ -131,6 +131,6 @@ def test_a_mission_that_is_reported_and_not_flown_has_failed(
         picture=False,
         out=tmp_path / "run",
     )
-    result = fly(find_mission("sector"), request)
+    result = session.fly("sector", request)
     assert result.outcome == "failed"
     assert "own position" in result.reason

@@ -1,8 +1,6 @@
 """`fly --estimator`: estimates of a flight, and the replay of its own log, to the last bit."""
 
 import json
-import sys
-import types
 from pathlib import Path
 
 import numpy as np
@@ -14,35 +12,19 @@ from missions.cli.main import run_command_line
 from missions.errors import PlanError
 from missions.estimation.in_flight import estimators_of
 from missions.estimation.over_logs import ReplayRequest, replay_logs
-from missions.kind import VehicleKind
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
-from missions.runs.session import RunRequest, fly
+from missions.runs import session
+from missions.runs.session import RunRequest
 
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
-
-
-@pytest.fixture
-def scripted(monkeypatch, make_sitl):
-    """Embedded worlds are scripted autopilots; gives the list of those that were opened."""
-    opened = []
-    module = types.ModuleType("missions.embedded")
-    module.model_kind = lambda _model: VehicleKind.MULTICOPTER
-
-    def open_embedded(world, **_options):
-        opened.append(make_sitl(world.vehicles[0].autopilot, len(world.vehicles)))
-        return opened[-1]
-
-    module.EmbeddedSitl = open_embedded
-    monkeypatch.setitem(sys.modules, "missions.embedded", module)
-    return opened
 
 
 def flight(tmp_path, **changes):
     options = FlightOptions(width_m=40.0, height_m=30.0, pattern="L2", vehicles=changes.pop("vehicles", 1))
     world = WorldSpec.of_team(options.vehicles, autopilot=changes.pop("autopilot", "px4"))
     request = RunRequest(options=options, world=world, out=tmp_path / "run", picture=False, **changes)
-    return fly(find_mission("lissajous"), request)
+    return session.fly("lissajous", request)
 
 
 def same_estimates(folder, again):
