@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from missions.embedded import occupancy_world, orbit_world
     from missions.errors import MissionError, PlanError
     from missions.library import MISSIONS, find_mission
     from missions.mission import Mission
@@ -39,6 +40,8 @@ __all__ = [
     "Via",
     "find_mission",
     "fly",
+    "occupancy_world",
+    "orbit_world",
 ]
 
 _MODULES: Final = {
@@ -57,6 +60,8 @@ _MODULES: Final = {
     "Via": "missions.options",
     "find_mission": "missions.library",
     "fly": "missions.runs.session",
+    "occupancy_world": "missions.embedded",
+    "orbit_world": "missions.embedded",
 }
 
 __getattr__ = lazy_exports(__name__, _MODULES)

@@ -204,13 +204,10 @@ def in_circles(needs):
         left = {name: others - free for name, others in left.items() if name not in free}
 
 
-CIRCLES_LEFT = ("missions.vehicle",)
-
-
-@pytest.mark.parametrize("package", ["estimators", "missions"])
+@pytest.mark.parametrize("package", ["estimators", "flightsim", "missions"])
 def test_no_modules_import_each_other(package):
     """Imports in functions and for type checking count."""
-    names = {name for name in MODULES if is_in(name, (package,)) and not is_in(name, CIRCLES_LEFT)}
+    names = {name for name in MODULES if is_in(name, (package,))}
     assert in_circles({name: needed(name) & names for name in names}) == []
 
 

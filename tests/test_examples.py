@@ -2,6 +2,7 @@
 
 import json
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -90,3 +91,19 @@ def test_own_aircraft_flies(tmp_path: Path) -> None:
     flown = flightstack_done("fly", "lissajous", *arguments, "--out", str(tmp_path / "run"))
     assert flown.returncode == 0, flown.stderr
     assert "completed: lissajous" in flown.stdout
+
+
+def test_a_sweep_in_a_small_form(tmp_path: Path) -> None:
+    sweep = runpy.run_path(str(EXAMPLES / "sweep.py"), run_name="sweep")
+    rows = list(sweep["sweep"]((0.0, 9.0), (1,), tmp_path))
+    assert [(row.wind_m_s, row.seed, row.outcome) for row in rows] == [
+        (0.0, 1, "completed"),
+        (9.0, 1, "completed"),
+    ]
+    assert rows[0].rms_error_m < rows[1].rms_error_m < rows[1].max_error_m < 5.0
+    lines = sweep["table"](rows).splitlines()
+    assert len(lines) == 3
+    assert lines[2].startswith("     9.0     1  completed ")
+    sweep["draw"](rows, tmp_path / "sweep.png")
+    assert (tmp_path / "sweep.png").stat().st_size > 5_000
+    assert (tmp_path / "wind-9-seed-1" / "flight.tlog").exists()

@@ -1,6 +1,8 @@
 """What README and pages show works as it stands: commands parse, missions fly, linked files are there."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Final
 
@@ -76,6 +78,21 @@ def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize("autopilot", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])
 def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
     fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
+
+
+def test_the_code_of_the_python_page_runs(tmp_path: Path) -> None:
+    """The blocks stand alone; the second one reads the log of the first."""
+    printed = []
+    for code in code_blocks((DOCS / "python.md").read_text(encoding="utf-8")):
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        printed.append(done.stdout)
+    flight, replayed, stepped = printed
+    assert flight.startswith("completed ")
+    assert re.search(r"truth \['roll [01]\.\d\d deg', 'pitch [01]\.\d\d deg'\]", replayed), replayed
+    assert re.fullmatch(r"[1-9]\d{3,} bytes in 2 s of vehicle time\n", stepped)
 
 
 @pytest.mark.parametrize(("page", "link"), LINKS, ids=lambda text: text)
