@@ -114,7 +114,10 @@ def references(
     """
     place = home_of(log, system_id, boot) if origin is None else origin
     frame = None if place is None else LocalFrame(place)
-    found = {AUTOPILOT: _autopilot(log, system_id, boot, frame), TRUTH: _truth(log, system_id, boot, frame)}
+    truth = _truth(log, system_id, boot, frame)
+    if truth and boot is None:  # boots of different systems have no common time
+        truth |= _offsets(log, truth)
+    found = {AUTOPILOT: _autopilot(log, system_id, boot, frame), TRUTH: truth}
     return {name: Reference(name, columns) for name, columns in found.items() if columns}
 
 
@@ -150,6 +153,29 @@ def target_reference(
     table = log.table(name, system_id=_TARGET_SYSTEM, component_id=component, boot=boot)
     frame = None if origin is None else LocalFrame(origin)
     return Reference(TRUTH, _from_hil_state(table, frame))
+
+
+def _offsets(log: "Log", own: Mapping[str, Series]) -> dict[str, Series]:
+    """From a vehicle to the first ground target of our SITL, at the times of the vehicle's truth."""
+    target = target_reference(log, 0, origin=None)
+    lat, lon = own["lat_deg"], own["lon_deg"]
+    if target is None or not len(lat.time_us):
+        return {}
+    per_lat, per_lon = LocalFrame(
+        GeodeticPosition(lat_deg=float(lat.values[0]), lon_deg=float(lon.values[0]), alt_m=0.0)
+    ).metres_per_degree
+    return {
+        name: Series(
+            series.source,
+            series.time_us,
+            per_degree * (target.columns[column].at(series.time_us) - series.values),
+            angle=False,
+        )
+        for name, column, series, per_degree in (
+            ("offset_north_m", "lat_deg", lat, per_lat),
+            ("offset_east_m", "lon_deg", lon, per_lon),
+        )
+    }
 
 
 def home_of(log: "Log", system_id: int, boot: int | None = None) -> GeodeticPosition | None:
@@ -338,6 +364,6 @@ def error_figures(column: str, error: Column, counted: NDArray[np.bool_]) -> Err
 
 COMPARED: Final[Sequence[str]] = (
     "roll_rad", "pitch_rad", "yaw_rad", "north_m", "east_m", "down_m", "alt_m",
-    "north_m_s", "east_m_s", "down_m_s", "course_rad",
+    "north_m_s", "east_m_s", "down_m_s", "course_rad", "offset_north_m", "offset_east_m",
 )  # fmt: skip
 """Columns that have references, in the order of tables and pictures."""
