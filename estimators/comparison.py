@@ -21,6 +21,7 @@ from estimators.references import (
     lacking_references,
     references,
     target_reference,
+    targets_reference,
 )
 from estimators.runner import EstimateTable, Runner
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -28,7 +29,7 @@ from flightsim.foundation.geodesy import GeodeticPosition
 if TYPE_CHECKING:
     from estimators.logs import Log
 
-__all__ = ["AGAINST", "Comparison", "comparisons"]
+__all__ = ["AGAINST", "OSPA_CUTOFF_M", "Comparison", "comparisons"]
 
 AGAINST: Final[Mapping[str, Sequence[str]]] = {
     "autopilot": (AUTOPILOT,),
@@ -37,6 +38,8 @@ AGAINST: Final[Mapping[str, Sequence[str]]] = {
 }
 """The references that estimates can be compared with, the main one first."""
 
+OSPA_CUTOFF_M: Final = 20.0
+"""Distance at which an estimate and a target of a set count as different, metres."""
 _TARGET: Final = "target"
 
 
@@ -45,7 +48,7 @@ class Comparison:
     """The estimates of one subject, compared.
 
     Attributes:
-        label: "vehicle 1", "target 3".
+        label: "vehicle 1", "target 3", "targets" (sets).
         subject: system id; 0 for a target.
         time_us: (n,) vehicle time of the estimates; it restarts with each boot.
         boot: (n,) number of each estimate's boot.
@@ -100,6 +103,12 @@ def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = "both") ->
         raise ValueError(f"against {against!r} is not accepted; there are {', '.join(AGAINST)}")
     found = []
     for table in runner.tables.values():
+        if table.of_sets:
+            found += [
+                _compared_sets(logs, runner, table, subject, AGAINST[against])
+                for subject in sorted({*table.subject.tolist()})
+            ]
+            continue
         numbers = (
             table[_TARGET].astype(np.int64) if _TARGET in table.columns else np.zeros(len(table), np.int64)
         )
@@ -174,6 +183,72 @@ def _compared(
         if any(figures.values())
         else _why_not(log, subject, table.columns, wanted, bool(known), counted, airborne_from),
     )
+
+
+def _compared_sets(
+    logs: "Sequence[Log]", runner: Runner, table: EstimateTable, subject: int, wanted: Sequence[str]
+) -> Comparison:
+    """Sets of targets, each against the set of the true targets: their numbers, and OSPA of their places."""
+    rows = np.flatnonzero(table.subject == subject)
+    index, all_us, values = table.target_index[rows], table.time_us[rows], table.values[rows]
+    first = np.flatnonzero(index <= 0)  # the row with which each set begins
+    time_us = all_us[first]
+    sizes = np.add.reduceat(index >= 0, first).astype(np.float64)
+    estimates = {"targets": sizes}
+    known: dict[str, dict[str, Column]] = {}
+    figures: dict[str, list[ErrorFigures]] = {}
+    counted: NDArray[np.bool_] = np.ones(len(first), dtype=np.bool_)
+    places = {"north_m", "east_m"} <= {*table.columns}
+    if places and TRUTH in wanted:
+        from estimators.tracking.ospa import ospa  # its kernel is compiled for sets only
+
+        truth = _true_targets(logs, runner, time_us)
+        columns = [table.columns.index("north_m"), table.columns.index("east_m")]
+        found = np.split(values[:, columns], first[1:])
+        there = np.isfinite(truth[:, :, 0])
+        counted = np.asarray(there.any(axis=1), dtype=np.bool_)
+        estimates["ospa_m"] = np.array(
+            [
+                ospa(one[np.isfinite(one[:, 0])], true[here], cutoff=OSPA_CUTOFF_M) if any_there else np.nan
+                for one, true, here, any_there in zip(found, truth, there, counted, strict=True)
+            ]
+        )
+        if counted.any():
+            known[TRUTH] = {"targets": there.sum(axis=1).astype(np.float64), "ospa_m": np.zeros(len(first))}
+            made = [
+                error_figures(name, estimates[name] - column, counted)
+                for name, column in known[TRUTH].items()
+            ]
+            figures[TRUTH] = [item for item in made if item is not None]
+    return Comparison(
+        label="targets" if not subject else f"targets of vehicle {subject}",
+        subject=subject,
+        time_us=time_us,
+        boot=table.boot[rows][first],
+        estimates=estimates,
+        references=known,
+        sources={TRUTH: ["HIL_STATE_QUATERNION"]} if known else {},
+        counted=counted,
+        airborne_s=duration_s([ALWAYS], time_us),
+        airborne_from="all of the log",
+        figures=figures,
+        not_compared=""
+        if figures
+        else "the log has no true targets for north_m, east_m"
+        if places
+        else "sets are compared by north_m and east_m, which their columns lack",
+    )
+
+
+def _true_targets(logs: "Sequence[Log]", runner: Runner, time_us: NDArray[np.int64]) -> NDArray[np.float64]:
+    for log in logs:
+        origin = runner.estimator.origin or next(
+            (place for s in log.systems if (place := home_of(log, s)) is not None), None
+        )
+        truth = targets_reference(log, time_us, origin=origin)
+        if truth.shape[1]:
+            return truth
+    return np.full((len(time_us), 0, 2), np.nan)
 
 
 def _why_not(

@@ -7,6 +7,7 @@ from typing import Any, Final
 from autopilot_bridge.mavlink import Frame
 from estimators.interface import Estimator, Outcome
 from estimators.messages import Message, read_message
+from estimators.observations import Observation
 from estimators.runner import Runner
 from estimators.vehicle_time import VehicleTime, stamp_field
 
@@ -28,7 +29,7 @@ class Fleet:
         single: use only the first vehicle that is received.
 
     Attributes:
-        name, needs, parameters: of the estimators.
+        name, needs, parameters, observes: of the estimators.
         team: one runner receives the messages of all vehicles.
         names: names of the messages that the estimators receive.
         heard_names: names of the messages that must be read from a log.
@@ -53,6 +54,7 @@ class Fleet:
         self.names = self._spare.names
         self.heard_names = self._spare.heard_names
         self.parameters = first.parameters
+        self.observes = first.OBSERVES
         self._system_ids = system_ids
         self._limit = 1 if single else MAX_VEHICLES
         self._vehicle_time = VehicleTime()
@@ -94,6 +96,17 @@ class Fleet:
         """
         runner = self._runner_of(message)
         outcome = None if runner is None else runner.take(time_us, message)
+        return None if runner is None or outcome is None else (runner, outcome)
+
+    def observe(self, observation: Observation) -> tuple[Runner, Outcome] | None:
+        """Process an observation; returns the same as `feed`. A vehicle has a runner from its first needed
+        message on.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error.
+        """
+        runner = self._runners.get(0 if self.team else observation.src_system)
+        outcome = None if runner is None else runner.observe(observation)
         return None if runner is None or outcome is None else (runner, outcome)
 
     def pass_over(self, time_us: int, message: Message) -> None:

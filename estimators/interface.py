@@ -12,9 +12,10 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from estimators.messages import Message
+from estimators.observations import Observation
 from flightsim.foundation.geodesy import GeodeticPosition
 
-__all__ = ["Estimate", "Estimator", "Need", "Outcome"]
+__all__ = ["Estimate", "EstimateSet", "Estimator", "Need", "Outcome"]
 
 P = TypeVar("P")
 
@@ -97,6 +98,29 @@ class Estimate(Protocol):
         ...
 
 
+class EstimateSet(Protocol):
+    """One estimate of any number of targets at a time: a frozen dataclass.
+
+    Attributes:
+        COLUMNS: names of the values of each target; with `north_m` and `east_m` among them, sets are compared
+            with the true targets.
+        time_us: vehicle time of the estimate.
+        subject: system id of the vehicle that it is about; 0 for targets.
+    """
+
+    COLUMNS: ClassVar[tuple[str, ...]]
+
+    @property
+    def time_us(self) -> int: ...
+
+    @property
+    def subject(self) -> int: ...
+
+    def rows(self) -> Sequence[tuple[float, ...]]:
+        """The values of each target; empty: no target was found."""
+        ...
+
+
 class Estimator(ABC, Generic[P]):
     """Base of estimators. One instance serves one vehicle, or, with `TEAM`, all vehicles that are received.
 
@@ -107,11 +131,13 @@ class Estimator(ABC, Generic[P]):
         NAME: name on the command line.
         PARAMETERS: frozen dataclass of the parameters, with unit-suffixed fields and checks.
         TEAM: whether it receives the messages of all vehicles.
+        OBSERVES: classes of the observations that it takes beside messages (`estimators.observations`).
     """
 
     NAME: ClassVar[str]
     PARAMETERS: ClassVar[type[Any]]
     TEAM: ClassVar[bool] = False
+    OBSERVES: ClassVar[tuple[type[Any], ...]] = ()
 
     def __init__(self, parameters: P | None = None) -> None:
         self.parameters: P = self.PARAMETERS() if parameters is None else parameters
@@ -131,13 +157,22 @@ class Estimator(ABC, Generic[P]):
             message: from `estimators.messages`, wire units. A message that is not among the needs is IGNORED.
         """
 
+    def observe(self, time_us: int, observation: Observation) -> Outcome:
+        """Process an observation of one of the classes in `OBSERVES`, as `handle` does a message.
+
+        Args:
+            time_us: vehicle time of the observation; for a team, on the time base common to all.
+            observation: such as `estimators.observations.Image`.
+        """
+        return Outcome.IGNORED
+
     @abstractmethod
     def reset(self) -> None:
         """Discard everything except the parameters."""
 
     @property
     @abstractmethod
-    def estimates(self) -> Sequence[Estimate]:
+    def estimates(self) -> Sequence[Estimate] | Sequence[EstimateSet]:
         """The estimates that the newest UPDATED message has changed; most estimators have one."""
 
     @property

@@ -1,7 +1,7 @@
 """Runs an estimator over a log. Only the messages that it needs are read: seconds for hours of flight."""
 
 import heapq
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from estimators.interface import Estimator, Need
 from estimators.library import make_estimator
 from estimators.messages import Message
 from estimators.needs import NOT_STREAMED, Supply, supplies
+from estimators.observations import Observation, observations_beside, read_observations
 from estimators.runner import why_unheard
 
 if TYPE_CHECKING:
@@ -94,6 +95,10 @@ def replay(
     if not (fleet.team and lacking) and served:
         try:
             for time_us, message, inside in _messages(opened, fleet, system_id, Part(from_s, to_s, boot)):
+                if isinstance(message, fleet.observes):
+                    if inside:
+                        fleet.observe(message)
+                    continue
                 # A parameter is logged once and is valid from then on, also when it was logged before the
                 # selected part.
                 if inside or message.name in NOT_STREAMED:
@@ -164,13 +169,42 @@ def _messages(
     in the order of the team's common time.
     """
     names = sorted(fleet.heard_names)
-    streams = [_messages_of(log, _present(log, names), system_id, part) for log in logs]
+    streams = [_all_of(log, _present(log, names), system_id, part, fleet) for log in logs]
     if len(streams) == 1:
         return streams[0]
     runner = fleet.runners[0]
     for log in logs:
         runner.learn_times(_first_system_times(log))
     return heapq.merge(*streams, key=lambda item: runner.common_us(item[0], item[1].src_system))
+
+
+def _all_of(
+    log: "Log", names: Sequence[str], system_id: int | None, part: Part, fleet: Fleet
+) -> Iterator[tuple[int, Any, bool]]:
+    """Messages and, in the order in which they were received, the observations of the run."""
+    messages = _messages_of(log, names, system_id, part)
+    path = observations_beside(log.path) if fleet.observes else None
+    if path is None:
+        return messages
+    orders = [stream.order[rows] for stream, rows in log.select(names, system_id=system_id)]
+    order = np.sort(np.concatenate(orders)).tolist() if orders else []
+    return _interleaved(zip(order, messages, strict=True), read_observations(path, fleet.observes))
+
+
+def _interleaved(
+    messages: Iterable[tuple[int, tuple[int, Any, bool]]], observations: Iterator[tuple[int, Observation]]
+) -> Iterator[tuple[int, Any, bool]]:
+    following = next(observations, None)
+    inside = True
+    for position, item in messages:
+        while following is not None and following[0] <= position:
+            yield following[1].time_us, following[1], inside
+            following = next(observations, None)
+        inside = item[2]
+        yield item
+    while following is not None:
+        yield following[1].time_us, following[1], inside
+        following = next(observations, None)
 
 
 def _messages_of(

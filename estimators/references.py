@@ -32,6 +32,7 @@ __all__ = [
     "quantity_of",
     "references",
     "target_reference",
+    "targets_reference",
 ]
 
 Column = NDArray[np.float64]
@@ -153,6 +154,25 @@ def target_reference(
     table = log.table(name, system_id=_TARGET_SYSTEM, component_id=component, boot=boot)
     frame = None if origin is None else LocalFrame(origin)
     return Reference(TRUTH, _from_hil_state(table, frame))
+
+
+def targets_reference(
+    log: "Log", time_us: NDArray[np.int64], *, origin: GeodeticPosition | None
+) -> NDArray[np.float64]:
+    """True places of all ground targets of our SITL, (n, targets, 2) north and east at n times; NaN: not
+    known.
+    """
+    name = "HIL_STATE_QUATERNION"
+    known = sorted(
+        {key.component_id for key in log.keys if key.name == name and key.system_id == _TARGET_SYSTEM}
+    )
+    places = np.full((len(time_us), len(known), 2), np.nan)
+    for k, component in enumerate(known):
+        found = target_reference(log, component - 1, origin=origin)
+        if found is not None and "north_m" in found.columns:
+            places[:, k, 0] = found.columns["north_m"].at(time_us)
+            places[:, k, 1] = found.columns["east_m"].at(time_us)
+    return places
 
 
 def _offsets(log: "Log", own: Mapping[str, Series]) -> dict[str, Series]:
@@ -327,6 +347,8 @@ class ErrorFigures:
     def as_summary(self) -> dict[str, float]:
         """`roll_mean_deg`, `roll_rms_deg`, `roll_mse_deg2`, `roll_max_deg`."""
         q, u = self.quantity, self.unit
+        if not u:
+            return {f"{q}_mean": self.mean, f"{q}_rms": self.rms, f"{q}_mse": self.mse, f"{q}_max": self.max}
         square = {"m_s": "m2_s2"}.get(u, f"{u}2")
         return {
             f"{q}_mean_{u}": self.mean,

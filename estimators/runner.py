@@ -4,9 +4,10 @@ Live and embedded flights feed it frames, and a log feeds it messages. All furth
 that the same messages in the same order give the same estimates, bit for bit.
 """
 
+import math
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,9 +16,10 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink import DEFINITIONS, Frame, FrameEncoder, MAVLinkMessage
 from estimators.errors import EstimatorError, EstimatorFailure, described
 from estimators.input_guard import NEW_BOOT_US
-from estimators.interface import Estimate, Estimator, Need, Outcome
+from estimators.interface import Estimate, EstimateSet, Estimator, Need, Outcome
 from estimators.messages import Message, read_message
 from estimators.needs import message_names
+from estimators.observations import Observation
 from estimators.team_time import TeamTime
 from estimators.vehicle_time import VehicleTime
 
@@ -71,35 +73,55 @@ def why_unheard(name: str, component_id: int) -> str | None:
 class EstimateTable:
     """Estimates of one kind in growing columns.
 
+    Estimates of sets (`EstimateSet`) have a row for each target, numbered by `target_index`. An empty set has
+    one row with index -1 and NaN as values.
+
     Args:
         kind: class of the estimates.
 
     Attributes:
         name: name of that class.
         columns: names of the values, with unit suffixes.
+        of_sets: whether the estimates are sets.
     """
 
-    __slots__ = ("_keys", "_values", "columns", "name")
+    __slots__ = ("_indices", "_keys", "_values", "columns", "name", "of_sets")
 
-    def __init__(self, kind: type[Estimate]) -> None:
+    def __init__(self, kind: type[Estimate] | type[EstimateSet]) -> None:
         self.name = kind.__name__
         self.columns: tuple[str, ...] = tuple(kind.COLUMNS)
+        self.of_sets = hasattr(kind, "rows")
         self._keys = array("q")  # time, subject and boot of each
+        self._indices = array("q")  # of the targets in sets
         self._values = array("d")
 
-    def append(self, estimate: Estimate, boot: int) -> None:
+    def append(self, estimate: Any, boot: int) -> None:
         """Append one estimate of the boot with this number. After an error nothing is appended.
 
         Raises:
-            TypeError, ValueError: its row is not as long as `columns`, or a value is not a number.
+            TypeError, ValueError: a row is not as long as `columns`, or a value is not a number.
         """
-        values = array("d", estimate.row())
+        if not self.of_sets:
+            values = self._checked(estimate.row(), "row() gives")
+            self._keys.extend(array("q", (estimate.time_us, estimate.subject, boot)))
+            self._values.extend(values)
+            return
+        values = array("d")
+        rows = estimate.rows()
+        for row in rows:
+            values.extend(self._checked(row, "rows() gives a row of"))
+        key = array("q", (estimate.time_us, estimate.subject, boot))
+        self._keys.extend(key * max(1, len(rows)))
+        self._indices.extend(range(len(rows)) if len(rows) else (-1,))
+        self._values.extend(values or array("d", (math.nan,)) * len(self.columns))
+
+    def _checked(self, row: Any, gives: str) -> "array[float]":
+        values = array("d", row)
         if len(values) != len(self.columns):
             raise ValueError(
-                f"{self.name}.row() gives {len(values)} values, and COLUMNS names {len(self.columns)}"
+                f"{self.name}.{gives} {len(values)} values, and COLUMNS names {len(self.columns)}"
             )
-        self._keys.extend(array("q", (estimate.time_us, estimate.subject, boot)))
-        self._values.extend(values)
+        return values
 
     def __len__(self) -> int:
         return len(self._keys) // 3
@@ -121,6 +143,13 @@ class EstimateTable:
     def boot(self) -> NDArray[np.int64]:
         """Number of the vehicle's boot of each estimate; 0 is the first that was received."""
         return self._key(2)
+
+    @property
+    def target_index(self) -> NDArray[np.int64]:
+        """Number of each row's target in its set, from 0; -1: the set is empty. Only for estimates of
+        sets.
+        """
+        return np.array(self._indices, dtype=np.int64)
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -249,7 +278,27 @@ class Runner:
         else:
             self.left_out["of another vehicle"] += 1
             return None
-        return self._handle(time_us, message)
+        return self._processed(time_us, name, self.estimator.handle, message)
+
+    def observe(self, observation: Observation) -> Outcome | None:
+        """Process an observation beside messages.
+
+        Returns:
+            The outcome; None for one that the estimator does not take, or of another vehicle.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error.
+        """
+        if not isinstance(observation, self.estimator.OBSERVES):
+            return None
+        time_us = observation.time_us
+        if self._team_time is not None:
+            time_us = self._team_time.common_us(time_us, observation.src_system)
+        elif observation.src_system != self.system_id:
+            self.left_out["of another vehicle"] += 1
+            return None
+        name = type(observation).__name__
+        return self._processed(time_us, name, self.estimator.observe, observation)
 
     def pass_over(self, time_us: int, message: Message) -> None:
         """Skip a message that is outside the selected part; the boots of its vehicle are still counted.
@@ -303,10 +352,12 @@ class Runner:
         except Exception as error:
             raise EstimatorFailure(f"{self.estimator.NAME}.reset() failed: {described(error)}") from error
 
-    def _handle(self, time_us: int, message: Message) -> Outcome:
+    def _processed(
+        self, time_us: int, name: str, process: Callable[[int, Any], Outcome], received: Any
+    ) -> Outcome:
         estimator = self.estimator
         try:
-            outcome = estimator.handle(time_us, message)
+            outcome = process(time_us, received)
             if outcome is Outcome.UPDATED:
                 kinds, boot = self._kinds, self.boot
                 for estimate in estimator.estimates:
@@ -314,10 +365,11 @@ class Runner:
                     table = kinds[kind] if kind in kinds else self._new_table(kind)
                     table.append(estimate, boot)
             elif outcome.__class__ is not Outcome:
-                raise TypeError(f"handle gave {outcome!r}, which is no Outcome")
+                method = "handle" if process == estimator.handle else "observe"
+                raise TypeError(f"{method} gave {outcome!r}, which is no Outcome")
         except Exception as error:
             raise EstimatorFailure(
-                f"{estimator.NAME} failed at {message.name} of {time_us * 1e-6:.3f} s: {described(error)}"
+                f"{estimator.NAME} failed at {name} of {time_us * 1e-6:.3f} s: {described(error)}"
             ) from error
         self.outcomes[outcome] += 1
         return outcome

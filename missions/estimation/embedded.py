@@ -90,9 +90,14 @@ class FlightEstimators:
         self._links: Sequence[Link] = ()
         self._clock: Clock | None = None
 
-    def around(self, recorder: Recorder) -> EstimatorTap:
-        """A recorder that replaces this one for connections and truth, and also feeds the estimators."""
-        self._tap = EstimatorTap(recorder, self.fleet, self._on_estimate)
+    def around(self, recorder: Recorder, log: Path) -> EstimatorTap:
+        """A recorder that replaces this one for connections and truth, and also feeds the estimators.
+
+        Args:
+            recorder: the recorder of the flight.
+            log: the log that it writes.
+        """
+        self._tap = EstimatorTap(recorder, self.fleet, self._on_estimate, log=log)
         self._watch = RateWatch(self.fleet.needs, self._tap.heard)
         return self._tap
 
@@ -115,6 +120,8 @@ class FlightEstimators:
             self._links = ()
             server.cancel()
             await asyncio.gather(server, return_exceptions=True)
+            if self._tap is not None:
+                self._tap.close()
 
     def report(self, folder: Path, *, picture: bool, wall_time_s: float) -> EstimationResult:
         """Write the estimates and their picture next to the flight's log, which must be closed.

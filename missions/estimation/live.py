@@ -108,14 +108,16 @@ class LiveProgress:
 class _Process:
     """One run on an open link."""
 
-    def __init__(self, request: LiveRequest, link: Link, fleet: Fleet, recorder: FlightRecorder) -> None:
+    def __init__(
+        self, request: LiveRequest, link: Link, fleet: Fleet, recorder: FlightRecorder, log: Path
+    ) -> None:
         self._request = request
         self._link = link
         self._fleet = fleet
         self._clock = TelemetryClock()
         self._recorder = recorder
         self._publisher = Publisher(self._say)
-        self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None)
+        self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None, log=log)
         self._watch = RateWatch(fleet.needs, self._tap.heard)
         self._look_us = 0
         self._stop = asyncio.Event()
@@ -290,7 +292,7 @@ def estimate(
         recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
         try:
             loop = asyncio.new_event_loop()
-            process = _Process(request, link, fleet, recorder)
+            process = _Process(request, link, fleet, recorder, folder / LOG_NAME)
             _end_on_signals(loop, process.stop)
             run(process.run(on_progress), loop)
         finally:

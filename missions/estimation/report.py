@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimators.comparison import Comparison, comparisons
 from estimators.fleet import Fleet
@@ -118,13 +119,14 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
             supplies = {s: given for s, given in supplies.items() if s in fleet.runners}
     lacking = {s: missing for s, given in supplies.items() if (missing := missing_of(given))}
     reason = request.failure or _told(lacking, len(supplies)) or reason
-    compared = [c for runner in fleet.runners.values() for c in comparisons(logs, runner, request.against)]
+    compared_of = [(runner, comparisons(logs, runner, request.against)) for runner in fleet.runners.values()]
+    compared = [c for _, own in compared_of for c in own]
     estimates = sum(len(table) for runner in fleet.runners.values() for table in runner.tables.values())
     if not reason and not estimates:
         reason = "no estimate was made" if supplies else "there is no vehicle's autopilot in it"
     partial = bool(reason) or request.interrupted
     outcome = FAILED if reason else INTERRUPTED if request.interrupted else COMPLETED
-    blocks = [_block(runner, compared, supplies) for runner in fleet.runners.values()]
+    blocks = [_block(runner, own, supplies) for runner, own in compared_of]
     summary: dict[str, Any] = {
         "estimator": fleet.name,
         "outcome": outcome,
@@ -201,7 +203,6 @@ def _block(
     runner: Runner, compared: Sequence[Comparison], supplies: Mapping[int, Sequence[Supply]]
 ) -> dict[str, Any]:
     """Figures of one runner: of a vehicle, or of a team."""
-    own = [c for c in compared if runner.system_id in (None, c.subject)]
     block: dict[str, Any] = {
         "system_id": runner.system_id,
         "samples": sum(len(table) for table in runner.tables.values()),
@@ -210,7 +211,7 @@ def _block(
         "left_out": dict(sorted(runner.left_out.items())),
         "partial": any(missing_of(given) for s, given in supplies.items() if runner.system_id in (None, s)),
         "remarks": {key: _plain(value) for key, value in runner.remarks.items()},
-        "subjects": [_subject(c) for c in own],
+        "subjects": [_subject(c) for c in compared],
     }
     return block
 
@@ -313,6 +314,8 @@ def write_estimates(folder: Path, fleet: Fleet) -> list[Path]:
 def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:
     time_us, boot, subject, values = table.time_us, table.boot, table.subject, table.values
     columns = {"time_us": time_us, "boot": boot, "subject": subject}
+    numbers: dict[str, NDArray[np.int64]] = {"target_index": table.target_index} if table.of_sets else {}
+    columns |= numbers
     columns |= dict(zip(table.columns, values.T, strict=True))
     arrays = folder / f"{name}.npz"
     with whole(arrays), arrays.open("xb") as file:
@@ -320,11 +323,10 @@ def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:
     text = folder / f"{name}.csv"
     with whole(text), text.open("x", encoding="utf-8", newline="") as lines:
         writer = csv.writer(lines)
-        writer.writerow(["time_s", "boot", "subject", *table.columns])
-        for time, number, about, row in zip(
-            time_us.tolist(), boot.tolist(), subject.tolist(), values.tolist(), strict=True
-        ):
-            writer.writerow([f"{time * 1e-6:.6f}", number, about, *(f"{v:.{_CSV_DIGITS}g}" for v in row)])
+        writer.writerow(["time_s", "boot", "subject", *numbers, *table.columns])
+        keys = np.column_stack((boot, subject, *numbers.values())).tolist()
+        for time, key, row in zip(time_us.tolist(), keys, values.tolist(), strict=True):
+            writer.writerow([f"{time * 1e-6:.6f}", *key, *(f"{v:.{_CSV_DIGITS}g}" for v in row)])
     return [arrays, text]
 
 

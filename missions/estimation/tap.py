@@ -8,12 +8,14 @@ link.
 import asyncio
 from collections import Counter
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage
 from estimators.errors import EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
+from estimators.observations import SUFFIX, Observation, ObservationWriter
 from estimators.runner import Runner, why_unheard
 from missions.vehicle.connection import Recorder
 
@@ -35,6 +37,7 @@ class EstimatorTap:
         recorder: the recorder that stores the frames.
         fleet: the estimators.
         on_estimate: called with a runner when its estimator has a new estimate.
+        log: the log that the recorder writes; observations are stored beside it.
 
     Attributes:
         failure: message of an error that an estimator raised; it receives no more frames after that. ""
@@ -44,7 +47,12 @@ class EstimatorTap:
     """
 
     def __init__(
-        self, recorder: Recorder, fleet: Fleet, on_estimate: Callable[[Runner, int], None] | None = None
+        self,
+        recorder: Recorder,
+        fleet: Fleet,
+        on_estimate: Callable[[Runner, int], None] | None = None,
+        *,
+        log: Path,
     ) -> None:
         self.fleet = fleet
         self.failure = ""
@@ -52,19 +60,37 @@ class EstimatorTap:
         self.autopilots: Counter[int] = Counter()
         self._record = recorder.record
         self._on_estimate = on_estimate
+        self._frames = 0
+        self._observations = ObservationWriter(log.with_suffix(SUFFIX))
 
     def record(self, frame: bytes, time_us: int) -> None:
         """Record a valid frame, and pass it to the estimators."""
         self._record(frame, time_us)
+        self._frames += 1
         taken = _frame(frame)
         if taken.system_id < GROUND_SYSTEM and not why_unheard(taken.definition.name, taken.component_id):
             self.heard[taken.system_id, taken.message_id] += 1
             if taken.component_id == AUTOPILOT_COMPONENT:
                 self.autopilots[taken.system_id] += 1
+        self._pass_on(lambda: self.fleet.feed(taken), time_us)
+
+    def observe(self, observation: Observation, time_us: int) -> None:
+        """Record an observation that is not a message, and pass it to the estimators, at a vehicle time."""
+        try:
+            self._observations.write(observation, self._frames)
+        except OSError as error:
+            self.failure = self.failure or f"can't write the observations: {error.strerror}; check the disk"
+        self._pass_on(lambda: self.fleet.observe(observation), time_us)
+
+    def close(self) -> None:
+        """Close the file of the observations."""
+        self._observations.close()
+
+    def _pass_on(self, process: Callable[[], tuple[Runner, Outcome] | None], time_us: int) -> None:
         if self.failure:
             return
         try:
-            result = self.fleet.feed(taken)
+            result = process()
             if result is not None and result[1] is Outcome.UPDATED and self._on_estimate is not None:
                 self._on_estimate(result[0], time_us)
         except EstimatorFailure as failure:

@@ -28,6 +28,7 @@ from missions.options import MissionOptions
 from missions.runs.records import FlightRecorder, FlightRecords
 from missions.runs.request import RunRequest
 from missions.runs.run_folder import (
+    LOG_NAME,
     PICTURE_NAME,
     how_left,
     replace_summary,
@@ -182,7 +183,7 @@ def _fly_interruptible(
     try:
         recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
         flight.recorder = recorder
-        heard_by = recorder if estimators is None else estimators.around(recorder)
+        heard_by = recorder if estimators is None else estimators.around(recorder, folder / LOG_NAME)
         stage.on_truth(heard_by.record_truth)
         try:
             ending.run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
