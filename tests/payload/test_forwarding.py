@@ -16,7 +16,7 @@ from autopilot_bridge.services.equipment.payload_commands import PayloadCommands
 from autopilot_bridge.services.plans.equipment import MissionEquipment
 from tests.services.command_rig import Channel, ServiceRig
 from tests.services.dispatch import deliver
-from tests.services.parts_rig import parts_of
+from tests.services.parts_rig import parts_of, service_of
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 CAMERA, GIMBAL = 100, 154
@@ -48,7 +48,7 @@ class Talk:
 
     def __init__(self, flavour: str, *present: int) -> None:
         self.rig = ServiceRig(flavour)
-        self.service = PayloadCommands(parts_of(self.rig))
+        self.service = service_of(self.rig, PayloadCommands)
         self.gcs = Source(Channel(), 255, 190)
         for component in present:
             self.heartbeat(1, component)

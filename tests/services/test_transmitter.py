@@ -10,9 +10,9 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.flight.context import ManualInput
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.inputs.manual import manual_rules
 from autopilot_bridge.services.inputs.transmitter import ArmingGesture, ModeSwitch, Radio
 from flightsim.airframe import AirframeKind
+from tests.services.command_rig import MANUAL
 
 COPTER, PLANE = AirframeKind.MULTICOPTER, AirframeKind.FIXED_WING
 
@@ -45,7 +45,7 @@ class Switch:
         store = ParameterStore(described.parameter_definitions(), {**channel, **parameters})
         self.pilot, self.radio = Pilot(), Radio()
         self.radio.override(4, first_us, 0)
-        rules = manual_rules(described).mode_switch
+        rules = MANUAL[flavour, COPTER].mode_switch
         self.switch = ModeSwitch(self.pilot, store, self.radio, rules)  # type: ignore[arg-type]
 
     def turn(self, pulse_us: int, held_us: int = 200_000, start_us: int = 1_000_000) -> list[FlightMode]:
@@ -143,7 +143,7 @@ def gesture(flavour: str, kind: AirframeKind = COPTER, **parameters: float) -> t
     described = get_flavour(flavour, kind)
     store = ParameterStore(described.parameter_definitions(), parameters)
     pilot = Pilot()
-    return ArmingGesture(pilot, store, manual_rules(described).gesture), pilot  # type: ignore[arg-type]
+    return ArmingGesture(pilot, store, MANUAL[flavour, kind].gesture), pilot  # type: ignore[arg-type]
 
 
 def hold(made: tuple[Any, Pilot], seconds: float, **sticks: Any) -> list[str]:
