@@ -75,10 +75,10 @@ def estimate(**given: Any) -> int:
     """
     from autopilot_bridge.errors import AddressError, BridgeError
     from estimators.errors import EstimatorError
+    from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warnings_of
     from missions.errors import PlanError
     from missions.estimation.live import LiveRequest
     from missions.estimation.live import estimate as run_estimator
-    from missions.estimation.report import FAILED, INTERRUPTED, table_lines, warnings_of
 
     teller = _Teller()
     try:
@@ -107,7 +107,7 @@ def estimate(**given: Any) -> int:
         raise click.UsageError(in_options(error)) from error
     finally:
         teller.end()
-    for line in table_lines([(given["connect"], result)]):
+    for line in table_lines([(given["connect"], result.compared)]):
         click.echo(line)
     for warning in warnings_of(result.summary):
         report(warning)

@@ -150,7 +150,7 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
 
 def _tell_estimator(summary: Mapping[str, Any]) -> int:
     """Print the result of the flight's estimator; returns the exit code."""
-    from missions.estimation.report import warnings_of
+    from estimators.reports import warnings_of
 
     name = summary["estimator"]
     for block in summary["vehicles"]:

@@ -65,9 +65,10 @@ def replay(**given: Any) -> int:
     """
     from estimators.errors import EstimatorError
     from estimators.logs import LogError
+    from estimators.reports import notes_of, table_lines, warnings_of
     from missions.errors import PlanError
     from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
-    from missions.estimation.report import EstimationResult, notes_of, table_lines, warnings_of
+    from missions.estimation.report import EstimationResult
 
     for path in given["logs"]:
         if path.is_dir():
@@ -105,7 +106,7 @@ def replay(**given: Any) -> int:
     except (EstimatorError, LogError, PlanError) as error:
         raise click.UsageError(in_options(error)) from error
     done = [(label, result) for label, result in results if isinstance(result, EstimationResult)]
-    for line in table_lines(done):
+    for line in table_lines([(label, result.compared) for label, result in done]):
         click.echo(line)
     for label, result in done:
         for note in notes_of(result.summary):

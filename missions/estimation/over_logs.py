@@ -12,8 +12,9 @@ from estimators.library import estimator_class, parameters_from
 from estimators.log_replay import replay
 from estimators.logs import Log, LogError, open_log
 from estimators.logs.dialect import load_dialect
+from estimators.reports.summary import FAILED
 from missions.errors import PlanError
-from missions.estimation.report import FAILED, EstimationResult, ReportRequest, report
+from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.runs.run_folder import RUNS, create_run_folder
 
 __all__ = ["ReplayRequest", "replay_logs"]

@@ -7,10 +7,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from estimators.reports.picture import tidy
 from missions.mission import Debriefing
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import OrbitTruth, orbit_truth
-from missions.runs.picture import draw_run, tidy
+from missions.runs.picture import draw_run
 
 _INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"

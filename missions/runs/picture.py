@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar  # type: ignore[import-untyped]
 
 from flightsim.foundation.geodesy import LocalFrame
+from estimators.reports.picture import tidy
 from missions.notes import PATTERN, FlightNotes
 from missions.runs.score import FlightScore, Track
 
@@ -20,7 +21,6 @@ _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e74
 _TRUTH: Final = "#111827"
 _INK: Final = "#1f2937"
 _LEAST_SPAN_M: Final = 10.0
-_GRID: Final = "#e5e7eb"
 _PHASE: Final = "#f3f4f6"
 
 
@@ -51,17 +51,6 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
     (rest or [altitude])[0].set_xlabel("vehicle time, s", fontsize=9, color=_INK)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
-
-
-def tidy(axes: Any) -> None:
-    """Simple axes: thin grid, two spines."""
-    axes.tick_params(colors=_INK, labelsize=8)
-    axes.grid(True, color=_GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color("#9ca3af")
 
 
 def _shown(track: Track, notes: FlightNotes) -> Track:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from missions.runs.picture import tidy
+from estimators.reports.picture import tidy
 from missions.studies.lissajous_localization import SampleRun
 from missions.studies.lissajous_setting import DT, SAMPLE_CELL, START, STEPS
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from estimators.comparison import Comparison
 from estimators.references import AUTOPILOT, TRUTH, quantity_of
 from flightsim.foundation.vectors import wrap_pi
-from missions.runs.picture import tidy
 
-__all__ = ["draw_errors"]
+__all__ = ["draw_errors", "tidy"]
 
 _INK: Final = "#1f2937"
+_GRID: Final = "#e5e7eb"
 _ESTIMATE: Final = "#c2410c"
 _COLOURS: Final = {AUTOPILOT: "#1769aa", TRUTH: "#111827"}
 _IN_AIR: Final = "#f3f4f6"
@@ -27,6 +27,17 @@ _MOST_ALONE: Final = 9  # largest number of quantities without a reference
 _NOT_DRAWN: Final = ("target",)
 _POINTS: Final = 6000  # more cannot be distinguished in the picture
 _UNITS: Final = {"deg": "deg", "m": "m", "m_s": "m/s"}
+
+
+def tidy(axes: Any) -> None:
+    """Simple axes: thin grid, two spines."""
+    axes.tick_params(colors=_INK, labelsize=8)
+    axes.grid(True, color=_GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color("#9ca3af")
 
 
 def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
