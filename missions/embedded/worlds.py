@@ -96,7 +96,7 @@ def motion_of(
     """
     north_m, east_m = place_ne_m
     if not math.hypot(north_m, east_m) <= _MAX_DISTANCE_M:
-        raise PlanError(f"target at {north_m:g},{east_m:g} m is not within {_MAX_DISTANCE_M:g} m of home")
+        raise PlanError(f"`target_ne_m` {north_m:g},{east_m:g} m is not within {_MAX_DISTANCE_M:g} m of home")
     moving = kind is not MotionKind.STATIC
     if not (0.0 < speed_m_s <= _MAX_SPEED_M_S if moving else speed_m_s == 0.0):
         accepted = f"more than 0 and up to {_MAX_SPEED_M_S:g} m/s" if moving else "0 m/s"

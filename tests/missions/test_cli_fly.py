@@ -146,7 +146,7 @@ def test_a_run_on_a_link_counts_from_the_first_heartbeat() -> None:
     flight.elsewhere = True
     assert flight.elapsed_s == 0.0
     flight.clock = cast(Clock, SimpleNamespace(time_us=3_605_000_000))
-    flight.vehicles = [cast(Vehicle, SimpleNamespace(first_heard_us=3_600_000_000))]
+    flight.vehicles = [cast(Vehicle, SimpleNamespace(link=SimpleNamespace(first_heartbeat_us=3_600_000_000)))]
     assert flight.elapsed_s == 5.0
 
 

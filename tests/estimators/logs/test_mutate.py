@@ -60,7 +60,7 @@ def test_a_window_of_some_messages(log, tmp_path):
 
 @pytest.mark.parametrize(("low", "high"), [(-1.0, None), (None, math.nan), (3.0, 3.0), (5.0, 1.0)])
 def test_windows_that_can_not_be(log, low, high):
-    with pytest.raises(LogError, match=r"--(from|to)"):
+    with pytest.raises(LogError, match=r"`(from|to)_s`"):
         window(log, log.select(), low, high)
 
 
