@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
+from estimators.tracking.metrics import rms
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
@@ -29,7 +31,6 @@ from flightsim.payload import (
     surveyed,
     synthetic_map,
 )
-from missions.occupancy.detection import Anomaly, AnomalyDetector, MapError
 
 Array = NDArray[np.float64]
 
@@ -173,7 +174,7 @@ def main() -> None:
         for seed in range(given.seeds):
             case = case_of(seed, errors, trusting=given.trusting)
             difference_nt = case.published.total_field_nt - case.truth.total_field_nt
-            error_nt.append(float(np.sqrt(np.mean(difference_nt**2))))
+            error_nt.append(rms(difference_nt))
             stated_nt.append(case.published.error_nt or 0.0)
             false += len(case.anomalies(wandering(seed, 1000.0 * given.km), []))
             for kind, target in targets(seed).items():

@@ -31,6 +31,7 @@ from estimators.interface import Estimator
 from estimators.messages import read_message
 from estimators.runner import Runner
 from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
+from estimators.tracking.metrics import rms
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.random_streams import RandomStreams
@@ -291,10 +292,10 @@ def score(recorded: Recorded, estimator: Estimator[Any]) -> Score:
     off = np.hypot(north, east)
     believed = np.hypot(table["north_sigma_m"][kept], table["east_sigma_m"][kept])
     return Score(
-        rmse_m=float(np.sqrt(np.mean(off**2))),
+        rmse_m=rms(off),
         median_m=float(np.median(off)),
         detections=int(kept.sum()),
-        sigmas=float(np.sqrt(np.mean((off / believed) ** 2))),
+        sigmas=rms(off / believed),
     )
 
 

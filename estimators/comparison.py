@@ -200,7 +200,7 @@ def _compared_sets(
     counted: NDArray[np.bool_] = np.ones(len(first), dtype=np.bool_)
     places = {"north_m", "east_m"} <= {*table.columns}
     if places and TRUTH in wanted:
-        from estimators.tracking.metrics import ospa  # its kernels are compiled for sets only
+        from estimators.tracking.ospa import ospa  # its kernels are compiled for sets only
 
         truth = _true_targets(logs, runner, time_us)
         columns = [table.columns.index("north_m"), table.columns.index("east_m")]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.tracking.metrics import mean_square
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_180, wrap_pi
 
@@ -372,7 +373,7 @@ def error_figures(column: str, error: Column, counted: NDArray[np.bool_]) -> Err
     chosen = factor * error[counted & np.isfinite(error)]
     if not len(chosen):
         return None
-    mse = float(np.mean(chosen * chosen))
+    mse = mean_square(chosen)
     return ErrorFigures(
         quantity=name,
         unit=unit,

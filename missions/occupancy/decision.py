@@ -4,8 +4,9 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from estimators.occupancy.occupancy_map import OccupancyMap
+from estimators.tracking.grid import Cell
 from missions.errors import PlanError
-from missions.occupancy.occupancy_map import Cell, OccupancyMap
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

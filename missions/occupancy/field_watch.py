@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.mavlink import decode
+from estimators.occupancy.detection import Anomaly, AnomalyDetector
 from flightsim.foundation.geodesy import LocalFrame
-from missions.occupancy.detection import Anomaly, AnomalyDetector
 from missions.occupancy.survey_map import SurveyMap
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.telemetry import Position, position

@@ -8,8 +8,8 @@ from missions.occupancy.heading_score import HeadingScore, heading_score
 from missions.occupancy.separation import least_separation_m
 
 if TYPE_CHECKING:
+    from estimators.occupancy.detection import Anomaly
     from missions.mission import Debriefing
-    from missions.occupancy.detection import Anomaly
     from missions.occupancy.team import Searcher, SearchTeam
     from missions.runs.score import FlightScore
 

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.tracking.metrics import rms
 from flightsim.foundation.vectors import wrap_pi
 from missions.occupancy.pilot import HeadingCommand
 
@@ -86,7 +87,7 @@ def heading_score(
     size = np.abs(errors)
     step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
     return HeadingScore(
-        rms_rad=float(np.sqrt(np.mean(size**2))),
+        rms_rad=rms(size),
         p95_rad=float(np.percentile(size, 95.0)),
         largest_rad=float(size.max()),
         settled_s=step_s * len(times),

@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from estimators.errors import EstimatorError
+from estimators.occupancy.detection import DetectionModel, MapError
+from estimators.tracking.grid import GridLayout
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
-from missions.occupancy.detection import DetectionModel, MapError
-from missions.occupancy.occupancy_map import GridLayout
 from missions.occupancy.search import SearchParameters
 from missions.occupancy.survey_map import SurveyMap
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
@@ -100,10 +101,12 @@ class OccupancyOptions(MissionOptions):
                 "`threshold_nt`, "
                 "or give the `noise_nt` of a better magnetometer"
             )
-        if self.map_error_nt is not None:
-            MapError(sigma_nt=self.map_error_nt)
-        # these constructors refuse impossible values
-        _ = self.layout, self.search_parameters, self.decision_parameters
+        try:  # these constructors refuse impossible values
+            _ = self.layout, self.search_parameters, self.decision_parameters
+            if self.map_error_nt is not None:
+                MapError(sigma_nt=self.map_error_nt)
+        except EstimatorError as error:
+            raise PlanError(str(error)) from None
 
     @property
     def layout(self) -> GridLayout:

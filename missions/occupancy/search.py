@@ -10,11 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.occupancy.detection import Anomaly, DetectionModel
+from estimators.occupancy.localisation import gaussian_centre
+from estimators.occupancy.occupancy_map import OccupancyMap
+from estimators.tracking.grid import Cell, GridLayout
 from missions.errors import PlanError
 from missions.occupancy.decision import Decision, DecisionParameters, decide
-from missions.occupancy.detection import Anomaly, DetectionModel
-from missions.occupancy.localisation import gaussian_centre
-from missions.occupancy.occupancy_map import Cell, GridLayout, OccupancyMap
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
+from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.occupancy.detection import Anomaly, AnomalyDetector, MapError
 from missions.occupancy.field_watch import FieldWatch, PlacedReading
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle

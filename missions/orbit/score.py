@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.mission import Debriefing
 from missions.notes import FlightNotes
@@ -134,7 +135,7 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
         "radius_std_m": _rounded(float(orbit.radius_m.std())),
         "radius_max_error_m": _rounded(float(np.abs(error).max())),
         "altitude_error_m": _rounded(float(np.abs(height).max())),
-        "altitude_rms_error_m": _rounded(math.sqrt(float(np.mean(height**2)))),
+        "altitude_rms_error_m": _rounded(rms(height)),
     }
     return figures
 

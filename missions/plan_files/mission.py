@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from autopilot_bridge.mission_plan import MissionItem
+from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -211,7 +212,7 @@ def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, flo
     else:
         across = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
     return {
-        "cross_track_rms_m": round(float(np.sqrt(np.mean(across**2))), 3),
+        "cross_track_rms_m": round(rms(across), 3),
         "cross_track_max_m": round(float(across.max()), 3),
     }
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, quaternions_from_euler
 from missions.notes import PATTERN, FlightNotes
@@ -167,7 +168,7 @@ def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
 
 
 def _rms(values: Array) -> float | None:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+    return rms(values) if len(values) else None
 
 
 def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np.void], int]:

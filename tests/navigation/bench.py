@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, layout
 from autopilot_bridge.navigation import states as s
+from estimators.tracking import metrics
 from flightsim import truth as t
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
@@ -87,8 +88,5 @@ class Bench:
         each."""
         error, p = self.error(), self.filter.covariance
         return np.array(
-            [
-                error[i : i + 3] @ np.linalg.solve(p[i : i + 3, i : i + 3], error[i : i + 3])
-                for i in (s.ATT, s.VEL, s.POS)
-            ]
+            [metrics.nees(error[i : i + 3], p[i : i + 3, i : i + 3]) for i in (s.ATT, s.VEL, s.POS)]
         )

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from autopilot_bridge.control.multicopter import MulticopterController
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, layout
+from estimators.tracking import metrics
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
@@ -65,12 +66,7 @@ def fly(seed: int, environment: Environment) -> tuple[np.ndarray, np.ndarray]:
             )
             error[6:9] = position - nav.state[layout.POS_NED_M]
             p = nav.covariance
-            nees.append(
-                [
-                    error[i : i + 3] @ np.linalg.solve(p[i : i + 3, i : i + 3], error[i : i + 3])
-                    for i in (0, 3, 6)
-                ]
-            )
+            nees.append([metrics.nees(error[i : i + 3], p[i : i + 3, i : i + 3]) for i in (0, 3, 6)])
             errors.append(error)
     health = nav.health
     assert health.position_resets == 1 and health.filter_resets == 0

@@ -11,6 +11,7 @@ from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingPa
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, layout
 from autopilot_bridge.navigation import states as s
+from estimators.tracking import metrics
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from flightsim.sensors.airspeed import AirspeedParameters
@@ -91,9 +92,7 @@ def measure(nav: NavigationFilter, truth: Array) -> list[float]:
         s.POS: (np.array(place) - state[layout.POS_NED_M])[:2],
         s.WIND: np.array(WIND_NED_M_S[:2]) - state[layout.WIND_NED_M_S][:2],
     }
-    nees = [
-        float(e @ np.linalg.solve(p[i : i + len(e), i : i + len(e)], e)) / len(e) for i, e in errors.items()
-    ]
+    nees = [float(metrics.nees(e, p[i : i + len(e), i : i + len(e)])) / len(e) for i, e in errors.items()]
     sizes = [float(np.hypot(*errors[i][:2])) for i in (s.VEL, s.POS, s.WIND)]
     tilt = math.degrees(np.hypot(*errors[s.ATT][:2]))
     return [*nees, tilt, *sizes, nav.health.position_horizontal_accuracy_m]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import NavigationParameters
 from autopilot_bridge.navigation import states as s
+from estimators.tracking import metrics
 from flightsim.sensors.airspeed import AirspeedParameters
 from flightsim.sensors.suite import SensorSuiteParameters
 from tests.navigation.bench import PARAMETERS, Bench
@@ -56,7 +57,7 @@ class WingBench(Bench):
 
         def per_dof(e: Array, first: int) -> float:
             block = p[first : first + len(e), first : first + len(e)]
-            return float(e @ np.linalg.solve(block, e)) / len(e)
+            return float(metrics.nees(e, block)) / len(e)
 
         return np.array(
             [

@@ -15,13 +15,12 @@ from estimators.tracking.association import assign
 from estimators.tracking.metrics import (
     calibration_error,
     crps,
-    gospa,
     inside_ellipse,
     mean_square,
     nees,
-    ospa,
     rms,
 )
+from estimators.tracking.ospa import gospa, ospa
 
 sets = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), max_size=5).map(
     lambda points: np.array(points, dtype=float).reshape(-1, 2)

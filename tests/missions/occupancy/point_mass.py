@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from missions.occupancy.detection import AnomalyDetector
+from estimators.occupancy.detection import AnomalyDetector
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
 

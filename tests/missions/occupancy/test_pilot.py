@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimators.tracking.grid import GridLayout
 from missions.occupancy.decision import DecisionParameters
-from missions.occupancy.occupancy_map import GridLayout
 from missions.occupancy.pilot import Motion, Pilot, heading_for_course
 from missions.occupancy.search import Search, SearchParameters
 from tests.missions.occupancy.point_mass import Aircraft

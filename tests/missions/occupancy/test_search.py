@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from estimators.errors import EstimatorError
+from estimators.occupancy.detection import Anomaly, DetectionModel
+from estimators.occupancy.occupancy_map import OccupancyMap
+from estimators.tracking.grid import GridLayout
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters, decide
-from missions.occupancy.detection import Anomaly, DetectionModel
-from missions.occupancy.occupancy_map import GridLayout, OccupancyMap
 from missions.occupancy.search import Search, SearchParameters
 
 
@@ -31,7 +33,7 @@ def test_cells_and_places_correspond():
 
 @pytest.mark.parametrize("cell_m", [0.0, -5.0, math.nan, 900.0, 0.5])
 def test_cells_that_make_no_map_are_refused_by_name(cell_m):
-    with pytest.raises(PlanError, match="`cell_m`"):
+    with pytest.raises(EstimatorError, match="`cell_m`"):
         GridLayout.over(width_m=1000.0, height_m=1000.0, cell_m=cell_m, centre_ne_m=(0.0, 0.0))
 
 
@@ -39,7 +41,7 @@ def test_cells_that_make_no_map_are_refused_by_name(cell_m):
     "bad", [np.zeros((10, 10)), np.full((10, 10), np.nan), -np.ones((10, 10)), np.ones((3, 3))]
 )
 def test_map_without_data_is_refused(bad):
-    with pytest.raises(PlanError, match="prior"):
+    with pytest.raises(EstimatorError, match="prior"):
         OccupancyMap(layout(), bad)
 
 
@@ -51,7 +53,7 @@ def test_no_detection_lowers_scores_by_the_probability_of_missing():
     ratio = occupancy.scores / before
     assert ratio[5] == pytest.approx(np.full(10, 0.1), abs=1e-3)  # flown over
     assert ratio[0] == pytest.approx(np.ones(10), abs=1e-6)  # far away
-    assert occupancy.probability_of_detection == pytest.approx(1.0 - float(occupancy.remaining.sum()))
+    assert occupancy.probability_of_detection == pytest.approx(1.0 - float(occupancy.belief.mass.sum()))
     assert 0.09 < occupancy.probability_of_detection < 0.2
 
 

@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from missions.errors import PlanError
-from missions.occupancy.significance import LEAST_RATIO, signal_to_noise
+from estimators.errors import EstimatorError
+from estimators.occupancy.significance import LEAST_RATIO, signal_to_noise
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class DetectionModel:
         range_m: standard deviation of the fall-off with distance.
 
     Raises:
-        PlanError: a value is out of its range.
+        EstimatorError: a value is out of its range.
     """
 
     probability_overhead: float = 0.95
@@ -48,9 +48,13 @@ class DetectionModel:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.probability_overhead < 1.0:
-            raise PlanError(f"`detection_probability` {self.probability_overhead:g} is not between 0 and 1")
+            raise EstimatorError(
+                f"`detection_probability` {self.probability_overhead:g} is not between 0 and 1"
+            )
         if not (math.isfinite(self.range_m) and self.range_m > 0.0):
-            raise PlanError(f"`detection_range_m` {self.range_m:g} m is not possible; ask for more than 0")
+            raise EstimatorError(
+                f"`detection_range_m` {self.range_m:g} m is not possible; ask for more than 0"
+            )
 
     def probability(
         self, north_m: Array, east_m: Array, start_ne_m: tuple[float, float], end_ne_m: tuple[float, float]
@@ -96,9 +100,11 @@ class MapError:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.sigma_nt) and self.sigma_nt >= 0.0):
-            raise PlanError(f"`map_error_nt` {self.sigma_nt:g} nT is not possible; ask for 0 or more")
+            raise EstimatorError(f"`map_error_nt` {self.sigma_nt:g} nT is not possible; ask for 0 or more")
         if not (math.isfinite(self.correlation_m) and self.correlation_m > 0.0):
-            raise PlanError(f"the map's error is alike over {self.correlation_m:g} m; accepted: more than 0")
+            raise EstimatorError(
+                f"the map's error is alike over {self.correlation_m:g} m; accepted: more than 0"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,12 +168,12 @@ class AnomalyDetector:
             longest_s: longest duration of an anomaly; a target is passed in less time.
 
         Raises:
-            PlanError: a value is out of its range.
+            EstimatorError: a value is out of its range.
         """
         if not (math.isfinite(threshold_nt) and threshold_nt > 0.0):
-            raise PlanError(f"`threshold_nt` {threshold_nt:g} nT is not possible; ask for more than 0")
+            raise EstimatorError(f"`threshold_nt` {threshold_nt:g} nT is not possible; ask for more than 0")
         if least_samples < 1:
-            raise PlanError(f"{least_samples} samples make no anomaly; at least 1 is needed")
+            raise EstimatorError(f"{least_samples} samples make no anomaly; at least 1 is needed")
         self.residual_nt = math.nan
         self.dropped = 0
         self.insignificant = 0

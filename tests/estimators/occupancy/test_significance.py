@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.occupancy_anomalies import Case, case_of, seen, targets, wandering
-from missions.errors import PlanError
-from missions.occupancy.detection import AnomalyDetector, MapError
-from missions.occupancy.significance import signal_to_noise
+from estimators.errors import EstimatorError
+from estimators.occupancy.detection import AnomalyDetector, MapError
+from estimators.occupancy.significance import signal_to_noise
 
 
 @pytest.fixture(scope="module")
@@ -68,5 +68,5 @@ def test_a_map_without_error_is_the_threshold_alone() -> None:
 
 @pytest.mark.parametrize("sigma_nt", [-1.0, float("nan"), float("inf")])
 def test_bad_errors_of_maps_are_refused_by_name(sigma_nt: float) -> None:
-    with pytest.raises(PlanError, match="`map_error_nt`"):
+    with pytest.raises(EstimatorError, match="`map_error_nt`"):
         MapError(sigma_nt=sigma_nt)

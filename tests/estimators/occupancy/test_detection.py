@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from missions.errors import PlanError
-from missions.occupancy.detection import AnomalyDetector, DetectionModel
+from estimators.errors import EstimatorError
+from estimators.occupancy.detection import AnomalyDetector, DetectionModel
 
 PLACES = st.tuples(st.floats(-300.0, 300.0), st.floats(-300.0, 300.0))
 
@@ -53,7 +53,7 @@ def test_standing_still_detects_nothing():
     ],
 )
 def test_bad_models_are_refused_by_name(values, named):
-    with pytest.raises(PlanError, match=named):
+    with pytest.raises(EstimatorError, match=named):
         DetectionModel(**values)
 
 
@@ -102,7 +102,7 @@ def test_bad_readings_are_dropped_and_counted():
 
 @pytest.mark.parametrize("threshold_nt", [0.0, -1.0, math.nan, math.inf])
 def test_bad_threshold_is_refused_by_name(threshold_nt):
-    with pytest.raises(PlanError, match="`threshold_nt`"):
+    with pytest.raises(EstimatorError, match="`threshold_nt`"):
         AnomalyDetector(threshold_nt=threshold_nt)
 
 

@@ -1,7 +1,6 @@
-"""The occupancy map of a search: scores of cells that searching lowers and that identified anomalies raise.
+"""Grid beliefs: the probability of a target's place in square cells over an area.
 
-Source: Lum, Rysdyk and Pongpunwattana 2005, section IV-B, equations 10 and 11; docs/papers.md. North and east
-are metres from home; arrays have rows to the north and columns to the east.
+North and east are metres from home; arrays have rows to the north and columns to the east.
 """
 
 import math
@@ -11,8 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from missions.errors import PlanError
-from missions.occupancy.detection import DetectionModel
+from estimators.errors import EstimatorError
+
+__all__ = ["MAX_CELLS", "Cell", "GridBelief", "GridLayout"]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class GridLayout:
         rows, columns: number of rows and columns.
 
     Raises:
-        PlanError: the size gives no map.
+        EstimatorError: the size gives no map.
     """
 
     south_m: float
@@ -42,14 +42,14 @@ class GridLayout:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
-            raise PlanError(f"`cell_m` {self.cell_m:g} m is not possible; ask for more than 0")
+            raise EstimatorError(f"`cell_m` {self.cell_m:g} m is not possible; ask for more than 0")
         if self.rows < 2 or self.columns < 2:
-            raise PlanError(
+            raise EstimatorError(
                 f"`cell_m` {self.cell_m:g} m leaves {self.rows} x {self.columns} cells in the area; "
                 "ask for smaller cells or a larger `width_m, height_m`: at least 2 x 2 make a map"
             )
         if self.rows * self.columns > MAX_CELLS:
-            raise PlanError(
+            raise EstimatorError(
                 f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than {MAX_CELLS}; "
                 "ask for larger cells or a smaller `width_m, height_m`"
             )
@@ -60,7 +60,7 @@ class GridLayout:
     ) -> "GridLayout":
         """Cells over `width_m` (east) by `height_m` (north) around a centre; partial cells are left out."""
         if not (math.isfinite(cell_m) and cell_m > 0.0):
-            raise PlanError(f"`cell_m` {cell_m:g} m is not possible; ask for more than 0")
+            raise EstimatorError(f"`cell_m` {cell_m:g} m is not possible; ask for more than 0")
         rows, columns = math.floor(height_m / cell_m + 1e-9), math.floor(width_m / cell_m + 1e-9)
         return cls(
             south_m=centre_ne_m[0] - 0.5 * rows * cell_m,
@@ -101,65 +101,75 @@ class GridLayout:
         return north[:, None], east[None, :]
 
 
-class OccupancyMap:
-    """Scores of the cells, shared by every searcher, and the probability of detection so far.
+class GridBelief:
+    """Probability that the target is in a cell and that no searcher has detected it so far.
 
-    The initial scores are the prior probability that the target is in a cell. Later they are no longer
-    probabilities: equation 11 isn't normalised, and raising adds belief.
+    Without normalization 1 minus the sum is the cumulative probability of detection (Bourgault et al. 2003).
+    The moments and the entropy are those of the normalized belief.
+
+    Args:
+        layout: the cells.
+        prior: (rows, columns), relative probability of each cell, finite and not negative; None: all equal.
 
     Attributes:
-        layout: the cells.
-        scores: (rows, columns), used for decisions.
-        remaining: (rows, columns), prior probability times the probability of having missed the target there
-            so far. It does not change when a target is identified, so 1 minus its sum is the cumulative
-            probability of detection (Bourgault et al. 2003).
+        mass: (rows, columns).
+
+    Raises:
+        EstimatorError: the prior has another shape, or no probability above zero.
     """
 
     def __init__(self, layout: GridLayout, prior: Array | None = None) -> None:
-        """Initialise the map.
-
-        Args:
-            layout: the cells.
-            prior: (rows, columns), relative probability of each cell, finite and not negative; None: all
-                equal.
-
-        Raises:
-            PlanError: the prior has another shape, or no probability above zero.
-        """
         shape = (layout.rows, layout.columns)
         start = np.ones(shape) if prior is None else np.array(prior, dtype=np.float64)
         if start.shape != shape:
-            raise PlanError(f"the prior has {start.shape} cells, the map {shape}")
+            raise EstimatorError(f"the prior has {start.shape} cells, the map {shape}")
         if not np.all(np.isfinite(start)) or np.any(start < 0.0) or not start.sum() > 0.0:
-            raise PlanError("the prior is not a probability: it must be finite, not negative, and not all 0")
+            raise EstimatorError(
+                "the prior is not a probability: it must be finite, not negative, and not all 0"
+            )
         self.layout = layout
-        self.scores: Array = start / start.sum()
-        self.remaining: Array = self.scores.copy()
+        self.mass: Array = start / start.sum()
+
+    def update(self, likelihood: Array) -> None:
+        """Multiply by the likelihood of what was observed: of no detection, 1 - p(D | cell)."""
+        self.mass *= likelihood
+
+    def normalize(self) -> float:
+        """Condition on the observations; returns the probability that they had. After a detection the belief
+        is a probability again; without any probability left it is uniform.
+        """
+        total = float(self.mass.sum())
+        self.mass[:] = self.mass / total if total > 0.0 else 1.0 / self.mass.size
+        return total
 
     @property
     def probability_of_detection(self) -> float:
         """Probability that a target on the map would have been detected so far."""
-        return 1.0 - float(self.remaining.sum())
+        return 1.0 - float(self.mass.sum())
 
-    def search(
-        self, start_ne_m: tuple[float, float], end_ne_m: tuple[float, float], model: DetectionModel
-    ) -> None:
-        """Lower the scores along a straight stretch of track on which nothing was detected (eq. 10, 11)."""
+    @property
+    def mode_ne_m(self) -> tuple[float, float]:
+        """Centre of the most probable cell."""
+        row, column = np.unravel_index(int(np.argmax(self.mass)), self.mass.shape)
+        return self.layout.centre_of((int(row), int(column)))
+
+    def moments(self) -> tuple[Array, Array]:
+        """Mean (2,) and covariance (2, 2) of the place, north and east, with that of a cell in it."""
         north, east = self.layout.centres()
-        missed = 1.0 - model.probability(north, east, start_ne_m, end_ne_m)
-        self.scores *= missed
-        self.remaining *= missed
+        p = self.mass / self.mass.sum()
+        mean = np.array([float(np.sum(p * north)), float(np.sum(p * east))])
+        off_n, off_e = north - mean[0], east - mean[1]
+        across = float(np.sum(p * off_n * off_e))
+        within = self.layout.cell_m**2 / 12.0
+        return mean, np.array(
+            [
+                [float(np.sum(p * off_n**2)) + within, across],
+                [across, float(np.sum(p * off_e**2)) + within],
+            ]
+        )
 
-    def raise_around(self, north_m: float, east_m: float, *, radius_m: float, height: float) -> None:
-        """Raise the scores around an identified target by a Gaussian, so that other searchers converge.
-
-        Args:
-            north_m, east_m: position of the target.
-            radius_m: scores farther away do not change; it is two standard deviations of the Gaussian.
-            height: height of the Gaussian's peak, in multiples of the prior's mean score.
-        """
-        north, east = self.layout.centres()
-        distance2 = (north - north_m) ** 2 + (east - east_m) ** 2
-        sigma_m = 0.5 * radius_m
-        peak = height / (self.layout.rows * self.layout.columns)
-        self.scores += np.where(distance2 <= radius_m**2, peak * np.exp(-0.5 * distance2 / sigma_m**2), 0.0)
+    @property
+    def entropy_nats(self) -> float:
+        """Entropy of the cell that holds the target."""
+        p = self.mass[self.mass > 0.0] / self.mass.sum()
+        return float(-np.sum(p * np.log(p)))

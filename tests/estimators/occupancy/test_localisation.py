@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from missions.occupancy.detection import AnomalyDetector
-from missions.occupancy.localisation import gaussian_centre
+from estimators.occupancy.detection import AnomalyDetector
+from estimators.occupancy.localisation import gaussian_centre
 from missions.occupancy.search import Candidate
 
 TARGET = (430.0, -270.0)
