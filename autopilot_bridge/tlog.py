@@ -21,9 +21,9 @@ from autopilot_bridge.mavlink.frame import (
     Frame,
 )
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
+from autopilot_bridge.packet_records import packet_records
 
 _TIME: Final = struct.Struct(">Q")
-_pack_time: Final = _TIME.pack
 FLUSH_BYTES: Final = 64 * 1024
 FLUSH_INTERVAL_US: Final = 1_000_000
 _CHUNK_BYTES: Final = 1 << 20
@@ -32,26 +32,29 @@ _CHUNK_BYTES: Final = 1 << 20
 class TlogWriter:
     """Writes a new log; whole records only, so that the file is readable even if the process is killed.
 
-    Records are kept until there are 64 KiB of them or one second of log time has passed, then they are
-    written to the operating system in one piece: a killed process loses at most these records.
+    Packets are kept until there are 64 KiB of them or one second of log time has passed. Then compiled code
+    splits them into records, which are written to the operating system in one piece: a killed process loses
+    at most these packets.
 
     Args:
         path: the file; it must not exist.
 
     Attributes:
-        records: number of records written.
+        records: number of records handed to the operating system.
 
     Raises:
         TlogError: the file exists or can't be created.
     """
 
-    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "path", "records")
+    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "_packets", "_times_us", "path", "records")
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.records = 0
-        self._buffer = bytearray()
-        self._kept = 0  # bytes
+        self._times_us: list[int] = []
+        self._packets: list[bytes] = []
+        self._kept = 0  # bytes of the packets
+        self._buffer = bytearray()  # records
         self._flushed_us = 0
         try:
             self._file: BinaryIO | None = open(self.path, "xb", buffering=0)  # noqa: SIM115
@@ -62,38 +65,60 @@ class TlogWriter:
         except OSError as error:
             raise TlogError(f"can't create {self.path}: {error.strerror}; check the folder") from error
 
-    def write(self, time_us: int, frame: bytes) -> None:
-        """Append one frame.
+    def write(self, time_us: int, packet: bytes) -> None:
+        """Append the frames of a packet, which get the same time.
 
         Args:
             time_us: microseconds of the Unix epoch.
-            frame: one raw frame.
+            packet: one or more whole frames, in sequence, of any MAVLink version, signed or not. They are
+                split by their lengths; data from other sources must go through a parser first.
 
         Raises:
-            TlogError: the log is closed, or the disk is full.
+            TlogError: a packet since the last flush does not end with a frame (all whole frames are
+                written), the log is closed, or the disk is full.
         """
-        self._buffer += _pack_time(time_us) + frame
-        self.records += 1
-        self._kept += len(frame)
+        self._times_us.append(time_us)
+        self._packets.append(packet)
+        self._kept += len(packet)
         if self._kept >= FLUSH_BYTES or not 0 <= time_us - self._flushed_us < FLUSH_INTERVAL_US:
             self._flushed_us = time_us
             self.flush()
+
+    @property
+    def unwritten(self) -> bytes:
+        """The records that were not written to the operating system yet."""
+        self._split()
+        return bytes(self._buffer)
 
     def flush(self) -> None:
         """Write everything to the operating system.
 
         Raises:
-            TlogError: the log is closed, or the disk is full.
+            TlogError: a packet does not end with a frame, the log is closed, or the disk is full.
         """
         if self._file is None:
             raise TlogError(f"{self.path} is closed; open a new log")
+        wrong = self._split()
         try:
             while self._buffer:
                 written = self._file.write(self._buffer)
                 del self._buffer[:written]
         except OSError as error:
             raise TlogError(f"can't write {self.path}: {error.strerror}; check the disk") from error
+        if wrong:
+            raise TlogError(wrong)
+
+    def _split(self) -> str:
+        """Split the packets into records; returns the error, or an empty text."""
+        if not self._packets:
+            return ""
+        data, count, wrong = packet_records(self._times_us, self._packets)
+        self._times_us.clear()
+        self._packets.clear()
         self._kept = 0
+        self._buffer += data
+        self.records += count
+        return wrong
 
     def close(self) -> None:
         """Write the remaining records and close; a second call does nothing."""

@@ -22,7 +22,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Verdict
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.sitl import PacketLog, Sitl, SitlVehicle
+from autopilot_bridge.sitl import Sitl, SitlVehicle
+from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import AirframeKind, load_airframe
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.world_spec import WorldSpec, team
@@ -71,7 +72,7 @@ class Flight:
         self.sitl = Sitl(
             WorldSpec(vehicles=team(vehicles, model=model, autopilot=flavour, parameters=parameters), seed=1)
         )
-        self.log = PacketLog(log)
+        self.log = TlogWriter(log)
         self.links = self.sitl.record(self.log)
 
     def take_off(self) -> None:

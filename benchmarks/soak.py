@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from autopilot_bridge.clock import TelemetryClock
 from autopilot_bridge.links import open_link, parse_address
-from autopilot_bridge.mavlink import definition, dialect
+from autopilot_bridge.mavlink import Frame, definition, dialect
 from missions.errors import MissionError
 from missions.vehicle.connection import Connection
 from missions.vehicle.setpoint import Setpoint
@@ -133,17 +133,17 @@ class Client:
     first_boot_ms: int = 0
     last_boot_ms: int = 0
 
-    def record(self, raw: bytes, _time_us: int) -> None:
-        """Take one frame of either direction (MAVLink 2, as both sides send it)."""
-        if raw[5] != self.system_id or raw[6] != 1:
-            return
-        message_id = int.from_bytes(raw[7:10], "little")
-        self.counts[message_id] += 1
-        if message_id == HEARTBEAT:
-            self.heartbeats_s.append(time.monotonic())
-        elif message_id == ATTITUDE:
-            self.last_boot_ms = int.from_bytes(raw[10:14], "little")
-            self.first_boot_ms = self.first_boot_ms or self.last_boot_ms
+    def record(self, frames: Sequence[Frame], _time_us: int) -> None:
+        """Take frames of either direction."""
+        for frame in frames:
+            if (frame.system_id, frame.component_id) != (self.system_id, 1):
+                continue
+            self.counts[frame.message_id] += 1
+            if frame.message_id == HEARTBEAT:
+                self.heartbeats_s.append(time.monotonic())
+            elif frame.message_id == ATTITUDE:
+                self.last_boot_ms = int.from_bytes(frame.payload[:4], "little")
+                self.first_boot_ms = self.first_boot_ms or self.last_boot_ms
 
     def restart(self) -> None:
         """Forget what was heard: it counts from now on."""

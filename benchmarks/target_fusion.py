@@ -15,6 +15,7 @@ import argparse
 import math
 import statistics
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ import numpy as np
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.clock.pacing import wall_time_s
-from autopilot_bridge.mavlink import FrameParser, definition
+from autopilot_bridge.mavlink import Frame, FrameParser, definition
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from autopilot_bridge.tlog import TlogWriter
@@ -122,7 +123,7 @@ class Recorded:
         start_us, end_us: of the pattern, that part which both fly.
     """
 
-    frames: list[Any]
+    frames: list[Frame]
     truth: np.ndarray[Any, np.dtype[np.float64]]
     start_us: int
     end_us: int
@@ -132,13 +133,13 @@ class Ears:
     """Keeps what comes from the vehicles; one for both, so that the order is that of arrival."""
 
     def __init__(self, log: TlogWriter | None) -> None:
-        self.frames: list[Any] = []
+        self.frames: list[Frame] = []
         self._log = log
 
-    def take(self, raw: bytes, frame: Any, time_us: int) -> None:
+    def take(self, frame: Frame, time_us: int) -> None:
         self.frames.append(frame)
         if self._log is not None:
-            self._log.write(EPOCH_UNIX_US + time_us, raw)
+            self._log.write(EPOCH_UNIX_US + time_us, frame.raw)
 
 
 class Ear:
@@ -146,12 +147,11 @@ class Ear:
 
     def __init__(self, ears: Ears) -> None:
         self._ears = ears
-        self._parser = FrameParser()
 
-    def record(self, frame: bytes, time_us: int) -> None:
-        if int.from_bytes(frame[7:10], "little") in HEARD:
-            for parsed in self._parser.feed(frame):
-                self._ears.take(frame, parsed, time_us)
+    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+        for frame in frames:
+            if frame.message_id in HEARD:
+                self._ears.take(frame, time_us)
 
 
 def paces(seed: int) -> tuple[float, float]:

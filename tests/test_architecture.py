@@ -12,7 +12,7 @@ PACKAGES = ("flightsim", "autopilot_bridge", "estimators", "missions")
 GROUND_FLOOR = tuple(
     f"autopilot_bridge.{name}"
     for name in (
-        *("mavlink", "links", "routing", "clock", "tlog", "errors"),
+        *("mavlink", "links", "routing", "clock", "tlog", "packet_records", "errors"),
         *("mission_plan", "mission_wire", "fence_shapes"),
         *("parameters", "parameter_files"),
     )

@@ -1,6 +1,7 @@
 """The clock interface for tasks."""
 
 import asyncio
+from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol
 
@@ -35,14 +36,23 @@ class Clock(Protocol):
 
 
 class LoopClock:
-    """The running event loop's own time: vehicle time on a `VirtualTimeLoop`."""
+    """An event loop's own time: vehicle time on a `VirtualTimeLoop`.
 
-    __slots__ = ()
+    It is that of the loop that runs when the time is first requested.
+    """
+
+    __slots__ = ("_time_s",)
+
+    def __init__(self) -> None:
+        self._time_s: Callable[[], float] | None = None
 
     @property
     def time_us(self) -> int:
         """Microseconds of the loop's time."""
-        return round(asyncio.get_running_loop().time() * 1e6)
+        time_s = self._time_s
+        if time_s is None:  # kept, because to ask for the running loop is a system call
+            time_s = self._time_s = asyncio.get_running_loop().time
+        return round(time_s() * 1e6)
 
     @property
     def stamp_us(self) -> int:

@@ -110,14 +110,15 @@ class _WorldSelector(selectors.DefaultSelector):
         yielding = self._rounds >= _MAX_ROUNDS_WITHOUT_STEP
         self._rounds = 0
         advance, time_us, ready, pacer = self._advance, self._time_us, self.ready, self.pacer
+        now_us = time_us()
         while True:
-            if time_us() >= self._limit_us:
+            if now_us >= self._limit_us:
                 self._stop_at_limit()
             self._until_poll -= 1
             if self._until_poll <= 0 and (events := self._poll()):
                 return events
             if pacer is not None:
-                ahead_s = pacer.ahead_s(time_us())
+                ahead_s = pacer.ahead_s(now_us)
                 if ahead_s > _MIN_SLEEP_S and (events := super().select(ahead_s)):
                     return events
             if self._broken is not None:
@@ -127,7 +128,8 @@ class _WorldSelector(selectors.DefaultSelector):
             except BaseException as error:
                 self._broken = error
                 raise
-            if ready or yielding or time_us() >= self.due_us:
+            now_us = time_us()
+            if ready or yielding or now_us >= self.due_us:
                 return []
 
     def _poll(self) -> list[tuple[selectors.SelectorKey, int]]:

@@ -35,6 +35,14 @@ class Frame(NamedTuple):
     version: int = 2
     signed: bool = False
 
+    @classmethod
+    def of(cls, raw: bytes) -> "Frame":
+        """The frame in bytes that an encoder has made, or that a parser has checked before."""
+        if raw[0] == MAGIC_V2:
+            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
+            return cls(raw, message_id, raw[5], raw[6], raw[4], 2, bool(raw[2] & INCOMPAT_SIGNED))
+        return cls(raw, raw[5], raw[3], raw[4], raw[2], 1)
+
     def __repr__(self) -> str:
         return (
             f"Frame({self.definition.name}, from {self.system_id}/{self.component_id}, "

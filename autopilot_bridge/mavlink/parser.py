@@ -20,6 +20,7 @@ from autopilot_bridge.mavlink.frame import (
 _CRC_EXTRA: Final = {key: bytes([item.crc_extra]) for key, item in DEFINITIONS.items()}
 _MAGIC_V1_BYTE: Final = bytes([MAGIC_V1])
 _MAGIC_V2_BYTE: Final = bytes([MAGIC_V2])
+_new: Final = tuple.__new__
 _unpack_head: Final = struct.Struct("<BBBBBBBHB").unpack_from
 _MAX_LATE: Final = 16  # frames; a larger step back means that the sender has restarted
 
@@ -118,6 +119,7 @@ class FrameParser:
 
     def feed(self, data: bytes) -> list[Frame]:
         """All frames completed by `data`, in order."""
+        data = bytes(data)  # no copy of bytes
         size = len(data)
         counters = self.counters
         counters.bytes_in += size
@@ -135,19 +137,24 @@ class FrameParser:
                 break
             message_id = low | high << 16
             extra = _CRC_EXTRA.get(message_id)
-            raw = bytes(data[start:end])
+            raw = data[start:end]
             if extra is None or mcrf4xx(raw[1:-2] + extra) != raw[-2] | raw[-1] << 8:
                 break
             if source is None or sender != (system_id, component_id):
                 sender = system_id, component_id
                 source = self._source(sender, sequence)
-            source.take(sequence)
-            frames.append(Frame(raw, message_id, system_id, component_id, sequence))
+            if sequence == (source.last_sequence + 1) & 0xFF:
+                source.frames += 1
+                source.last_sequence = sequence
+            else:
+                source.take(sequence)
+            # as the constructor does, in half the time
+            frames.append(_new(Frame, (raw, message_id, system_id, component_id, sequence, 2, False)))
             start = end
         counters.frames += len(frames)
         counters.bytes_framed += start
         if start < size:
-            frames += self._search(bytes(data[start:]))
+            frames += self._search(data[start:])
         return frames
 
     def flush(self) -> None:

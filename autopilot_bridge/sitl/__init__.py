@@ -8,7 +8,6 @@ from autopilot_bridge.sitl.backend import (
     EmulatedBackend,
     emulated,
 )
-from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
@@ -23,7 +22,6 @@ __all__ = [
     "BackendSetup",
     "EmulatedBackend",
     "PaceReport",
-    "PacketLog",
     "Port",
     "SigningParameters",
     "SigningStore",

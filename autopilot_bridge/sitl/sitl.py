@@ -11,12 +11,12 @@ from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
 from autopilot_bridge.sitl.backend import BackendMaker, emulated
 from autopilot_bridge.sitl.failures import NEVER_US
-from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
 from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.tlog import TlogWriter
 from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, magnetic_field_of
 from flightsim.world import World, WorldParameters
 from flightsim.world_spec import WorldSpec
@@ -39,6 +39,7 @@ class Sitl:
     Attributes:
         spec: as given.
         world: vehicles and air.
+        time_us: vehicle time, microseconds since boot.
         vehicles: with sensors, autopilots and links.
         targets: on the ground.
         published_map: the map that a survey made of the magnetic field; None: there is none.
@@ -80,7 +81,7 @@ class Sitl:
         )
         self.shared_links: list[SharedLink] = []
         self._step_us = 1_000_000 // spec.physics_rate_hz
-        self._time_us = 0
+        self.time_us = 0
         self._poll_us = self._step_us
         self._next_poll_us = NEVER_US
         self._attended: list[Callable[[int], None]] = []
@@ -90,19 +91,14 @@ class Sitl:
         self._target_truth = TargetTruthEncoder(self.targets, spec.place)
 
     @property
-    def time_us(self) -> int:
-        """Vehicle time, microseconds since boot."""
-        return self._time_us
-
-    @property
     def step_us(self) -> int:
         """Length of a physics step."""
         return self._step_us
 
     def advance(self) -> None:
         """Make one physics step."""
-        time_us = self._time_us + self._step_us
-        self._time_us = time_us
+        time_us = self.time_us + self._step_us
+        self.time_us = time_us
         for vehicle in self.vehicles:
             vehicle.step(time_us)
         self.world.advance()
@@ -127,7 +123,7 @@ class Sitl:
         for vehicle in self.vehicles:
             vehicle.links.poll()
         for look_after in self._attended:
-            look_after(self._time_us)
+            look_after(self.time_us)
 
     def attend(self, look_after: Callable[[int], None]) -> None:
         """Register a function that is called with vehicle time whenever real links are polled."""
@@ -160,7 +156,7 @@ class Sitl:
     def poll_every(self, interval_us: int) -> None:
         """Set the interval at which real links are polled (vehicle time); memory links need no polling."""
         self._poll_us = max(self._step_us, interval_us)
-        self._next_poll_us = self._time_us + self._poll_us
+        self._next_poll_us = self.time_us + self._poll_us
 
     def connect(
         self,
@@ -185,7 +181,7 @@ class Sitl:
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 
-    def record(self, log: PacketLog, on_failure: Callable[[str], None] | None = None) -> list[MemoryLink]:
+    def record(self, log: TlogWriter, on_failure: Callable[[str], None] | None = None) -> list[MemoryLink]:
         """Log every vehicle's messages on a separate link, and the truth, stamped with the vehicles' clock.
 
         Args:
@@ -203,7 +199,7 @@ class Sitl:
             nonlocal failed
             if not failed:
                 try:
-                    log.write_packet(epoch_us + time_us, packet)
+                    log.write(epoch_us + time_us, packet)
                 except TlogError as error:
                     if on_failure is None:
                         raise
@@ -211,7 +207,7 @@ class Sitl:
                     on_failure(str(error))
 
         for link in links:
-            link.on_receive = lambda packet: keep(self._time_us, packet)
+            link.on_receive = lambda packet: keep(self.time_us, packet)
         self.on_truth(keep)
         return links
 
@@ -219,7 +215,7 @@ class Sitl:
         """Register a listener for truth frames at 50 Hz, for the log and the score."""
         self._truth_listeners.append(listener)
         if self._next_truth_us == NEVER_US:
-            self._next_truth_us = self._time_us + self._truth_interval_us
+            self._next_truth_us = self.time_us + self._truth_interval_us
 
     def close(self) -> None:
         """Close every link, and the open files of the autopilots."""

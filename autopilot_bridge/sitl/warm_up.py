@@ -20,8 +20,8 @@ from autopilot_bridge.navigation.external import (
     ExternalFrame,
     ExternalSample,
 )
+from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.sitl.sitl import Sitl
-from autopilot_bridge.telemetry.packet_records import packet_records
 from flightsim.airframe import AirframeKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.world_spec import VehicleSpec, WorldSpec

@@ -76,6 +76,17 @@ def decode_columns(
     return columns
 
 
+def decode_records(
+    data: NDArray[np.uint8], starts: NDArray[np.uint32] | NDArray[np.int64], definition: MessageDefinition
+) -> NDArray[np.void]:
+    """Decode messages of one definition into records (`record_dtype`); arguments as of `decode_columns`."""
+    size = definition.size
+    buffer = np.empty(len(starts) * size, dtype=np.uint8)
+    scratch = np.empty(_ROWS_AT_ONCE * size, dtype=np.uint8)
+    _gather(data, starts, size, np.array([[0, size, 0]]), scratch, buffer)
+    return buffer.view(record_dtype(definition))
+
+
 @kernel
 def _gather(
     data: NDArray[np.uint8],

@@ -8,15 +8,16 @@ that begins outside a valid one, and a stamp that looks like the beginning of a 
 either. The bytes between frames are classified afterwards (`gaps`).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink import MessageDefinition
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
 from estimators.logs.crc import Int, checksum
-from estimators.logs.dialect import Dialect
 from flightsim.foundation.kernels import kernel
 
 STAMP_SIZE: Final = 8
@@ -55,15 +56,15 @@ class MessageTable:
     ids: NDArray[np.int64]
 
 
-def message_table(dialect: Dialect) -> MessageTable:
-    """Lookup table of a dialect's messages."""
-    ids = np.array(sorted(dialect.messages), dtype=np.int64)
+def message_table(definitions: Mapping[int, MessageDefinition]) -> MessageTable:
+    """Lookup table of messages, by id."""
+    ids = np.array(sorted(definitions), dtype=np.int64)
     used = np.unique(ids // _PAGE)
     pages = np.zeros((1 << 24) // _PAGE, dtype=np.int16)
     pages[used] = np.arange(1, len(used) + 1)
     rows = np.full((len(used) + 1, _PAGE), -1, dtype=np.int16)
     rows[pages[ids // _PAGE], ids % _PAGE] = np.arange(len(ids))
-    extras = np.array([dialect.messages[int(key)].definition.crc_extra for key in ids], dtype=np.uint8)
+    extras = np.array([definitions[int(key)].crc_extra for key in ids], dtype=np.uint8)
     return MessageTable(pages, rows, extras, ids)
 
 

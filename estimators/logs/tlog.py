@@ -55,7 +55,7 @@ class TlogSource(LogSource):
         self.size_bytes = len(data)
         self.dialect = dialect
         self.data = data
-        self._table = message_table(dialect)
+        self._table = message_table({key: item.definition for key, item in dialect.messages.items()})
         self.index: FrameIndex = scan(data, self._table, find_lead(data, self._table))
         self.count = len(self.index.starts)
         if not self.count:

@@ -92,9 +92,9 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     Raises:
         TlogError: the file exists or can't be made.
     """
-    from autopilot_bridge.sitl import PacketLog
+    from autopilot_bridge.tlog import TlogWriter
 
-    recorder = PacketLog(path)
+    recorder = TlogWriter(path)
     for spec, listener in zip(
         simulated.spec.vehicles, simulated.record(recorder, losses.log_ended), strict=True
     ):

@@ -8,6 +8,7 @@ link.
 import asyncio
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -26,8 +27,6 @@ PUBLISH_RATE_HZ: Final = 10.0
 
 TEAM_SYSTEM: Final = 255
 """System id that sends the estimates of a team: a process at the base station."""
-
-_MAGIC_V2: Final = 0xFD
 
 
 class EstimatorTap:
@@ -63,16 +62,16 @@ class EstimatorTap:
         self._frames = 0
         self._observations = ObservationWriter(log.with_suffix(SUFFIX))
 
-    def record(self, frame: bytes, time_us: int) -> None:
-        """Record a valid frame, and pass it to the estimators."""
-        self._record(frame, time_us)
-        self._frames += 1
-        taken = _frame(frame)
-        if taken.system_id < GROUND_SYSTEM and not why_unheard(taken.definition.name, taken.component_id):
-            self.heard[taken.system_id, taken.message_id] += 1
-            if taken.component_id == AUTOPILOT_COMPONENT:
-                self.autopilots[taken.system_id] += 1
-        self._pass_on(lambda: self.fleet.feed(taken), time_us)
+    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+        """Record valid frames, and pass them to the estimators."""
+        self._record(frames, time_us)
+        for frame in frames:
+            self._frames += 1
+            if frame.system_id < GROUND_SYSTEM and not why_unheard(frame.definition.name, frame.component_id):
+                self.heard[frame.system_id, frame.message_id] += 1
+                if frame.component_id == AUTOPILOT_COMPONENT:
+                    self.autopilots[frame.system_id] += 1
+            self._pass_on(partial(self.fleet.feed, frame), time_us)
 
     def observe(self, observation: Observation, time_us: int) -> None:
         """Record an observation that is not a message, and pass it to the estimators, at a vehicle time."""
@@ -98,14 +97,7 @@ class EstimatorTap:
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Record a frame of truth. It is not passed to estimators, but is placed in the order of the log."""
-        self.record(frame, time_us)
-
-
-def _frame(raw: bytes) -> Frame:
-    """A frame from bytes that a parser has already checked, or that an encoder has created."""
-    if raw[0] == _MAGIC_V2:
-        return Frame(raw, raw[7] | raw[8] << 8 | raw[9] << 16, raw[5], raw[6], raw[4], 2, bool(raw[2] & 1))
-    return Frame(raw, raw[5], raw[3], raw[4], raw[2], 1)
+        self.record([Frame.of(frame)], time_us)
 
 
 class Publisher:

@@ -1,91 +1,79 @@
-"""The frames of a flight as columns: raw payloads, collected by message and decoded with numpy."""
+"""The frames of a flight: its log while it is flown, and columns of it afterwards."""
 
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.errors import TlogError
-from autopilot_bridge.mavlink import DEFINITIONS, definition
-from autopilot_bridge.tlog import TlogReader, TlogWriter
-from estimators.logs.columns import record_dtype
-
-SCORED_MESSAGES: Final = frozenset(
-    definition(name).message_id
-    for name in (
-        "HIL_STATE_QUATERNION",
-        "LOCAL_POSITION_NED",
-        "GLOBAL_POSITION_INT",
-        "GPS_GLOBAL_ORIGIN",
-        "ATTITUDE",
-        "ATTITUDE_TARGET",
-        "HEARTBEAT",
-    )
-)
-"""Messages kept for the summary and the picture; all others are only counted."""
+from autopilot_bridge.mavlink import DEFINITIONS, Frame, definition
+from autopilot_bridge.packet_records import packet_records
+from autopilot_bridge.tlog import TlogWriter
+from estimators.logs.columns import decode_records, record_dtype
+from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, message_table, scan
 
 UnixTime = Callable[[], int]
 """Returns microseconds of the Unix epoch."""
 
-_MAGIC_V2: Final = 0xFD
+_MESSAGES: Final = 0  # column of `FrameIndex.stream_keys`
 
 
 class FlightRecords:
-    """Counts of all messages of a flight, and the payloads of messages that are scored."""
+    """All frames of a flight, as columns.
 
-    def __init__(self) -> None:
-        self._counts: Counter[int] = Counter()
-        self._payloads: dict[tuple[int, int, int], list[bytes]] = {}
+    Args:
+        data: bytes of a telemetry log.
+    """
+
+    def __init__(self, data: NDArray[np.uint8]) -> None:
+        self._data = data
+        self._messages: MessageTable = message_table(DEFINITIONS)
+        self._index: FrameIndex = scan(data, self._messages, STAMP_SIZE)
 
     @classmethod
-    def from_tlog(cls, path: Path) -> "FlightRecords":
+    def from_tlog(cls, path: Path) -> Self:
         """Records from an existing log."""
-        records = cls()
-        for _, frame in TlogReader(path):
-            records.add(frame.raw)
-        return records
+        return cls(np.fromfile(path, dtype=np.uint8))
 
-    def add(self, raw: bytes) -> None:
-        """Add one valid frame."""
-        if raw[0] == _MAGIC_V2:
-            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
-            self._counts[message_id] += 1
-            if message_id in SCORED_MESSAGES:
-                key = (message_id, raw[5], raw[6])
-                self._payloads.setdefault(key, []).append(raw[10 : 10 + raw[1]])
-        else:
-            self._counts[raw[5]] += 1
-            if raw[5] in SCORED_MESSAGES:
-                self._payloads.setdefault((raw[5], raw[3], raw[4]), []).append(raw[6 : 6 + raw[1]])
+    @classmethod
+    def of_frames(cls, frames: Iterable[bytes]) -> Self:
+        """Records of some valid frames."""
+        packets = list(frames)
+        return cls(np.frombuffer(packet_records([0] * len(packets), packets)[0], dtype=np.uint8))
 
-    @property
+    @cached_property
     def message_counts(self) -> dict[str, int]:
         """Frames by message name, sorted by name."""
-        return dict(sorted((DEFINITIONS[k].name, n) for k, n in self._counts.items()))
+        index = self._index
+        by_stream = np.bincount(index.streams, minlength=len(index.stream_keys))
+        counts = np.zeros(len(self._messages.ids), dtype=np.int64)
+        np.add.at(counts, index.stream_keys[:, _MESSAGES], by_stream)
+        named = zip(self._messages.ids.tolist(), counts.tolist(), strict=True)
+        return dict(sorted((DEFINITIONS[message_id].name, count) for message_id, count in named if count))
 
     def table(self, name: str, system_id: int, component_id: int | None = None) -> NDArray[np.void]:
         """All messages of a name from one system, as a structured array with the message's fields.
 
         Args:
-            component_id: sender; None: any component of the system.
+            component_id: sender; None: any component of the system, one after the other.
         """
         found = definition(name)
-        dtype = record_dtype(found)
-        parts = [
-            payload
-            for (message_id, system, component), payloads in self._payloads.items()
-            if message_id == found.message_id and system == system_id and component_id in (None, component)
-            for payload in payloads
+        message = int(np.searchsorted(self._messages.ids, found.message_id))
+        index = self._index
+        streams = [
+            number
+            for number, key in enumerate(index.stream_keys.tolist())
+            if key[:2] == [message, system_id] and component_id in (None, key[2])
         ]
-        size = dtype.itemsize
-        return np.frombuffer(b"".join(p[:size].ljust(size, b"\0") for p in parts), dtype=dtype)
+        tables = [decode_records(self._data, index.starts[index.streams == n], found) for n in streams]
+        return np.concatenate(tables) if tables else np.empty(0, dtype=record_dtype(found))
 
 
 class FlightRecorder:
-    """Writes the frames of all connections, and the truth, to the log and the records.
+    """Writes the frames of all connections, and the truth, to the log.
 
     Args:
         log: an open log.
@@ -93,31 +81,37 @@ class FlightRecorder:
         unix_time_us: wall clock for flights of vehicles that are not embedded.
 
     Attributes:
-        records: records of all frames.
-        failure: reason why the log can no longer be written. The log ends there, and recording continues
-            without it. "" without a failure.
+        failure: reason why the log can no longer be written. The log ends there, and recording continues in
+            memory. "" without a failure.
     """
 
     def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
-        self.records = FlightRecords()
         self.failure = ""
         self._log = log
+        self._write = log.write
         self._epoch_us = epoch_us
         self._unix_time_us = unix_time_us
+        self._unlogged: tuple[list[int], list[bytes]] = [], []
 
-    def record(self, frame: bytes, time_us: int) -> None:
-        """Log one frame that was sent or received at vehicle time `time_us`."""
-        stamp = self._unix_time_us() if self._epoch_us is None else self._epoch_us + time_us
-        if not self.failure:
-            try:
-                self._log.write(stamp, frame)
-            except TlogError as error:
-                self.failure = str(error)
-        self.records.add(frame)
+    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+        """Log frames that were sent or received together at vehicle time `time_us`."""
+        self._keep(b"".join([frame.raw for frame in frames]), time_us)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Log one frame of truth."""
-        self.record(frame, time_us)
+        self._keep(frame, time_us)
+
+    def _keep(self, packet: bytes, time_us: int) -> None:
+        stamp_us = self._unix_time_us() if self._epoch_us is None else self._epoch_us + time_us
+        if self.failure:
+            times_us, packets = self._unlogged
+            times_us.append(stamp_us)
+            packets.append(packet)
+            return
+        try:
+            self._write(stamp_us, packet)
+        except TlogError as error:
+            self.failure = str(error)
 
     def flush(self) -> None:
         """Pass all data to the operating system, so that `failure` is up to date."""
@@ -126,6 +120,12 @@ class FlightRecorder:
     def close(self) -> None:
         """Close the log."""
         self._try(self._log.close)
+
+    def records(self) -> FlightRecords:
+        """All frames that were recorded, including those that the log has no room for. Close it before."""
+        logged = np.fromfile(self._log.path, dtype=np.uint8)
+        unlogged = self._log.unwritten + packet_records(*self._unlogged)[0]
+        return FlightRecords(np.concatenate([logged, np.frombuffer(unlogged, dtype=np.uint8)]))
 
     def _try(self, write: Callable[[], None]) -> None:
         try:

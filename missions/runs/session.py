@@ -198,7 +198,7 @@ def _fly_interruptible(
         stage.loop.close()
     sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
-    debriefing = _debrief(request, recorder.records, flight)
+    debriefing = _debrief(request, recorder.records(), flight)
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
         reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)

@@ -6,7 +6,7 @@ two dictionary operations; it is decoded only when it is requested.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Protocol, Self
 
@@ -44,8 +44,8 @@ _POLL_S: Final = 0.002  # for links without a file descriptor
 class Recorder(Protocol):
     """Receives all frames of a connection, in both directions."""
 
-    def record(self, frame: bytes, time_us: int) -> None:
-        """Process one frame that was sent or received at a vehicle time."""
+    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+        """Process frames that were sent or received together at a vehicle time."""
         ...
 
 
@@ -149,20 +149,28 @@ class Connection:
             self._on_frames(frames)
 
     def _on_frames(self, frames: list[Frame]) -> None:
-        time_us = self.clock.time_us
-        put, listeners, recorder = self._newest.put, self._listeners, self._recorder
+        if self._observed is None:
+            self._record(frames)
+        put, listeners = self._newest.put, self._listeners
         for frame in frames:
             message_id = frame.message_id
             put(frame)
-            if self._observed is not None and message_id in _TIMESTAMPED:
-                time_us = self._observe(frame)
-            if recorder is not None and message_id != SETUP_SIGNING:  # a log contains no keys
-                recorder.record(frame.raw, time_us)
+            if self._observed is not None:
+                if message_id in _TIMESTAMPED:
+                    self._observe(frame)
+                self._record([frame])
             if message_id in listeners:
                 for listener in tuple(listeners[message_id]):
                     listener(frame)
 
-    def _observe(self, frame: Frame) -> int:
+    def _record(self, frames: list[Frame]) -> None:
+        if self._recorder is not None:
+            logged = [
+                frame for frame in frames if frame.message_id != SETUP_SIGNING
+            ]  # a log contains no keys
+            self._recorder.record(logged, self.clock.time_us)
+
+    def _observe(self, frame: Frame) -> None:
         """Set the clock from the messages of the vehicle's autopilot."""
         assert self._observed is not None
         if frame.component_id == AUTOPILOT_COMPONENT:
@@ -171,7 +179,6 @@ class Connection:
             if frame.system_id == self._clock_source:
                 offset = _TIMESTAMPED[frame.message_id]
                 self._observed.observe(int.from_bytes(frame.payload[offset : offset + 4], "little") * 1000)
-        return self._observed.time_us
 
     async def _keep_looking_after_link(self) -> None:
         """Poll links whose descriptors change (servers, reconnecting clients) or that have none."""
@@ -205,8 +212,7 @@ class Connection:
         data = self._encoder.encode(message)
         if self.signing is not None and self.signing.signs:
             data = self.signing.sign(data)
-        if self._recorder is not None and type(message).id != SETUP_SIGNING:
-            self._recorder.record(data, self.clock.time_us)
+        self._record([Frame.of(data)])
         self._link.send(data)
 
     async def _keep_sending_heartbeats(self) -> None:
@@ -290,6 +296,7 @@ class MessageStream:
         component_id: int | None,
     ) -> None:
         self._queue: deque[Frame] = deque()
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._waiting: asyncio.Future[None] | None = None
         self._system_id, self._component_id = system_id, component_id
         self._stops = [connection.listen(name, self._on_frame) for name in names]
@@ -318,7 +325,9 @@ class MessageStream:
             await asyncio.sleep(0)
         while not self._queue:
             self._at_once = 0
-            self._waiting = asyncio.get_running_loop().create_future()
+            if self._loop is None:
+                self._loop = asyncio.get_running_loop()
+            self._waiting = self._loop.create_future()
             try:
                 await self._waiting
             finally:

@@ -16,7 +16,7 @@ The place in the mission never goes back: evidence of an earlier place is ignore
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
@@ -104,6 +104,11 @@ class MissionStep:
     radius_m: float = 0.0
     stay_s: float = math.inf
     through: bool = False
+    _frame: LocalFrame | None = field(init=False, repr=False, compare=False, default=None)
+
+    def __post_init__(self) -> None:
+        if self.place is not None:
+            object.__setattr__(self, "_frame", LocalFrame(self.place))
 
     @property
     def flown(self) -> bool:
@@ -112,11 +117,11 @@ class MissionStep:
 
     def contains(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
         """Whether a position is within the radius."""
-        if self.place is None:
+        if self.place is None or self._frame is None:
             return False
         if math.isinf(self.radius_m):
             return alt_m >= self.place.alt_m
-        return math.hypot(*LocalFrame(self.place).ned_from_geodetic(lat_deg, lon_deg, alt_m)) <= self.radius_m
+        return math.hypot(*self._frame.ned_from_geodetic(lat_deg, lon_deg, alt_m)) <= self.radius_m
 
 
 def mission_steps(

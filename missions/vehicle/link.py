@@ -10,9 +10,17 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock, TelemetryClock
-from autopilot_bridge.mavlink import MAVLinkMessage, command_name, decode, definition, dialect, enum_name
+from autopilot_bridge.mavlink import (
+    Frame,
+    MAVLinkMessage,
+    command_name,
+    decode,
+    definition,
+    dialect,
+    enum_name,
+)
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.errors import VehicleTimeout
+from missions.errors import MissionError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes, LinkLoss
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
@@ -333,6 +341,34 @@ class VehicleLink:
     def _silent(self) -> bool:
         """Whether no heartbeat was received for three seconds of vehicle time."""
         return self.heartbeat_us is not None and self.clock.time_us - self.heartbeat_us > _SILENT_AFTER_US
+
+    async def follow(self, handle: Callable[[MAVLinkMessage], bool], *, on: Sequence[str]) -> None:
+        """Pass each message of the autopilot that is named in `on` to `handle`, until it returns true.
+
+        Each message is handled when it is received, and the task that waits continues only at the end: for
+        waits that look at many messages.
+
+        Args:
+            handle: must not send or wait; an error that it raises ends the wait.
+            on: names of messages.
+        """
+        over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def on_frame(frame: Frame) -> None:
+            if (frame.system_id, frame.component_id) != (self._system_id, AUTOPILOT_COMPONENT) or over.done():
+                return
+            try:
+                if handle(decode(frame)):
+                    over.set_result(None)
+            except MissionError as error:
+                over.set_exception(error)
+
+        stops = [self.connection.listen(name, on_frame) for name in on]
+        try:
+            await over
+        finally:
+            for stop in stops:
+                stop()
 
     async def wait_until(
         self,

@@ -1,7 +1,7 @@
 """The plans that a vehicle stores (mission, geofence, rally points), and the progress of its mission."""
 
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
@@ -119,23 +119,25 @@ class VehiclePlans:
             told = len(tracker.reached)
             return tracker.behind > wanted
 
-        names = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "GLOBAL_POSITION_INT", "HEARTBEAT")
-        with self._link.messages(*names) as stream:
-            try:
-                async with self._link.deadline(timeout_s, f"mission item {sequence}"):
-                    while not there():
-                        message = await anext(stream)
-                        if message.get_type() == "HEARTBEAT":
-                            if mode.left(message.custom_mode) and not tracker.at_the_last_place:
-                                name = self._link.firmware.mode_name(message.custom_mode)
-                                raise MissionError(
-                                    f"the vehicle left the mission for mode {name} "
-                                    f"before item {sequence}; {self._link.last_received()}"
-                                )
-                        else:
-                            tracker.on_message(message, self._link.clock.stamp_us)
-            except TimeoutError:
-                raise VehicleTimeout(
-                    f"mission item {sequence} was not reached within {timeout_s:g} s; "
+        def handle(message: Any) -> bool:
+            if message.get_type() != "HEARTBEAT":
+                tracker.on_message(message, self._link.clock.stamp_us)
+            elif mode.left(message.custom_mode) and not tracker.at_the_last_place:
+                name = self._link.firmware.mode_name(message.custom_mode)
+                raise MissionError(
+                    f"the vehicle left the mission for mode {name} before item {sequence}; "
                     f"{self._link.last_received()}"
-                ) from None
+                )
+            return there()
+
+        if there():
+            return
+        names = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "GLOBAL_POSITION_INT", "HEARTBEAT")
+        try:
+            async with self._link.deadline(timeout_s, f"mission item {sequence}"):
+                await self._link.follow(handle, on=names)
+        except TimeoutError:
+            raise VehicleTimeout(
+                f"mission item {sequence} was not reached within {timeout_s:g} s; "
+                f"{self._link.last_received()}"
+            ) from None

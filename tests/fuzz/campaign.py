@@ -18,9 +18,9 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
-from autopilot_bridge.sitl import PacketLog
 from autopilot_bridge.sitl.server import objects_kept
 from autopilot_bridge.sitl.warm_up import compile_flight_code
+from autopilot_bridge.tlog import TlogWriter
 from flightsim import truth as t
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from flightsim.world_spec import VehicleSpec
@@ -157,7 +157,7 @@ class Campaign:
         )
 
 
-class _Log(PacketLog):
+class _Log(TlogWriter):
     """A log that looks at what it is given, and keeps nothing."""
 
     def __init__(self) -> None:
@@ -165,8 +165,7 @@ class _Log(PacketLog):
             super().__init__(Path(folder) / "nobody.tlog")
 
     def flush(self) -> None:
-        self._kept = 0
-        assert not self._packets or not self._take_apart()
+        assert not self._split()
         self._buffer.clear()
 
 

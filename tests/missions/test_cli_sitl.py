@@ -7,8 +7,7 @@ from click.testing import CliRunner
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS
-from autopilot_bridge.sitl import PacketLog
-from autopilot_bridge.tlog import TlogReader
+from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import SyntheticMapParameters, synthetic_map
@@ -71,14 +70,14 @@ def test_signature_off_the_map_is_refused_by_name(survey_map):
 
 
 def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path, monkeypatch):
-    flush = PacketLog.flush
+    flush = TlogWriter.flush
 
     def filling(log):
         if log.records > 500:
             raise TlogError(f"can't write {log.path}: No space left on device; check the disk")
         flush(log)
 
-    monkeypatch.setattr(PacketLog, "flush", filling)
+    monkeypatch.setattr(TlogWriter, "flush", filling)
     log = tmp_path / "said.tlog"
     words = ["--speedup", "0", *LINK, "--duration", "6", "--log", str(log)]
     result = CliRunner().invoke(command, words, standalone_mode=False)

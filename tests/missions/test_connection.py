@@ -24,8 +24,8 @@ class Recording:
     def __init__(self):
         self.frames = []
 
-    def record(self, frame, time_us):
-        self.frames.append((time_us, frame))
+    def record(self, frames, time_us):
+        self.frames += [(time_us, frame.raw) for frame in frames]
 
 
 def on_memory(script, **arguments):

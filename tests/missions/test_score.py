@@ -75,13 +75,13 @@ def test_a_missed_waypoint_that_is_crossed_later_spoils_no_other():
     assert waypoint_misses_m(commanded, eight[:1]) == ()
 
 
-def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True):
+def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True, more=()):
     """A flight 10 m up along a straight path.
 
     It is off the commanded path by `offset_ned` while flying, and the autopilot's frame is off the true one
     by `gps_ned` all the time.
     """
-    records = FlightRecords()
+    frames = []
     autopilot, simulator = FrameEncoder(1, 1), FrameEncoder(1, 240)
     frame = LocalFrame(HOME)
     for k in range(0, 2001):
@@ -92,7 +92,7 @@ def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=
         pos = np.array((n, 0.0, -height)) + share * np.array(offset_ned)
         if truth:
             lat, lon, alt = frame.geodetic_from_ned(*(pos - np.array(gps_ned)))
-            records.add(
+            frames.append(
                 simulator.encode(
                     dialect.MAVLink_hil_state_quaternion_message(
                         t_us, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, round(lat * 1e7), round(lon * 1e7),
@@ -104,13 +104,13 @@ def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=
             lat, lon, alt = frame.geodetic_from_ned(*pos)
             t_ms = t_us // 1000
             message = dialect.MAVLink_global_position_int_message
-            records.add(
+            frames.append(
                 autopilot.encode(
                     message(t_ms, round(lat * 1e7), round(lon * 1e7), round(alt * 1e3), round(-pos[2] * 1e3),
                             0, 0, 0, 0xFFFF)
                 )
             )  # fmt: skip
-            records.add(
+            frames.append(
                 autopilot.encode(dialect.MAVLink_attitude_message(t_ms, roll_error, 0.0, 0.0, 0, 0, 0))
             )
     notes = FlightNotes(system_id=1, autopilot="px4")
@@ -120,7 +120,7 @@ def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=
     notes.commanded = CommandedPath(
         origin=HOME, points_ned_m=straight_path(), waypoints_ned_m=np.zeros((0, 3)), acceptance_m=2.0
     )
-    return records, notes
+    return FlightRecords.of_frames([*frames, *more]), notes
 
 
 def test_a_perfect_flight_scores_zero():
@@ -153,7 +153,7 @@ def test_without_truth_the_estimate_is_scored():
 
 
 def test_nothing_recorded_scores_nothing():
-    result = score(FlightRecords(), FlightNotes(system_id=1))
+    result = score(FlightRecords.of_frames(()), FlightNotes(system_id=1))
     assert result.path_rms_error_m is None
     assert result.distance_m == 0.0
 
@@ -170,18 +170,20 @@ def test_records_count_and_decode_columns():
 
 
 def test_messages_without_a_number_are_left_out_and_counted(tmp_path):
-    records, notes = make_flight(offset_ned=(0.0, 0.3, -0.4), roll_error=math.radians(2.0))
+    frames = []
     autopilot, simulator = FrameEncoder(1, 1), FrameEncoder(1, 240)
     for k, bad in enumerate((math.nan, math.inf, -math.inf)):
         attitude = dialect.MAVLink_attitude_message(40_100 + k, bad, 0.0, 0.0, 0, 0, 0)
-        records.add(autopilot.encode(attitude))
+        frames.append(autopilot.encode(attitude))
     for k, q in enumerate(([math.nan, 0.0, 0.0, 0.0], [0.0] * 4)):
         target = dialect.MAVLink_attitude_target_message(20_000 + k, 0, q, 0.0, 0.0, 0.0, 0.5)
-        records.add(autopilot.encode(target))
+        frames.append(autopilot.encode(target))
         truth = dialect.MAVLink_hil_state_quaternion_message
-        records.add(
+        frames.append(
             simulator.encode(truth(40_000_001 + k, q, 0.0, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
         )
+    error_rad = math.radians(2.0)
+    records, notes = make_flight(offset_ned=(0.0, 0.3, -0.4), roll_error=error_rad, more=frames)
     result = score(records, notes)
     assert result.messages_not_finite == 7
     assert result.max_attitude_error_deg == pytest.approx(2.0, abs=1e-3)

@@ -264,7 +264,7 @@ class FillingDisk(TlogWriter):
     room = 0
 
     def flush(self):
-        if self.path.stat().st_size + len(self._buffer) > self.room:
+        if self.path.stat().st_size + len(self.unwritten) > self.room:
             raise TlogError(f"can't write {self.path}: No space left on device; check the disk")
         super().flush()
 

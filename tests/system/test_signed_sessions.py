@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import all as dialect
 from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningKey, SigningState, decode
 from autopilot_bridge.mavlink.signing import MINUTE, Refusal
-from autopilot_bridge.sitl import PacketLog, SigningParameters, SigningStore, Sitl, UnsignedFrom
-from autopilot_bridge.tlog import TlogReader
+from autopilot_bridge.sitl import SigningParameters, SigningStore, Sitl, UnsignedFrom
+from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.vehicle import Vehicle
@@ -282,7 +282,7 @@ def test_no_key_is_taken_while_armed() -> None:
 
 def test_keys_are_in_no_log(tmp_path: Path) -> None:
     keys = Keys(Reach.MACHINE)
-    with PacketLog(tmp_path / "log.tlog") as log:
+    with TlogWriter(tmp_path / "log.tlog") as log:
         keys.sitl.record(log)
         keys.bring(KEY.secret)
         while keys.sitl.time_us < 2_000_000:

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import Armed, Disarmed, Event
 from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage
 from autopilot_bridge.services.files.card_layout import CardLayout, LogTimes
@@ -20,7 +21,6 @@ from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE
 from autopilot_bridge.storage import OpenFile, VehiclePath
 from autopilot_bridge.telemetry.motion import MotionMessages
-from autopilot_bridge.telemetry.packet_records import packet_records
 
 _STOP_AFTER_US: Final = 2_000_000
 """A log continues for this time after disarming, so that it contains the end of the flight."""

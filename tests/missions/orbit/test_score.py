@@ -26,7 +26,7 @@ def debriefing(*phases, marks=MARKS):
     for name, start_us, end_us in phases:
         notes.begin(name, start_us)
         notes.end(end_us)
-    records = FlightRecords()
+    records = FlightRecords.of_frames(())
     return Debriefing(
         records=records, flights=[(notes, score(records, notes))], options=OrbitOptions(radius_m=150.0)
     )

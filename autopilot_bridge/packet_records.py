@@ -1,4 +1,4 @@
-"""Packets of our own channels as records of a log (.tlog): compiled code splits many at once."""
+"""Packets of whole frames as records of a log (.tlog): compiled code splits many at once."""
 
 from typing import Final
 
@@ -72,7 +72,7 @@ def _split(data: Bytes, times_us: Integers, sizes: Integers, out: Bytes) -> tupl
 
 
 def packet_records(times_us: list[int], packets: list[bytes]) -> tuple[bytes, int, str]:
-    """Records of the frames in packets that channels of ours have sent.
+    """Records of the frames in packets.
 
     Frames are split by their lengths only; data from other sources must go through a parser first. The
     packets may contain forwarded frames of other systems, unchanged: MAVLink 1, or signed.
