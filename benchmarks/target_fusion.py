@@ -55,7 +55,7 @@ from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
 FORMS = ("measurement", "kalman", "proposed", "frequency")
-HEARD = frozenset(
+RECEIVED = frozenset(
     definition(name).message_id
     for name in (
         "GPS_RAW_INT",
@@ -114,7 +114,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recorded:
-    """A flight as it was heard, with the truth.
+    """A flight as it was received, with the truth.
 
     Attributes:
         frames: what the base station hears of the vehicles, in order.
@@ -149,7 +149,7 @@ class Ear:
         self._parser = FrameParser()
 
     def record(self, frame: bytes, time_us: int) -> None:
-        if int.from_bytes(frame[7:10], "little") in HEARD:
+        if int.from_bytes(frame[7:10], "little") in RECEIVED:
             for parsed in self._parser.feed(frame):
                 self._ears.take(frame, parsed, time_us)
 

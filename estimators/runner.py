@@ -30,7 +30,7 @@ __all__ = [
     "TRUTH_MESSAGES",
     "EstimateTable",
     "Runner",
-    "why_unheard",
+    "why_excluded",
 ]
 
 TRUTH_COMPONENT: Final = 25
@@ -61,7 +61,7 @@ LANDING_TARGET.
 _SYSTEM_TIME: Final = "SYSTEM_TIME"
 
 
-def why_unheard(name: str, component_id: int) -> str | None:
+def why_excluded(name: str, component_id: int) -> str | None:
     """The reason why estimators don't receive a component's message; None when they do."""
     if component_id == TRUTH_COMPONENT:
         return "truth"
@@ -213,7 +213,7 @@ class Runner:
         self._newest_us: int | None = None
 
     @property
-    def heard_names(self) -> frozenset[str]:
+    def read_names(self) -> frozenset[str]:
         """Names of the messages to read from a log: those that the estimator needs and, for a team, those
         that its common time needs.
         """
@@ -268,7 +268,7 @@ class Runner:
         if name not in self.names:
             return None
         component = message.src_component
-        if component != 1 and (reason := why_unheard(name, component)):
+        if component != 1 and (reason := why_excluded(name, component)):
             self.left_out[reason] += 1
             return None
         if team_time is not None:

@@ -320,14 +320,14 @@ class Commander:
             if self.booted and self._checks.report_due(time_us):
                 self._tell_reasons(self.arming_reasons, check_only=True)
         self._events.extend(self._monitor.update(self.situation, self.parameters, self.context.health))
-        told = self.failsafes.update(self.situation, self.parameters)
-        self._events.extend(told)
+        changes = self.failsafes.update(self.situation, self.parameters)
+        self._events.extend(changes)
         self._select()
         crash = self._crash.update(self.situation, self.context) if self.parameters.crash_check else None
         if crash is not None:
             self.emit(crash)
             self._disarm(DisarmReason.FAILSAFE)
-        restored = self._memory.recall(told)
+        restored = self._memory.recall(changes)
         if restored is not None and self.armed:
             self.change_mode(restored)
 

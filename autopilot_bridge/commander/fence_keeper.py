@@ -108,7 +108,7 @@ class FenceKeeper:
         if parameters.predicts and position is not None and situation.airborne:
             position = place_ahead(context, position)
         home = tuple(context.home_ned_m.tolist()) if situation.home_set else None
-        told = watch.update(
+        changes = watch.update(
             position,
             home,
             context.frame,
@@ -122,7 +122,7 @@ class FenceKeeper:
         situation.fence_present = watch.present(parameters)
         situation.fence_breaches = watch.breaches
         situation.fence_away_m = watch.distance_m
-        return told
+        return changes
 
     def allows(self, place_ned_m: Array) -> bool:
         """True when a position is inside all enabled walls."""

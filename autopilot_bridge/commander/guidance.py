@@ -125,10 +125,10 @@ class Guidance:
         fence, frame = commander.parameters.fence, commander.context.frame
         bounded = commander.policy.fence_bounds_targets and fence.bounds_targets
         if bounded and not commander.fence.allows((north_m, east_m, down_m), frame, fence):
-            told = CommandDenied(
+            denied = CommandDenied(
                 time_us=commander.time_us, command=_DO_REPOSITION, reason=Reason.OUTSIDE_FENCE
             )
-            commander.emit(told)
+            commander.emit(denied)
             return Verdict(result=commander.policy.mode_denied, reasons=(Reason.OUTSIDE_FENCE,))
         verdict = commander.set_mode(commander.policy.reposition_mode)
         if not verdict.accepted or not commander.armed or commander.mode is not commander.commanded_mode:

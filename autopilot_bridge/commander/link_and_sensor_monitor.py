@@ -44,7 +44,7 @@ class LinkAndSensorMonitor:
         self, situation: Situation, parameters: CommanderParameters, navigation: NavigationHealth | None
     ) -> list[Event]:
         """Check the newest situation; returns the changes."""
-        told: list[Event | None] = [
+        changes: list[Event | None] = [
             self._airspeed.update(situation.health, armed=situation.armed, time_us=situation.time_us),
             self._judge(Aid.GROUND_STATION, situation.gcs_age_s, parameters.gcs_loss_s, situation.time_us),
             self._judge(Aid.STICKS, situation.sticks_age_s, parameters.manual_loss_s, situation.time_us),
@@ -52,8 +52,8 @@ class LinkAndSensorMonitor:
         if navigation is not None and navigation.time_since_gps_us >= 0:
             age_s, limit_s = navigation.time_since_gps_us * 1e-6, _GPS_STOPPED_US * 1e-6
             news = self._judge(Aid.GPS, age_s, limit_s, situation.time_us)
-            told.append(news if situation.armed else None)
-        return [event for event in told if event is not None]
+            changes.append(news if situation.armed else None)
+        return [event for event in changes if event is not None]
 
     def _judge(self, aid: Aid, age_s: float, limit_s: float, time_us: int) -> AidChanged | None:
         if limit_s <= 0.0:

@@ -29,9 +29,9 @@ class ModeMemory:
         """A client or pilot has selected a mode."""
         self._mode = None
 
-    def recall(self, told: Iterable[Event]) -> FlightMode | None:
+    def recall(self, changes: Iterable[Event]) -> FlightMode | None:
         """The mode to restore because the radio is back; None: no change."""
-        for event in told:
+        for event in changes:
             if isinstance(event, FailsafeCleared) and event.kind is FailsafeKind.MANUAL_LOST:
                 mode, self._mode = self._mode, None
                 return mode

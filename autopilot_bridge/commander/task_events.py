@@ -29,9 +29,9 @@ class TaskFollower:
         events = commander.context.events
         if not events:
             return
-        told = events[:]
+        changes = events[:]
         events.clear()
-        for each in told:
+        for each in changes:
             self._take(each)
 
     def _take(self, event: flight.FlightEvent) -> None:

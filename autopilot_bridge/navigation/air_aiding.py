@@ -104,7 +104,7 @@ class AirAiding:
         self.wind_us = self.airspeed_us = self.sideslip_us = -1
 
     @property
-    def pitot_believed(self) -> bool:
+    def pitot_trusted(self) -> bool:
         """There is a pitot tube in use, alive and not found wrong."""
         used = self._parameters.use_airspeed
         return used and self._check.passed and self._pitot.alive(self._time_us)
@@ -135,7 +135,7 @@ class AirAiding:
             return True
         if gps_us >= 0 and time_us - gps_us <= _GROUND_AID_US:
             return False  # the speed is a measured one
-        blown = self.pitot_believed and self._pitot.true_m_s > self._parameters.airspeed_threshold_m_s
+        blown = self.pitot_trusted and self._pitot.true_m_s > self._parameters.airspeed_threshold_m_s
         return not blown and time_us - self._quiet_since_us > _QUIET_US
 
     def look(self, time_us: int) -> None:
@@ -153,7 +153,7 @@ class AirAiding:
         """
         self._time_us = time_us
         solution, p, pitot = self._solution, self._parameters, self._pitot
-        pitot.update_density(believed=self.pitot_believed)
+        pitot.update_density(trusted=self.pitot_trusted)
         self._set_wind_walk()
         self._turn.update()
         self._judge_flight(at_rest)
@@ -193,7 +193,7 @@ class AirAiding:
 
     def _judge_flight(self, at_rest: bool) -> None:
         speed = self.relative_velocity_m_s
-        if self.pitot_believed:
+        if self.pitot_trusted:
             speed = max(speed, self._pitot.true_m_s)
         down_m = float(self._solution.core[X_POS + 2])
         fast = speed > self._parameters.airspeed_threshold_m_s
@@ -265,7 +265,7 @@ class AirAiding:
         """Wind and airspeed into the navigation state; `interval_s` since the last time."""
         p, pitot, health = self._parameters, self._pitot, self._health
         core = self._solution.core
-        measured = self.pitot_believed
+        measured = self.pitot_trusted
         synthetic = not measured and (self.flying or health.velocity_horizontal)
         health.airspeed_valid, health.airspeed_synthetic = measured, synthetic
         if measured or synthetic:

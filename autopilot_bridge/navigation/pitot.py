@@ -91,13 +91,13 @@ class Pitot:
             and time_us - self._changed_us <= _STUCK_US
         )
 
-    def update_density(self, *, believed: bool) -> None:
+    def update_density(self, *, trusted: bool) -> None:
         """Air density from the barometer, and from the sensor's own temperature if that is valid."""
         static_pa = float(self._readings.barometer.values[BARO_PRESSURE_PA])
         if not _PRESSURE_PA[0] <= static_pa <= _PRESSURE_PA[1]:
             return
         sensed_c = float(self._readings.airspeed.values[AIRSPEED_TEMPERATURE_C])
-        if believed and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
+        if trusted and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
             temperature_k = sensed_c + ICE_POINT_K - self._parameters.airspeed_sensor_heating_k
         else:
             temperature_k = standard_temperature_k(static_pa)

@@ -144,7 +144,7 @@ class Solution:
         elapsed_s = (self.steps - self._accuracy_step) * self.period_us * 1e-6
         self._accuracy_step = self.steps
         fade = math.exp(-2.0 * elapsed_s / p.gps_position_tau_s)
-        believed = []
+        accepted = []
         for axes, new in zip(((0, 1), (2,)), reported, strict=True):
             old = self.gps_error_var[axes[0]]
             if new >= old:
@@ -155,8 +155,8 @@ class Solution:
                     self._shrink_gps_error(axis, math.sqrt(new / old))
             else:
                 new += (old - new) * fade
-            believed.append(new)
-        horizontal, vertical = believed
+            accepted.append(new)
+        horizontal, vertical = accepted
         self.gps_error_var = (horizontal, horizontal, vertical)
         self.process[cov.GPS_VAR_HORIZONTAL] = horizontal
         self.process[cov.GPS_VAR_VERTICAL] = vertical

@@ -28,7 +28,7 @@ from autopilot_bridge.payload.camera_tracking import CameraTracker
 from autopilot_bridge.payload.camera_trigger import PhotoTrigger
 from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.payload.component import Component
-from autopilot_bridge.payload.vehicle_heard import VehicleHeard
+from autopilot_bridge.payload.reported_vehicle import ReportedVehicle
 from flightsim.foundation.vectors import Quaternion, from_euler, product
 from flightsim.payload import Camera, CameraFrame, Gimbal
 
@@ -64,7 +64,7 @@ class CameraComponent(Component):
         stream: a video stream with a running server; None: there is none.
         keeper: makes files of photos and videos; None: photos and videos are only counted.
         mode: CAMERA_MODE.
-        lens, storage, tracker, trigger, heard: the parts.
+        lens, storage, tracker, trigger, vehicle: the parts; `vehicle` is what the autopilot has reported.
         photo_quality: quality of JPEG files, up to 100.
         definition: the camera definition file and the camera's settings.
         recording_since_us: start of the running video; None: no video is being recorded.
@@ -95,7 +95,7 @@ class CameraComponent(Component):
         self.storage = CameraStorage()
         self.tracker = CameraTracker(camera.parameters.model)
         self.trigger = PhotoTrigger()
-        self.heard = VehicleHeard(system_id)
+        self.vehicle = ReportedVehicle(system_id)
         self.recording_since_us: int | None = None
         self.status_interval_us = 0
         self._gimbal = gimbal
@@ -154,7 +154,7 @@ class CameraComponent(Component):
         if self._gimbal is not None:
             w, x, y, z = self._gimbal.measured_q_ned_from_gimbal.tolist()
             return w, x, y, z
-        q_ned_from_frd = self.heard.q_ned_from_frd
+        q_ned_from_frd = self.vehicle.q_ned_from_frd
         return None if q_ned_from_frd is None else product(q_ned_from_frd, self._q_frd_from_mount)
 
     # actions of commands
@@ -211,14 +211,14 @@ class CameraComponent(Component):
     # inside
 
     def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        told = self.heard.handle(message, sender, self._time_us)
+        new = self.vehicle.handle(message, sender, self._time_us)
         if (
-            told
+            new
             and message.get_msgId() == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
-            and self.trigger.travelled(self.heard.velocity_ned_m_s, self._time_us)
+            and self.trigger.travelled(self.vehicle.velocity_ned_m_s, self._time_us)
         ):
             self.take_photo()
-        if not told:
+        if not new:
             self.definition.handle(message, sender, self._time_us)
 
     def _record(self, time_us: int) -> None:

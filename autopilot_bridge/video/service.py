@@ -241,14 +241,14 @@ class VideoService:
             return
         if self._parameters.folder is None:
             self._process.kill()
-        elif not self._heard_out(self._line, self._process):
+        elif not self._finished(self._line, self._process):
             self._on_loss(_ENDED)
             self._process.kill()
         self._process.wait()
         self._line.close()
         self._line = self._process = None
 
-    def _heard_out(self, line: socket.socket, process: "subprocess.Popen[bytes]") -> bool:
+    def _finished(self, line: socket.socket, process: "subprocess.Popen[bytes]") -> bool:
         """Wait until the picture process has written the pending files; False: it did not finish."""
         try:
             line.settimeout(_END_S)

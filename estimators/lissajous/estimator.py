@@ -99,8 +99,8 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         if self.parameters.frequency:
             sigmas = [math.sqrt(max(0.0, float(motion.covariance[MOTION + i, MOTION + i]))) for i in (0, 1)]
         else:
-            believed = self.parameters.epsilon_rad_s if self.parameters.form is Form.PROPOSED else 0.0
-            sigmas = [math.sqrt(believed * omega) for omega in (omega_x, omega_y)]
+            drift_rad_s = self.parameters.epsilon_rad_s if self.parameters.form is Form.PROPOSED else 0.0
+            sigmas = [math.sqrt(drift_rad_s * omega) for omega in (omega_x, omega_y)]
         self._estimates = (
             LissajousEstimate(
                 time_us=motion.time_us or 0,

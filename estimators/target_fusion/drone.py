@@ -50,7 +50,7 @@ class Drone:
         self.reader = PositionReader(p.source)
         self.guard = InputGuard(max_gap_us=round(1e6 * p.max_gap_s))
         self.pending: deque[Detection] = deque(maxlen=_REMEMBERED)
-        self._heard: deque[Detection] = deque(maxlen=_REMEMBERED)
+        self._received: deque[Detection] = deque(maxlen=_REMEMBERED)
         self.newest_us = 0
         self._history_us = round(1e6 * p.history_s)
         self._attitudes = Orientations(self._history_us, _REACH_US)
@@ -66,7 +66,7 @@ class Drone:
         self._attitudes.clear()
         self._gimbal.clear()
         self.pending.clear()
-        self._heard.clear()
+        self._received.clear()
         self.newest_us = 0
 
     def hear_position(self, time_us: int, message: Message) -> Outcome:
@@ -144,9 +144,9 @@ class Drone:
             message.distance,
             0.5 * (message.size_x + message.size_y),
         )
-        if detection in self._heard:
+        if detection in self._received:
             return Outcome.REPEATED
-        self._heard.append(detection)
+        self._received.append(detection)
         self.pending.append(detection)
         return Outcome.USED
 

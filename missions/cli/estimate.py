@@ -21,13 +21,13 @@ class _Teller:
 
     def __init__(self) -> None:
         self._line = StatusLine()
-        self._told: tuple[str, ...] = ()
+        self._reported: tuple[str, ...] = ()
 
     def __call__(self, progress: "LiveProgress") -> None:
         # rates change all the time and are not compared
         lacking = tuple(text.split(" at ")[0] for text in progress.lacking)
-        if lacking != self._told:
-            self._told = lacking
+        if lacking != self._reported:
+            self._reported = lacking
             self._line.end()
             for text in progress.lacking:
                 report(text)

@@ -16,7 +16,7 @@ from estimators.errors import EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
 from estimators.observations import SUFFIX, Observation, ObservationWriter
-from estimators.runner import Runner, why_unheard
+from estimators.runner import Runner, why_excluded
 from missions.vehicle.connection import Recorder
 
 __all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
@@ -42,7 +42,7 @@ class EstimatorTap:
     Attributes:
         failure: message of an error that an estimator raised; it receives no more frames after that. ""
             without an error.
-        heard: number of frames by (system id, message id) that estimators may receive, for rates.
+        received: number of frames by (system id, message id) that estimators may receive, for rates.
         autopilots: number of frames of autopilots, by system id.
     """
 
@@ -56,7 +56,7 @@ class EstimatorTap:
     ) -> None:
         self.fleet = fleet
         self.failure = ""
-        self.heard: Counter[tuple[int, int]] = Counter()
+        self.received: Counter[tuple[int, int]] = Counter()
         self.autopilots: Counter[int] = Counter()
         self._record = recorder.record
         self._on_estimate = on_estimate
@@ -68,8 +68,8 @@ class EstimatorTap:
         self._record(frame, time_us)
         self._frames += 1
         taken = _frame(frame)
-        if taken.system_id < GROUND_SYSTEM and not why_unheard(taken.definition.name, taken.component_id):
-            self.heard[taken.system_id, taken.message_id] += 1
+        if taken.system_id < GROUND_SYSTEM and not why_excluded(taken.definition.name, taken.component_id):
+            self.received[taken.system_id, taken.message_id] += 1
             if taken.component_id == AUTOPILOT_COMPONENT:
                 self.autopilots[taken.system_id] += 1
         self._pass_on(lambda: self.fleet.feed(taken), time_us)

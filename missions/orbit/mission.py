@@ -52,7 +52,7 @@ class OrbitMission(Mission[OrbitOptions]):
 
         return orbit_figures(debriefing)
 
-    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         if summary.get("orbit_s") is None:
             return ()
         circle = f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s"
@@ -62,7 +62,7 @@ class OrbitMission(Mission[OrbitOptions]):
                 f"{summary['radius_std_m']:.1f} m, altitude within {summary['altitude_error_m']:.1f} m",
             )
         return (
-            f"{circle}, as the mission believes: mean radius {summary['radius_estimate_mean_m']:.1f} m, "
+            f"{circle}, as the mission estimates: mean radius {summary['radius_estimate_mean_m']:.1f} m, "
             f"standard deviation {summary['radius_estimate_std_m']:.1f} m, altitude by pressure within "
             f"{summary['altitude_estimate_error_m']:.1f} m; target lost {summary['target_losses']} times, "
             f"{summary['detections_used']} detections used",

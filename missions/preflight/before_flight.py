@@ -32,8 +32,8 @@ FARTHEST_M: Final = 10_000.0
 _FAR_M: Final = 1000.0
 _PLAN_HOME_M: Final = 200.0
 _RESERVE: Final = 1.3
-_ASKED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
-_SHOWN: Final = (*_ASKED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
+_REQUESTED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
+_SHOWN: Final = (*_REQUESTED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
 _LISTEN_S: Final = 1.5
 _PARAMETERS_AT_ONCE: Final = 4
 
@@ -90,10 +90,10 @@ async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
 
 
 async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
-    for name in (*_ASKED, FILTER_STATUS[vehicle.autopilot]):
+    for name in (*_REQUESTED, FILTER_STATUS[vehicle.autopilot]):
         if vehicle.link.message(name) is None:
             await vehicle.commands.set_message_rate(name, 2.0)
-    told: list[Mapping[str, Any]] = []  # reports of the navigation filter
+    reports: list[Mapping[str, Any]] = []  # reports of the navigation filter
     with vehicle.link.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)
@@ -102,14 +102,14 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
         except MissionError:  # an autopilot without a fence
             fence_items = []
         while (status := stream.take()) is not None:
-            told.append(status.to_dict())
+            reports.append(status.to_dict())
     messages: dict[str, Mapping[str, Any]] = {}
     for name in _SHOWN:
         message = vehicle.link.message(name)
         if message is not None:
             messages[name] = message.to_dict()
-    if told:
-        messages[FILTER_STATUS[vehicle.autopilot]] = usual(told)
+    if reports:
+        messages[FILTER_STATUS[vehicle.autopilot]] = usual(reports)
     return Snapshot(
         flavour=vehicle.autopilot,
         kind=vehicle.kind,

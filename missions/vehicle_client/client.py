@@ -246,7 +246,7 @@ async def open_client(
     if client is None:
         which = "autopilot" if system_id is None else f"autopilot with system id {system_id}"
         raise VehicleTimeout(
-            f"no {which} was received on {address} within {timeout_s:g} s; {await _heard(address)}"
+            f"no {which} was received on {address} within {timeout_s:g} s; {await _received_instead(address)}"
         )
 
 
@@ -262,10 +262,10 @@ async def _find(mavsdk: Mavsdk, timeout_s: float, system_id: int | None) -> Syst
     return None
 
 
-async def _heard(address: Address) -> str:
+async def _received_instead(address: Address) -> str:
     """Description of what is received on a link without the requested autopilot."""
     try:
         quality = await listen(address, _LISTEN_S)
     except BridgeError as error:
         return str(error)
-    return quality.heard()
+    return quality.description()

@@ -284,7 +284,7 @@ def test_arduplane_failsafe_on_the_ground_does_not_disarm() -> None:
 
 @pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
 @pytest.mark.parametrize("angle_deg", [65.0, -65.0, 55.0, -55.0])
-def test_px4_attitude_beyond_its_limits_is_told(axis: int, angle_deg: float) -> None:
+def test_px4_attitude_beyond_its_limits_is_reported(axis: int, angle_deg: float) -> None:
     """60 degrees to either side (FD_FAIL_R, FD_FAIL_P)."""
     rig = flying("px4", FlightMode.HOLD)
     euler_rad = [0.0, 0.0, 0.0]

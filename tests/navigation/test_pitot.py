@@ -23,7 +23,7 @@ def pitot_at(pressure_pa: float, static_pa: float, temperature_c: float, **chang
     readings.airspeed.values[:] = pressure_pa, temperature_c
     readings.airspeed.time_us = 1000
     pitot.look(2000)
-    pitot.update_density(believed=True)
+    pitot.update_density(trusted=True)
     return pitot
 
 

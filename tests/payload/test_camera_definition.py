@@ -115,8 +115,8 @@ def test_mode_is_one_thing_by_command_and_by_setting(world):
     assert world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_SETTINGS).mode_id == m.CAMERA_MODE_VIDEO
     world.frames.clear()
     assert world.command(CAMERA_COMPONENT, m.MAV_CMD_SET_CAMERA_MODE, 0, m.CAMERA_MODE_IMAGE) == ACCEPTED
-    told = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
-    assert [(value.param_id, number(value)) for value in told] == [("CAM_MODE", m.CAMERA_MODE_IMAGE)]
+    reported = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
+    assert [(value.param_id, number(value)) for value in reported] == [("CAM_MODE", m.CAMERA_MODE_IMAGE)]
 
 
 def test_one_setting_by_name_or_number(world):
@@ -125,5 +125,5 @@ def test_one_setting_by_name_or_number(world):
     world.tell(read(SYSTEM, CAMERA_COMPONENT, b"", 1))
     world.tell(read(SYSTEM, CAMERA_COMPONENT, b"NO_SUCH", -1))
     world.tell(read(SYSTEM, CAMERA_COMPONENT, b"", 99))
-    told = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
-    assert [value.param_id for value in told] == ["CAM_AUTOFOCUS", "CAM_PHOTOQUAL"]
+    reported = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
+    assert [value.param_id for value in reported] == ["CAM_AUTOFOCUS", "CAM_PHOTOQUAL"]

@@ -49,7 +49,7 @@ def settings(world: World):
     return world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_SETTINGS)
 
 
-def test_a_photo_says_where_and_when_by_what_the_vehicle_told(world):
+def test_a_photo_says_where_and_when_by_what_the_vehicle_reported(world):
     world.run(2.0)
     assert say(world, START, 0, 0, 1) == ACCEPTED
     unplaced = photos(world)[-1]
@@ -91,7 +91,7 @@ def test_a_command_sent_again_takes_no_second_photo(world):
         assert say(world, START, 0, 0, 1, 7) == ACCEPTED
     assert len(photos(world)) == 1
     assert say(world, START, 0, 0, 1, 8) == ACCEPTED
-    assert say(world, START, 0, 0, 1, 8, sender=(254, 190)) == ACCEPTED  # somebody else's eighth
+    assert say(world, START, 0, 0, 1, 8, sender=(254, 190)) == ACCEPTED  # its eighth, of another component
     assert len(photos(world)) == 3
     world.run(5.0)
     assert say(world, START, 0, 0, 1, 8, sender=(254, 190)) == ACCEPTED  # he has started anew
@@ -162,10 +162,10 @@ def test_videos(world):
     assert say(world, start, 0, 2.0) == ACCEPTED
     before = len(world.messages(m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS))
     world.run(5.0)
-    told = world.messages(m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)[before:]
-    assert len(told) == 10
-    assert [status.recording_time_ms for status in told] == [500 * n for n in range(1, 11)]
-    assert {status.video_status for status in told} == {1}
+    reported = world.messages(m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)[before:]
+    assert len(reported) == 10
+    assert [status.recording_time_ms for status in reported] == [500 * n for n in range(1, 11)]
+    assert {status.video_status for status in reported} == {1}
     assert say(world, start, 0, 0) == m.MAV_RESULT_TEMPORARILY_REJECTED
     assert say(world, m.MAV_CMD_STORAGE_FORMAT, 1, 1, 1) == m.MAV_RESULT_TEMPORARILY_REJECTED
     assert say(world, stop) == ACCEPTED

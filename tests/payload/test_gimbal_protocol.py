@@ -46,13 +46,13 @@ def tell_place(world: World, north_m: float, height_m: float, *, sender, vx: flo
 def test_another_system_is_looked_at_and_taken_on(world):
     assert say(world, m.MAV_CMD_DO_SET_ROI_SYSID, SYSTEM + 1) == ACCEPTED
     world.run(1.0)
-    assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)  # not heard of yet
+    assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)  # not received of yet
     tell_place(world, 100.0, 0.0, sender=OTHER_VEHICLE, vx=20.0)
     world.run(2.5)
     look = pointing(world)
     # 150 m ahead by now, 100 m down
     assert (look.pitch, look.yaw) == pytest.approx((-math.degrees(math.atan2(100.0, 150.0)), 0.0), abs=4.0)
-    tell_place(world, -100.0, 0.0, sender=(SYSTEM + 2, 1))  # somebody else
+    tell_place(world, -100.0, 0.0, sender=(SYSTEM + 2, 1))  # another vehicle
     world.run(0.4)
     assert abs(pointing(world).yaw) < 10.0
     world.run(3.0)  # no word for longer than is taken on: it stays where it looks
@@ -120,25 +120,27 @@ def test_the_mount_of_before(world):
     assert say(world, control, math.inf, 0, 0, 0, 0, 0, targeting) == DENIED
 
 
-def test_a_change_of_control_is_told_at_once(world):
-    def told() -> list:
+def test_a_change_of_control_is_reported_at_once(world):
+    def reported() -> list:
         return world.messages(m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
 
     configure = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-    before = len(told())
+    before = len(reported())
     assert say(world, configure, *GROUND, 254, 1, 0, 0, GIMBAL_COMPONENT) == ACCEPTED
-    assert len(told()) == before + 1
-    status = told()[-1]
+    assert len(reported()) == before + 1
+    status = reported()[-1]
     assert (status.primary_control_sysid, status.primary_control_compid) == GROUND
     assert (status.secondary_control_sysid, status.secondary_control_compid) == (254, 1)
     assert say(world, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, sender=(254, 1)) == ACCEPTED
     assert say(world, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, sender=(253, 1)) == DENIED
     assert say(world, configure, -1, -1, -1, -1) == ACCEPTED
-    assert len(told()) == before + 1  # nothing has changed
+    assert len(reported()) == before + 1  # nothing has changed
     assert say(world, configure, 300, 1, -1, -1) == DENIED
     assert say(world, configure, *GROUND, -1, -1, 0, 0, 99) == UNSUPPORTED
-    assert say(world, configure, 0, 0, 0, 0, sender=(253, 1)) == ACCEPTED  # nobody, says anybody
-    assert told()[-1].primary_control_sysid == 0
+    assert (
+        say(world, configure, 0, 0, 0, 0, sender=(253, 1)) == ACCEPTED
+    )  # no controller, says another component
+    assert reported()[-1].primary_control_sysid == 0
 
 
 def test_the_own_autopilot_always_points(world):

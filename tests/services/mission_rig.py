@@ -72,12 +72,12 @@ class Vehicle:
         return source.channel.take()  # type: ignore[attr-defined]
 
     def tick(self, seconds: float) -> list[tuple[float, Any]]:
-        start, heard = self.time_us, []
+        start, received = self.time_us, []
         while self.time_us < start + seconds * 1e6:
             self.time_us += 20_000
             self.service.tick(self.time_us)
-            heard += [((self.time_us - start) / 1e6, message) for message in self.channel.take()]
-        return heard
+            received += [((self.time_us - start) / 1e6, message) for message in self.channel.take()]
+        return received
 
     def take_texts(self) -> list[tuple[int, str]]:
         texts, self.texts = self.texts, []

@@ -209,12 +209,12 @@ def test_set_current(px4: Vehicle, ardupilot: Vehicle) -> None:
         vehicle.take_texts()
         vehicle.tick(0.02)
     assert px4.tell(choose(2)) == []
-    ((_, told),) = px4.tick(0.02)
-    assert (told.get_type(), told.seq, told.total) == ("MISSION_CURRENT", 2, 4)
+    ((_, reported),) = px4.tick(0.02)
+    assert (reported.get_type(), reported.seq, reported.total) == ("MISSION_CURRENT", 2, 4)
     assert px4.tell(choose(77)) == []
     assert px4.take_texts() == [(2, "WPM: WP CURR CMD: Not in list")]
-    (told,) = ardupilot.tell(choose(2))
-    assert (told.get_type(), told.seq, told.total) == ("MISSION_CURRENT", 2, 3)
+    (reported,) = ardupilot.tell(choose(2))
+    assert (reported.get_type(), reported.seq, reported.total) == ("MISSION_CURRENT", 2, 3)
     assert ardupilot.tell(choose(4)) == []
     assert ardupilot.take_texts() == []
 
@@ -272,11 +272,11 @@ def test_item_reached(px4: Vehicle, ardupilot: Vehicle) -> None:
         vehicle.tick(0.1)
         vehicle.other.take()
         vehicle.service.item_reached(1)
-        heard = vehicle.tick(0.02)
-        assert [message.seq for _, message in heard] == [1]
-        heard = vehicle.tick(20.0)
-        assert names([message for _, message in heard]) == ["MISSION_ITEM_REACHED"] * repeats
-        assert [round(when) for when, _ in heard] == list(range(1, repeats + 1))
+        received = vehicle.tick(0.02)
+        assert [message.seq for _, message in received] == [1]
+        received = vehicle.tick(20.0)
+        assert names([message for _, message in received]) == ["MISSION_ITEM_REACHED"] * repeats
+        assert [round(when) for when, _ in received] == list(range(1, repeats + 1))
         assert len(vehicle.other.take()) == repeats + 1
 
 

@@ -87,13 +87,13 @@ def test_silence(flavour: str, retry_s: float, timeout_s: float, text: tuple[int
     vehicle.take_texts()
     vehicle.tell(count(5))
     vehicle.tell(plan(5)[0])
-    heard = vehicle.tick(12.0)
-    again = [(when, message) for when, message in heard if "REQUEST" in message.get_type()]
+    received = vehicle.tick(12.0)
+    again = [(when, message) for when, message in received if "REQUEST" in message.get_type()]
     assert again[0][0] == pytest.approx(retry_s, abs=0.03)
     assert all(message.seq == 1 for _, message in again)
     assert timeout_s - retry_s - 0.05 < again[-1][0] <= timeout_s + 0.03
     assert vehicle.take_texts() == [text]
-    ends = [(when, message.type) for when, message in heard if message.get_type() == "MISSION_ACK"]
+    ends = [(when, message.type) for when, message in received if message.get_type() == "MISSION_ACK"]
     assert ends == ([] if flavour == "px4" else [(pytest.approx(8.02, abs=0.03), 15)])
     assert vehicle.mission == before
     assert upload(vehicle, plan(2)).type == 0
@@ -271,12 +271,12 @@ def test_when_an_item_is_requested_again_and_when_the_upload_ends(
 ) -> None:
     vehicle = Vehicle(flavour)
     vehicle.tell(count(2))
-    heard = vehicle.tick(timeout_s + 3.0)
-    asked = [at for at, message in heard if message.get_type().startswith("MISSION_REQUEST")]
+    received = vehicle.tick(timeout_s + 3.0)
+    asked = [at for at, message in received if message.get_type().startswith("MISSION_REQUEST")]
     tick_s = 0.02
     step_s = tick_s * (math.floor(retry_s / tick_s + 1e-9) + 1)  # after the time, not at it
     assert asked == pytest.approx([step_s * (k + 1) for k in range(int(timeout_s / step_s + 1e-9))])
-    acks = [(at, message.type) for at, message in heard if message.get_type() == "MISSION_ACK"]
+    acks = [(at, message.type) for at, message in received if message.get_type() == "MISSION_ACK"]
     assert [kind for _, kind in acks] == ends
     assert [at for at, _ in acks] == pytest.approx([timeout_s + tick_s] * len(ends))
 

@@ -169,8 +169,8 @@ def test_ardupilot_set_is_echoed_once_to_everybody(ardupilot: Vehicle) -> None:
     for _ in range(2):
         (reply,) = ardupilot.write("WPNAV_SPEED", 800.0, 9)
         assert (reply.param_id, reply.param_value, reply.param_index) == ("WPNAV_SPEED", 800.0, 65535)
-        (heard,) = ardupilot.other.take()
-        assert heard.param_value == 800.0
+        (received,) = ardupilot.other.take()
+        assert received.param_value == 800.0
 
 
 @pytest.mark.parametrize(
@@ -313,22 +313,22 @@ def test_whatever_arrives_nothing_raises(flavour: str, messages: list[Any]) -> N
     ("flavour", "name", "given"),
     [("px4", "MAV_SYS_ID", 3), ("px4", "MAV_COMP_ID", 1), ("ardupilot", "SYSID_THISMAV", 3)],
 )
-def test_the_ids_of_a_vehicle_are_told_and_stay(flavour: str, name: str, given: int) -> None:
+def test_the_ids_of_a_vehicle_are_reported_and_stay(flavour: str, name: str, given: int) -> None:
     """A change is answered with the value that is kept, and a text."""
     sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour, system_id=3, parameters={name: 9.0}),)))
     link, parser = sitl.connect(0), FrameParser()
 
-    def heard(message: Any, seconds: float) -> list[Any]:
+    def received(message: Any, seconds: float) -> list[Any]:
         link.send(FrameEncoder(255, 190).encode(message))
         until_us = sitl.time_us + round(seconds * 1e6)
         while sitl.time_us < until_us:
             sitl.advance()
         return [decode(frame) for _, data in link.receive() for frame in parser.feed(data)]
 
-    heard(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), 3.0)
+    received(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), 3.0)
     wanted = struct.unpack("<f", struct.pack("<i", 7))[0] if flavour == "px4" else 7.0
     kind = 6 if flavour == "px4" else 4
-    messages = heard(mavlink.MAVLink_param_set_message(3, 1, name.encode(), wanted, kind), 0.5)
+    messages = received(mavlink.MAVLink_param_set_message(3, 1, name.encode(), wanted, kind), 0.5)
     (value,) = [m.param_value for m in messages if m.get_type() == "PARAM_VALUE" and m.param_id == name]
     assert (struct.unpack("<i", struct.pack("<f", value))[0] if flavour == "px4" else value) == given
     texts = "".join(m.text for m in messages if m.get_type() == "STATUSTEXT")

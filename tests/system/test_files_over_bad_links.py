@@ -44,13 +44,13 @@ class Station:
         self.request: tuple[int, bytes] = (0, b"")
 
     def run(self, seconds: float) -> list[Any]:
-        heard: list[Any] = []
+        received: list[Any] = []
         until_us = self.sitl.time_us + round(seconds * 1e6)
         while self.sitl.time_us < until_us:
             self.sitl.advance()
             for _, data in self.link.receive():
-                heard += [decode(frame) for frame in self.parser.feed(data)]
-        return heard
+                received += [decode(frame) for frame in self.parser.feed(data)]
+        return received
 
     def ask(
         self, opcode: int, data: bytes = b"", *, session: int = 0, offset: int = 0, size: int | None = None

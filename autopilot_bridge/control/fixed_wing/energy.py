@@ -108,7 +108,7 @@ def _trim_pitch(airspeed: float, p: Array, s: Array) -> float:
 
 @kernel
 def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bool) -> float:
-    """Climb rate to fly, m/s; NaN where nothing asks for one. `hold`: the present height unless told else."""
+    """Climb rate to fly, m/s; NaN: no climb rate is commanded. `hold`: the present height by default."""
     height, climb = -nav[n.POS + 2], -nav[n.VEL + 2]
     wanted, rate = -sp[to.DOWN_M], sp[to.HEIGHT_RATE_M_S]
     if math.isfinite(wanted) or not (math.isfinite(rate) or not hold):

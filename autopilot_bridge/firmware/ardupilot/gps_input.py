@@ -95,13 +95,13 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
 
     unmoved = bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
     no_climb = unmoved or bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT)
-    told = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
-    if not all(abs(part) < _MAX_SPEED_M_S for part in told):
+    reported = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
+    if not all(abs(part) < _MAX_SPEED_M_S for part in reported):
         return None
     return _fix(
         message,
         alt_m=0.0 if ignored & mavlink.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
-        velocity=(*told, math.nan, math.nan, math.nan)[:3],
+        velocity=(*reported, math.nan, math.nan, math.nan)[:3],
         hdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
         vdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
         eph_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),

@@ -100,7 +100,7 @@ class Px4Messages(CommonMessages):
     servo_unused_us = 900
     servo_disarmed_us = 900
     gps_timeout_us = 1_000_000
-    gps_told_before_first = False
+    gps_sent_before_first = False
 
     def __init__(self, sources: TelemetrySources) -> None:
         super().__init__(sources)

@@ -37,7 +37,7 @@ class LandTask(AircraftTask):
     """Land at a place. DONE on the ground, with the propeller stopped and a `TouchedDown` event.
 
     With an approach leg it is flown at once, its slope the glide slope. Without one the aircraft circles down
-    beside the place and lands against the wind. Once the ground is believed, nothing turns again.
+    beside the place and lands against the wind. Once the ground is detected, nothing turns again.
 
     Args:
         place_ned_m: where to touch down, (3,); NaN components: of the place where the task starts, on the

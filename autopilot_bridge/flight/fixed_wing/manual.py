@@ -100,7 +100,7 @@ class ManualTask(AircraftTask):
         return TaskStatus.RUNNING
 
     def _fly_level(self, ctx: FlightContext) -> None:
-        """Nobody holds the sticks: nothing on the ground, straight and level in the air."""
+        """No stick input: no thrust on the ground, straight and level in the air."""
         if ctx.on_ground:
             clear_setpoint(ctx.setpoint, sp.IDLE)
             self._down_m = math.nan

@@ -1,4 +1,4 @@
-"""Return: PX4's fixed-wing Return and ArduPlane's RTL, told apart by parameters only."""
+"""Return: PX4's fixed-wing Return and ArduPlane's RTL, which differ in parameters only."""
 
 import math
 from dataclasses import replace

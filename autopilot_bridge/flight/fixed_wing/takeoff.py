@@ -257,7 +257,7 @@ class TakeoffTask(AircraftTask):
     def _climb_to_height(self, p: FixedWingFlightParameters, remaining_m: float) -> None:
         """Full power, the pitch holds the airspeed; near the height the energy control takes over.
 
-        What is still slow gathers speed on its way up: low over the ground nobody dives for it.
+        What is still slow gathers speed on its way up: low over the ground the aircraft does not dive for it.
         """
         state, command = self._state, self._command
         command.airspeed_m_s = p.takeoff_airspeed_m_s

@@ -23,7 +23,7 @@ class Download:
     partner: Source
     mission_type: MissionType
     items: tuple[MissionItem, ...]
-    heard_us: int
+    received_us: int
     next_seq: int = 0
 
 

@@ -265,7 +265,7 @@ def test_traffic_from_any_direction_is_a_conflict_when_its_path_leads_here(
     assert (f"Heading {heading_deg}" in alert) == conflict
 
 
-def test_px4_returns_from_traffic_when_told_so() -> None:
+def test_px4_returns_from_traffic_when_configured() -> None:
     vehicle = Vehicle("px4", NAV_TRAFF_AVOID=2)
     vehicle.rig.fly()
     vehicle.hear(report(vehicle))
