@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from estimators.library import make_estimator
     from estimators.log_replay import Replay, replay
     from estimators.logs.errors import LogError
+    from estimators.logs.formats import open_log
     from estimators.logs.log import Log
-    from estimators.logs.opening import open_log
     from estimators.logs.report import report_of
 
 __all__ = [
@@ -50,7 +50,7 @@ _MODULES: Final = {
     "Replay": "estimators.log_replay",
     "comparisons": "estimators.comparison",
     "make_estimator": "estimators.library",
-    "open_log": "estimators.logs.opening",
+    "open_log": "estimators.logs.formats",
     "replay": "estimators.log_replay",
     "report_of": "estimators.logs.report",
 }

@@ -76,8 +76,8 @@ class Fleet:
         read = self._read.get(frame.message_id)
         if read is None:
             definition = frame.definition
-            tells_time = stamp_field(definition.name, definition.field_names) is not None
-            read = self._read[frame.message_id] = tells_time or definition.name in self.read_names
+            has_time = stamp_field(definition.name, definition.field_names) is not None
+            read = self._read[frame.message_id] = has_time or definition.name in self.read_names
         if not read:
             return None
         message = read_message(frame)

@@ -249,7 +249,7 @@ class Autopilot:
             firmware.parameters,
             self,
             on_list=self._texts.banner,
-            on_fixed=self._tell_fixed,
+            on_fixed=self._report_fixed,
         )
         timed = [more for more in self._more if type(more).tick is not Microservice.tick]
         self._timed: tuple[TimedService, ...] = (
@@ -362,7 +362,7 @@ class Autopilot:
 
     def _follow(self, event: events.Event) -> None:
         """Pass an event of the vehicle to the other parts of the autopilot."""
-        self._texts.tell(event)
+        self._texts.report(event)
         for follower in self._followers:
             follower.follow(event)
         match event:
@@ -392,7 +392,7 @@ class Autopilot:
         self.navigation.set_parameters(flavour.navigation_parameters(store))
         self._streams.change(name, self._time_us)
 
-    def _tell_fixed(self, name: str) -> None:
+    def _report_fixed(self, name: str) -> None:
         value = self.parameters.get(name)
         self._texts.announce(mavlink.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
 

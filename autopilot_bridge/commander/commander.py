@@ -244,7 +244,7 @@ class Commander:
         )
         if reasons:
             self._checks.reasons = reasons
-            self._tell_reasons(reasons, check_only=False)
+            self._report_reasons(reasons, check_only=False)
             return Verdict(result=self.policy.arming_denied, reasons=reasons)
         self.armed = self.context.armed = True
         self._disarming.begin(self.time_us)
@@ -278,7 +278,7 @@ class Commander:
         self._refresh()
         reasons = self._checks.run(self.commanded_mode, self.situation, self.parameters)
         if reasons:
-            self._tell_reasons(reasons, check_only=True)
+            self._report_reasons(reasons, check_only=True)
         return reasons
 
     def set_home_here(self) -> bool:
@@ -318,7 +318,7 @@ class Commander:
         if not self.armed:
             self._checks.run(self.commanded_mode, self.situation, self.parameters)
             if self.booted and self._checks.report_due(time_us):
-                self._tell_reasons(self.arming_reasons, check_only=True)
+                self._report_reasons(self.arming_reasons, check_only=True)
         self._events.extend(self._monitor.update(self.situation, self.parameters, self.context.health))
         changes = self.failsafes.update(self.situation, self.parameters)
         self._events.extend(changes)
@@ -331,7 +331,7 @@ class Commander:
         if restored is not None and self.armed:
             self.change_mode(restored)
 
-    def _tell_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
+    def _report_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
         mode = self.commanded_mode
         self.emit(ArmingDenied(time_us=self.time_us, mode=mode, reasons=reasons, check_only=check_only))
 

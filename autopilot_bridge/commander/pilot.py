@@ -55,7 +55,7 @@ class PilotInput:
         self._time_us = -1
         self._sticks = _NO_INPUT
 
-    def hear_gcs(self, time_us: int) -> None:
+    def on_gcs(self, time_us: int) -> None:
         """A heartbeat of a ground station was received."""
         self._gcs_time_us = time_us
 

@@ -125,7 +125,7 @@ class PlanTask(ABC):
         """The item being flown; None after the last."""
         return None if self._finished or self._seq < 0 else self._store.items[self._seq]
 
-    def _tell(self, ctx: FlightContext, event: FlightEvent) -> None:
+    def _emit(self, ctx: FlightContext, event: FlightEvent) -> None:
         """Report progress, unless the plan is not the stored one."""
         if not self._rules.silent:
             ctx.events.append(event)
@@ -154,7 +154,7 @@ class PlanTask(ABC):
             item = items[seq]
             if is_navigation(item):
                 self._seq = self._store.current = seq
-                self._tell(ctx, WaypointStarted(seq))
+                self._emit(ctx, WaypointStarted(seq))
                 if self._begin_timed(ctx, item, came_from):
                     self._go_on_beside(ctx)
                     return
@@ -168,14 +168,14 @@ class PlanTask(ABC):
                 self._beside.append(seq)
             else:
                 self._seq = self._store.current = seq
-                self._tell(ctx, WaypointStarted(seq))
+                self._emit(ctx, WaypointStarted(seq))
                 self._act(ctx, item, seq)
             seq += 1
         self._finish(ctx)
 
     def _finish(self, ctx: FlightContext) -> None:
         if not self._finished:
-            self._tell(ctx, MissionFinished())
+            self._emit(ctx, MissionFinished())
         self._finished = True
         self._seq = self._store.current
         self._forget_leg()
@@ -210,7 +210,7 @@ class PlanTask(ABC):
             ctx.events.append(ItemCommanded(seq))
         elif item.command not in MARKERS and item.command not in CONDITIONS:
             ctx.events.append(ItemCommanded(seq))
-        self._tell(ctx, WaypointReached(seq, navigation=False))
+        self._emit(ctx, WaypointReached(seq, navigation=False))
 
     def _change_by_item(self, ctx: FlightContext, item: MissionItem) -> None:
         """DO_CHANGE_SPEED in the plan; -2: back to the parameters' speed."""
@@ -234,7 +234,7 @@ class PlanTask(ABC):
                 if not self._is_met(ctx, item):
                     return
                 self._condition_left_s = math.nan
-                self._tell(ctx, WaypointReached(seq, navigation=False))
+                self._emit(ctx, WaypointReached(seq, navigation=False))
             else:
                 self._act(ctx, item, seq)
             self._beside.popleft()
@@ -339,7 +339,7 @@ class PlanTask(ABC):
 
     def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
         """The current item is finished: report it, and continue."""
-        self._tell(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
+        self._emit(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
         last = self._seq + 1 >= len(self._store.items)
         if last or not item.autocontinue:
             self._finish(ctx)

@@ -196,9 +196,9 @@ class ExternalAiding:
         return self.in_use or self._coherent >= _COHERENT_SAMPLES
 
     def _repeats_itself(self, values: Array) -> bool:
-        said = values.tobytes()
-        self._equal = self._equal + 1 if said == self._last else 0
-        self._last = said
+        received = values.tobytes()
+        self._equal = self._equal + 1 if received == self._last else 0
+        self._last = received
         return self._equal >= _FROZEN_SAMPLES
 
     # position

@@ -55,7 +55,7 @@ class GpsQuality:
         "_last_us",
         "_newest_us",
         "_parameters",
-        "_said",
+        "_previous",
         "_travelled",
         "good",
         "good_since_us",
@@ -63,7 +63,7 @@ class GpsQuality:
 
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
-        self._last = self._anchor = self._said = [0.0] * GPS_SIZE
+        self._last = self._anchor = self._previous = [0.0] * GPS_SIZE
         self._travelled = [0.0] * 3
         self.restart()
 
@@ -118,11 +118,11 @@ class GpsQuality:
 
     def _repeats_itself(self, values: list[float]) -> bool:
         """Position and velocity have been the same, digit by digit, for too long."""
-        if values[_MEASURED] == self._said[_MEASURED]:
+        if values[_MEASURED] == self._previous[_MEASURED]:
             self._equal += 1
         else:
             self._equal = 0
-            self._said = values
+            self._previous = values
         return self._equal >= _FROZEN_SAMPLES
 
     def _moves_as_it_says(self, values: list[float], measured_us: int) -> bool:

@@ -190,6 +190,6 @@ class GustVariance:
         wind's error is then mostly turbulence of the last minute, with the same sign."""
         if state_variance > self._SETTLED:
             return
-        said = max(0.0, min(innovation_m_s * innovation_m_s, self._MOST) - noise_variance)
+        excess = max(0.0, min(innovation_m_s * innovation_m_s, self._MOST) - noise_variance)
         self._memory_s = min(self._memory_s + interval_s, self._LONGEST_S)
-        self.variance += (said - self.variance) * min(1.0, interval_s / self._memory_s)
+        self.variance += (excess - self.variance) * min(1.0, interval_s / self._memory_s)

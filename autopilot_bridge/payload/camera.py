@@ -136,13 +136,13 @@ class CameraComponent(Component):
         if self.lens.moving and time_us - self._lens_us >= _LENS_INTERVAL_US:
             self.lens.move(1e-6 * min(time_us - self._lens_us, 2 * _LENS_INTERVAL_US))
             self._lens_us = time_us
-            self.tell_settings()
+            self.send_settings()
         if self.recording_since_us is not None:
             self._record(time_us)
 
-    def tell(self, frame: CameraFrame) -> None:
+    def update(self, frame: CameraFrame) -> None:
         """Send the detections of a frame that was delivered on this step."""
-        self.tracker.tell(frame)
+        self.tracker.update(frame)
         for detection in frame.detections:
             self.send(landing_target(detection))
 
@@ -163,13 +163,13 @@ class CameraComponent(Component):
         """Take a photo now; False: the card is full."""
         if self.storage.full:
             self.trigger.stop()
-            self.tell_status()
+            self.send_status()
             return False
         name = "" if self.keeper is None else self.keeper.photo(self._time_us, photo_notes(self))
         message = image_captured(self, self._time_us, self.storage.images, name)
         self.storage.add_photo(message)
         self.send(message)
-        self.tell_status()
+        self.send_status()
         return True
 
     def start_recording(self, status_hz: float) -> bool:
@@ -181,7 +181,7 @@ class CameraComponent(Component):
         self._next_status_us = self._time_us + self.status_interval_us
         if self.keeper is not None:
             self.keeper.start_video(self._time_us)
-        self.tell_status()
+        self.send_status()
         return True
 
     def stop_recording(self) -> bool:
@@ -192,19 +192,19 @@ class CameraComponent(Component):
         self.recording_since_us = None
         if self.keeper is not None:
             self.keeper.stop_video(self._time_us)
-        self.tell_status()
+        self.send_status()
         return True
 
     def move_lens(self) -> None:
         """A continuous zoom or focus has begun, or another property of the lens has changed."""
         self._lens_us = self._time_us
-        self.tell_settings()
+        self.send_settings()
 
-    def tell_settings(self) -> None:
+    def send_settings(self) -> None:
         """Send CAMERA_SETTINGS."""
         self.send(self._settings(self._time_us))
 
-    def tell_status(self) -> None:
+    def send_status(self) -> None:
         """Send CAMERA_CAPTURE_STATUS."""
         self.send(capture_status(self, self._time_us))
 
@@ -226,7 +226,7 @@ class CameraComponent(Component):
             self.stop_recording()
         elif self.status_interval_us and time_us >= self._next_status_us:
             self._next_status_us += self.status_interval_us
-            self.tell_status()
+            self.send_status()
 
     @property
     def recorded_mib(self) -> float:

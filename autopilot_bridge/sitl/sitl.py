@@ -112,11 +112,11 @@ class Sitl:
         if time_us >= self._next_truth_us:
             self._next_truth_us = time_us + self._truth_interval_us
             for vehicle in self.vehicles:
-                self._tell_truth(time_us, vehicle.truth_encoder.encode(time_us))
+                self._report_truth(time_us, vehicle.truth_encoder.encode(time_us))
             for frame in self._target_truth.encode(time_us):
-                self._tell_truth(time_us, frame)
+                self._report_truth(time_us, frame)
 
-    def _tell_truth(self, time_us: int, frame: bytes) -> None:
+    def _report_truth(self, time_us: int, frame: bytes) -> None:
         for listener in self._truth_listeners:
             listener(time_us, frame)
 

@@ -45,7 +45,7 @@ class RtspServer:
         requests = RequestReader()
         try:
             while True:
-                data = await _said(reader, player)
+                data = await _read_request(reader, player)
                 if not data:
                     break
                 for request in requests.feed(data):
@@ -62,7 +62,7 @@ class RtspServer:
                 await writer.wait_closed()
 
 
-async def _said(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
+async def _read_request(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
     """The next data of a player on its connection; empty when the player has closed it.
 
     Timeouts are counted, not measured as a total time: after a pause of this process, data received meanwhile

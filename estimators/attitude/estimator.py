@@ -208,7 +208,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             return refused
         self._state[at.CLIMB] = message.climb
         self._state[at.THROTTLE] = 0.01 * min(100, message.throttle)
-        self._hear(time_us, self._air.airspeed(time_us, AirspeedSource.VFR_HUD, message.airspeed))
+        self._use_airspeed(time_us, self._air.airspeed(time_us, AirspeedSource.VFR_HUD, message.airspeed))
         return Outcome.USED if refused is None else refused
 
     def _airspeed(self, time_us: int, message: Message) -> Outcome:
@@ -219,7 +219,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._forget()
         elif refused is not None:
             return refused
-        self._hear(time_us, self._air.airspeed(time_us, AirspeedSource.AIRSPEED, message.airspeed))
+        self._use_airspeed(time_us, self._air.airspeed(time_us, AirspeedSource.AIRSPEED, message.airspeed))
         return Outcome.USED if refused is None else refused
 
     def _scaled_pressure(self, time_us: int, message: Message) -> Outcome:
@@ -231,10 +231,10 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         elif refused is not None:
             return refused
         self._air.static_pressure(message.press_abs)
-        self._hear(time_us, self._air.by_pressure(time_us, message.press_diff))
+        self._use_airspeed(time_us, self._air.by_pressure(time_us, message.press_diff))
         return Outcome.USED if refused is None else refused
 
-    def _hear(self, time_us: int, airspeed_m_s: float | None) -> None:
+    def _use_airspeed(self, time_us: int, airspeed_m_s: float | None) -> None:
         if airspeed_m_s is not None:
             self._state[at.AIRSPEED] = airspeed_m_s
             self._state[at.AIRSPEED_FRESH] = 1.0
@@ -252,7 +252,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         if message.id != self._instance or (updated & INERTIAL_FIELDS != INERTIAL_FIELDS and updated):
             return Outcome.IGNORED
         if updated & DIFFERENTIAL_PRESSURE and message.diff_pressure > 0.0:
-            self._hear(time_us, self._air.by_pressure(time_us, message.diff_pressure))
+            self._use_airspeed(time_us, self._air.by_pressure(time_us, message.diff_pressure))
         return self._imu(time_us, message)
 
     def _raw_imu(self, time_us: int, message: Message) -> Outcome:

@@ -69,7 +69,7 @@ class Drone:
         self._received.clear()
         self.newest_us = 0
 
-    def hear_position(self, time_us: int, message: Message) -> Outcome:
+    def take_position(self, time_us: int, message: Message) -> Outcome:
         """Process a position message."""
         refused = self._admit(time_us, message, values_of(self.parameters.source, message), leads=True)
         if refused not in (None, Outcome.TIME_JUMP):
@@ -81,11 +81,11 @@ class Drone:
             self._height_m = fix.alt_m - self.reader.home.alt_m
         return refused or Outcome.USED
 
-    def hear_home(self, message: Message) -> GeodeticPosition | None:
+    def take_home(self, message: Message) -> GeodeticPosition | None:
         """Process a HOME_POSITION; returns None when its position is invalid."""
-        return self.reader.home if self.reader.hear_home(message) else None
+        return self.reader.home if self.reader.take_home(message) else None
 
-    def hear_attitude(self, time_us: int, message: Message) -> Outcome:
+    def take_attitude(self, time_us: int, message: Message) -> Outcome:
         """Process an ATTITUDE."""
         angles = (message.roll, message.pitch, message.yaw)
         refused = self._admit(time_us, message, angles)
@@ -94,7 +94,7 @@ class Drone:
         self._attitudes.add(time_us, from_euler(*angles))
         return refused or Outcome.USED
 
-    def hear_gimbal(self, time_us: int, message: Message) -> Outcome:
+    def take_gimbal(self, time_us: int, message: Message) -> Outcome:
         """Process a GIMBAL_DEVICE_ATTITUDE_STATUS. The attitude is stored relative to the vehicle's heading,
         for both conventions of the message.
         """
@@ -122,7 +122,7 @@ class Drone:
         attitude = self._attitudes.at(time_us)
         return None if attitude is None else yaw_of(attitude)
 
-    def hear_detection(self, time_us: int, message: Message) -> Outcome:
+    def take_detection(self, time_us: int, message: Message) -> Outcome:
         """Process a LANDING_TARGET of the camera; it is placed when all needed data have arrived."""
         values = (message.angle_x, message.angle_y, message.distance, message.size_x, message.size_y)
         if not math.isfinite(sum(values)):

@@ -48,9 +48,9 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         self._handlers: dict[str, Callable[[int, Drone, Message], Outcome]] = {
             MESSAGES[self.parameters.source]: self._on_position,
             "HOME_POSITION": self._on_home,
-            "ATTITUDE": lambda t, drone, m: drone.hear_attitude(t, m),
-            "GIMBAL_DEVICE_ATTITUDE_STATUS": lambda t, drone, m: drone.hear_gimbal(t, m),
-            "LANDING_TARGET": lambda t, drone, m: drone.hear_detection(t, m),
+            "ATTITUDE": lambda t, drone, m: drone.take_attitude(t, m),
+            "GIMBAL_DEVICE_ATTITUDE_STATUS": lambda t, drone, m: drone.take_gimbal(t, m),
+            "LANDING_TARGET": lambda t, drone, m: drone.take_detection(t, m),
         }
         self.drones: dict[int, Drone] = {}
         self.beliefs: dict[int, TargetBelief] = {}
@@ -116,10 +116,10 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return detected if name == "LANDING_TARGET" and detected is not None else outcome
 
     def _on_position(self, time_us: int, drone: Drone, message: Message) -> Outcome:
-        return drone.hear_position(time_us, message)
+        return drone.take_position(time_us, message)
 
     def _on_home(self, time_us: int, drone: Drone, message: Message) -> Outcome:
-        home = drone.hear_home(message)
+        home = drone.take_home(message)
         if home is None:
             return Outcome.IMPLAUSIBLE
         p = self.parameters

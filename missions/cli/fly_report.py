@@ -102,7 +102,7 @@ class Pace:
         return None if passed_s < _PACE_LEAST_S else (vehicle_s - looks[0][1]) / passed_s
 
 
-def tell(result: "RunResult", mission: "Mission[Any]") -> int:
+def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
     """Print the result of a run; returns the exit code."""
     from missions.runs.run_folder import POOR, wind_words
 
@@ -145,10 +145,10 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
                 f"path at most, more than the acceptance radius of {block['acceptance_m']:g} m"
             )
     click.echo(f"run: {result.folder}")
-    return _tell_estimator(summary["estimator"]) if "estimator" in summary else 0
+    return _print_estimator(summary["estimator"]) if "estimator" in summary else 0
 
 
-def _tell_estimator(summary: Mapping[str, Any]) -> int:
+def _print_estimator(summary: Mapping[str, Any]) -> int:
     """Print the result of the flight's estimator; returns the exit code."""
     from estimators.reports import warnings_of
 

@@ -53,7 +53,7 @@ class RateWatch:
         self._received = received
         self._before: Counter[tuple[int, int]] = Counter()
         self._before_us: int | None = None
-        self._asked: Counter[tuple[int, int]] = Counter()
+        self._requests: Counter[tuple[int, int]] = Counter()
         self.lacking: list[str] = []
         self.enough = False
         self.measured_s = 0.0
@@ -99,8 +99,8 @@ class RateWatch:
             for index, need in enumerate(self._needs):
                 if NOT_STREAMED.issuperset(need.messages):
                     continue
-                asked = self._to_ask(system_id, index, need, rate_hz)
-                requests += [(system_id, name, asked_hz) for name, asked_hz in asked]
+                requested = self._to_request(system_id, index, need, rate_hz)
+                requests += [(system_id, name, requested_hz) for name, requested_hz in requested]
         self.enough = not self.lacking
         if self.enough or self.measured_s:
             self.measured_s += elapsed_s
@@ -122,7 +122,7 @@ class RateWatch:
 
         return rate_hz
 
-    def _to_ask(
+    def _to_request(
         self, system_id: int, index: int, need: Need, rate_hz: Callable[[str], float]
     ) -> list[tuple[str, float]]:
         """Messages and rates to request; empty when one is fast enough, or requests had no effect."""
@@ -131,13 +131,13 @@ class RateWatch:
         served = received_hz > 0.0 and received_hz >= RATE_TOLERANCE * need.rate_hz
         if served and (not need.rate_hz or received_hz >= RATE_TOLERANCE * wanted_hz):
             return []
-        times = self._asked[system_id, index]
+        times = self._requests[system_id, index]
         if served:  # sufficient; a higher rate is requested once
-            self._asked[system_id, index] += 1
+            self._requests[system_id, index] += 1
             return [] if times else [(need.messages[-best], wanted_hz)]
         if need.optional and times >= _ROUNDS * len(need.messages):
             return []
-        self._asked[system_id, index] += 1
+        self._requests[system_id, index] += 1
         name = need.messages[times % len(need.messages)]
         # An autopilot that refuses the second rate as too fast has already accepted the first.
         enough_hz = _MARGIN * need.rate_hz

@@ -282,7 +282,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
             received += f" (refused by the signing key: {signing.counters.reasons})"
         hint = "is it on, and sending there?"
         if request.connect and request.signing_key is None and not others:
-            hint += " Does it ask for signatures (`signing_key`)?"
+            hint += " Does it require signatures (`signing_key`)?"
         raise MissionError(f"no vehicle{which} was received{where}{received}: {error}; {hint}") from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.link.regain_s = request.regain_s if request.connect else 0.0

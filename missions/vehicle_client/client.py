@@ -216,10 +216,10 @@ async def open_client(
             received.
     """
     url = mavsdk_url(address)
-    said: list[str] = []
+    texts: list[str] = []
 
     def keep(_level: object, message: str, _file: object, _line: int) -> bool:
-        said.append(message)
+        texts.append(message)
         return True  # do not print it on the terminal
 
     log_subscribe(keep)
@@ -230,7 +230,7 @@ async def open_client(
         try:
             await mavsdk.add_any_connection(url)
         except MavsdkConnectionError as error:
-            why = said[-1] if said else str(error)
+            why = texts[-1] if texts else str(error)
             raise MissionError(f"{address} can't be opened: {why}") from error
         system = await _find(mavsdk, timeout_s, system_id)
         if system is not None:

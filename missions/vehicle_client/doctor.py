@@ -103,18 +103,18 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
     events = EventsAsync(client.system)
     # provides the names of the events
     await ComponentMetadataAsync(client.system).request_autopilot_component()
-    telling = asyncio.create_task(_next_report(events))
+    report = asyncio.create_task(_next_report(events))
     try:
         for _ in range(_REPORTS):
             await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
-            if (await asyncio.wait({telling}, timeout=_REPORT_S))[0]:
+            if (await asyncio.wait({report}, timeout=_REPORT_S))[0]:
                 break
         else:
             return []
     finally:
-        telling.cancel()
+        report.cancel()
     found = []
-    for entry in telling.result().current_mode_intention.problems:
+    for entry in report.result().current_mode_intention.problems:
         text = " ".join(f"{entry.message} {entry.description}".split())
         level = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
         found.append(level("arming check", text, f"look at {entry.health_component or 'it'}"))
@@ -166,6 +166,6 @@ def _link(quality: LinkQuality, client: VehicleClient, missing: list[str]) -> Fi
                        "they should come once a second")  # fmt: skip
     if missing:
         return warning(
-            "link", f"{text}; not sent when asked for: {', '.join(missing)}", "is it too slow a line?"
+            "link", f"{text}; not sent when requested: {', '.join(missing)}", "is it too slow a line?"
         )
     return ok("link", text)

@@ -36,9 +36,9 @@ class Flight:
         self.catch_up()
         params = (*values, *(0.0,) * (7 - len(values)))
         self.client.link.mav.command_long_send(1, component, command, 0, *params)
-        return self.hear(reply, component)
+        return self.receive(reply, component)
 
-    def hear(self, name: str, component: int = CAMERA) -> Any:
+    def receive(self, name: str, component: int = CAMERA) -> Any:
         return self.client.until(name, lambda m: m.get_type() == name and m.get_srcComponent() == component)
 
     def received(self, name: str, component: int = CAMERA) -> list[Any]:

@@ -277,7 +277,7 @@ def test_arduplane_failsafe_on_the_ground_does_not_disarm() -> None:
     rig = aircraft("ardupilot", FS_GCS_ENABL=1, FS_LONG_ACTN=1)
     rig.commander.set_mode(FlightMode.FBWA)
     assert rig.commander.arm().accepted
-    rig.commander.pilot.hear_gcs(rig.time_us)
+    rig.commander.pilot.on_gcs(rig.time_us)
     rig.run(7.0)
     assert rig.commander.armed and rig.commander.mode is FlightMode.RETURN
 

@@ -118,7 +118,7 @@ class Leader:
             return 20.0, 0.0, 0.0, 0.0
         return (20.0 + 3.0 * (k - 10.0), 0.0, 3.0, 0.0) if k < 30.0 else (80.0, 3.0 * (k - 30.0), 0.0, 3.0)
 
-    def tell(self, time_s: float) -> None:
+    def deliver(self, time_s: float) -> None:
         north, east, vn, ve = self.motion(time_s)
         lat, lon, alt = self.frame.geodetic_from_ned(north, east, 0.0)
         place = round(lat * 1e7), round(lon * 1e7)
@@ -147,18 +147,18 @@ def test_follows_a_leader_and_holds_when_it_is_lost(flavour: str) -> None:
     next_s = [flight.time_s]
     reported = [True]
 
-    def tell() -> None:
+    def report() -> None:
         if reported[0] and flight.time_s >= next_s[0]:
             next_s[0] += 1.0
-            leader.tell(flight.time_s)
+            leader.deliver(flight.time_s)
 
-    flight.fly(2.0, tell)
+    flight.fly(2.0, report)
     flight.set_mode("follow")
-    flight.fly(26.0, tell)
+    flight.fly(26.0, report)
     assert leader.off() == pytest.approx((-8.0, 0.0, -8.0), abs=0.8)
     assert flight.velocity_ned_m_s[0] == pytest.approx(3.0, abs=0.3)
     assert abs(math.remainder(flight.yaw_rad, math.tau)) < 0.1  # to the leader
-    flight.fly(30.0, tell)
+    flight.fly(30.0, report)
     assert leader.off() == pytest.approx((0.0, -8.0, -8.0), abs=0.9)  # behind it again
     reported[0] = False
     flight.fly(8.0)

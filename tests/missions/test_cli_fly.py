@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from autopilot_bridge.clock import Clock
 from missions.cli.fly import fly
-from missions.cli.fly_report import Pace, tell
+from missions.cli.fly_report import Pace, print_result
 from missions.cli.mission_command import FlightOption
 from missions.cli.pattern_command import ratio_of
 from missions.errors import PlanError
@@ -252,7 +252,7 @@ def test_the_wind_that_was_flown_is_in_the_last_lines_and_above_the_picture(
     wind = {"speed_m_s": 5.0, "from_deg": 270.0, "profile": "uniform", "turbulence": "light"}
     summary = flown_summary(wind=wind)
     result = RunResult(outcome="completed", reason="", folder=tmp_path, summary=summary)
-    assert tell(result, MISSIONS["sector"]) == 0
+    assert print_result(result, MISSIONS["sector"]) == 0
     reported = capsys.readouterr().out.splitlines()
     assert reported[0].endswith("139.0 s, 1.01 times real time")
     assert reported[1] == "wind 5 m/s from 270 degrees, light turbulence"

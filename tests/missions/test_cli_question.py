@@ -46,7 +46,7 @@ from missions.preflight.before_flight import Look, confirmed
 async def flight():
     line = ProgressLine()
     line._last_wall_s = -1e9
-    progress = asyncio.create_task(tell(line))
+    progress = asyncio.create_task(count_up(line))
     await asyncio.sleep(0.3)
     confirm = confirmation(["serial:/dev/ttyACM0:57600"], yes=False, check=False, screen=line.held)
     await confirmed([Look(system_id=1, findings=())], confirm)
@@ -55,7 +55,7 @@ async def flight():
     line.end()
     print("flown")
 
-async def tell(line):
+async def count_up(line):
     while True:
         line(SimpleNamespace(clock=object(), vehicles=[], elapsed_s=1.0))
         await asyncio.sleep(0.02)

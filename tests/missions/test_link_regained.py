@@ -80,7 +80,7 @@ def test_a_link_that_does_not_come_back_in_time_ends_the_mission(flown, flavour)
 
 
 def test_setpoints_wait_where_they_were_and_go_on(flown):
-    """The vehicle still receives our messages and stays guided; it stays there while its position is not received."""
+    """The vehicle still receives our messages and stays guided; it waits while no position is received."""
 
     async def script(vehicle, autopilot):
         vehicle.link.regain_s = 60.0

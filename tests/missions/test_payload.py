@@ -90,7 +90,7 @@ def test_a_gimbal_that_another_client_points_is_warned_of_once(primary, warned):
     rig = Rig()
     payload = Payload(rig)
     payload.take_gimbal_control()
-    rig.primary = (42, 190)  # it takes the manager some time to tell who has it
+    rig.primary = (42, 190)  # it takes the manager some time to report the controller
     payload.point_gimbal(pitch_rad=-0.5, yaw_rad=0.0)
     assert rig.notes.warnings == []
     rig.primary = primary

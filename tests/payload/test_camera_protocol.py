@@ -25,7 +25,7 @@ def say(world: World, command: int, *values: float, sender=(255, 190)) -> int | 
 
 
 def place(world: World, *, vx: float = 0.0, boot_ms: int = 0) -> None:
-    world.tell(
+    world.deliver(
         m.MAVLink_global_position_int_message(
             boot_ms,
             round(HOME.lat_deg * 1e7),
@@ -55,7 +55,7 @@ def test_a_photo_says_where_and_when_by_what_the_vehicle_reported(world):
     unplaced = photos(world)[-1]
     assert (unplaced.lat, unplaced.lon, unplaced.time_utc) == (0, 0, 0)
     place(world)
-    world.tell(m.MAVLink_system_time_message(1_700_000_000_000_000, 0), sender=AUTOPILOT)
+    world.deliver(m.MAVLink_system_time_message(1_700_000_000_000_000, 0), sender=AUTOPILOT)
     world.command(GIMBAL_COMPONENT, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -30.0, 20.0)
     world.run(2.0)
     place(world)
@@ -81,7 +81,9 @@ def test_an_old_position_is_none(world):
 
 
 def test_others_positions_are_not_ours(world):
-    world.tell(m.MAVLink_global_position_int_message(0, 10, 20, 30, 40, 0, 0, 0, 0), sender=(SYSTEM + 1, 1))
+    world.deliver(
+        m.MAVLink_global_position_int_message(0, 10, 20, 30, 40, 0, 0, 0, 0), sender=(SYSTEM + 1, 1)
+    )
     say(world, START, 0, 0, 1)
     assert photos(world)[-1].lat == 0
 

@@ -66,7 +66,7 @@ class Vehicle:
     def mission(self) -> tuple[MissionItem, ...]:
         return self.stores[MissionType.MISSION].items
 
-    def tell(self, message: Any, source: Source | None = None) -> list[Any]:
+    def deliver(self, message: Any, source: Source | None = None) -> list[Any]:
         source = source or self.gcs
         deliver(message, source, self.time_us, self.service)
         return source.channel.take()  # type: ignore[attr-defined]
@@ -127,9 +127,9 @@ def names(messages: list[Any]) -> list[str]:
 
 def upload(vehicle: Vehicle, items: list[Any], kind: int = 0) -> Any:
     """Upload obediently; the MISSION_ACK that ends it."""
-    (reply,) = vehicle.tell(count(len(items), kind))
+    (reply,) = vehicle.deliver(count(len(items), kind))
     for _ in range(3 * len(items) + 3):
         if reply.get_type() == "MISSION_ACK":
             return reply
-        (reply,) = vehicle.tell(items[reply.seq])
+        (reply,) = vehicle.deliver(items[reply.seq])
     return reply

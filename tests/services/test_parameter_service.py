@@ -56,15 +56,15 @@ class Vehicle:
         self.service = ParameterService(self.store, policy, self, on_list=self.listed_by.append)
         self.time_us = 0
 
-    def tell(self, message: Any) -> list[Any]:
+    def deliver(self, message: Any) -> list[Any]:
         assert deliver(message, Source(self.asking, 255, 190), self.time_us, self.service)
         return self.asking.take()
 
     def read(self, name: str = "", index: int = -1) -> list[Any]:
-        return self.tell(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), index))
+        return self.deliver(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), index))
 
     def write(self, name: str, value: float, kind: int) -> list[Any]:
-        return self.tell(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
+        return self.deliver(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
 
     def tick(self, times: int = 1) -> None:
         for _ in range(times):
@@ -155,7 +155,7 @@ def test_px4_silently_refuses_wrong_types_and_nan(px4: Vehicle, name: str, value
     assert px4.store.as_dict() == before
     px4.write("MPC_XY_CRUISE", 6.0, 9)
     px4.asking.take()
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     px4.tick(60)
     assert len(px4.asking.take()) == px4.store.count + 1
 
@@ -187,7 +187,7 @@ def test_ardupilot_ignores_nan(ardupilot: Vehicle) -> None:
 
 
 def test_px4_list_starts_with_the_hash(px4: Vehicle) -> None:
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     px4.tick()
     first = px4.asking.take()
     assert 1 < len(first) < px4.store.count  # not in one burst
@@ -219,7 +219,7 @@ def test_px4_hash_is_the_crc_of_names_and_raw_values(px4: Vehicle) -> None:
 
 
 def test_px4_setting_the_hash_ends_the_list(px4: Vehicle) -> None:
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     px4.tick()
     px4.asking.take()
     assert px4.write("_HASH_CHECK", 0.0, 5) == []
@@ -228,7 +228,7 @@ def test_px4_setting_the_hash_ends_the_list(px4: Vehicle) -> None:
 
 
 def test_ardupilot_list_in_order_with_the_banner_hook(ardupilot: Vehicle) -> None:
-    ardupilot.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    ardupilot.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     assert ardupilot.listed_by == [ardupilot.asking]
     ardupilot.tick(33)  # 0.65 s
     messages = ardupilot.asking.take()
@@ -237,7 +237,7 @@ def test_ardupilot_list_in_order_with_the_banner_hook(ardupilot: Vehicle) -> Non
 
 
 def test_a_slow_channel_loses_nothing(px4: Vehicle) -> None:
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     for tick in range(400):
         px4.asking.congested = tick % 4 != 0
         px4.tick()
@@ -301,7 +301,7 @@ def test_address_rules() -> None:
 def test_whatever_arrives_nothing_raises(flavour: str, messages: list[Any]) -> None:
     vehicle = Vehicle(flavour)
     for message in messages:
-        vehicle.tell(message)
+        vehicle.deliver(message)
         vehicle.tick()
     packer = mavlink.MAVLink(None, 1, 1)
     for message in vehicle.other.take():

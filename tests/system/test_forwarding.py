@@ -18,9 +18,9 @@ class Client:
         self.received: list[Frame] = []
         self.parser = FrameParser()
         self.link: MemoryLink = sitl.connect(0)
-        self.link.on_receive = self.hear
+        self.link.on_receive = self.receive
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         self.received += [
             frame for frame in self.parser.feed(data) if frame.system_id != 1 or frame.component_id != 1
         ]

@@ -190,10 +190,10 @@ def test_payload_speaks_under_the_vehicles_key() -> None:
     parser, components = FrameParser(), set()
     unsigned = FrameParser()
 
-    def hear(data: bytes) -> None:
+    def receive(data: bytes) -> None:
         components.update(frame.component_id for frame in checking.admit(parser.feed(data)))
 
-    link.on_receive = hear
+    link.on_receive = receive
     mine.on_receive = lambda data: (unsigned.feed(data), None)[1]
     while sitl.time_us < 3_000_000:
         sitl.advance()
@@ -214,13 +214,13 @@ class Keys:
         self.texts: list[str] = []
         self.elsewhere: list[int] = []
         self.parser, self.other_parser = FrameParser(), FrameParser()
-        self.link.on_receive = self.hear
+        self.link.on_receive = self.receive
         self.other.on_receive = lambda data: self.elsewhere.extend(
             frame.message_id for frame in self.other_parser.feed(data)
         )
         self.encoder = FrameEncoder(255, 190)
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         self.texts += [
             decode(frame).text for frame in self.parser.feed(data) if frame.definition.name == "STATUSTEXT"
         ]

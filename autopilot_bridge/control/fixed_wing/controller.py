@@ -34,7 +34,7 @@ class FixedWingController:
     * throttle, but no height: the pitch flies the airspeed;
     * throttle and a height rate without a height: the pitch flies the height rate alone, even into the stall
       (the flare);
-    * airspeed not known: pitch flies height, the throttle what the energy of the climb asks for.
+    * airspeed not known: pitch flies height, the throttle what the energy of the climb requires.
 
     Levels OFF and IDLE, unknown levels, and an unknown attitude (except with SURFACES_DIRECT) stop the
     propeller and centre the surfaces.
@@ -95,7 +95,7 @@ class FixedWingController:
 
     @property
     def hover_thrust(self) -> float:
-        """0.5: an aircraft has none; here so that either controller can be asked."""
+        """0.5: an aircraft has none; here so that both controllers have the property."""
         return _HOVER_THRUST
 
     @property

@@ -36,7 +36,7 @@ _POWERLESS_S: Final = 3.0  # so long full throttle may fail to keep the energy u
 _POWERLESS_DOUBT: Final = 0.4  # of that time: a gust downwards passes
 _GLIDE_SHARE: Final = 1.1  # of the lowest airspeed at this bank
 _FULL_THROTTLE: Final = 0.95  # of its limit
-_PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change asked for when pitch alone flies the airspeed
+_PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change commanded when pitch alone flies the airspeed
 
 
 @kernel

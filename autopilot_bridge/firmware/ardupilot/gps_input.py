@@ -90,7 +90,7 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
     """The values of a GPS_INPUT; None: not a fix."""
     ignored = int(message.ignore_flags)
 
-    def said(flag: int, value: float) -> float:
+    def unless(flag: int, value: float) -> float:
         return math.nan if ignored & flag else float(value)
 
     unmoved = bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
@@ -102,11 +102,11 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
         message,
         alt_m=0.0 if ignored & mavlink.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
         velocity=(*reported, math.nan, math.nan, math.nan)[:3],
-        hdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
-        vdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
-        eph_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
-        epv_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
-        speed_accuracy_m_s=said(mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
+        hdop=unless(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
+        vdop=unless(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
+        eph_m=unless(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
+        epv_m=unless(mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
+        speed_accuracy_m_s=unless(mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
     )
 
 
@@ -153,9 +153,9 @@ def _fix(
     return values
 
 
-def _least(said: float, otherwise: float) -> float:
+def _least(reported: float, otherwise: float) -> float:
     """The received value if it is valid, else the other one."""
-    return said if said > 0.0 else otherwise
+    return reported if reported > 0.0 else otherwise
 
 
 _Reader = Callable[[MavlinkMessage], list[float] | None]

@@ -1,4 +1,4 @@
-"""A circle of a plan (NAV_LOITER_*): what it asks for, and when and where it is left."""
+"""A circle of a plan (NAV_LOITER_*): what it requires, and when and where it is left."""
 
 import math
 from typing import Final

@@ -1,4 +1,4 @@
-"""What a flight task asks of the control laws: the fixed-wing setpoint as plain numbers, written at once."""
+"""The fixed-wing setpoint of a flight task as plain numbers, written to the control laws at once."""
 
 import math
 from typing import Final

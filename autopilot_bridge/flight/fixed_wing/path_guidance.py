@@ -231,7 +231,7 @@ def _adapted_period(
     on_track: float,
 ) -> float:
     """The nominal period, not below what the roll response allows, not above what the curve in the wind
-    asks for.
+    commands.
     """
     period, damping, roll_time = law[_PERIOD], law[_DAMPING], law[_ROLL_TIME]
     if law[_LOWER_BOUND] == 0.0:

@@ -110,7 +110,7 @@ class ManualService(Microservice):
     def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
         if gcs:
-            self._commander.pilot.hear_gcs(time_us)
+            self._commander.pilot.on_gcs(time_us)
 
     def _may_steer(self, source: Source) -> bool:
         only = self._rules.gcs_only

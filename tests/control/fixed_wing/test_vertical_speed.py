@@ -47,7 +47,7 @@ class Law:
         return lifting_rad / PARAMETERS.lift_angle_rad * (airspeed_m_s / PARAMETERS.airspeed_trim_m_s) ** 2
 
     def feel(self, load_factor: float) -> None:
-        """What the accelerometers tell from now on."""
+        """What the accelerometers measure from now on."""
         self.nav[FORCE_DOWN] = -load_factor * G_M_S2
 
     def pitch(self, climb_m_s: float, lowest: float = LOWEST, highest: float = HIGHEST) -> float:
