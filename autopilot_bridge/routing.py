@@ -23,8 +23,6 @@ class Router(Generic[ChannelT]):
     A channel must be hashable. Routing uses ids only, so no frame is packed again: forward `frame.raw`.
     """
 
-    __slots__ = ("_senders",)
-
     def __init__(self) -> None:
         self._senders: dict[ChannelT, dict[tuple[int, int], None]] = {}
 
@@ -91,8 +89,6 @@ class LoopGuard:
     Args:
         memory: number of frames that are remembered.
     """
-
-    __slots__ = ("_memory", "_received")
 
     def __init__(self, memory: int = 512) -> None:
         self._received: dict[bytes, object] = {}

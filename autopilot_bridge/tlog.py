@@ -45,8 +45,6 @@ class TlogWriter:
         TlogError: the file exists or can't be created.
     """
 
-    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "path", "records")
-
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.records = 0

@@ -85,8 +85,6 @@ class EstimateTable:
         of_sets: whether the estimates are sets.
     """
 
-    __slots__ = ("_indices", "_keys", "_values", "columns", "name", "of_sets")
-
     def __init__(self, kind: type[Estimate] | type[EstimateSet]) -> None:
         self.name = kind.__name__
         self.columns: tuple[str, ...] = tuple(kind.COLUMNS)

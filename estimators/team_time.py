@@ -23,8 +23,6 @@ class TeamTime:
     time is not converted.
     """
 
-    __slots__ = ("_boots_us", "_reference_us")
-
     def __init__(self) -> None:
         self._boots_us: dict[int, int] = {}
         self._reference_us: int | None = None

@@ -72,8 +72,6 @@ class _SystemTime:
 class VehicleTime:
     """Determines the vehicle time of messages, one after the other, in the order of their arrival."""
 
-    __slots__ = ("_fields", "_systems")
-
     def __init__(self) -> None:
         self._fields: dict[Any, tuple[str, int] | None] = {}
         self._systems: dict[int, _SystemTime] = {}

@@ -62,8 +62,6 @@ EntryT = TypeVar("EntryT")
 class _Progress:
     """The mission being flown, as the mission protocol sees it."""
 
-    __slots__ = ("_commander", "complete")
-
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
         self.complete = False

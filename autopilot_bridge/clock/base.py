@@ -37,8 +37,6 @@ class Clock(Protocol):
 class LoopClock:
     """The running event loop's own time: vehicle time on a `VirtualTimeLoop`."""
 
-    __slots__ = ()
-
     @property
     def time_us(self) -> int:
         """Microseconds of the loop's time."""

@@ -172,8 +172,6 @@ class ArmingChecks:
         reasons: all reasons against arming.
     """
 
-    __slots__ = ("_policy", "_reported_us", "reasons")
-
     def __init__(self, policy: CommanderPolicy) -> None:
         self._policy = policy
         self._reported_us = 0

@@ -81,8 +81,6 @@ class FenceKeeper:
         parameters: returns the present parameters.
     """
 
-    __slots__ = ("_context", "_health", "_parameters", "_watch")
-
     def __init__(
         self,
         watch: FenceWatch,

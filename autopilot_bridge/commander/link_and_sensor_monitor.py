@@ -12,8 +12,6 @@ from autopilot_bridge.navigation.health import NavigationHealth
 class AirspeedMonitor:
     """Reports when the sensor is disabled while armed, and when it is used again."""
 
-    __slots__ = ("_valid",)
-
     def __init__(self) -> None:
         self._valid = True
 
@@ -33,8 +31,6 @@ _GPS_STOPPED_US: Final = 7_000_000
 
 class LinkAndSensorMonitor:
     """Reports when a link or GPS that was present is lost, and when it is back."""
-
-    __slots__ = ("_airspeed", "_lost_us")
 
     def __init__(self) -> None:
         self._airspeed = AirspeedMonitor()

@@ -13,8 +13,6 @@ class ModeMemory:
         active: the flavour restores the mode; else nothing is stored.
     """
 
-    __slots__ = ("_active", "_mode")
-
     def __init__(self, *, active: bool) -> None:
         self._active = active
         self._mode: FlightMode | None = None

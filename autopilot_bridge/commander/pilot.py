@@ -23,8 +23,6 @@ class PilotInput:
         muted: the radio is being calibrated; its sticks have no effect.
     """
 
-    __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "muted", "radio_failed_since_us")
-
     def __init__(self, *, built_in_radio: bool) -> None:
         self._built_in_radio = built_in_radio
         self._sticks = _NO_INPUT
@@ -89,8 +87,6 @@ def stick_travel(now: ManualInput, before: ManualInput) -> float:
 
 class StickOverride:
     """Compares the sticks with their positions at the last mode command."""
-
-    __slots__ = ("_at_command",)
 
     def __init__(self) -> None:
         self._at_command = ManualInput()

@@ -18,8 +18,6 @@ class SetpointStream:
         needs_position: the newest setpoint can't be flown without a position.
     """
 
-    __slots__ = ("_time_us", "_vehicle", "needs_position")
-
     def __init__(self, vehicle: VehicleTasks) -> None:
         self._vehicle = vehicle
         self.needs_position = False

@@ -99,8 +99,6 @@ class SituationUpdate:
         battery: provides the warning level.
     """
 
-    __slots__ = ("_battery", "_context", "_home", "_pilot", "_policy", "_setpoints", "_situation")
-
     def __init__(
         self,
         situation: Situation,

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 class TaskFollower:
     """Reads the events of the active flight task for the commander."""
 
-    __slots__ = ("_commander",)
-
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
 

@@ -24,8 +24,6 @@ class ObstacleMap:
         measured_us: time of each measurement; -1: never.
     """
 
-    __slots__ = ("distances_m", "measured_us", "newest_us")
-
     def __init__(self) -> None:
         self.distances_m: Array = np.full(SECTORS, math.nan)
         self.measured_us: NDArray[np.int64] = np.full(SECTORS, -1, dtype=np.int64)

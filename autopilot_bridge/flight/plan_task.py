@@ -55,20 +55,6 @@ class PlanTask(ABC):
         rules: how the firmware flies a plan.
     """
 
-    __slots__ = (
-        "_beside",
-        "_condition_left_s",
-        "_finished",
-        "_first_item",
-        "_jumps",
-        "_rules",
-        "_seq",
-        "_store",
-        "_sub",
-        "_version",
-        "_wait_left_s",
-    )
-
     def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
         self._store = store
         self._first_item = first_item

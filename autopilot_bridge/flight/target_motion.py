@@ -32,19 +32,6 @@ class TargetMotion:
         accepted, refused: measurements so far.
     """
 
-    __slots__ = (
-        "_acceleration_m_s2",
-        "_p",
-        "_refused_in_a_row",
-        "_still",
-        "_time_us",
-        "_x",
-        "accepted",
-        "course_rad",
-        "received_us",
-        "refused",
-    )
-
     def __init__(self, *, acceleration_m_s2: float = 1.0, still: bool = False) -> None:
         self._acceleration_m_s2 = acceleration_m_s2
         self._still = still

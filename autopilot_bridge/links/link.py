@@ -91,8 +91,6 @@ class SendQueue:
         taken_bytes: total bytes that the stream has accepted.
     """
 
-    __slots__ = ("_counters", "_limit_bytes", "_pieces", "queued_bytes", "taken_bytes")
-
     def __init__(self, counters: LinkCounters, limit_bytes: int = MAX_BACKLOG_BYTES) -> None:
         self._counters = counters
         self._limit_bytes = limit_bytes

@@ -257,8 +257,6 @@ class _Stream:
         taken_s: time at which it last accepted queued data, as far as this was checked.
     """
 
-    __slots__ = ("_counters", "_taken_bytes", "queue", "received_s", "socket", "taken_s")
-
     def __init__(self, opened: socket.socket, counters: LinkCounters) -> None:
         opened.setblocking(False)
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -46,29 +46,6 @@ class AirAiding:
             and sideslip both), and each was fused; -1 for never.
     """
 
-    __slots__ = (
-        "_air",
-        "_airspeed_gusts",
-        "_check",
-        "_fast_since_us",
-        "_fused_us",
-        "_health",
-        "_parameters",
-        "_pitot",
-        "_quiet_since_us",
-        "_rest_down_m",
-        "_shown_m_s",
-        "_sideslip_gusts",
-        "_solution",
-        "_time_us",
-        "_turn",
-        "_usual_m_s",
-        "airspeed_us",
-        "flying",
-        "sideslip_us",
-        "wind_us",
-    )
-
     def __init__(self, parameters: NavigationParameters, parts: AidingParts) -> None:
         self._parameters = parameters
         self._solution, self._health = parts.solution, parts.health

@@ -69,19 +69,6 @@ class ExternalCounts:
         resets: jumps of the estimate to the sender's values.
     """
 
-    __slots__ = (
-        "flooded",
-        "frozen",
-        "fused",
-        "incoherent",
-        "late",
-        "not_finite",
-        "poor",
-        "refused",
-        "resets",
-        "taken",
-    )
-
     def __init__(self) -> None:
         self.taken = self.fused = self.refused = self.not_finite = self.late = 0
         self.poor = self.frozen = self.incoherent = self.flooded = self.resets = 0

@@ -36,21 +36,6 @@ class GpsAiding:
         quality: judge of the receiver.
     """
 
-    __slots__ = (
-        "_before_rejoining",
-        "_clocks",
-        "_contradictions",
-        "_heading",
-        "_health",
-        "_height",
-        "_parameters",
-        "_reading",
-        "_solution",
-        "_standby",
-        "frame",
-        "quality",
-    )
-
     def __init__(
         self,
         parameters: NavigationParameters,

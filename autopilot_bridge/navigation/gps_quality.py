@@ -46,21 +46,6 @@ class GpsQuality:
         good_since_us: time of the first sample of the present good series; -1 when the newest one failed.
     """
 
-    __slots__ = (
-        "_anchor",
-        "_anchor_us",
-        "_distrusted",
-        "_equal",
-        "_last",
-        "_last_us",
-        "_newest_us",
-        "_parameters",
-        "_previous",
-        "_travelled",
-        "good",
-        "good_since_us",
-    )
-
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
         self._last = self._anchor = self._previous = [0.0] * GPS_SIZE

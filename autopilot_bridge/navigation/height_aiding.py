@@ -19,19 +19,6 @@ _GPS_FRESH_US: Final = 1_000_000
 class HeightAiding:
     """Prepares barometer updates of a `Solution`, and has its height jump where that is due."""
 
-    __slots__ = (
-        "_baro_known",
-        "_clocks",
-        "_contradictions",
-        "_gps_known",
-        "_health",
-        "_parameters",
-        "_pressure_scale",
-        "_reading",
-        "_solution",
-        "_terrain",
-    )
-
     def __init__(
         self, parameters: NavigationParameters, parts: AidingParts, *, terrain: TerrainEstimator
     ) -> None:

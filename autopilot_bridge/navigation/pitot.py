@@ -35,17 +35,6 @@ class Pitot:
         sample_us: when the newest usable sample was measured; -1 before the first.
     """
 
-    __slots__ = (
-        "_changed_us",
-        "_newest_us",
-        "_parameters",
-        "_pressure_pa",
-        "_readings",
-        "equivalent_m_s",
-        "sample_us",
-        "true_per_equivalent",
-    )
-
     def __init__(self, parameters: NavigationParameters, *, readings: SensorReadings) -> None:
         self._parameters = parameters
         self._readings = readings
@@ -116,8 +105,6 @@ class AirspeedCheck:
         passed: the sensor is used.
     """
 
-    __slots__ = ("_bad_since_us", "_good_since_us", "_integral_m", "_updated_us", "passed")
-
     def __init__(self) -> None:
         self.restart()
 
@@ -166,8 +153,6 @@ class GustVariance:
     Attributes:
         variance: (m/s)^2.
     """
-
-    __slots__ = ("_memory_s", "variance")
 
     _LIGHT: Final = 1.0  # (m/s)^2, light turbulence of MIL-F-8785C at 100 m
     _LIGHT_FOR_S: Final = 15.0  # weight of that first guess

@@ -15,8 +15,6 @@ _COHERENCE_M: Final = 30.0  # height difference over which the error is assumed 
 class PressureScale:
     """Turns pressure altitudes into growth of the barometer offset's variance."""
 
-    __slots__ = ("_reference_m",)
-
     def __init__(self) -> None:
         self.restart()
 

@@ -64,22 +64,6 @@ class Solution:
         steps_per_s: physics rate.
     """
 
-    __slots__ = (
-        "_accuracy_step",
-        "_parameters",
-        "core",
-        "gps_error_var",
-        "history",
-        "obs",
-        "p",
-        "period_us",
-        "process",
-        "row",
-        "rows",
-        "steps",
-        "work",
-    )
-
     def __init__(self, parameters: NavigationParameters, *, physics_rate_hz: int) -> None:
         self._parameters = parameters
         self.period_us = 1_000_000 // physics_rate_hz

@@ -47,8 +47,6 @@ class OpenFile(Protocol):
 class HeldBytes:
     """Reading of an open file whose bytes are in memory."""
 
-    __slots__ = ("_data",)
-
     def __init__(self, data: bytes | bytearray) -> None:
         self._data = data
 

@@ -164,8 +164,6 @@ class FolderStore:
 class _FolderFile:
     """An open file of a `FolderStore`."""
 
-    __slots__ = ("_descriptor", "_store")
-
     def __init__(self, store: FolderStore, descriptor: int) -> None:
         self._store = store
         self._descriptor = descriptor

@@ -80,8 +80,6 @@ class GeneratedStore:
 class _Snapshot(HeldBytes):
     """The bytes of a generated file at the time when it was opened."""
 
-    __slots__ = ()
-
     def write(self, offset: int, data: bytes) -> None:
         raise error(errno.EBADF)
 
@@ -91,8 +89,6 @@ class _Snapshot(HeldBytes):
 
 class _Upload(HeldBytes):
     """A file being written, processed as a whole when it is closed."""
-
-    __slots__ = ("_take",)
 
     _data: bytearray
 

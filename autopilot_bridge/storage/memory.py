@@ -133,8 +133,6 @@ class MemoryStore:
 class _MemoryFile(HeldBytes):
     """An open file of a `MemoryStore`; after its removal it can still be read, as on a disk."""
 
-    __slots__ = ("_store", "_writable")
-
     _data: bytearray
 
     def __init__(self, store: MemoryStore, data: bytearray, *, writable: bool) -> None:

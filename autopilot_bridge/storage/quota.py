@@ -37,8 +37,6 @@ class Usage:
         size_bytes, files: in use.
     """
 
-    __slots__ = ("_quota", "files", "size_bytes")
-
     def __init__(self, quota: Quota) -> None:
         self._quota = quota
         self.size_bytes = 0

@@ -44,8 +44,6 @@ class LineBudget:
         ValueError: the capacity is not above 0.
     """
 
-    __slots__ = ("_share_bytes", "_time_us", "backlog_bytes", "bytes_per_s", "forwarded_bytes")
-
     def __init__(self, bytes_per_s: float) -> None:
         if not 0.0 < bytes_per_s < float("inf"):
             raise ValueError(f"capacity {bytes_per_s} bytes/s is not above 0")
@@ -160,8 +158,6 @@ class RadioFlow:
         multiplier: fraction of their rates that streams keep.
         slowdown_us: added to all intervals.
     """
-
-    __slots__ = ("_control", "_received_us", "multiplier", "slowdown_us")
 
     def __init__(self, control: FlowControl) -> None:
         self._control = control

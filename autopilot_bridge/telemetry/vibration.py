@@ -34,8 +34,6 @@ class VibrationMeter:
         update: takes the newest sample.
     """
 
-    __slots__ = ("_level", "update")
-
     def __init__(self, accel_frd_m_s2: Array, *, rate_hz: float) -> None:
         self._level = np.zeros(3)
         blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)

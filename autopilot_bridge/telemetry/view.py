@@ -25,30 +25,6 @@ class TelemetryView:
     `lon_e7`, `alt_amsl_m`, `alt_relative_m` (to home). `time_us` and `time_ms` are always those of the step.
     """
 
-    __slots__ = (
-        "_fresh_us",
-        "_nav_state",
-        "acc",
-        "alt_amsl_m",
-        "alt_relative_m",
-        "context",
-        "has_global",
-        "heading_deg",
-        "lat_e7",
-        "lon_e7",
-        "pitch",
-        "pos",
-        "q",
-        "rates",
-        "readings",
-        "roll",
-        "time_ms",
-        "time_us",
-        "vel",
-        "vibration",
-        "yaw",
-    )
-
     def __init__(
         self, context: FlightContext, nav_state: NDArray[np.float64], readings: SensorReadings
     ) -> None:

@@ -49,8 +49,6 @@ class PositionReader:
         home: home from HOME_POSITION; None before it was received.
     """
 
-    __slots__ = ("_local", "home", "message", "source")
-
     def __init__(self, source: Source) -> None:
         self.source = source
         self.message = MESSAGES[source]

@@ -15,8 +15,6 @@ class Orientations:
         reach_us: largest time difference to the nearest orientation that may be used.
     """
 
-    __slots__ = ("_history_us", "_quaternions", "_reach_us", "_times")
-
     def __init__(self, history_us: int, reach_us: int) -> None:
         self._history_us = history_us
         self._reach_us = reach_us

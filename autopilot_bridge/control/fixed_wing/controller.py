@@ -50,8 +50,6 @@ class FixedWingController:
         actuators: roles of `flightsim.interface`, `AILERON` ... `BRAKE`.
     """
 
-    __slots__ = ("_packed", "_parameters", "_state", "actuators", "setpoint", "step")
-
     def __init__(
         self, parameters: FixedWingParameters | None = None, *, physics_rate_hz: float, nav: Array
     ) -> None:

@@ -30,8 +30,6 @@ class CircleItem:
         task: flies it.
     """
 
-    __slots__ = ("_aligned", "_done_at_turns", "_seconds", "_to_height", "_turns", "task")
-
     def __init__(
         self,
         item: MissionItem,

@@ -12,26 +12,6 @@ _NAN: Final = math.nan
 class FlightCommand:
     """One setpoint of level FLY; NaN means not given. Fields as in `control.fixed_wing.setpoint`."""
 
-    __slots__ = (
-        "airspeed_m_s",
-        "brake",
-        "course_rad",
-        "down_m",
-        "flaps",
-        "heading_rad",
-        "height_rate_m_s",
-        "lateral_acceleration_m_s2",
-        "pitch_max_rad",
-        "pitch_min_rad",
-        "pitch_rad",
-        "roll_limit_rad",
-        "roll_rad",
-        "steering_heading_rad",
-        "throttle",
-        "throttle_max",
-        "yaw_stick",
-    )
-
     def __init__(self) -> None:
         self.clear()
 

@@ -49,24 +49,6 @@ class LandTask(AircraftTask):
         approach: the approach flown; None before `activate`.
     """
 
-    __slots__ = (
-        "_abort_climb_m",
-        "_blind",
-        "_circle",
-        "_flare",
-        "_go_arounds",
-        "_line",
-        "_path",
-        "_power",
-        "_rolled_s",
-        "_start",
-        "_touch_pitch_rad",
-        "_wanted",
-        "_wind",
-        "approach",
-        "phase",
-    )
-
     works_on_ground: ClassVar[bool] = True
 
     def __init__(self, place_ned_m: Array | None = None, approach_ned_m: Array | None = None) -> None:

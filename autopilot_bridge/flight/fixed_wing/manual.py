@@ -65,8 +65,6 @@ class ManualTask(AircraftTask):
         kind: what the sticks mean.
     """
 
-    __slots__ = ("_down_m", "_held_s", "_line", "_locked", "_path", "kind")
-
     works_on_ground: ClassVar[bool] = True
 
     def __init__(self, kind: ManualMode) -> None:

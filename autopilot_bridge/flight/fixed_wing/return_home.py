@@ -60,8 +60,6 @@ class ReturnTask(AircraftTask):
         place: where the return leads; None: nowhere.
     """
 
-    __slots__ = ("_first_item", "_home", "_rules", "_store", "_sub", "_wait_s", "phase", "place")
-
     def __init__(
         self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
     ) -> None:

@@ -41,22 +41,6 @@ class TakeoffTask(AircraftTask):
         phase: see `TakeoffPhase`.
     """
 
-    __slots__ = (
-        "_altitude_m",
-        "_down_m",
-        "_fast",
-        "_launch",
-        "_loiter",
-        "_path",
-        "_place",
-        "_rotated_s",
-        "_runway",
-        "_start_down_m",
-        "_throttle",
-        "_way_m",
-        "phase",
-    )
-
     works_on_ground: ClassVar[bool] = True
 
     def __init__(self, altitude_above_home_m: float | None = None, place_ned_m: Array | None = None) -> None:

@@ -29,26 +29,6 @@ class GuidedTask:
         kind: the kind of the present target.
     """
 
-    __slots__ = (
-        "_acceleration",
-        "_age_s",
-        "_attitude",
-        "_climb_m_s",
-        "_goto",
-        "_goto_started",
-        "_hold",
-        "_hover_down_m",
-        "_motion",
-        "_position",
-        "_ramp",
-        "_rates",
-        "_turn",
-        "_velocity",
-        "_yaw_rad",
-        "_yaw_rate_rad_s",
-        "kind",
-    )
-
     def __init__(self) -> None:
         self.kind = GuidedKind.HOLD
         self._position: Array = np.full(3, np.nan)

@@ -76,8 +76,6 @@ class MissionTask(PlanTask):
         rules: how the firmware flies a plan.
     """
 
-    __slots__ = ("_leg", "_motion", "_nose", "_ramp", "_speed_m_s", "_turning")
-
     def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
         super().__init__(store, first_item=first_item, rules=rules)
         self._leg: _Leg | None = None

@@ -50,8 +50,6 @@ class ChannelSession:
 class Sessions:
     """The sessions of all channels on which messages were received."""
 
-    __slots__ = ("_sessions",)
-
     def __init__(self) -> None:
         self._sessions: dict[int, ChannelSession] = {}
 
