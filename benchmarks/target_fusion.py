@@ -249,7 +249,7 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
 
 
 def base_station(form: str, setting: Setting, **chosen: Any) -> TargetFusionEstimator:
-    """The estimator as it would be set for this pattern. All forms believe in the same noise."""
+    """The estimator as it would be set for this pattern. All forms use the same noise."""
     omega_x, omega_y = setting.omega_rad_s
     values: dict[str, Any] = {
         "form": "proposed" if form == "frequency" else form,
@@ -290,12 +290,12 @@ def score(recorded: Recorded, estimator: Estimator[Any]) -> Score:
     )
     north, east = table["north_m"][kept] - true_north, table["east_m"][kept] - true_east
     off = np.hypot(north, east)
-    believed = np.hypot(table["north_sigma_m"][kept], table["east_sigma_m"][kept])
+    accepted = np.hypot(table["north_sigma_m"][kept], table["east_sigma_m"][kept])
     return Score(
         rmse_m=rms(off),
         median_m=float(np.median(off)),
         detections=int(kept.sum()),
-        sigmas=rms(off / believed),
+        sigmas=rms(off / accepted),
     )
 
 

@@ -14,11 +14,10 @@ from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from estimators.comparison import Comparison, comparisons
-    from estimators.errors import EstimatorError
+    from estimators.errors import EstimatorError, LogError
     from estimators.interface import Estimate, Estimator, Need
     from estimators.library import make_estimator
     from estimators.log_replay import Replay, replay
-    from estimators.logs.errors import LogError
     from estimators.logs.formats import open_log
     from estimators.logs.log import Log
     from estimators.logs.report import report_of
@@ -45,7 +44,7 @@ _MODULES: Final = {
     "Estimator": "estimators.interface",
     "EstimatorError": "estimators.errors",
     "Log": "estimators.logs.log",
-    "LogError": "estimators.logs.errors",
+    "LogError": "estimators.errors",
     "Need": "estimators.interface",
     "Replay": "estimators.log_replay",
     "comparisons": "estimators.comparison",

@@ -20,8 +20,7 @@ from estimators.interface import Estimate, EstimateSet, Estimator, Need, Outcome
 from estimators.messages import Message, read_message
 from estimators.needs import message_names
 from estimators.observations import Observation
-from estimators.team_time import TeamTime
-from estimators.vehicle_time import VehicleTime
+from estimators.vehicle_time import TeamTime, VehicleTime
 
 __all__ = [
     "ESTIMATE_MESSAGES",

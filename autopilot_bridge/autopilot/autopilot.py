@@ -20,8 +20,8 @@ from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.firmware.external_mapping import connected
 from autopilot_bridge.firmware.flavour import Flavour
-from autopilot_bridge.firmware.gps_source import connected
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
@@ -40,7 +40,7 @@ from autopilot_bridge.services.parameters.protocol import ParameterService, fix_
 from autopilot_bridge.services.plans.geofence import MissionFence
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache

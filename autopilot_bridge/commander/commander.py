@@ -32,16 +32,14 @@ from autopilot_bridge.commander.guidance import Guidance
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.link_and_sensor_monitor import LinkAndSensorMonitor
-from autopilot_bridge.commander.mode_memory import ModeMemory
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
-from autopilot_bridge.commander.pilot import PilotInput, StickOverride
+from autopilot_bridge.commander.pilot import ModeMemory, PilotInput, StickOverride
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
-from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.situation import Situation, SituationUpdate
 from autopilot_bridge.commander.task_events import TaskFollower
 from autopilot_bridge.commander.tasks import TaskRunner
-from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
+from autopilot_bridge.commander.vehicle_tasks import LandDetector, SetpointStream, VehicleTasks
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.plan_reading import ends_in_landing, in_landing_sequence, starts_with_takeoff

@@ -1,8 +1,10 @@
-"""The pilot's input: sticks and heartbeats of ground stations with their ages, and the override of a mode."""
+"""The pilot's input: sticks and heartbeats of ground stations their ages, and their effect on the mode."""
 
 import math
+from collections.abc import Iterable
 from typing import Final
 
+from autopilot_bridge.commander.events import Event, FailsafeAction, FailsafeCleared, FailsafeKind
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.flight.context import ManualInput
@@ -10,6 +12,36 @@ from autopilot_bridge.flight.context import ManualInput
 _NO_INPUT: Final = ManualInput()
 _RADIO_AT_REST: Final = ManualInput(throttle=-1.0, valid=True, simulated=True)
 THROTTLE_HIGH: Final = -0.8  # above this the throttle stick is not down
+
+
+class ModeMemory:
+    """Stores the mode from before a failsafe of the radio until another decision replaces it.
+
+    Args:
+        active: the flavour restores the mode; else nothing is stored.
+    """
+
+    def __init__(self, *, active: bool) -> None:
+        self._active = active
+        self._mode: FlightMode | None = None
+
+    def note(self, started: Iterable[tuple[FailsafeKind, FailsafeAction]], mode: FlightMode) -> None:
+        """Failsafes started in a mode; only a first, short loss of the radio is reversed later."""
+        for kind, action in started:
+            if action > FailsafeAction.WARN:
+                self._mode = mode if self._active and kind is FailsafeKind.MANUAL_LOST else None
+
+    def forget(self) -> None:
+        """A client or pilot has selected a mode."""
+        self._mode = None
+
+    def recall(self, changes: Iterable[Event]) -> FlightMode | None:
+        """The mode to restore because the radio is back; None: no change."""
+        for event in changes:
+            if isinstance(event, FailsafeCleared) and event.kind is FailsafeKind.MANUAL_LOST:
+                mode, self._mode = self._mode, None
+                return mode
+        return None
 
 
 class PilotInput:

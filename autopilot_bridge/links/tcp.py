@@ -8,8 +8,7 @@ from typing import Final
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import TcpClient, TcpServer
-from autopilot_bridge.links.faults import open_error
-from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, PeerId, SendQueue
+from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, PeerId, SendQueue, open_error
 
 CONNECT_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 1.0

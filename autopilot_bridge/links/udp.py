@@ -8,8 +8,7 @@ from typing import Final
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import UdpClient, UdpPeer, UdpServer
-from autopilot_bridge.links.faults import open_error
-from autopilot_bridge.links.link import MAX_READ_BYTES, READ_SIZE, LinkCounters, PeerId
+from autopilot_bridge.links.link import MAX_READ_BYTES, READ_SIZE, LinkCounters, PeerId, open_error
 
 PEER_SILENCE_S: Final = 30.0
 REPLACE_S: Final = 5.0

@@ -16,7 +16,7 @@ from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
 from autopilot_bridge.sitl.vehicle import SitlVehicle
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, magnetic_field_of
 from flightsim.world import World, WorldParameters
 from flightsim.world_spec import WorldSpec

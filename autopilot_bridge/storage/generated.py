@@ -4,8 +4,7 @@ import errno
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from autopilot_bridge.storage.files import Entry, HeldBytes, Mode, OpenFile
-from autopilot_bridge.storage.paths import VehiclePath, error
+from autopilot_bridge.storage.files import Entry, HeldBytes, Mode, OpenFile, VehiclePath, error
 
 Content = Callable[[Mapping[str, str]], bytes]
 """Makes a file's bytes; the argument holds the query after `?` in its name (ArduPilot)."""

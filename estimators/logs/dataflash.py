@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 from pymavlink import DFReader
 
+from estimators.errors import LogError
 from estimators.logs.dataflash_mapping import map_messages
 from estimators.logs.dataflash_time import PX4_TIME, RawTable, stamp
-from estimators.logs.errors import LogError
 from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
 from estimators.logs.sdlog2_mapping import map_sdlog2
 

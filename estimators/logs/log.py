@@ -12,7 +12,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.logs.errors import LogError, NothingThere
+from estimators.errors import LogError, NothingThere
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log_clock import LogClock, make_clock
 from estimators.logs.source import LogSource, Positions, Stream

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from pyulog.core import ULog
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
 from estimators.logs.ulog_mapping import UlogFacts, board_rotation, map_topics
 

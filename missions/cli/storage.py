@@ -34,8 +34,8 @@ class VehicleCards:
 
     def __init__(self, storage: str | None, count: int) -> None:
         from autopilot_bridge.storage import FOLDER_QUOTA, TEMPORARY_QUOTA
-        from autopilot_bridge.storage.card import MemoryCard
         from autopilot_bridge.storage.folder import FolderStore
+        from autopilot_bridge.storage.memory import MemoryCard
 
         self._stores: list[FolderStore] = []
         self._temporary: tempfile.TemporaryDirectory[str] | None = None

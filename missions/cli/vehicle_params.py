@@ -84,7 +84,7 @@ def set_(name: str, value: float, **given: Any) -> int:
 @connected
 def save(file: Path, **given: Any) -> int:
     """Save all parameters to FILE: .params (QGroundControl), .parm or .param (ArduPilot, MAVProxy)."""
-    from estimators.logs.errors import LogError
+    from estimators.errors import LogError
     from estimators.logs.new_file import new_file
     from missions.vehicle_client.parameters import format_values, read_all
 

@@ -5,6 +5,7 @@ import json
 from collections import deque
 from collections.abc import AsyncIterator, Collection, Container, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 from typing import Any, Final
 
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, MavsdkConnectionError, System
@@ -14,13 +15,22 @@ from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkDirectError, MavlinkMessage
 
 from autopilot_bridge.errors import BridgeError
-from autopilot_bridge.links import Address
+from autopilot_bridge.links import (
+    VEHICLE_FORMS,
+    Address,
+    ReplayLog,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpClient,
+    UdpPeer,
+    UdpServer,
+)
 from autopilot_bridge.mavlink import definition, dialect
-from missions.errors import MissionError, VehicleTimeout
+from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
 from missions.vehicle.firmware_records import FIRMWARES
-from missions.vehicle_client.addresses import mavsdk_url
 from missions.vehicle_client.listening import listen
 
 _AUTOPILOT: Final = 1
@@ -37,6 +47,27 @@ WANTED: Final[Mapping[str, tuple[str, ...]]] = {
                   "BATTERY_STATUS", "EXTENDED_SYS_STATE", "RC_CHANNELS", "SYSTEM_TIME"),
 }  # fmt: skip
 """Messages that report the state of a vehicle."""
+
+
+def mavsdk_url(address: Address) -> str:
+    """The MAVSDK connection string for a link.
+
+    Raises:
+        PlanError: MAVSDK does not support this kind of link.
+    """
+    match address:
+        case UdpServer():
+            return f"udpin://{address.host}:{address.port}"
+        case UdpClient():
+            return f"udpout://{address.host}:{address.port}"
+        case TcpClient():
+            return f"tcpout://{address.host}:{address.port}"
+        case TcpServer():
+            return f"tcpin://{address.host}:{address.port}"
+        case SerialPort():
+            return f"serial://{Path(address.device).absolute()}:{address.baud}"
+        case UdpPeer() | ReplayLog():
+            raise PlanError(f"`connect` {address}: not for this command; accepted: {VEHICLE_FORMS}")
 
 
 class VehicleClient:

@@ -13,7 +13,7 @@ from estimators.interface import Estimator, Need, Outcome
 from estimators.library import estimator_class
 from estimators.log_replay import replay
 from estimators.logs import open_log
-from estimators.team_time import TeamTime
+from estimators.vehicle_time import TeamTime
 from tests.recorded_logs import each_recorded_log
 
 UNIX_S = 1.7e9

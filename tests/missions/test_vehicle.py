@@ -117,7 +117,7 @@ def test_command_is_repeated_with_confirmation_until_answered(flown):
     flown(script)
 
 
-def test_px4_first_mode_acknowledgement_is_not_believed(flown):
+def test_px4_first_mode_acknowledgement_is_not_accepted(flown):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(5.0)
         autopilot.refuse_modes.add("return")
@@ -314,7 +314,7 @@ def test_a_refused_arming_leaves_nothing_in_doubt(flown):
     assert flown(script) is False
 
 
-def test_a_disarmed_heartbeat_long_after_arming_is_believed(flown):
+def test_a_disarmed_heartbeat_long_after_arming_is_accepted(flown):
     async def script(vehicle, autopilot):
         await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         autopilot.armed = False

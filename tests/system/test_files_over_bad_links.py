@@ -13,8 +13,8 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.services.files.ftp_protocol import MAX_DATA, FtpError, Opcode
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage import MemoryStore, Mode, Quota
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import make_directories, read_whole
+from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
 HEADER = struct.Struct("<HBBBBBBI")

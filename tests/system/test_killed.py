@@ -17,8 +17,8 @@ from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.mavlink import Frame, decode, definition
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.sitl import Sitl
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.folder import FolderStore
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogReader
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl

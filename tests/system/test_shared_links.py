@@ -284,7 +284,7 @@ def test_impostors_on_a_shared_link(worlds: Callable[..., World]) -> None:
 def test_a_client_is_kept_on_a_shared_link_whatever_else_it_sends(
     odd: bytes | str, worlds: Callable[..., World]
 ) -> None:
-    """A line's end, half a frame, a vehicle's frame brought back: once believed, a client is sent to."""
+    """A line's end, half a frame, a vehicle's frame brought back: once accepted, a client is sent to."""
     world = worlds(2)
     ground = world.client(world.listen("udpin", shared=True), 255)
     ground.say_hello()

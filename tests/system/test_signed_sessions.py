@@ -159,15 +159,15 @@ def test_an_attacker_changes_nothing_at_all(
 
 
 @pytest.mark.parametrize(
-    ("reach", "believed"), [(Reach.CABLE, True), (Reach.MACHINE, False), (Reach.NETWORK, False)]
+    ("reach", "accepted"), [(Reach.CABLE, True), (Reach.MACHINE, False), (Reach.NETWORK, False)]
 )
-def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Reach, believed: bool) -> None:
+def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Reach, accepted: bool) -> None:
     sitl = Sitl(WorldSpec(), signing=SigningParameters(key=KEY))
     link = sitl.connect(0, reach=reach)
     setting = dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9)
     link.send(FrameEncoder(255, 190).encode(setting))
     taken = sitl.vehicles[0].autopilot.parameters.as_dict()["MIS_TAKEOFF_ALT"]
-    assert taken == (7.0 if believed else 2.5)
+    assert taken == (7.0 if accepted else 2.5)
 
 
 def test_a_radio_on_the_line_passes_unsigned() -> None:

@@ -12,9 +12,9 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage import MemoryStore, Quota
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import exists, read_whole
 from autopilot_bridge.storage.folder import FolderStore
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogReader
 from flightsim.world_spec import VehicleSpec, WorldSpec
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from autopilot_bridge.firmware.gps_source import GpsSource, ardupilot_gps_source
+from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
+from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from flightsim.airframe import AirframeKind
 from flightsim.foundation.vectors import from_euler, rotate, yaw_of

@@ -42,7 +42,7 @@ class Law:
 
     @staticmethod
     def load_factor(airspeed_m_s: float, angle_of_attack_rad: float) -> float:
-        """Of the wing as it is believed, in still air."""
+        """Of the wing as modelled, in still air."""
         lifting_rad = angle_of_attack_rad - PARAMETERS.trim_pitch_rad + PARAMETERS.lift_angle_rad
         return lifting_rad / PARAMETERS.lift_angle_rad * (airspeed_m_s / PARAMETERS.airspeed_trim_m_s) ** 2
 

@@ -135,7 +135,7 @@ def test_nothing_is_made_of_images_without_attitude_height_or_gimbal():
     assert tracker.status is TargetStatus.EXPECTED
 
 
-def test_a_gimbal_that_fell_silent_is_not_believed():
+def test_a_gimbal_that_fell_silent_is_not_accepted():
     rig = Rig()
     rig.run(3.0)
     used = rig.tracker.target.accepted

@@ -6,9 +6,9 @@ from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError
 from missions.notes import FlightNotes
 from missions.orbit.gps_switch import GpsSwitch
+from missions.orbit.mission import orbit_verdict
 from missions.orbit.options import GpsOff, OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.orbit.verdict import orbit_verdict
 
 INJECT = dialect.MAV_CMD_INJECT_FAILURE
 REAL = 9  # MAV_PARAM_TYPE

@@ -39,7 +39,7 @@ def test_a_vehicle_elsewhere_is_reported_with_the_position_that_the_mission_assu
     assert figures["radius_mean_error_percent"] is None
     assert (figures["detections_used"], figures["detections_rejected"]) == (5900, 12)
     circle, unknown = mission.report_lines(figures)
-    assert circle.startswith("orbit of 150 m for 600 s, as the mission believes: mean radius 150.4 m")
+    assert circle.startswith("orbit of 150 m for 600 s, as the mission estimates: mean radius 150.4 m")
     for words in ("standard deviation 1.9 m", "within 3.2 m", "target lost 1 times", "5900 detections"):
         assert words in circle
     assert "does not report" in unknown

@@ -11,7 +11,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.kind import VehicleKind
-from missions.preflight.fence_geometry import first_outside
+from missions.preflight.before_flight import first_outside
 from missions.preflight.finding import Finding, Level
 from missions.preflight.health import health_findings, not_ready_because, reasons_against_arming, sensors
 from missions.preflight.lost_link import lost_link_words
