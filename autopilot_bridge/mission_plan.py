@@ -47,8 +47,6 @@ class MissionStore:
         version: raised by every change of `items`, so that a task flying the plan notices an upload.
     """
 
-    __slots__ = ("current", "items", "plan_id", "version")
-
     def __init__(self) -> None:
         self.items: tuple[MissionItem, ...] = ()
         self.current = 0

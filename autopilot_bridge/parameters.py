@@ -152,8 +152,6 @@ class ParameterStore:
         ValueError: the same name twice in the table.
     """
 
-    __slots__ = ("_definitions", "_fixed", "_folded", "_index", "_subscribers", "_values")
-
     def __init__(
         self, definitions: Iterable[ParameterDefinition], overrides: Mapping[str, float] | None = None
     ) -> None:

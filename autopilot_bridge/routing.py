@@ -23,34 +23,32 @@ class Router(Generic[ChannelT]):
     A channel must be hashable. Routing uses ids only, so no frame is packed again: forward `frame.raw`.
     """
 
-    __slots__ = ("_heard",)
-
     def __init__(self) -> None:
-        self._heard: dict[ChannelT, dict[tuple[int, int], None]] = {}
+        self._senders: dict[ChannelT, dict[tuple[int, int], None]] = {}
 
     @property
     def channels(self) -> tuple[ChannelT, ...]:
         """All channels, in the order they were added."""
-        return tuple(self._heard)
+        return tuple(self._senders)
 
     def add(self, channel: ChannelT) -> None:
         """Add a channel; a second call does nothing."""
-        self._heard.setdefault(channel, {})
+        self._senders.setdefault(channel, {})
 
     def remove(self, channel: ChannelT) -> None:
         """Forget a channel and its components."""
-        self._heard.pop(channel, None)
+        self._senders.pop(channel, None)
 
-    def heard(self, channel: ChannelT) -> frozenset[tuple[int, int]]:
+    def senders(self, channel: ChannelT) -> frozenset[tuple[int, int]]:
         """(system id, component id) of all components received on a channel."""
-        return frozenset(self._heard.get(channel, ()))
+        return frozenset(self._senders.get(channel, ()))
 
     def learn(self, frame: Frame, source: ChannelT) -> None:
         """Record that the sender of a frame is on `source`."""
         sender = (frame.system_id, frame.component_id)
-        table = self._heard.get(source)
+        table = self._senders.get(source)
         if table is None:
-            table = self._heard[source] = {}
+            table = self._senders[source] = {}
         table.pop(sender, None)  # to the end: the first in the table was silent longest
         table[sender] = None
         if len(table) > MAX_COMPONENTS:
@@ -69,17 +67,17 @@ class Router(Generic[ChannelT]):
         """Channels that lead to a target (0: all), without `source`."""
         return [
             channel
-            for channel, heard in self._heard.items()
-            if channel != source and _leads_to(heard, target_system, target_component)
+            for channel, senders in self._senders.items()
+            if channel != source and _leads_to(senders, target_system, target_component)
         ]
 
 
-def _leads_to(heard: dict[tuple[int, int], None], system: int, component: int) -> bool:
+def _leads_to(senders: dict[tuple[int, int], None], system: int, component: int) -> bool:
     if system == 0:
         return True
     if component == 0:
-        return any(heard_system == system for heard_system, _ in heard)
-    return (system, component) in heard
+        return any(sender_system == system for sender_system, _ in senders)
+    return (system, component) in senders
 
 
 class LoopGuard:
@@ -92,18 +90,16 @@ class LoopGuard:
         memory: number of frames that are remembered.
     """
 
-    __slots__ = ("_heard", "_memory")
-
     def __init__(self, memory: int = 512) -> None:
-        self._heard: dict[bytes, object] = {}
+        self._received: dict[bytes, object] = {}
         self._memory = memory
 
     def comes_round(self, raw: bytes, channel: object) -> bool:
         """True when these bytes were received first on another channel; remembers them otherwise."""
-        first = self._heard.get(raw)
+        first = self._received.get(raw)
         if first is None:
-            if len(self._heard) >= self._memory:
-                del self._heard[next(iter(self._heard))]
-            self._heard[raw] = channel
+            if len(self._received) >= self._memory:
+                del self._received[next(iter(self._received))]
+            self._received[raw] = channel
             return False
         return first != channel

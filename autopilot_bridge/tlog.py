@@ -46,8 +46,6 @@ class TlogWriter:
         TlogError: the file exists or can't be created.
     """
 
-    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "_packets", "_times_us", "path", "records")
-
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.records = 0

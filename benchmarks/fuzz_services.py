@@ -1,11 +1,11 @@
-"""Messages that nobody should send, into vehicles in hold: every message of the dialect and the sequences of
-every service, with absurd fields.
+"""Malformed and out-of-range messages into vehicles in hold: every message of the dialect and the sequences
+of every service, with absurd fields.
 
     python -m benchmarks.fuzz_services [--messages 1000000] [--seed 0] [--flavour px4|ardupilot] [--jobs 2]
 
 The messages are shared out to both flavours and both classes of vehicle. What is asked
 (`tests.fuzz.campaign`): no exception, no batch of messages that takes more than 50 ms, a vehicle that keeps
-its mode and place whenever nobody gave an order, and memory that does not grow. Exit code 1: something else
+its mode and place whenever no command was sent, and memory that does not grow. Exit code 1: something else
 was seen; what, is printed with the seed and the round that shows it again.
 """
 
@@ -38,7 +38,7 @@ def fire(job: Job) -> tuple[Job, Figures, float]:
     """Run one."""
     start_s = time.perf_counter()
     campaign = Campaign(job.flavour, job.model, job.seed)
-    campaign.run(job.messages, told=_tell)
+    campaign.run(job.messages, reported=_tell)
     return job, campaign.figures, time.perf_counter() - start_s
 
 

@@ -113,7 +113,7 @@ def main() -> None:
         theirs, their_wall_s, their_cpu_s = timed(lambda: pymavlink_messages(part))
         size = log.stat().st_size
     outcomes = [runner.outcomes for runner in found.fleet.runners.values()]
-    heard = sum(sum(counter.values()) for counter in outcomes)
+    received = sum(sum(counter.values()) for counter in outcomes)
     made = sum(len(t) for runner in found.fleet.runners.values() for t in runner.tables.values())
     if found.partial or not made:
         sys.exit(f"the replay failed: {found.failure or found.lacking or 'no estimate was made'}")
@@ -121,10 +121,10 @@ def main() -> None:
     write = sys.stdout.write
     write(
         f"{given.minutes:g} minutes at {given.rate} Hz: {size / 1e6:.1f} MB, {count} messages, "
-        f"{heard} of them heard, {made} estimates\n"
+        f"{received} of them received, {made} estimates\n"
         f"{'':<34} {'wall s':>8} {'CPU s':>8} {'us/message':>11} {'of CPU':>8}\n"
-        f"{'read and estimate (of those heard)':<34} {wall_s:8.2f} {cpu_s:8.2f}"
-        f" {wall_s / heard * 1e6:11.2f} {cpu_s / heard * 1e6:8.2f}\n"
+        f"{'read and estimate (of those received)':<34} {wall_s:8.2f} {cpu_s:8.2f}"
+        f" {wall_s / received * 1e6:11.2f} {cpu_s / received * 1e6:8.2f}\n"
         f"{'pymavlink, reading of a slice only':<34} {their_wall_s:8.2f} {their_cpu_s:8.2f}"
         f" {their_wall_s / theirs * 1e6:11.2f} {their_cpu_s / theirs * 1e6:8.2f}\n"
         f"an hour takes {wall_s * hour:.2f} s ({cpu_s * hour:.2f} s of CPU time); "

@@ -2,7 +2,7 @@
 
     python -m benchmarks.serial_missions [--baud 57600] [--flavour px4] [--mission plan] [--unplug]
 
-For each a `flightstack sitl` at one end and `flightstack fly --connect` at the other, each told the rate of
+For each a `flightstack sitl` at one end and `flightstack fly --connect` at the other, each with the rate of
 the line; at a speedup the line is so much faster by the wall clock. A row tells how the mission ended, what
 of the line was used, how long bytes waited for it, how many commands there were, how many had to be repeated
 and how long the slowest answer took, and the rates of telemetry that were left: ATTITUDE,
@@ -10,9 +10,9 @@ GLOBAL_POSITION_INT, HEARTBEAT. All times are the vehicle's (`tests.serial_meter
 is pulled out in flight, longer than failsafes wait, and put in again.
 
 Exit code 1: a mission did not end as planned, or bytes waited for half a second. After unplugging, a mission
-whose autopilot has left the guided mode may end with its reason. Repeated commands are told and not judged: a
-machine that stops makes a mission ask again. `orbit` steers by what it hears, and loses its target when the
-machine can't keep up: give it a lower speedup.
+whose autopilot has left the guided mode may end with its reason. Repeated commands are reported and not
+judged: a machine that stops makes a mission ask again. `orbit` steers by received messages, and loses its
+target when the machine can't keep up: give it a lower speedup.
 """
 
 import argparse

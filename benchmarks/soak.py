@@ -65,7 +65,7 @@ def kind_of(index: int) -> tuple[str, str]:
 
 
 def serve(vehicles: int, port: int) -> None:
-    """Run the vehicles until told to stop; a line of JSON each second tells pace and memory."""
+    """Run the vehicles until a signal stops them; a line of JSON each second reports pace and memory."""
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
     from autopilot_bridge.sitl.ports import Port
     from flightsim.world_spec import VehicleSpec, WorldSpec
@@ -95,13 +95,13 @@ def serve(vehicles: int, port: int) -> None:
     signal.signal(signal.SIGTERM, on_signal)
 
     def report(pace: "PaceReport") -> None:
-        told = {
+        reported = {
             "time_s": pace.time_us * 1e-6,
             "slipped_s": pace.slipped_s,
             "memory": resident_bytes(),
             "cpu_s": time.process_time(),
         }
-        sys.stdout.write(json.dumps(told) + "\n")
+        sys.stdout.write(json.dumps(reported) + "\n")
         sys.stdout.flush()
 
     server.run(lambda: stop, report=report)
@@ -146,7 +146,7 @@ class Client:
                 self.first_boot_ms = self.first_boot_ms or self.last_boot_ms
 
     def restart(self) -> None:
-        """Forget what was heard: it counts from now on."""
+        """Forget what was received: it counts from now on."""
         self.counts.clear()
         del self.heartbeats_s[:-1]
         self.first_boot_ms = 0
@@ -227,7 +227,7 @@ async def ask(connection: Connection, flavour: str, system_id: int, role: int) -
 
 @dataclass
 class Figures:
-    """What the vehicles' process told."""
+    """What the vehicles' process reported."""
 
     wall_s: list[float] = field(default_factory=list)
     time_s: list[float] = field(default_factory=list)
@@ -236,12 +236,12 @@ class Figures:
     cpu_s: list[float] = field(default_factory=list)
 
     def take(self, line: bytes) -> None:
-        told: dict[str, Any] = json.loads(line)
+        reported: dict[str, Any] = json.loads(line)
         self.wall_s.append(time.monotonic())
-        self.time_s.append(told["time_s"])
-        self.slipped_s.append(told["slipped_s"])
-        self.memory.append(told["memory"])
-        self.cpu_s.append(told["cpu_s"])
+        self.time_s.append(reported["time_s"])
+        self.slipped_s.append(reported["slipped_s"])
+        self.memory.append(reported["memory"])
+        self.cpu_s.append(reported["cpu_s"])
 
     def restart(self) -> None:
         for values in (self.wall_s, self.time_s, self.slipped_s, self.memory, self.cpu_s):

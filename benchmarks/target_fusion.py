@@ -56,7 +56,7 @@ from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
 FORMS = ("measurement", "kalman", "proposed", "frequency")
-HEARD = frozenset(
+RECEIVED = frozenset(
     definition(name).message_id
     for name in (
         "GPS_RAW_INT",
@@ -115,7 +115,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recorded:
-    """A flight as it was heard, with the truth.
+    """A flight as it was received, with the truth.
 
     Attributes:
         frames: what the base station hears of the vehicles, in order.
@@ -150,7 +150,7 @@ class Ear:
 
     def record(self, frames: Sequence[Frame], time_us: int) -> None:
         for frame in frames:
-            if frame.message_id in HEARD:
+            if frame.message_id in RECEIVED:
                 self._ears.take(frame, time_us)
 
 
@@ -249,7 +249,7 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
 
 
 def base_station(form: str, setting: Setting, **chosen: Any) -> TargetFusionEstimator:
-    """The estimator as it would be set for this pattern. All forms believe in the same noise."""
+    """The estimator as it would be set for this pattern. All forms use the same noise."""
     omega_x, omega_y = setting.omega_rad_s
     values: dict[str, Any] = {
         "form": "proposed" if form == "frequency" else form,
@@ -290,12 +290,12 @@ def score(recorded: Recorded, estimator: Estimator[Any]) -> Score:
     )
     north, east = table["north_m"][kept] - true_north, table["east_m"][kept] - true_east
     off = np.hypot(north, east)
-    believed = np.hypot(table["north_sigma_m"][kept], table["east_sigma_m"][kept])
+    accepted = np.hypot(table["north_sigma_m"][kept], table["east_sigma_m"][kept])
     return Score(
         rmse_m=rms(off),
         median_m=float(np.median(off)),
         detections=int(kept.sum()),
-        sigmas=rms(off / believed),
+        sigmas=rms(off / accepted),
     )
 
 

@@ -14,13 +14,12 @@ from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from estimators.comparison import Comparison, comparisons
-    from estimators.errors import EstimatorError
+    from estimators.errors import EstimatorError, LogError
     from estimators.interface import Estimate, Estimator, Need
     from estimators.library import make_estimator
     from estimators.log_replay import Replay, replay
-    from estimators.logs.errors import LogError
+    from estimators.logs.formats import open_log
     from estimators.logs.log import Log
-    from estimators.logs.opening import open_log
     from estimators.logs.report import report_of
 
 __all__ = [
@@ -45,12 +44,12 @@ _MODULES: Final = {
     "Estimator": "estimators.interface",
     "EstimatorError": "estimators.errors",
     "Log": "estimators.logs.log",
-    "LogError": "estimators.logs.errors",
+    "LogError": "estimators.errors",
     "Need": "estimators.interface",
     "Replay": "estimators.log_replay",
     "comparisons": "estimators.comparison",
     "make_estimator": "estimators.library",
-    "open_log": "estimators.logs.opening",
+    "open_log": "estimators.logs.formats",
     "replay": "estimators.log_replay",
     "report_of": "estimators.logs.report",
 }

@@ -1,8 +1,18 @@
-"""The error tree of estimators. Messages name the value, what is accepted, and the next step."""
+"""The error trees of estimators and logs. Messages name the value, what is accepted, and the next step."""
 
 import traceback
 
-__all__ = ["EstimatorError", "EstimatorFailure", "described"]
+from autopilot_bridge.errors import TlogError
+
+__all__ = ["EstimatorError", "EstimatorFailure", "LogError", "NothingThere", "described"]
+
+
+class LogError(TlogError):
+    """A log can't be opened or lacks the requested data; the message names it and the next step."""
+
+
+class NothingThere(LogError):
+    """The requested part of a log contains no data; the message names what the log contains."""
 
 
 class EstimatorError(ValueError):

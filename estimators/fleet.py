@@ -32,7 +32,7 @@ class Fleet:
         name, needs, parameters, observes: of the estimators.
         team: one runner receives the messages of all vehicles.
         names: names of the messages that the estimators receive.
-        heard_names: names of the messages that must be read from a log.
+        read_names: names of the messages that must be read from a log.
 
     Raises:
         EstimatorError: the estimator needs a message that it is not allowed to receive.
@@ -52,7 +52,7 @@ class Fleet:
         self.team = first.TEAM
         self.needs = first.needs
         self.names = self._spare.names
-        self.heard_names = self._spare.heard_names
+        self.read_names = self._spare.read_names
         self.parameters = first.parameters
         self.observes = first.OBSERVES
         self._system_ids = system_ids
@@ -73,16 +73,16 @@ class Fleet:
         Returns:
             The runner that processed it and the outcome; None if it was left out.
         """
-        heard = self._read.get(frame.message_id)
-        if heard is None:
+        read = self._read.get(frame.message_id)
+        if read is None:
             definition = frame.definition
-            tells_time = stamp_field(definition.name, definition.field_names) is not None
-            heard = self._read[frame.message_id] = tells_time or definition.name in self.heard_names
-        if not heard:
+            has_time = stamp_field(definition.name, definition.field_names) is not None
+            read = self._read[frame.message_id] = has_time or definition.name in self.read_names
+        if not read:
             return None
         message = read_message(frame)
         time_us = self._vehicle_time.stamp(message)
-        return self.take(time_us, message) if message.name in self.heard_names else None
+        return self.take(time_us, message) if message.name in self.read_names else None
 
     def newest_us(self, system_id: int) -> int:
         """Newest vehicle time of a system in the frames fed so far; 0: none yet."""

@@ -22,8 +22,6 @@ class InputGuard:
         max_gap_us: longest gap of a leading stream that the estimator can bridge; None: any.
     """
 
-    __slots__ = ("_last", "_max_gap_us")
-
     def __init__(self, max_gap_us: int | None = None) -> None:
         if max_gap_us is not None and max_gap_us <= 0:
             raise ValueError(f"max_gap_us {max_gap_us} is not above 0; None accepts any gap")

@@ -204,15 +204,15 @@ def _choice(text: str, known: Mapping[str, Any], name: str) -> Any:
 def _one_of(text: str, kinds: tuple[Any, ...], name: str) -> Any:
     if type(None) in kinds and text.lower() in ("none", ""):
         return None
-    complaints: list[str] = []
+    errors: list[str] = []
     # Every input is valid text, so text is tried last.
     for kind in sorted((k for k in kinds if k is not type(None)), key=lambda k: k is str):
         try:
             return _value(text, kind, name)
         except EstimatorError as error:
-            complaints.append(str(error))
+            errors.append(str(error))
     accepts_none = ", or none" if type(None) in kinds else ""
-    raise EstimatorError(complaints[-1] + accepts_none)
+    raise EstimatorError(errors[-1] + accepts_none)
 
 
 def _tuple(text: str, kinds: tuple[Any, ...], name: str) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ from estimators.library import make_estimator
 from estimators.messages import Message
 from estimators.needs import NOT_STREAMED, Supply, supplies
 from estimators.observations import Observation, observations_beside, read_observations
-from estimators.runner import why_unheard
+from estimators.runner import why_excluded
 
 if TYPE_CHECKING:
     from estimators.logs import Log
@@ -129,7 +129,7 @@ def log_rate_hz(log: "Log", system_id: int, name: str) -> float:
     components = [
         key.component_id
         for key in log.keys
-        if key.name == name and key.system_id == system_id and why_unheard(name, key.component_id) is None
+        if key.name == name and key.system_id == system_id and why_excluded(name, key.component_id) is None
     ]
     if not components:
         return 0.0
@@ -168,7 +168,7 @@ def _messages(
     """Needed messages in the order of the file, and whether they are in the selected part; of several logs,
     in the order of the team's common time.
     """
-    names = sorted(fleet.heard_names)
+    names = sorted(fleet.read_names)
     streams = [_all_of(log, _present(log, names), system_id, part, fleet) for log in logs]
     if len(streams) == 1:
         return streams[0]

@@ -73,11 +73,11 @@ def wanted_rate_hz(need: Need) -> float:
 def _supply(need: Need, rate_hz: Callable[[str], float]) -> Supply:
     fastest, fastest_hz = "", 0.0
     for name in need.messages:
-        heard_hz = rate_hz(name)
-        if heard_hz > 0.0 and heard_hz >= RATE_TOLERANCE * need.rate_hz:
-            return Supply(need=need, message=name, rate_hz=heard_hz, met=True)
-        if heard_hz > fastest_hz:
-            fastest, fastest_hz = name, heard_hz
+        received_hz = rate_hz(name)
+        if received_hz > 0.0 and received_hz >= RATE_TOLERANCE * need.rate_hz:
+            return Supply(need=need, message=name, rate_hz=received_hz, met=True)
+        if received_hz > fastest_hz:
+            fastest, fastest_hz = name, received_hz
     return Supply(need=need, message=fastest, rate_hz=fastest_hz, met=False)
 
 

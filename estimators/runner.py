@@ -20,8 +20,7 @@ from estimators.interface import Estimate, EstimateSet, Estimator, Need, Outcome
 from estimators.messages import Message, read_message
 from estimators.needs import message_names
 from estimators.observations import Observation
-from estimators.team_time import TeamTime
-from estimators.vehicle_time import VehicleTime
+from estimators.vehicle_time import TeamTime, VehicleTime
 
 __all__ = [
     "ESTIMATE_MESSAGES",
@@ -30,7 +29,7 @@ __all__ = [
     "TRUTH_MESSAGES",
     "EstimateTable",
     "Runner",
-    "why_unheard",
+    "why_excluded",
 ]
 
 TRUTH_COMPONENT: Final = 25
@@ -61,7 +60,7 @@ LANDING_TARGET.
 _SYSTEM_TIME: Final = "SYSTEM_TIME"
 
 
-def why_unheard(name: str, component_id: int) -> str | None:
+def why_excluded(name: str, component_id: int) -> str | None:
     """The reason why estimators don't receive a component's message; None when they do."""
     if component_id == TRUTH_COMPONENT:
         return "truth"
@@ -84,8 +83,6 @@ class EstimateTable:
         columns: names of the values, with unit suffixes.
         of_sets: whether the estimates are sets.
     """
-
-    __slots__ = ("_indices", "_keys", "_values", "columns", "name", "of_sets")
 
     def __init__(self, kind: type[Estimate] | type[EstimateSet]) -> None:
         self.name = kind.__name__
@@ -213,7 +210,7 @@ class Runner:
         self._newest_us: int | None = None
 
     @property
-    def heard_names(self) -> frozenset[str]:
+    def read_names(self) -> frozenset[str]:
         """Names of the messages to read from a log: those that the estimator needs and, for a team, those
         that its common time needs.
         """
@@ -268,7 +265,7 @@ class Runner:
         if name not in self.names:
             return None
         component = message.src_component
-        if component != 1 and (reason := why_unheard(name, component)):
+        if component != 1 and (reason := why_excluded(name, component)):
             self.left_out[reason] += 1
             return None
         if team_time is not None:

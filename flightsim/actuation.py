@@ -55,8 +55,6 @@ class _Properties:
         limits: (properties, 3): offset, minimum, maximum.
     """
 
-    __slots__ = ("_scale", "_setters", "_values")
-
     def __init__(self, setters: Sequence[Callable[[float], Any]], scales: Array, limits: Array) -> None:
         self._setters = tuple(setters)
         self._values = np.zeros(len(self._setters))
@@ -78,19 +76,6 @@ class FixedWingActuators:
         roles: those the vehicle has.
         parked: chocks are before the wheels, until throttle is given or it is launched: brakes are full on.
     """
-
-    __slots__ = (
-        "_channels",
-        "_effectiveness",
-        "_fdm",
-        "_name",
-        "_nodes",
-        "_slow",
-        "_stuck",
-        "parked",
-        "roles",
-        "write",
-    )
 
     def __init__(self, fdm: jsbsim.FGFDMExec, airframe: Airframe) -> None:
         """Find the properties.

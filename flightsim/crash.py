@@ -60,8 +60,6 @@ class Touches:
         within_steps: touches no farther apart are bounces of one landing.
     """
 
-    __slots__ = ("_aloft_ned_m_s", "_on_ground", "_step", "_touch_ned_m_s", "_within_steps")
-
     def __init__(self, within_steps: int) -> None:
         self._within_steps = within_steps
         self._aloft_ned_m_s = np.zeros(3)

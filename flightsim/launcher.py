@@ -43,27 +43,6 @@ class Launcher:
         released: True when the vehicle flies by itself.
     """
 
-    __slots__ = (
-        "_attitude",
-        "_direction_ned",
-        "_dt_s",
-        "_enable",
-        "_forces",
-        "_inertia_kg_m2",
-        "_mass",
-        "_moments",
-        "_motion",
-        "_origin",
-        "_set_force",
-        "_set_moment",
-        "_speed_m_s",
-        "distance_m",
-        "held",
-        "parameters",
-        "released",
-        "time_s",
-    )
-
     def __init__(self, fdm: jsbsim.FGFDMExec, parameters: LaunchParameters, *, physics_rate_hz: int) -> None:
         """Take hold of the vehicle where it is now, with the attitude it has now.
 

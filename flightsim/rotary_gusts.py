@@ -79,8 +79,6 @@ class RotaryGusts:
         rates_frd_rad_s: (3,) present rotation of the air over ground, body axes, written in place by `step`.
     """
 
-    __slots__ = ("_block", "_dt_s", "_generator", "_next", "_span_m", "_state", "_work", "rates_frd_rad_s")
-
     def __init__(self, *, span_m: float, dt_s: float, seed_sequence: np.random.SeedSequence) -> None:
         """Start in the stationary state of p_g, with no slopes.
 

@@ -173,21 +173,6 @@ class TruthReader:
         AirframeError: the model lacks a property.
     """
 
-    __slots__ = (
-        "_get_motion",
-        "_get_slow",
-        "_pack_motion",
-        "_pack_slow",
-        "_raw",
-        "_raw_view",
-        "_sink_max_m_s",
-        "_slow_phase",
-        "_slow_steps",
-        "_truth",
-        "_write",
-        "touches",
-    )
-
     def __init__(
         self,
         fdm: jsbsim.FGFDMExec,

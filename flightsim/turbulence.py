@@ -104,19 +104,6 @@ class DrydenTurbulence:
         scales: (4,) present lengths and intensities, as of `low_altitude_scales`.
     """
 
-    __slots__ = (
-        "_block",
-        "_cos_wind",
-        "_dt_s",
-        "_generator",
-        "_next",
-        "_sin_wind",
-        "_state",
-        "_w20_m_s",
-        "scales",
-        "velocity_ned_m_s",
-    )
-
     def __init__(
         self,
         *,

@@ -62,30 +62,6 @@ class Vehicle:
         load_warnings: JSBSim's warnings about the model; empty if there are none.
     """
 
-    __slots__ = (
-        "_air",
-        "_fdm",
-        "_initial",
-        "_magnetic_steps",
-        "_motor_effectiveness",
-        "_read",
-        "_reader",
-        "_run",
-        "_seed_sequence",
-        "_set_actuators",
-        "_slow_steps",
-        "_steps",
-        "_surfaces",
-        "airframe",
-        "crash",
-        "environment",
-        "home",
-        "launcher",
-        "load_warnings",
-        "physics_rate_hz",
-        "truth",
-    )
-
     def __init__(
         self,
         model: str | Path = "iris",

@@ -34,24 +34,6 @@ class VehicleAir:
         stirs: there is something to do in every step.
     """
 
-    __slots__ = (
-        "_fdm",
-        "_ground_alt_m",
-        "_gusts",
-        "_physics_rate_hz",
-        "_profile",
-        "_rotary",
-        "_seed_sequence",
-        "_set_gust",
-        "_set_rotary",
-        "_set_wind",
-        "_shears",
-        "_span_m",
-        "_turbulence",
-        "_wind_ned_m_s",
-        "stirs",
-    )
-
     def __init__(
         self,
         fdm: jsbsim.FGFDMExec,

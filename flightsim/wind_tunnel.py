@@ -84,26 +84,6 @@ class WindTunnel:
         standing_height_m: of its centre of gravity over the ground, on its wheels.
     """
 
-    __slots__ = (
-        "_block_steps",
-        "_environment",
-        "_fdm",
-        "_forces",
-        "_get",
-        "_height_m",
-        "_home",
-        "_start_done",
-        "_sticky",
-        "actuators",
-        "airframe",
-        "chord_m",
-        "density_kg_m3",
-        "mass_kg",
-        "standing_height_m",
-        "wing_area_m2",
-        "wing_span_m",
-    )
-
     def __init__(
         self,
         model: str | Path | Airframe,

@@ -56,8 +56,6 @@ class World:
         step_us: length of a physics step.
     """
 
-    __slots__ = ("parameters", "step_us", "streams", "time_us", "vehicles")
-
     def __init__(self, parameters: WorldParameters | None = None) -> None:
         self.parameters = parameters or WorldParameters()
         self.streams = RandomStreams(self.parameters.seed)

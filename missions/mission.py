@@ -62,10 +62,10 @@ class Debriefing:
 
 def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
     """The verdicts on all vehicles of a flight in one sentence; "" if all have flown the commanded paths."""
-    told = {notes.system_id: verdict(notes, score) for notes, score in debriefing.flights}
-    if len(told) == 1:
-        return next(iter(told.values()))
-    return "; ".join(f"vehicle {system_id}: {text}" for system_id, text in told.items() if text)
+    verdicts = {notes.system_id: verdict(notes, score) for notes, score in debriefing.flights}
+    if len(verdicts) == 1:
+        return next(iter(verdicts.values()))
+    return "; ".join(f"vehicle {system_id}: {text}" for system_id, text in verdicts.items() if text)
 
 
 class Mission(Generic[AnyOptions]):
@@ -75,7 +75,7 @@ class Mission(Generic[AnyOptions]):
         name: name for users and for file names.
         world_defaults: the world it is flown in by default.
         kinds: kinds of vehicles that can fly it, the default one first.
-        together: one call of `fly_team` flies all vehicles of a team, instead of one call of `fly` for each.
+        flies_as_team: one call of `fly_team` flies all vehicles of a team; else `fly` is called for each.
         commands: the mission commands its vehicle. A mission that only observes leaves the vehicle in its
             current state, even in flight.
     """
@@ -83,7 +83,7 @@ class Mission(Generic[AnyOptions]):
     name: str = "mission"
     world_defaults = WorldDefaults()
     kinds: tuple[VehicleKind, ...] = (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
-    together = False
+    flies_as_team = False
     commands = True
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
@@ -128,7 +128,7 @@ class Mission(Generic[AnyOptions]):
         raise PlanError(f"mission {self.name} flies no single vehicle")
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[AnyOptions]) -> None:
-        """Fly all vehicles of a team, each ready to arm; called instead of `fly` if `together` is set."""
+        """Fly all vehicles of a team, each ready to arm; called instead of `fly` if `flies_as_team`."""
         raise PlanError(f"mission {self.name} flies no team")
 
     def estimator_settings(self, options: AnyOptions) -> Mapping[str, float]:
@@ -156,7 +156,7 @@ class Mission(Generic[AnyOptions]):
         """What `summary.json` has beside the figures of every flight."""
         return {}
 
-    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         """Lines that the command line prints after a completed flight, besides those of every flight."""
         return ()
 

@@ -16,7 +16,7 @@ except ImportError:  # not on Windows: there everybody compiles
 
 
 def compile_in_turn() -> None:
-    """Compile for every kind of vehicle, or load what somebody else has compiled in the meantime."""
+    """Compile for every kind of vehicle, or load what another process has compiled in the meantime."""
     with _turn():
         compile_flight_code((VehicleSpec(), VehicleSpec(model="aerosonde")))
 

@@ -163,7 +163,7 @@ class SerialLine:
                 way.put(os.read(source, 65536), now_s)
         arrived = way.take(now_s, elapsed_s)
         if arrived:
-            with contextlib.suppress(BlockingIOError):  # nobody reads there: lost, as on a cable
+            with contextlib.suppress(BlockingIOError):  # no reader there: lost, as on a cable
                 os.write(sink, arrived)
 
 

@@ -1,4 +1,4 @@
-"""A program at a terminal of its own, and somebody who types there."""
+"""A program at a terminal of its own, and a user that types there."""
 
 import fcntl
 import os
@@ -18,7 +18,7 @@ END_OF_FILE = "\x04"
 
 
 class Terminal:
-    """What somebody sees of a program, and types.
+    """What a user sees of a program, and types.
 
     Attributes:
         process: the program.
@@ -72,7 +72,7 @@ class Terminal:
     def _read(self) -> bool:
         """Take what has come on the screen by now; whether it was something."""
         before = len(self.seen)
-        with suppress(OSError):  # nobody has it open any more
+        with suppress(OSError):  # no process has it open any more
             while self._screen is not None and select.select([self._screen], [], [], 0.0)[0]:
                 data = os.read(self._screen, 65536)
                 self.seen += data.decode(errors="replace")
@@ -82,7 +82,7 @@ class Terminal:
 
 
 def _take_terminal() -> None:
-    """In the program's process: it is told when its terminal is closed, also where the tests run by nohup."""
+    """In the program's process: a signal when its terminal is closed, also where the tests run by nohup."""
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -20,8 +20,8 @@ from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.firmware.external_mapping import connected
 from autopilot_bridge.firmware.flavour import Flavour
-from autopilot_bridge.firmware.gps_source import connected
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
@@ -40,7 +40,7 @@ from autopilot_bridge.services.parameters.protocol import ParameterService, fix_
 from autopilot_bridge.services.plans.geofence import MissionFence
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache
@@ -61,8 +61,6 @@ EntryT = TypeVar("EntryT")
 
 class _Progress:
     """The mission being flown, as the mission protocol sees it."""
-
-    __slots__ = ("_commander", "complete")
 
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
@@ -249,7 +247,7 @@ class Autopilot:
             firmware.parameters,
             self,
             on_list=self._texts.banner,
-            on_fixed=self._tell_fixed,
+            on_fixed=self._report_fixed,
         )
         timed = [more for more in self._more if type(more).tick is not Microservice.tick]
         self._timed: tuple[TimedService, ...] = (
@@ -362,7 +360,7 @@ class Autopilot:
 
     def _follow(self, event: events.Event) -> None:
         """Pass an event of the vehicle to the other parts of the autopilot."""
-        self._texts.tell(event)
+        self._texts.report(event)
         for follower in self._followers:
             follower.follow(event)
         match event:
@@ -392,7 +390,7 @@ class Autopilot:
         self.navigation.set_parameters(flavour.navigation_parameters(store))
         self._streams.change(name, self._time_us)
 
-    def _tell_fixed(self, name: str) -> None:
+    def _report_fixed(self, name: str) -> None:
         value = self.parameters.get(name)
         self._texts.announce(mavlink.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
 

@@ -51,19 +51,6 @@ class ChannelStreams:
         running: the same tables, as a sequence to iterate over.
     """
 
-    __slots__ = (
-        "_cache",
-        "_channels",
-        "_firmware",
-        "_motion",
-        "_parameters",
-        "_ports",
-        "_step_us",
-        "_throttles",
-        "running",
-        "tables",
-    )
-
     def __init__(
         self,
         channels: list[AutopilotChannel],

@@ -20,8 +20,6 @@ RECEIVER: Final = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 class NavigationJudgement:
     """The filter's health in the form that the commander reads."""
 
-    __slots__ = ("_navigation",)
-
     def __init__(self, navigation: NavigationFilter) -> None:
         self._navigation = navigation
 

@@ -40,7 +40,7 @@ class StatusTextService:
         """Forget a channel that was closed."""
         self._greeted.discard(channel.name)
 
-    def tell(self, event: Event) -> None:
+    def report(self, event: Event) -> None:
         """Announce an event with the flavour's text."""
         end = "\t" if self._flavour.sends_events else ""  # marks a text that an EVENT repeats
         for notice in self._flavour.notices(event):
@@ -66,7 +66,7 @@ class StatusTextService:
         return (
             not self._flavour.text_needs_heartbeat
             or channel.name in self._greeted
-            or getattr(channel, "hears_all", False)  # a log
+            or getattr(channel, "receives_all", False)  # a log
         )
 
     def _messages(self, severity: int, text: str) -> list[MavlinkMessage]:

@@ -41,8 +41,6 @@ class LoopClock:
     It is that of the loop that runs when the time is first requested.
     """
 
-    __slots__ = ("_time_s",)
-
     def __init__(self) -> None:
         self._time_s: Callable[[], float] | None = None
 

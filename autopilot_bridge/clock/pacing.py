@@ -29,8 +29,6 @@ class Pacer:
         slipped_s: total wall time lost because the simulation could not keep pace, s.
     """
 
-    __slots__ = ("_anchor_s", "_anchor_us", "_monotonic", "_speedup", "max_lag_s", "slipped_s")
-
     def __init__(
         self,
         speedup: float = 1.0,
@@ -76,8 +74,6 @@ class RealTimeClock:
         wait: waits for so many wall seconds; a function that also serves sockets may be used here.
         max_lag_s: lag that is caught up (see `Pacer`).
     """
-
-    __slots__ = ("_pacer", "_wait", "lag_s", "max_lag_seen_s")
 
     def __init__(
         self,

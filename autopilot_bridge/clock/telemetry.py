@@ -217,8 +217,6 @@ class TelemetryClock:
 class _Deadline:
     """A time of the vehicle, and the action at that time."""
 
-    __slots__ = ("callback", "time_us")
-
     def __init__(self, time_us: int, callback: Callable[[], object]) -> None:
         self.time_us = time_us
         self.callback = callback

@@ -138,9 +138,9 @@ def arming_reasons(
         reasons.append(Reason.LEANING)
     if situation.throttle_high and Need.MANUAL_CONTROL in needs:
         reasons.append(Reason.THROTTLE_HIGH)
-    heard = policy.gcs_needed_to_arm or math.isfinite(situation.gcs_age_s)
+    expected = policy.gcs_needed_to_arm or math.isfinite(situation.gcs_age_s)
     lost = 0.0 < parameters.gcs_loss_s < situation.gcs_age_s
-    if heard and lost and parameters.gcs_loss_action > FailsafeAction.WARN:
+    if expected and lost and parameters.gcs_loss_action > FailsafeAction.WARN:
         reasons.append(Reason.GCS_LOST)
     if not parameters.check_arming or (forced and policy.force_arm_skips_checks):
         optional = frozenset() if Need.POSITION in needs else frozenset({Reason.POSITION})
@@ -171,8 +171,6 @@ class ArmingChecks:
     Attributes:
         reasons: all reasons against arming.
     """
-
-    __slots__ = ("_policy", "_reported_us", "reasons")
 
     def __init__(self, policy: CommanderPolicy) -> None:
         self._policy = policy

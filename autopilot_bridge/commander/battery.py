@@ -8,8 +8,6 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 class BatteryMonitor:
     """Monitors the battery. Voltage must stay low for `battery_timer_s`, so sag under load has no effect."""
 
-    __slots__ = ("_critical_since_us", "_low_since_us", "level")
-
     def __init__(self) -> None:
         self.level = BatteryLevel.OK
         self._low_since_us: int | None = None

@@ -32,16 +32,14 @@ from autopilot_bridge.commander.guidance import Guidance
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.link_and_sensor_monitor import LinkAndSensorMonitor
-from autopilot_bridge.commander.mode_memory import ModeMemory
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
-from autopilot_bridge.commander.pilot import PilotInput, StickOverride
+from autopilot_bridge.commander.pilot import ModeMemory, PilotInput, StickOverride
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
-from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.situation import Situation, SituationUpdate
 from autopilot_bridge.commander.task_events import TaskFollower
 from autopilot_bridge.commander.tasks import TaskRunner
-from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
+from autopilot_bridge.commander.vehicle_tasks import LandDetector, SetpointStream, VehicleTasks
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.plan_reading import ends_in_landing, in_landing_sequence, starts_with_takeoff
@@ -244,7 +242,7 @@ class Commander:
         )
         if reasons:
             self._checks.reasons = reasons
-            self._tell_reasons(reasons, check_only=False)
+            self._report_reasons(reasons, check_only=False)
             return Verdict(result=self.policy.arming_denied, reasons=reasons)
         self.armed = self.context.armed = True
         self._disarming.begin(self.time_us)
@@ -278,7 +276,7 @@ class Commander:
         self._refresh()
         reasons = self._checks.run(self.commanded_mode, self.situation, self.parameters)
         if reasons:
-            self._tell_reasons(reasons, check_only=True)
+            self._report_reasons(reasons, check_only=True)
         return reasons
 
     def set_home_here(self) -> bool:
@@ -318,20 +316,20 @@ class Commander:
         if not self.armed:
             self._checks.run(self.commanded_mode, self.situation, self.parameters)
             if self.booted and self._checks.report_due(time_us):
-                self._tell_reasons(self.arming_reasons, check_only=True)
+                self._report_reasons(self.arming_reasons, check_only=True)
         self._events.extend(self._monitor.update(self.situation, self.parameters, self.context.health))
-        told = self.failsafes.update(self.situation, self.parameters)
-        self._events.extend(told)
+        changes = self.failsafes.update(self.situation, self.parameters)
+        self._events.extend(changes)
         self._select()
         crash = self._crash.update(self.situation, self.context) if self.parameters.crash_check else None
         if crash is not None:
             self.emit(crash)
             self._disarm(DisarmReason.FAILSAFE)
-        restored = self._memory.recall(told)
+        restored = self._memory.recall(changes)
         if restored is not None and self.armed:
             self.change_mode(restored)
 
-    def _tell_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
+    def _report_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
         mode = self.commanded_mode
         self.emit(ArmingDenied(time_us=self.time_us, mode=mode, reasons=reasons, check_only=check_only))
 

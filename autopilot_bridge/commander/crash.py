@@ -24,8 +24,6 @@ _EXEMPT: Final = frozenset((FlightMode.ACRO,))
 class CrashCheck:
     """Monitors one flight; called at 10 Hz."""
 
-    __slots__ = ("_acceleration_m_s2", "_since_us")
-
     def __init__(self) -> None:
         self._acceleration_m_s2 = [0.0, 0.0, 0.0]
         self._since_us: int | None = None

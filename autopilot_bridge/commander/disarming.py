@@ -11,8 +11,6 @@ from autopilot_bridge.flight.context import FlightContext
 class AutoDisarm:
     """Monitors one armed period: take-off, landing, and when the motors must stop."""
 
-    __slots__ = ("_flew", "_landed_since_us", "_policy", "_waiting_since_us")
-
     def __init__(self, policy: CommanderPolicy) -> None:
         self._policy = policy
         self._flew = False

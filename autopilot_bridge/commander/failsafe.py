@@ -64,16 +64,6 @@ class FailsafeMonitor:
             requirements of the modes.
     """
 
-    __slots__ = (
-        "_active",
-        "_fence_breaches",
-        "_keeps_mode",
-        "_policy",
-        "_position_lost_us",
-        "_tilted_us",
-        "started",
-    )
-
     def __init__(self, policy: CommanderPolicy) -> None:
         self._policy = policy
         self._keeps_mode = policy.recovers

@@ -81,8 +81,6 @@ class FenceKeeper:
         parameters: returns the present parameters.
     """
 
-    __slots__ = ("_context", "_health", "_parameters", "_watch")
-
     def __init__(
         self,
         watch: FenceWatch,
@@ -108,7 +106,7 @@ class FenceKeeper:
         if parameters.predicts and position is not None and situation.airborne:
             position = place_ahead(context, position)
         home = tuple(context.home_ned_m.tolist()) if situation.home_set else None
-        told = watch.update(
+        changes = watch.update(
             position,
             home,
             context.frame,
@@ -122,7 +120,7 @@ class FenceKeeper:
         situation.fence_present = watch.present(parameters)
         situation.fence_breaches = watch.breaches
         situation.fence_away_m = watch.distance_m
-        return told
+        return changes
 
     def allows(self, place_ned_m: Array) -> bool:
         """True when a position is inside all enabled walls."""

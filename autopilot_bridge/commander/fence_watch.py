@@ -31,20 +31,6 @@ class FenceWatch:
         distance_m: how far outside the height limits and the circle the vehicle is.
     """
 
-    __slots__ = (
-        "_above_floor",
-        "_armed",
-        "_auto_on",
-        "_backup_m",
-        "_home",
-        "_off",
-        "breach_time_us",
-        "breaches",
-        "broken",
-        "distance_m",
-        "geofence",
-    )
-
     def __init__(self, plan: MissionStore) -> None:
         self.geofence = Geofence(plan)
         self.broken = _NOTHING

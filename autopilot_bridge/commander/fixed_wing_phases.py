@@ -23,8 +23,6 @@ _NOTHING: Final[tuple[Event, ...]] = ()
 class PhaseWatch:
     """Compares the phase of the task being flown with the phase 20 ms before."""
 
-    __slots__ = ("_phase", "_task")
-
     def __init__(self) -> None:
         self._task: FlightTask | None = None
         self._phase: TakeoffPhase | LandPhase | None = None

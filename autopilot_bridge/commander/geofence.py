@@ -25,8 +25,6 @@ class Geofence:
         plan: the store of the uploaded fence.
     """
 
-    __slots__ = ("_frame", "_plan", "_return_point", "_shapes", "_version")
-
     def __init__(self, plan: MissionStore) -> None:
         self._plan = plan
         self._version = -1

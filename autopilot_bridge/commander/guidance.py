@@ -125,10 +125,10 @@ class Guidance:
         fence, frame = commander.parameters.fence, commander.context.frame
         bounded = commander.policy.fence_bounds_targets and fence.bounds_targets
         if bounded and not commander.fence.allows((north_m, east_m, down_m), frame, fence):
-            told = CommandDenied(
+            denied = CommandDenied(
                 time_us=commander.time_us, command=_DO_REPOSITION, reason=Reason.OUTSIDE_FENCE
             )
-            commander.emit(told)
+            commander.emit(denied)
             return Verdict(result=commander.policy.mode_denied, reasons=(Reason.OUTSIDE_FENCE,))
         verdict = commander.set_mode(commander.policy.reposition_mode)
         if not verdict.accepted or not commander.armed or commander.mode is not commander.commanded_mode:
@@ -259,15 +259,15 @@ class Guidance:
         if speed_m_s <= 0.0:
             self.forget_speed()
             for each in dict.fromkeys(self._vehicle.speed_kind(kind) for kind in SpeedKind):
-                self._tell_speed(each, None)
+                self._report_speed(each, None)
             return
         changed = self._vehicle.speed_kind(kind)
         speed = min(speed_m_s, _MAX_SPEED_M_S)
         self._speeds_m_s[changed] = speed
         self._apply_speeds()
-        self._tell_speed(changed, speed)
+        self._report_speed(changed, speed)
 
-    def _tell_speed(self, kind: SpeedKind, speed_m_s: float | None) -> None:
+    def _report_speed(self, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Set the speed of the task being flown, and of one that is paused."""
         tasks = self._commander.tasks
         for task in (tasks.task, tasks.paused):

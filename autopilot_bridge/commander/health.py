@@ -79,8 +79,6 @@ class VehicleHealth:
 class _Watch:
     """Freshness of one sensor: detects late samples and values that never change."""
 
-    __slots__ = ("_equal", "_last", "_last_time_us", "_may_repeat", "_reading", "_stale_us")
-
     def __init__(self, reading: Reading, stale_us: int, *, may_repeat: bool = False) -> None:
         self._reading = reading
         self._stale_us = stale_us
@@ -110,19 +108,6 @@ class HealthMonitor:
         airspeed: the vehicle has, and needs, a pitot tube.
         gps_may_repeat: fixes with identical values do not count as a frozen receiver.
     """
-
-    __slots__ = (
-        "_airspeed",
-        "_barometer",
-        "_battery",
-        "_gps",
-        "_imu",
-        "_magnetometer",
-        "_rangefinder",
-        "_readings",
-        "health",
-        "navigation",
-    )
 
     def __init__(
         self,

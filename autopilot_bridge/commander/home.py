@@ -25,8 +25,6 @@ class Home:
         commanded: a client has set it: arming does not move it.
     """
 
-    __slots__ = ("_context", "_emit", "_frame", "commanded", "position", "yaw_rad")
-
     def __init__(self, context: FlightContext, emit: Callable[[Event], None]) -> None:
         self._context = context
         self._emit = emit

@@ -12,8 +12,6 @@ from autopilot_bridge.navigation.health import NavigationHealth
 class AirspeedMonitor:
     """Reports when the sensor is disabled while armed, and when it is used again."""
 
-    __slots__ = ("_valid",)
-
     def __init__(self) -> None:
         self._valid = True
 
@@ -34,8 +32,6 @@ _GPS_STOPPED_US: Final = 7_000_000
 class LinkAndSensorMonitor:
     """Reports when a link or GPS that was present is lost, and when it is back."""
 
-    __slots__ = ("_airspeed", "_lost_us")
-
     def __init__(self) -> None:
         self._airspeed = AirspeedMonitor()
         self._lost_us: dict[Aid, int | None] = {}  # None: not lost
@@ -44,7 +40,7 @@ class LinkAndSensorMonitor:
         self, situation: Situation, parameters: CommanderParameters, navigation: NavigationHealth | None
     ) -> list[Event]:
         """Check the newest situation; returns the changes."""
-        told: list[Event | None] = [
+        changes: list[Event | None] = [
             self._airspeed.update(situation.health, armed=situation.armed, time_us=situation.time_us),
             self._judge(Aid.GROUND_STATION, situation.gcs_age_s, parameters.gcs_loss_s, situation.time_us),
             self._judge(Aid.STICKS, situation.sticks_age_s, parameters.manual_loss_s, situation.time_us),
@@ -52,8 +48,8 @@ class LinkAndSensorMonitor:
         if navigation is not None and navigation.time_since_gps_us >= 0:
             age_s, limit_s = navigation.time_since_gps_us * 1e-6, _GPS_STOPPED_US * 1e-6
             news = self._judge(Aid.GPS, age_s, limit_s, situation.time_us)
-            told.append(news if situation.armed else None)
-        return [event for event in told if event is not None]
+            changes.append(news if situation.armed else None)
+        return [event for event in changes if event is not None]
 
     def _judge(self, aid: Aid, age_s: float, limit_s: float, time_us: int) -> AidChanged | None:
         if limit_s <= 0.0:

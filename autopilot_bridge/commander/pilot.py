@@ -1,8 +1,10 @@
-"""The pilot's input: sticks and heartbeats of ground stations with their ages, and the override of a mode."""
+"""The pilot's input: sticks and heartbeats of ground stations their ages, and their effect on the mode."""
 
 import math
+from collections.abc import Iterable
 from typing import Final
 
+from autopilot_bridge.commander.events import Event, FailsafeAction, FailsafeCleared, FailsafeKind
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.flight.context import ManualInput
@@ -10,6 +12,36 @@ from autopilot_bridge.flight.context import ManualInput
 _NO_INPUT: Final = ManualInput()
 _RADIO_AT_REST: Final = ManualInput(throttle=-1.0, valid=True, simulated=True)
 THROTTLE_HIGH: Final = -0.8  # above this the throttle stick is not down
+
+
+class ModeMemory:
+    """Stores the mode from before a failsafe of the radio until another decision replaces it.
+
+    Args:
+        active: the flavour restores the mode; else nothing is stored.
+    """
+
+    def __init__(self, *, active: bool) -> None:
+        self._active = active
+        self._mode: FlightMode | None = None
+
+    def note(self, started: Iterable[tuple[FailsafeKind, FailsafeAction]], mode: FlightMode) -> None:
+        """Failsafes started in a mode; only a first, short loss of the radio is reversed later."""
+        for kind, action in started:
+            if action > FailsafeAction.WARN:
+                self._mode = mode if self._active and kind is FailsafeKind.MANUAL_LOST else None
+
+    def forget(self) -> None:
+        """A client or pilot has selected a mode."""
+        self._mode = None
+
+    def recall(self, changes: Iterable[Event]) -> FlightMode | None:
+        """The mode to restore because the radio is back; None: no change."""
+        for event in changes:
+            if isinstance(event, FailsafeCleared) and event.kind is FailsafeKind.MANUAL_LOST:
+                mode, self._mode = self._mode, None
+                return mode
+        return None
 
 
 class PilotInput:
@@ -22,8 +54,6 @@ class PilotInput:
     Attributes:
         muted: the radio is being calibrated; its sticks have no effect.
     """
-
-    __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "muted", "radio_failed_since_us")
 
     def __init__(self, *, built_in_radio: bool) -> None:
         self._built_in_radio = built_in_radio
@@ -55,7 +85,7 @@ class PilotInput:
         self._time_us = -1
         self._sticks = _NO_INPUT
 
-    def hear_gcs(self, time_us: int) -> None:
+    def on_gcs(self, time_us: int) -> None:
         """A heartbeat of a ground station was received."""
         self._gcs_time_us = time_us
 
@@ -89,8 +119,6 @@ def stick_travel(now: ManualInput, before: ManualInput) -> float:
 
 class StickOverride:
     """Compares the sticks with their positions at the last mode command."""
-
-    __slots__ = ("_at_command",)
 
     def __init__(self) -> None:
         self._at_command = ManualInput()

@@ -12,7 +12,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput
 from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.commander.setpoints import SetpointStream
+from autopilot_bridge.commander.vehicle_tasks import SetpointStream
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.navigation import layout as nav
@@ -98,8 +98,6 @@ class SituationUpdate:
         home: provides whether home is known.
         battery: provides the warning level.
     """
-
-    __slots__ = ("_battery", "_context", "_home", "_pilot", "_policy", "_setpoints", "_situation")
 
     def __init__(
         self,

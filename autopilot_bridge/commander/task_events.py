@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 class TaskFollower:
     """Reads the events of the active flight task for the commander."""
 
-    __slots__ = ("_commander",)
-
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
 
@@ -29,9 +27,9 @@ class TaskFollower:
         events = commander.context.events
         if not events:
             return
-        told = events[:]
+        changes = events[:]
         events.clear()
-        for each in told:
+        for each in changes:
             self._take(each)
 
     def _take(self, event: flight.FlightEvent) -> None:

@@ -1,10 +1,12 @@
-"""Parameters of external odometry: PX4's EKF2_EV_*, ArduPilot's VISO_* and EK3_SRC1_*."""
+"""Parameters of external data: odometry (EKF2_EV_*, VISO_*, EK3_SRC1_*), and the source of the first GPS."""
 
+from enum import Enum, auto
 from typing import Final
 
 from autopilot_bridge.firmware.mapping import FieldMap, build, integer
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.parameters import ParameterStore
+from flightsim.interface import GPS_SIZE, Reading, SensorReadings
 
 EXTERNAL_NAV: Final = 6
 """ExternalNav, of EK3_SRC1_*."""
@@ -33,6 +35,39 @@ _HEIGHT: Final = 2
 _VELOCITY: Final = 4
 _YAW: Final = 8
 _VISION: Final = 3  # of EKF2_HGT_REF
+
+_NONE: Final = 0
+_MAV: Final = 14
+
+
+class GpsSource(Enum):
+    """Where fixes come from."""
+
+    SENSOR = auto()
+    MESSAGES = auto()
+    NONE = auto()
+
+
+def own_receiver(store: ParameterStore) -> GpsSource:
+    """PX4 takes no fixes by messages."""
+    return GpsSource.SENSOR
+
+
+def ardupilot_gps_source(store: ParameterStore) -> GpsSource:
+    """GPS1_TYPE: 0 none, 14 MAVLink, all others the receiver on board."""
+    kind = integer(store, "GPS1_TYPE")
+    return {_NONE: GpsSource.NONE, _MAV: GpsSource.MESSAGES}.get(kind, GpsSource.SENSOR)
+
+
+def connected(readings: SensorReadings, source: GpsSource) -> SensorReadings:
+    """The readings with the receiver that the autopilot listens to; the others are the same objects."""
+    if source is GpsSource.SENSOR:
+        return readings
+    chosen = SensorReadings()
+    for name in SensorReadings.__slots__:
+        setattr(chosen, name, getattr(readings, name))
+    chosen.gps = Reading(GPS_SIZE)
+    return chosen
 
 
 def px4_external(store: ParameterStore) -> ExternalParameters:

@@ -12,7 +12,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
-from autopilot_bridge.firmware.gps_source import GpsSource, own_receiver
+from autopilot_bridge.firmware.external_mapping import GpsSource, own_receiver
 from autopilot_bridge.firmware.services import FirmwareServices
 from autopilot_bridge.firmware.texts import Notice
 from autopilot_bridge.flight.context import FlightContext

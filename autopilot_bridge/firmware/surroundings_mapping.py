@@ -111,8 +111,8 @@ def px4_avoidance(store: ParameterStore) -> AvoidanceParameters:
 
 def ardupilot_avoidance(store: ParameterStore) -> AvoidanceParameters:
     """AVOID_*, with a proximity sensor by MAVLink (PRX1_TYPE 2)."""
-    told = integer(store, "PRX1_TYPE") == _MAVLINK
-    enabled = told and bool(integer(store, "AVOID_ENABLE") & _PROXIMITY)
+    by_messages = integer(store, "PRX1_TYPE") == _MAVLINK
+    enabled = by_messages and bool(integer(store, "AVOID_ENABLE") & _PROXIMITY)
     return AvoidanceParameters(
         enabled=enabled,
         guided=enabled,

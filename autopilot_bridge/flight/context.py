@@ -172,32 +172,6 @@ class FlightContext:
         hover_thrust: the controller's estimate, 0..1.
     """
 
-    __slots__ = (
-        "armed",
-        "attitude_setpoint",
-        "dt_s",
-        "events",
-        "frame",
-        "ground_contact",
-        "health",
-        "home_ned_m",
-        "home_yaw_rad",
-        "hover_thrust",
-        "landed_state",
-        "maybe_landed",
-        "nav",
-        "nose_on_roi",
-        "parameters",
-        "phase",
-        "rally",
-        "roi",
-        "setpoint",
-        "sticks",
-        "surroundings",
-        "time_us",
-        "within_fence",
-    )
-
     def __init__(
         self,
         *,

@@ -23,8 +23,6 @@ class Turn:
         relative: turn by the angle, not to it.
     """
 
-    __slots__ = ("_angle_rad", "_direction", "_left_rad", "_relative", "rate_max_rad_s")
-
     def __init__(
         self,
         angle_rad: float,

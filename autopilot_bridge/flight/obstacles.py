@@ -21,14 +21,12 @@ class ObstacleMap:
 
     Attributes:
         distances_m: by sector; infinite: nothing within range; NaN: never measured.
-        told_us: time of each measurement; -1: never.
+        measured_us: time of each measurement; -1: never.
     """
-
-    __slots__ = ("distances_m", "newest_us", "told_us")
 
     def __init__(self) -> None:
         self.distances_m: Array = np.full(SECTORS, math.nan)
-        self.told_us: NDArray[np.int64] = np.full(SECTORS, -1, dtype=np.int64)
+        self.measured_us: NDArray[np.int64] = np.full(SECTORS, -1, dtype=np.int64)
         self.newest_us = -1
 
     def take(self, first_rad: float, width_rad: float, distance_m: float, time_us: int) -> None:
@@ -45,10 +43,10 @@ class ObstacleMap:
         count = min(SECTORS, max(1, last - first + 1))
         for k in range(count):
             sector = (first + k) % SECTORS
-            fresh = self.told_us[sector] == time_us
+            fresh = self.measured_us[sector] == time_us
             known = float(self.distances_m[sector])
             self.distances_m[sector] = min(known, distance_m) if fresh else distance_m
-            self.told_us[sector] = time_us
+            self.measured_us[sector] = time_us
         self.newest_us = time_us
 
     def speed_limit(
@@ -81,12 +79,12 @@ class ObstacleMap:
         for k in range(middle - reach, middle + reach + 1):
             sector = k % SECTORS
             off = math.remainder(k * SECTOR_RAD - direction_rad, math.tau)
-            told = int(self.told_us[sector])
+            measured_us = int(self.measured_us[sector])
             distance_m = float(self.distances_m[sector])
             if (
                 abs(off) > guard_rad
-                or told < 0
-                or time_us - told > timeout_us
+                or measured_us < 0
+                or time_us - measured_us > timeout_us
                 or not math.isfinite(distance_m)
             ):
                 continue
@@ -98,5 +96,5 @@ class ObstacleMap:
     def known(self, direction_rad: float, time_us: int, *, timeout_us: int) -> bool:
         """This direction was measured within `timeout_us`."""
         sector = round(direction_rad / SECTOR_RAD) % SECTORS
-        told = int(self.told_us[sector])
-        return told >= 0 and time_us - told <= timeout_us
+        measured_us = int(self.measured_us[sector])
+        return measured_us >= 0 and time_us - measured_us <= timeout_us

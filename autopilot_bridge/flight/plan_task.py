@@ -55,20 +55,6 @@ class PlanTask(ABC):
         rules: how the firmware flies a plan.
     """
 
-    __slots__ = (
-        "_beside",
-        "_condition_left_s",
-        "_finished",
-        "_first_item",
-        "_jumps",
-        "_rules",
-        "_seq",
-        "_store",
-        "_sub",
-        "_version",
-        "_wait_left_s",
-    )
-
     def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
         self._store = store
         self._first_item = first_item
@@ -125,7 +111,7 @@ class PlanTask(ABC):
         """The item being flown; None after the last."""
         return None if self._finished or self._seq < 0 else self._store.items[self._seq]
 
-    def _tell(self, ctx: FlightContext, event: FlightEvent) -> None:
+    def _emit(self, ctx: FlightContext, event: FlightEvent) -> None:
         """Report progress, unless the plan is not the stored one."""
         if not self._rules.silent:
             ctx.events.append(event)
@@ -154,7 +140,7 @@ class PlanTask(ABC):
             item = items[seq]
             if is_navigation(item):
                 self._seq = self._store.current = seq
-                self._tell(ctx, WaypointStarted(seq))
+                self._emit(ctx, WaypointStarted(seq))
                 if self._begin_timed(ctx, item, came_from):
                     self._go_on_beside(ctx)
                     return
@@ -168,14 +154,14 @@ class PlanTask(ABC):
                 self._beside.append(seq)
             else:
                 self._seq = self._store.current = seq
-                self._tell(ctx, WaypointStarted(seq))
+                self._emit(ctx, WaypointStarted(seq))
                 self._act(ctx, item, seq)
             seq += 1
         self._finish(ctx)
 
     def _finish(self, ctx: FlightContext) -> None:
         if not self._finished:
-            self._tell(ctx, MissionFinished())
+            self._emit(ctx, MissionFinished())
         self._finished = True
         self._seq = self._store.current
         self._forget_leg()
@@ -210,7 +196,7 @@ class PlanTask(ABC):
             ctx.events.append(ItemCommanded(seq))
         elif item.command not in MARKERS and item.command not in CONDITIONS:
             ctx.events.append(ItemCommanded(seq))
-        self._tell(ctx, WaypointReached(seq, navigation=False))
+        self._emit(ctx, WaypointReached(seq, navigation=False))
 
     def _change_by_item(self, ctx: FlightContext, item: MissionItem) -> None:
         """DO_CHANGE_SPEED in the plan; -2: back to the parameters' speed."""
@@ -234,7 +220,7 @@ class PlanTask(ABC):
                 if not self._is_met(ctx, item):
                     return
                 self._condition_left_s = math.nan
-                self._tell(ctx, WaypointReached(seq, navigation=False))
+                self._emit(ctx, WaypointReached(seq, navigation=False))
             else:
                 self._act(ctx, item, seq)
             self._beside.popleft()
@@ -339,7 +325,7 @@ class PlanTask(ABC):
 
     def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
         """The current item is finished: report it, and continue."""
-        self._tell(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
+        self._emit(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
         last = self._seq + 1 >= len(self._store.items)
         if last or not item.autocontinue:
             self._finish(ctx)

@@ -24,8 +24,6 @@ class LandingTargetTrack:
         motion: the filter of the position.
     """
 
-    __slots__ = ("motion",)
-
     def __init__(self) -> None:
         self.motion = TargetMotion(acceleration_m_s2=_SLOWEST_M_S2, still=True)
 
@@ -57,8 +55,6 @@ class Surroundings:
         landing_target: the place to land at.
         obstacles: distances around the vehicle.
     """
-
-    __slots__ = ("landing_target", "leader", "obstacles")
 
     def __init__(self) -> None:
         self.leader = TargetMotion()

@@ -27,23 +27,10 @@ class TargetMotion:
         still: the target is known not to move.
 
     Attributes:
-        heard_us: time of the newest measurement; -1: never.
+        received_us: time of the newest measurement; -1: never.
         course_rad: its direction of travel; NaN until it has moved.
         accepted, refused: measurements so far.
     """
-
-    __slots__ = (
-        "_acceleration_m_s2",
-        "_p",
-        "_refused_in_a_row",
-        "_still",
-        "_time_us",
-        "_x",
-        "accepted",
-        "course_rad",
-        "heard_us",
-        "refused",
-    )
 
     def __init__(self, *, acceleration_m_s2: float = 1.0, still: bool = False) -> None:
         self._acceleration_m_s2 = acceleration_m_s2
@@ -55,7 +42,7 @@ class TargetMotion:
 
     def forget(self) -> None:
         """Forget the target."""
-        self.heard_us = self._time_us = -1
+        self.received_us = self._time_us = -1
         self.course_rad = math.nan
         self._refused_in_a_row = 0
 
@@ -70,7 +57,7 @@ class TargetMotion:
             sigma_m: 1-sigma of the position, each axis.
         """
         variance = sigma_m * sigma_m
-        if self.heard_us < 0:
+        if self.received_us < 0:
             self._begin(time_us, position_ned_m, velocity_ned_m_s, variance)
             return True
         if time_us < self._time_us:
@@ -93,19 +80,19 @@ class TargetMotion:
             self._correct(1, velocity_ned_m_s - self._x[1], 0.25)
         self._limit()
         self.accepted += 1
-        self.heard_us = time_us
+        self.received_us = time_us
         return True
 
     def at(self, time_us: int) -> tuple[Array, Array] | None:
         """(position, velocity) at a time at or after the newest measurement; None: not known."""
-        if self.heard_us < 0:
+        if self.received_us < 0:
             return None
         ahead_s = max(0, time_us - self._time_us) * 1e-6
         return self._x[0] + ahead_s * self._x[1], self._x[1].copy()
 
     def age_s(self, time_us: int) -> float:
         """Age of the newest measurement; infinite when there was none."""
-        return math.inf if self.heard_us < 0 else (time_us - self.heard_us) * 1e-6
+        return math.inf if self.received_us < 0 else (time_us - self.received_us) * 1e-6
 
     def _begin(self, time_us: int, position: Array, velocity: Array | None, variance: float) -> None:
         self._x[0] = position
@@ -113,7 +100,7 @@ class TargetMotion:
         known = velocity is not None
         speed_variance = 0.0 if self._still else (0.25 if known else _START_SPEED_M_S**2)
         self._p[:] = ((variance, 0.0), (0.0, speed_variance))
-        self._time_us = self.heard_us = time_us
+        self._time_us = self.received_us = time_us
         self._refused_in_a_row = 0
         self.accepted += 1
         self._limit()

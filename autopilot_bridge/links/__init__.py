@@ -12,10 +12,10 @@ from autopilot_bridge.links.address import (
     UdpServer,
     parse_address,
 )
+from autopilot_bridge.links.factory import open_link
 from autopilot_bridge.links.link import Link, LinkCounters, PeerId
 from autopilot_bridge.links.lossy import Impairment, LossyLink
 from autopilot_bridge.links.memory import MemoryLink, memory_pair
-from autopilot_bridge.links.opening import open_link
 from autopilot_bridge.links.reach import Reach, listens_to_network, open_unsigned, reach_of
 from autopilot_bridge.links.replay import ReplayLink
 from autopilot_bridge.links.serial_port import SerialLink

@@ -1,9 +1,12 @@
 """The interface of a link: bytes to and from peers; it never blocks, and never raises because of a peer."""
 
+import errno
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
+
+from autopilot_bridge.errors import LinkError
 
 PeerId = tuple[str, int]
 """The identity of a peer: host and port; device or name and 0 where there are no ports."""
@@ -12,6 +15,24 @@ MAX_BACKLOG_BYTES: Final = 256 * 1024
 MAX_READS: Final = 256  # in one `receive`, so that a flood on one link can't block the others
 MAX_READ_BYTES: Final = 1 << 18  # in one `receive`
 READ_SIZE: Final = 65536
+
+_HUNG_UP: Final = "the other end hung up at once: check what listens there"
+
+
+def open_error(address: str, error: OSError) -> LinkError:
+    """A LinkError with the problem of the address and its solution."""
+    advice = {
+        errno.EADDRINUSE: "the port is in use: stop the other program or choose another port",
+        errno.EADDRNOTAVAIL: "no interface of this machine has that address: use 127.0.0.1 or 0.0.0.0",
+        errno.EACCES: "not permitted: choose a port above 1023",
+        errno.ECONNREFUSED: "nothing listens there: start the vehicle or the simulator first, check the port",
+        errno.ECONNRESET: _HUNG_UP,
+        errno.ENOTCONN: _HUNG_UP,
+        errno.EHOSTUNREACH: "the host can't be reached: check the network",
+        errno.ENETUNREACH: "the network can't be reached: check the network",
+        errno.ETIMEDOUT: "no answer: check the host and the port",
+    }.get(error.errno or 0, "check the address")
+    return LinkError(f"can't open {address}: {error.strerror or error}; {advice}")
 
 
 @dataclass(slots=True)
@@ -90,8 +111,6 @@ class SendQueue:
         queued_bytes: bytes waiting.
         taken_bytes: total bytes that the stream has accepted.
     """
-
-    __slots__ = ("_counters", "_limit_bytes", "_pieces", "queued_bytes", "taken_bytes")
 
     def __init__(self, counters: LinkCounters, limit_bytes: int = MAX_BACKLOG_BYTES) -> None:
         self._counters = counters

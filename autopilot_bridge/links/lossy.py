@@ -50,8 +50,6 @@ class LossyLink:
         time_us: returns the time of the delays.
     """
 
-    __slots__ = ("_incoming", "_link", "_outgoing", "counters")
-
     def __init__(
         self,
         link: Link,
@@ -115,8 +113,6 @@ class LossyLink:
 
 class _Impaired(Generic[To]):
     """Pieces in transit in one direction."""
-
-    __slots__ = ("_generator", "_held", "_impairment", "_last_due_us", "_order", "_queue", "_time_us", "lost")
 
     def __init__(
         self, impairment: Impairment, generator: np.random.Generator, time_us: Callable[[], int]

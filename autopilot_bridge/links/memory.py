@@ -20,19 +20,6 @@ class MemoryLink:
             returns nothing.
     """
 
-    __slots__ = (
-        "_bytes_dropped",
-        "_bytes_out",
-        "_dropped",
-        "_inbox",
-        "_other",
-        "_peer",
-        "_writes",
-        "closed",
-        "name",
-        "on_receive",
-    )
-
     def __init__(self, name: str, on_receive: Callable[[bytes], None] | None = None) -> None:
         self.name = name
         self.on_receive = on_receive

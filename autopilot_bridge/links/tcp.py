@@ -8,8 +8,7 @@ from typing import Final
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import TcpClient, TcpServer
-from autopilot_bridge.links.faults import open_error
-from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, PeerId, SendQueue
+from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, PeerId, SendQueue, open_error
 
 CONNECT_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 1.0
@@ -76,7 +75,7 @@ class TcpServerLink:
             before = len(received)
             alive = client.receive(peer, received, 1, CLIENT_READ_SIZE)
             if len(received) > before:
-                client.heard_s = self._monotonic()
+                client.received_s = self._monotonic()
             if not alive or (client.queue.congested and client.deaf_s(self._monotonic()) > DEAF_S):
                 self._drop(peer)
         return received
@@ -112,11 +111,11 @@ class TcpServerLink:
                 continue
             self.counters.connects += 1
             self._clients[peer[:2]] = stream = _Stream(opened, self.counters)
-            stream.heard_s = stream.taken_s = self._monotonic()
+            stream.received_s = stream.taken_s = self._monotonic()
 
     def _make_room(self) -> bool:
-        silent = min(self._clients, key=lambda peer: self._clients[peer].heard_s)
-        if self._monotonic() - self._clients[silent].heard_s < REPLACE_S:
+        silent = min(self._clients, key=lambda peer: self._clients[peer].received_s)
+        if self._monotonic() - self._clients[silent].received_s < REPLACE_S:
             return False
         self._drop(silent)
         return True
@@ -253,18 +252,16 @@ class _Stream:
     Attributes:
         socket: as opened.
         queue: data not accepted yet.
-        heard_s: time of the last received data.
+        received_s: time of the last received data.
         taken_s: time at which it last accepted queued data, as far as this was checked.
     """
-
-    __slots__ = ("_counters", "_taken_bytes", "heard_s", "queue", "socket", "taken_s")
 
     def __init__(self, opened: socket.socket, counters: LinkCounters) -> None:
         opened.setblocking(False)
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.socket = opened
         self.queue = SendQueue(counters)
-        self.heard_s = self.taken_s = 0.0
+        self.received_s = self.taken_s = 0.0
         self._taken_bytes = 0
         self._counters = counters
 

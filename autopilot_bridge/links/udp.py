@@ -8,8 +8,7 @@ from typing import Final
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import UdpClient, UdpPeer, UdpServer
-from autopilot_bridge.links.faults import open_error
-from autopilot_bridge.links.link import MAX_READ_BYTES, READ_SIZE, LinkCounters, PeerId
+from autopilot_bridge.links.link import MAX_READ_BYTES, READ_SIZE, LinkCounters, PeerId, open_error
 
 PEER_SILENCE_S: Final = 30.0
 REPLACE_S: Final = 5.0
@@ -47,10 +46,10 @@ class UdpLink:
         self._monotonic = monotonic
         self._silence_s = silence_s
         self.counters = LinkCounters()
-        self._last_heard_s: dict[PeerId, float] = {}
+        self._last_received_s: dict[PeerId, float] = {}
         self._partner: PeerId | None = None
         self._remote: PeerId | None = None  # the peer until the first sender is received
-        self._partner_heard = False
+        self._partner_known = False
         self._learns = isinstance(address, UdpServer)
         self._is_client = isinstance(address, UdpClient)
         self._socket = _open(address)
@@ -75,7 +74,7 @@ class UdpLink:
         """The peers that data are sent to."""
         if self._partner is not None:
             return (self._partner,)
-        return tuple(self._last_heard_s)
+        return tuple(self._last_received_s)
 
     @property
     def congested(self) -> bool:
@@ -91,7 +90,7 @@ class UdpLink:
             return
         if self._learns:
             self._forget_silent()
-            for peer in tuple(self._last_heard_s):
+            for peer in tuple(self._last_received_s):
                 self._send_to(data, peer)
         elif self._partner is not None:
             self._send_to(data, self._partner)
@@ -117,7 +116,7 @@ class UdpLink:
             counters.reads += 1
             peer: PeerId = sender[:2]
             if not self._is_client:
-                self._heard(peer)
+                self._received_from(peer)
             received.append((peer, bytes(self._read[:size])))
         return received
 
@@ -148,36 +147,36 @@ class UdpLink:
             counters.writes += 1
             counters.bytes_out += len(data)
 
-    def _heard(self, peer: PeerId) -> None:
+    def _received_from(self, peer: PeerId) -> None:
         if not self._learns:
-            if not self._partner_heard:
-                self._partner, self._partner_heard = peer, True
+            if not self._partner_known:
+                self._partner, self._partner_known = peer, True
                 self.counters.connects += 1
             return
         now_s = self._monotonic()
-        if peer not in self._last_heard_s:
-            if len(self._last_heard_s) >= MAX_PEERS:
-                silent = min(self._last_heard_s, key=self._last_heard_s.__getitem__)
-                if now_s - self._last_heard_s[silent] < REPLACE_S:
+        if peer not in self._last_received_s:
+            if len(self._last_received_s) >= MAX_PEERS:
+                silent = min(self._last_received_s, key=self._last_received_s.__getitem__)
+                if now_s - self._last_received_s[silent] < REPLACE_S:
                     return
                 self.forget(silent)
             self.counters.connects += 1
-        self._last_heard_s[peer] = now_s
+        self._last_received_s[peer] = now_s
 
     def forget(self, peer: PeerId) -> None:
         """Send nothing more to a peer, until data of it are received again."""
-        if peer in self._last_heard_s:
-            del self._last_heard_s[peer]
+        if peer in self._last_received_s:
+            del self._last_received_s[peer]
             self.counters.disconnects += 1
-        elif peer == self._partner and self._partner_heard:
-            self._partner, self._partner_heard = self._remote, False
+        elif peer == self._partner and self._partner_known:
+            self._partner, self._partner_known = self._remote, False
             self.counters.disconnects += 1
 
     def _forget_silent(self) -> None:
-        if not self._last_heard_s:
+        if not self._last_received_s:
             return
         oldest_s = self._monotonic() - self._silence_s
-        for peer in [peer for peer, heard_s in self._last_heard_s.items() if heard_s < oldest_s]:
+        for peer in [peer for peer, received_s in self._last_received_s.items() if received_s < oldest_s]:
             self.forget(peer)
 
 

@@ -39,17 +39,17 @@ class _Inbox:
         parser: finds the frames.
         pieces: waiting data; `size` bytes in total.
         understood: a frame of it was accepted at least once.
-        heard_at: number of the last `take` with data of it.
+        received_at: number of the last `take` with data of it.
     """
 
-    __slots__ = ("heard_at", "parser", "pieces", "size", "understood")
+    __slots__ = ("parser", "pieces", "received_at", "size", "understood")
 
     def __init__(self) -> None:
         self.parser = FrameParser()
         self.pieces: deque[bytes] = deque()
         self.size = 0
         self.understood = False
-        self.heard_at = 0
+        self.received_at = 0
 
 
 class Intake(Generic[PeerT]):
@@ -141,7 +141,7 @@ class Intake(Generic[PeerT]):
         if not inbox.pieces:
             self._waiting.append(peer)
         inbox.size += len(data)
-        inbox.heard_at = self._takes
+        inbox.received_at = self._takes
         if len(data) <= _SLICE_BYTES:
             inbox.pieces.append(data)
         else:
@@ -184,10 +184,10 @@ class Intake(Generic[PeerT]):
         """
         inboxes = self._inboxes
         stranger = next((peer for peer, inbox in inboxes.items() if not inbox.understood), None)
-        silent = min(inboxes, key=lambda peer: inboxes[peer].heard_at)
+        silent = min(inboxes, key=lambda peer: inboxes[peer].received_at)
         if stranger is not None:
             gone = stranger
-        elif self._takes - inboxes[silent].heard_at > _SILENT_TAKES:
+        elif self._takes - inboxes[silent].received_at > _SILENT_TAKES:
             gone = silent
         else:
             gone = next(reversed(inboxes))

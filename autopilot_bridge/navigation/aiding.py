@@ -47,27 +47,6 @@ class Aiding:
         at_rest: the vehicle stands still on the ground.
     """
 
-    __slots__ = (
-        "_clocks",
-        "_contradictions",
-        "_gps",
-        "_heading",
-        "_health",
-        "_height",
-        "_parameters",
-        "_parts",
-        "_readings",
-        "_report_every",
-        "_slow_every",
-        "_solution",
-        "_standby",
-        "_terrain",
-        "_tick",
-        "air",
-        "at_rest",
-        "external",
-    )
-
     def __init__(
         self,
         parameters: NavigationParameters,

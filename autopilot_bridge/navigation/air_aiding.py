@@ -46,29 +46,6 @@ class AirAiding:
             and sideslip both), and each was fused; -1 for never.
     """
 
-    __slots__ = (
-        "_air",
-        "_airspeed_gusts",
-        "_check",
-        "_fast_since_us",
-        "_fused_us",
-        "_health",
-        "_parameters",
-        "_pitot",
-        "_quiet_since_us",
-        "_rest_down_m",
-        "_shown_m_s",
-        "_sideslip_gusts",
-        "_solution",
-        "_time_us",
-        "_turn",
-        "_usual_m_s",
-        "airspeed_us",
-        "flying",
-        "sideslip_us",
-        "wind_us",
-    )
-
     def __init__(self, parameters: NavigationParameters, parts: AidingParts) -> None:
         self._parameters = parameters
         self._solution, self._health = parts.solution, parts.health
@@ -104,7 +81,7 @@ class AirAiding:
         self.wind_us = self.airspeed_us = self.sideslip_us = -1
 
     @property
-    def pitot_believed(self) -> bool:
+    def pitot_trusted(self) -> bool:
         """There is a pitot tube in use, alive and not found wrong."""
         used = self._parameters.use_airspeed
         return used and self._check.passed and self._pitot.alive(self._time_us)
@@ -135,7 +112,7 @@ class AirAiding:
             return True
         if gps_us >= 0 and time_us - gps_us <= _GROUND_AID_US:
             return False  # the speed is a measured one
-        blown = self.pitot_believed and self._pitot.true_m_s > self._parameters.airspeed_threshold_m_s
+        blown = self.pitot_trusted and self._pitot.true_m_s > self._parameters.airspeed_threshold_m_s
         return not blown and time_us - self._quiet_since_us > _QUIET_US
 
     def look(self, time_us: int) -> None:
@@ -153,7 +130,7 @@ class AirAiding:
         """
         self._time_us = time_us
         solution, p, pitot = self._solution, self._parameters, self._pitot
-        pitot.update_density(believed=self.pitot_believed)
+        pitot.update_density(trusted=self.pitot_trusted)
         self._set_wind_walk()
         self._turn.update()
         self._judge_flight(at_rest)
@@ -193,7 +170,7 @@ class AirAiding:
 
     def _judge_flight(self, at_rest: bool) -> None:
         speed = self.relative_velocity_m_s
-        if self.pitot_believed:
+        if self.pitot_trusted:
             speed = max(speed, self._pitot.true_m_s)
         down_m = float(self._solution.core[X_POS + 2])
         fast = speed > self._parameters.airspeed_threshold_m_s
@@ -265,7 +242,7 @@ class AirAiding:
         """Wind and airspeed into the navigation state; `interval_s` since the last time."""
         p, pitot, health = self._parameters, self._pitot, self._health
         core = self._solution.core
-        measured = self.pitot_believed
+        measured = self.pitot_trusted
         synthetic = not measured and (self.flying or health.velocity_horizontal)
         health.airspeed_valid, health.airspeed_synthetic = measured, synthetic
         if measured or synthetic:

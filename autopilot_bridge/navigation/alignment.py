@@ -24,8 +24,6 @@ class Alignment:
         mag_frd_gauss: mean magnetic field; None without a magnetometer.
     """
 
-    __slots__ = ("_accel", "_dt_s", "_elapsed_s", "_mag", "_mag_samples", "_time_s")
-
     def __init__(self, *, duration_s: float, dt_s: float) -> None:
         self._time_s = duration_s
         self._dt_s = dt_s

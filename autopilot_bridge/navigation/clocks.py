@@ -9,8 +9,6 @@ _TOO_MANY: Final = 4  # within that time of each other: the estimate is unusable
 class Contradictions:
     """Counts the times at which a healthy sensor was used although it contradicted the estimate."""
 
-    __slots__ = ("_count", "_newest_us")
-
     def __init__(self) -> None:
         self.restart()
 
@@ -34,22 +32,6 @@ class Contradictions:
 
 class Clocks:
     """Times of the last accepted updates, microseconds since boot; -1 for never."""
-
-    __slots__ = (
-        "aligned_us",
-        "baro_us",
-        "gps_height_refused_us",
-        "gps_height_us",
-        "gps_judged_us",
-        "gps_position_us",
-        "gps_us",
-        "gps_velocity_us",
-        "height_held",
-        "height_us",
-        "horizontal_aid_us",
-        "mag_refused_us",
-        "mag_us",
-    )
 
     def __init__(self) -> None:
         self.restart()

@@ -69,31 +69,18 @@ class ExternalCounts:
         resets: jumps of the estimate to the sender's values.
     """
 
-    __slots__ = (
-        "flooded",
-        "frozen",
-        "fused",
-        "incoherent",
-        "late",
-        "not_finite",
-        "poor",
-        "refused",
-        "resets",
-        "taken",
-    )
-
     def __init__(self) -> None:
         self.taken = self.fused = self.refused = self.not_finite = self.late = 0
         self.poor = self.frozen = self.incoherent = self.flooded = self.resets = 0
 
 
-def variance_of(said: float, noise: float, *, own: bool) -> float:
+def variance_of(reported: float, noise: float, *, own: bool) -> float:
     """The variance that the filter uses for a variance in a message.
 
     Args:
-        said: the sender's; NaN or an invalid value: not known.
+        reported: the sender's; NaN or an invalid value: not known.
         noise: 1-sigma: the smallest value used.
         own: only `noise` is used.
     """
     least = noise * noise
-    return least if own or not 0.0 < said < 1e6 else max(said, least)
+    return least if own or not 0.0 < reported < 1e6 else max(reported, least)

@@ -53,31 +53,6 @@ class ExternalAiding:
         heading: theirs.
     """
 
-    __slots__ = (
-        "_clocks",
-        "_coherent",
-        "_equal",
-        "_fused_us",
-        "_gap",
-        "_gap_us",
-        "_health",
-        "_height_known",
-        "_last",
-        "_mapped",
-        "_obs",
-        "_offset",
-        "_offset_by_gps",
-        "_parameters",
-        "_place_known",
-        "_queue",
-        "_refused_since_us",
-        "_reset_counter",
-        "_solution",
-        "_standby",
-        "counts",
-        "heading",
-    )
-
     def __init__(self, parameters: ExternalParameters, parts: AidingParts) -> None:
         self._parameters = parameters
         self._solution, self._health, self._clocks = parts.solution, parts.health, parts.clocks
@@ -196,9 +171,9 @@ class ExternalAiding:
         return self.in_use or self._coherent >= _COHERENT_SAMPLES
 
     def _repeats_itself(self, values: Array) -> bool:
-        said = values.tobytes()
-        self._equal = self._equal + 1 if said == self._last else 0
-        self._last = said
+        received = values.tobytes()
+        self._equal = self._equal + 1 if received == self._last else 0
+        self._last = received
         return self._equal >= _FROZEN_SAMPLES
 
     # position

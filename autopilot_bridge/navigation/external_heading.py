@@ -34,19 +34,6 @@ class ExternalHeading:
         own: and it doesn't refer to north.
     """
 
-    __slots__ = (
-        "_coherent",
-        "_difference_rad",
-        "_fused_us",
-        "_health",
-        "_obs",
-        "_refused_since_us",
-        "_solution",
-        "_turn_rad",
-        "in_use",
-        "own",
-    )
-
     def __init__(self, *, solution: Solution, health: NavigationHealth, obs: Array) -> None:
         self._solution = solution
         self._health = health

@@ -58,26 +58,6 @@ class NavigationFilter:
         vehicle_at_rest: set by the land detector: the vehicle stands still on the ground.
     """
 
-    __slots__ = (
-        "_aiding",
-        "_aligned",
-        "_alignment",
-        "_countdown",
-        "_divisor",
-        "_dt_s",
-        "_imu",
-        "_limits",
-        "_mechanise",
-        "_parameters",
-        "_readings",
-        "_slow_readings",
-        "_solution",
-        "_taken_us",
-        "health",
-        "state",
-        "vehicle_at_rest",
-    )
-
     def __init__(
         self, parameters: NavigationParameters, *, readings: SensorReadings, physics_rate_hz: int
     ) -> None:

@@ -25,7 +25,7 @@ from flightsim.interface import (
 
 Array = NDArray[np.float64]
 
-_UNTOLD_VARIANCE_M2_S2 = 1e4
+_UNKNOWN_VARIANCE_M2_S2 = 1e4
 
 
 class GpsAiding:
@@ -35,21 +35,6 @@ class GpsAiding:
         frame: NED frame at the origin; None before it is set, by the first good fix or from outside.
         quality: judge of the receiver.
     """
-
-    __slots__ = (
-        "_before_rejoining",
-        "_clocks",
-        "_contradictions",
-        "_heading",
-        "_health",
-        "_height",
-        "_parameters",
-        "_reading",
-        "_solution",
-        "_standby",
-        "frame",
-        "quality",
-    )
 
     def __init__(
         self,
@@ -157,7 +142,7 @@ class GpsAiding:
             obs[f.GPS_VEL_VAR + i] = scale * noise * noise
             if obs[f.GPS_VEL + i] != obs[f.GPS_VEL + i]:  # not measured: it adds no information
                 obs[f.GPS_VEL + i] = solution.past_velocity(row)[i]
-                obs[f.GPS_VEL_VAR + i] = _UNTOLD_VARIANCE_M2_S2
+                obs[f.GPS_VEL_VAR + i] = _UNKNOWN_VARIANCE_M2_S2
         solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))
 
     def _reset(self, row: int, time_us: int) -> None:

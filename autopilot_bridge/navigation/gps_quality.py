@@ -46,24 +46,9 @@ class GpsQuality:
         good_since_us: time of the first sample of the present good series; -1 when the newest one failed.
     """
 
-    __slots__ = (
-        "_anchor",
-        "_anchor_us",
-        "_distrusted",
-        "_equal",
-        "_last",
-        "_last_us",
-        "_newest_us",
-        "_parameters",
-        "_said",
-        "_travelled",
-        "good",
-        "good_since_us",
-    )
-
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
-        self._last = self._anchor = self._said = [0.0] * GPS_SIZE
+        self._last = self._anchor = self._previous = [0.0] * GPS_SIZE
         self._travelled = [0.0] * 3
         self.restart()
 
@@ -118,11 +103,11 @@ class GpsQuality:
 
     def _repeats_itself(self, values: list[float]) -> bool:
         """Position and velocity have been the same, digit by digit, for too long."""
-        if values[_MEASURED] == self._said[_MEASURED]:
+        if values[_MEASURED] == self._previous[_MEASURED]:
             self._equal += 1
         else:
             self._equal = 0
-            self._said = values
+            self._previous = values
         return self._equal >= _FROZEN_SAMPLES
 
     def _moves_as_it_says(self, values: list[float], measured_us: int) -> bool:

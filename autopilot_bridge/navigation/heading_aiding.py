@@ -26,8 +26,6 @@ class HeadingCheck:
         magnetometer_wrong: found so in this flight.
     """
 
-    __slots__ = ("_confirmed", "_refused_since_us", "_since_us", "magnetometer_wrong")
-
     def __init__(self) -> None:
         self.restart()
 
@@ -64,16 +62,6 @@ Array = NDArray[np.float64]
 
 class HeadingAiding:
     """Prepares magnetometer updates of a `Solution`, and turns its yaw."""
-
-    __slots__ = (
-        "_check",
-        "_clocks",
-        "_field_ned_gauss",
-        "_health",
-        "_parameters",
-        "_reading",
-        "_solution",
-    )
 
     def __init__(self, parameters: NavigationParameters, parts: AidingParts) -> None:
         self._parameters = parameters

@@ -6,7 +6,6 @@ from typing import Final
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.parameters import NavigationParameters
-from autopilot_bridge.navigation.pressure_scale import PressureScale
 from autopilot_bridge.navigation.states import X_BARO_OFFSET, X_POS, X_VEL
 from autopilot_bridge.navigation.terrain import TerrainEstimator
 from flightsim.foundation.atmosphere import pressure_altitude_m
@@ -15,22 +14,38 @@ from flightsim.interface import BARO_PRESSURE_PA
 _GAP_US: Final = 2_000_000  # silence after which a sensor's refusal is counted from the beginning
 _GPS_FRESH_US: Final = 1_000_000
 
+_BAND_M: Final = 4.0
+_COHERENCE_M: Final = 30.0  # height difference over which the error is assumed to add up evenly
+
+
+class PressureScale:
+    """Turns pressure altitudes into growth of the barometer offset's variance.
+
+    On a day warmer or colder than the standard one, a metre of pressure altitude is some per cent more or
+    less of height (15 K: five per cent). The error is the same on the way up and down, so it is computed from
+    the height differences between turning points; differences within a band are turbulence and are ignored.
+    """
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """As at boot."""
+        self._reference_m = math.nan
+
+    def variance_m2(self, altitude_m: float, scale_error: float) -> float:
+        """What to add for the newest pressure altitude; `scale_error` is the 1-sigma of the scale."""
+        reference = self._reference_m
+        if math.isnan(reference):
+            self._reference_m = altitude_m
+            return 0.0
+        nearest = min(altitude_m + _BAND_M, max(altitude_m - _BAND_M, reference))
+        self._reference_m = nearest
+        return scale_error * scale_error * _COHERENCE_M * abs(nearest - reference)
+
 
 class HeightAiding:
     """Prepares barometer updates of a `Solution`, and has its height jump where that is due."""
-
-    __slots__ = (
-        "_baro_known",
-        "_clocks",
-        "_contradictions",
-        "_gps_known",
-        "_health",
-        "_parameters",
-        "_pressure_scale",
-        "_reading",
-        "_solution",
-        "_terrain",
-    )
 
     def __init__(
         self, parameters: NavigationParameters, parts: AidingParts, *, terrain: TerrainEstimator

@@ -35,17 +35,6 @@ class Pitot:
         sample_us: when the newest usable sample was measured; -1 before the first.
     """
 
-    __slots__ = (
-        "_changed_us",
-        "_newest_us",
-        "_parameters",
-        "_pressure_pa",
-        "_readings",
-        "equivalent_m_s",
-        "sample_us",
-        "true_per_equivalent",
-    )
-
     def __init__(self, parameters: NavigationParameters, *, readings: SensorReadings) -> None:
         self._parameters = parameters
         self._readings = readings
@@ -91,13 +80,13 @@ class Pitot:
             and time_us - self._changed_us <= _STUCK_US
         )
 
-    def update_density(self, *, believed: bool) -> None:
+    def update_density(self, *, trusted: bool) -> None:
         """Air density from the barometer, and from the sensor's own temperature if that is valid."""
         static_pa = float(self._readings.barometer.values[BARO_PRESSURE_PA])
         if not _PRESSURE_PA[0] <= static_pa <= _PRESSURE_PA[1]:
             return
         sensed_c = float(self._readings.airspeed.values[AIRSPEED_TEMPERATURE_C])
-        if believed and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
+        if trusted and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
             temperature_k = sensed_c + ICE_POINT_K - self._parameters.airspeed_sensor_heating_k
         else:
             temperature_k = standard_temperature_k(static_pa)
@@ -115,8 +104,6 @@ class AirspeedCheck:
     Attributes:
         passed: the sensor is used.
     """
-
-    __slots__ = ("_bad_since_us", "_good_since_us", "_integral_m", "_updated_us", "passed")
 
     def __init__(self) -> None:
         self.restart()
@@ -167,8 +154,6 @@ class GustVariance:
         variance: (m/s)^2.
     """
 
-    __slots__ = ("_memory_s", "variance")
-
     _LIGHT: Final = 1.0  # (m/s)^2, light turbulence of MIL-F-8785C at 100 m
     _LIGHT_FOR_S: Final = 15.0  # weight of that first guess
     _LONGEST_S: Final = 60.0
@@ -190,6 +175,6 @@ class GustVariance:
         wind's error is then mostly turbulence of the last minute, with the same sign."""
         if state_variance > self._SETTLED:
             return
-        said = max(0.0, min(innovation_m_s * innovation_m_s, self._MOST) - noise_variance)
+        excess = max(0.0, min(innovation_m_s * innovation_m_s, self._MOST) - noise_variance)
         self._memory_s = min(self._memory_s + interval_s, self._LONGEST_S)
-        self.variance += (said - self.variance) * min(1.0, interval_s / self._memory_s)
+        self.variance += (excess - self.variance) * min(1.0, interval_s / self._memory_s)

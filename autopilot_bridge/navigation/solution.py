@@ -64,22 +64,6 @@ class Solution:
         steps_per_s: physics rate.
     """
 
-    __slots__ = (
-        "_accuracy_step",
-        "_parameters",
-        "core",
-        "gps_error_var",
-        "history",
-        "obs",
-        "p",
-        "period_us",
-        "process",
-        "row",
-        "rows",
-        "steps",
-        "work",
-    )
-
     def __init__(self, parameters: NavigationParameters, *, physics_rate_hz: int) -> None:
         self._parameters = parameters
         self.period_us = 1_000_000 // physics_rate_hz
@@ -144,7 +128,7 @@ class Solution:
         elapsed_s = (self.steps - self._accuracy_step) * self.period_us * 1e-6
         self._accuracy_step = self.steps
         fade = math.exp(-2.0 * elapsed_s / p.gps_position_tau_s)
-        believed = []
+        accepted = []
         for axes, new in zip(((0, 1), (2,)), reported, strict=True):
             old = self.gps_error_var[axes[0]]
             if new >= old:
@@ -155,8 +139,8 @@ class Solution:
                     self._shrink_gps_error(axis, math.sqrt(new / old))
             else:
                 new += (old - new) * fade
-            believed.append(new)
-        horizontal, vertical = believed
+            accepted.append(new)
+        horizontal, vertical = accepted
         self.gps_error_var = (horizontal, horizontal, vertical)
         self.process[cov.GPS_VAR_HORIZONTAL] = horizontal
         self.process[cov.GPS_VAR_VERTICAL] = vertical

@@ -32,16 +32,6 @@ class Standby:
         held: nothing aids the horizontal position; it is held, or adrift.
     """
 
-    __slots__ = (
-        "_adrift",
-        "_clocks",
-        "_rested",
-        "_solution",
-        "_turn_rad_s",
-        "_turning_since_us",
-        "held",
-    )
-
     def __init__(self, solution: Solution, clocks: Clocks) -> None:
         self._solution = solution
         self._clocks = clocks

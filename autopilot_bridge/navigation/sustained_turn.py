@@ -23,8 +23,6 @@ _GRADUAL: Final = 2.0  # a rate that changes in steps changes all the same way: 
 class SustainedTurn:
     """Follows the turn rate and widens the gyro biases of a `Solution`."""
 
-    __slots__ = ("_mean", "_parameters", "_reference", "_solution", "_sum", "_sum_time_s")
-
     def __init__(self, parameters: NavigationParameters, *, solution: Solution) -> None:
         self._parameters = parameters
         self._solution = solution

@@ -22,8 +22,6 @@ class TerrainEstimator:
         in_use: the newest range was accepted.
     """
 
-    __slots__ = ("_fused_us", "_parameters", "_predicted_us", "_variance", "down_m", "in_use", "test_ratio")
-
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
         self.restart()

@@ -28,7 +28,7 @@ from autopilot_bridge.payload.camera_tracking import CameraTracker
 from autopilot_bridge.payload.camera_trigger import PhotoTrigger
 from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.payload.component import Component
-from autopilot_bridge.payload.vehicle_heard import VehicleHeard
+from autopilot_bridge.payload.reported_vehicle import ReportedVehicle
 from flightsim.foundation.vectors import Quaternion, from_euler, product
 from flightsim.payload import Camera, CameraFrame, Gimbal
 
@@ -64,7 +64,7 @@ class CameraComponent(Component):
         stream: a video stream with a running server; None: there is none.
         keeper: makes files of photos and videos; None: photos and videos are only counted.
         mode: CAMERA_MODE.
-        lens, storage, tracker, trigger, heard: the parts.
+        lens, storage, tracker, trigger, vehicle: the parts; `vehicle` is what the autopilot has reported.
         photo_quality: quality of JPEG files, up to 100.
         definition: the camera definition file and the camera's settings.
         recording_since_us: start of the running video; None: no video is being recorded.
@@ -95,7 +95,7 @@ class CameraComponent(Component):
         self.storage = CameraStorage()
         self.tracker = CameraTracker(camera.parameters.model)
         self.trigger = PhotoTrigger()
-        self.heard = VehicleHeard(system_id)
+        self.vehicle = ReportedVehicle(system_id)
         self.recording_since_us: int | None = None
         self.status_interval_us = 0
         self._gimbal = gimbal
@@ -136,13 +136,13 @@ class CameraComponent(Component):
         if self.lens.moving and time_us - self._lens_us >= _LENS_INTERVAL_US:
             self.lens.move(1e-6 * min(time_us - self._lens_us, 2 * _LENS_INTERVAL_US))
             self._lens_us = time_us
-            self.tell_settings()
+            self.send_settings()
         if self.recording_since_us is not None:
             self._record(time_us)
 
-    def tell(self, frame: CameraFrame) -> None:
+    def update(self, frame: CameraFrame) -> None:
         """Send the detections of a frame that was delivered on this step."""
-        self.tracker.tell(frame)
+        self.tracker.update(frame)
         for detection in frame.detections:
             self.send(landing_target(detection))
 
@@ -154,7 +154,7 @@ class CameraComponent(Component):
         if self._gimbal is not None:
             w, x, y, z = self._gimbal.measured_q_ned_from_gimbal.tolist()
             return w, x, y, z
-        q_ned_from_frd = self.heard.q_ned_from_frd
+        q_ned_from_frd = self.vehicle.q_ned_from_frd
         return None if q_ned_from_frd is None else product(q_ned_from_frd, self._q_frd_from_mount)
 
     # actions of commands
@@ -163,13 +163,13 @@ class CameraComponent(Component):
         """Take a photo now; False: the card is full."""
         if self.storage.full:
             self.trigger.stop()
-            self.tell_status()
+            self.send_status()
             return False
         name = "" if self.keeper is None else self.keeper.photo(self._time_us, photo_notes(self))
         message = image_captured(self, self._time_us, self.storage.images, name)
         self.storage.add_photo(message)
         self.send(message)
-        self.tell_status()
+        self.send_status()
         return True
 
     def start_recording(self, status_hz: float) -> bool:
@@ -181,7 +181,7 @@ class CameraComponent(Component):
         self._next_status_us = self._time_us + self.status_interval_us
         if self.keeper is not None:
             self.keeper.start_video(self._time_us)
-        self.tell_status()
+        self.send_status()
         return True
 
     def stop_recording(self) -> bool:
@@ -192,33 +192,33 @@ class CameraComponent(Component):
         self.recording_since_us = None
         if self.keeper is not None:
             self.keeper.stop_video(self._time_us)
-        self.tell_status()
+        self.send_status()
         return True
 
     def move_lens(self) -> None:
         """A continuous zoom or focus has begun, or another property of the lens has changed."""
         self._lens_us = self._time_us
-        self.tell_settings()
+        self.send_settings()
 
-    def tell_settings(self) -> None:
+    def send_settings(self) -> None:
         """Send CAMERA_SETTINGS."""
         self.send(self._settings(self._time_us))
 
-    def tell_status(self) -> None:
+    def send_status(self) -> None:
         """Send CAMERA_CAPTURE_STATUS."""
         self.send(capture_status(self, self._time_us))
 
     # inside
 
     def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        told = self.heard.handle(message, sender, self._time_us)
+        new = self.vehicle.handle(message, sender, self._time_us)
         if (
-            told
+            new
             and message.get_msgId() == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
-            and self.trigger.travelled(self.heard.velocity_ned_m_s, self._time_us)
+            and self.trigger.travelled(self.vehicle.velocity_ned_m_s, self._time_us)
         ):
             self.take_photo()
-        if not told:
+        if not new:
             self.definition.handle(message, sender, self._time_us)
 
     def _record(self, time_us: int) -> None:
@@ -226,7 +226,7 @@ class CameraComponent(Component):
             self.stop_recording()
         elif self.status_interval_us and time_us >= self._next_status_us:
             self._next_status_us += self.status_interval_us
-            self.tell_status()
+            self.send_status()
 
     @property
     def recorded_mib(self) -> float:

@@ -93,7 +93,7 @@ class CameraCommands:
         if count != 1:
             if not camera.trigger.start(interval_s, count, camera.time_us):
                 return _DENIED
-            camera.tell_status()
+            camera.send_status()
             return _ACCEPTED
         single = (sender, sequence, camera.time_us)
         if sequence > 0 and self._is_repeated(single):
@@ -108,7 +108,7 @@ class CameraCommands:
 
     def _stop_capture(self, message: Any, sender: Sender) -> int | None:
         self._camera.trigger.stop()
-        self._camera.tell_status()
+        self._camera.send_status()
         return _ACCEPTED
 
     def _start_video(self, message: Any, sender: Sender) -> int | None:
@@ -173,8 +173,8 @@ class CameraCommands:
         if mode not in _MODES:
             return _DENIED
         self._camera.mode = mode
-        self._camera.tell_settings()
-        self._camera.definition.tell("CAM_MODE")
+        self._camera.send_settings()
+        self._camera.definition.report("CAM_MODE")
         return _ACCEPTED
 
     def _zoom(self, message: Any, sender: Sender) -> int | None:
@@ -200,7 +200,7 @@ class CameraCommands:
         self._camera.mode = int(mavlink.CAMERA_MODE_IMAGE)
         self._camera.lens.reset()
         self._camera.photo_quality = PHOTO_QUALITY
-        self._camera.tell_settings()
+        self._camera.send_settings()
         return _ACCEPTED
 
     def _format(self, message: Any, sender: Sender) -> int | None:
@@ -213,7 +213,7 @@ class CameraCommands:
             return _REJECTED
         camera.storage.format(reset_log=reset_log == 1)
         camera.send(camera.storage.message(camera.time_ms))
-        camera.tell_status()
+        camera.send_status()
         return _ACCEPTED
 
     # the stream
@@ -229,12 +229,12 @@ class CameraCommands:
         return self._with_stream(number, lambda stream, fov: self._camera.send(stream.information(fov)))
 
     def _send_stream_status(self, number: float) -> int:
-        def tell(stream: VideoStream, fov_deg: float) -> None:
+        def report(stream: VideoStream, fov_deg: float) -> None:
             # MAVSDK 4.1 requests only the status, but reads the address only from the information
             self._camera.send(stream.information(fov_deg))
             self._camera.send(stream.status(fov_deg))
 
-        return self._with_stream(number, tell)
+        return self._with_stream(number, report)
 
     def _with_stream(self, number: float, act: Callable[[VideoStream, float], None]) -> int:
         """Apply a function to the stream of a number (0: all) and the field of view, degrees."""

@@ -77,21 +77,21 @@ class CameraDefinition:
                 if index == -1:
                     index = self._index(message.param_id)
                 if 0 <= index < len(self.settings):
-                    self._tell(index)
+                    self._send_setting(index)
             case mavlink.MAVLINK_MSG_ID_PARAM_EXT_SET:
                 self._set(message)
 
     def step(self, time_us: int) -> None:
         """Continue files and lists."""
         if self._list:
-            self._tell(self._list.pop(0))
+            self._send_setting(self._list.pop(0))
         if self._next_tick_us is not None and time_us >= self._next_tick_us:
             self._next_tick_us = time_us + _TICK_US
             self._files.tick(time_us)
 
-    def tell(self, name: str) -> None:
+    def report(self, name: str) -> None:
         """Report a setting that a command has changed."""
-        self._tell(self._index(name))
+        self._send_setting(self._index(name))
 
     def _index(self, name: str) -> int:
         return next((i for i, setting in enumerate(self.settings) if setting.name == name), -1)
@@ -112,7 +112,7 @@ class CameraDefinition:
             )
         )
 
-    def _tell(self, index: int) -> None:
+    def _send_setting(self, index: int) -> None:
         setting = self.settings[index]
         self._camera.send(
             mavlink.MAVLink_param_ext_value_message(
@@ -145,7 +145,7 @@ def definition(settings: tuple[CameraSetting, ...]) -> bytes:
 def _settings(camera: "CameraComponent") -> tuple[CameraSetting, ...]:
     def set_mode(mode: int) -> None:
         camera.mode = mode
-        camera.tell_settings()
+        camera.send_settings()
 
     def set_quality(quality: int) -> None:
         camera.photo_quality = quality
@@ -153,7 +153,7 @@ def _settings(camera: "CameraComponent") -> tuple[CameraSetting, ...]:
     def set_autofocus(on: int) -> None:
         kind = mavlink.FOCUS_TYPE_AUTO_CONTINUOUS if on else mavlink.FOCUS_TYPE_AUTO_SINGLE
         if camera.lens.focus(kind, math.nan):
-            camera.tell_settings()
+            camera.send_settings()
 
     return (
         CameraSetting(

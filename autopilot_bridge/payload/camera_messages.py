@@ -72,12 +72,12 @@ def capture_status(camera: "CameraComponent", time_us: int) -> Any:
 
 def image_captured(camera: "CameraComponent", time_us: int, index: int, name: str) -> Any:
     """CAMERA_IMAGE_CAPTURED: position from the autopilot, orientation as known to the camera."""
-    here = camera.heard.located(time_us)
+    here = camera.vehicle.located(time_us)
     q = camera.orientation
-    relative_alt_m = camera.heard.relative_alt_m
+    relative_alt_m = camera.vehicle.relative_alt_m
     return mavlink.MAVLink_camera_image_captured_message(
         camera.time_ms,
-        camera.heard.unix_us(time_us),
+        camera.vehicle.unix_us(time_us),
         0,
         0 if here is None else round(here.lat_deg * 1e7),
         0 if here is None else round(here.lon_deg * 1e7),
@@ -97,13 +97,13 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
         "quality": camera.photo_quality,
         "focal_35_mm": camera.lens.focal_mm * _FILM_WIDTH_MM / SENSOR_WIDTH_MM,
     }
-    here, q = camera.heard.located(camera.time_us), camera.orientation
+    here, q = camera.vehicle.located(camera.time_us), camera.orientation
     if here is not None:
         notes |= {"lat_deg": here.lat_deg, "lon_deg": here.lon_deg, "alt_m": here.alt_m}
     if q is not None:
         north, east, _ = rotate(q, _FORWARD)
         notes["yaw_deg"] = math.degrees(math.atan2(east, north))
-    unix_us = camera.heard.unix_us(camera.time_us)
+    unix_us = camera.vehicle.unix_us(camera.time_us)
     if unix_us:
         notes["unix_us"] = unix_us
     return notes
@@ -111,7 +111,7 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
 
 def fov_status(camera: "CameraComponent", time_us: int) -> Any:
     """CAMERA_FOV_STATUS: the camera's position, and the ground point at the centre of its picture."""
-    here, q = camera.heard.located(time_us), camera.orientation
+    here, q = camera.vehicle.located(time_us), camera.orientation
     ground = None if here is None or q is None else ground_point(camera, here, rotate(q, _FORWARD))
     width_rad, height_rad = camera.lens.fov_rad
     return mavlink.MAVLink_camera_fov_status_message(
@@ -126,7 +126,7 @@ def fov_status(camera: "CameraComponent", time_us: int) -> Any:
 
 def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
     """CAMERA_TRACKING_GEO_STATUS: the ground position of the tracked target."""
-    tracker, here, q = camera.tracker, camera.heard.located(time_us), camera.orientation
+    tracker, here, q = camera.tracker, camera.vehicle.located(time_us), camera.orientation
     place, distance_m, heading_rad = None, math.nan, math.nan
     if tracker.thing is not None and here is not None and q is not None:
         right, down = tracker.thing.detection.normalised
@@ -155,7 +155,7 @@ def ground_point(
     camera: "CameraComponent", here: GeodeticPosition, ray_ned: tuple[float, float, float]
 ) -> GeodeticPosition | None:
     """The point where a ray meets level ground at home's height; None: no such point within range."""
-    height_m = here.alt_m - camera.heard.home_alt_m
+    height_m = here.alt_m - camera.vehicle.home_alt_m
     north, east, down = ray_ned
     if not (height_m > 0.0 and down > 0.0 and height_m / down * math.hypot(north, east) < _FARTHEST_M):
         return None

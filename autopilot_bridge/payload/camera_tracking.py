@@ -62,7 +62,7 @@ class CameraTracker:
         self.thing = None
         self._lost = False
 
-    def tell(self, frame: CameraFrame) -> None:
+    def update(self, frame: CameraFrame) -> None:
         """Update from a new frame."""
         self._frame = frame
         thing = self.thing

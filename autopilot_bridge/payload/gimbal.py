@@ -22,7 +22,7 @@ from autopilot_bridge.payload.gimbal_messages import (
     mount_orientation,
     status_flags,
 )
-from autopilot_bridge.payload.vehicle_heard import VehicleHeard
+from autopilot_bridge.payload.reported_vehicle import ReportedVehicle
 from flightsim.foundation.rotations import euler_from_quaternion
 from flightsim.payload import Gimbal, GimbalFlags
 
@@ -63,8 +63,8 @@ class GimbalComponent(Component):
             },
         )
         self.control = GimbalControl(system_id)
-        self._heard = VehicleHeard(system_id)
-        self.aim = GimbalAim(self._heard)
+        self._vehicle = ReportedVehicle(system_id)
+        self.aim = GimbalAim(self._vehicle)
         self._gimbal = gimbal
         self._next_roi_us = 0
         self._builders.update(
@@ -109,7 +109,7 @@ class GimbalComponent(Component):
         kind = message.get_msgId()
         match kind:
             case m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT | m.MAVLINK_MSG_ID_FOLLOW_TARGET:
-                self._heard.handle(message, sender, self._time_us)
+                self._vehicle.handle(message, sender, self._time_us)
                 self.aim.handle(message, sender, self._time_us)
             case m.MAVLINK_MSG_ID_GIMBAL_DEVICE_SET_ATTITUDE:
                 if self.control.may_point(sender):

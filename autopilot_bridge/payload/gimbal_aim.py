@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
-from autopilot_bridge.payload.vehicle_heard import STALE_US, VehicleHeard
+from autopilot_bridge.payload.reported_vehicle import STALE_US, ReportedVehicle
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 _RELATIVE_FRAMES: Final = RELATIVE_FRAMES | TERRAIN_FRAMES  # the ground is assumed level with home
@@ -21,11 +21,11 @@ class GimbalAim:
         system_id: id of the followed system; 0: none.
     """
 
-    def __init__(self, heard: VehicleHeard) -> None:
-        self._heard = heard
+    def __init__(self, vehicle: ReportedVehicle) -> None:
+        self._vehicle = vehicle
         self._place: GeodeticPosition | None = None
         self._velocity_ned_m_s = (0.0, 0.0, 0.0)
-        self._told_us = 0
+        self._commanded_us = 0
         self.system_id = 0
 
     @property
@@ -42,8 +42,8 @@ class GimbalAim:
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and abs(alt_m) < 1e5):
             return False
         if frame in _RELATIVE_FRAMES:
-            alt_m += self._heard.home_alt_m
-        if self._heard.position is None or math.isnan(alt_m):
+            alt_m += self._vehicle.home_alt_m
+        if self._vehicle.position is None or math.isnan(alt_m):
             return None
         self._place = GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
         self._velocity_ned_m_s = (0.0, 0.0, 0.0)
@@ -76,19 +76,19 @@ class GimbalAim:
             return
         self._place = GeodeticPosition(lat_deg=1e-7 * message.lat, lon_deg=1e-7 * message.lon, alt_m=alt_m)
         self._velocity_ned_m_s = velocity
-        self._told_us = time_us
+        self._commanded_us = time_us
 
     def direction(self, time_us: int) -> tuple[float, float] | None:
         """(pitch, yaw from north), radians, of the target; None: not known now.
 
         A moving target is extrapolated in a straight line for up to three seconds after its last message.
         """
-        here, place = self._heard.position, self._place
+        here, place = self._vehicle.position, self._place
         if here is None or place is None:
             return None
         north, east, down = LocalFrame(here).ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
         if self.system_id:
-            elapsed_us = time_us - self._told_us
+            elapsed_us = time_us - self._commanded_us
             if elapsed_us > STALE_US:
                 return None
             ways = (1e-6 * elapsed_us * speed for speed in self._velocity_ned_m_s)

@@ -5,11 +5,11 @@ DO_GIMBAL_MANAGER_CONFIGURE).
 from typing import Final
 
 from autopilot_bridge.payload.component import whole
-from autopilot_bridge.payload.vehicle_heard import AUTOPILOT
+from autopilot_bridge.payload.reported_vehicle import AUTOPILOT
 
 Sender = tuple[int, int]
 
-NOBODY: Final = (0, 0)
+NO_CONTROLLER: Final = (0, 0)
 _LEAVE, _TAKE, _GIVE_UP = -1, -2, -3
 _NONSENSE: Final = -99
 
@@ -25,13 +25,13 @@ class GimbalControl:
     """
 
     def __init__(self, system_id: int) -> None:
-        self.primary: Sender = NOBODY
-        self.secondary: Sender = NOBODY
+        self.primary: Sender = NO_CONTROLLER
+        self.secondary: Sender = NO_CONTROLLER
         self._autopilot = (system_id, AUTOPILOT)
 
     def may_point(self, sender: Sender) -> bool:
         """True when a sender's commands are executed."""
-        return self.primary == NOBODY or sender in (self.primary, self.secondary, self._autopilot)
+        return self.primary == NO_CONTROLLER or sender in (self.primary, self.secondary, self._autopilot)
 
     def configure(self, parameters: tuple[float, ...], sender: Sender) -> bool:
         """Parameters 1 to 4: system and component of the primary, then of the secondary control.
@@ -54,7 +54,7 @@ def _wanted(system: float, component: float, now: Sender, sender: Sender) -> Sen
     if _TAKE in ids:
         return sender
     if _GIVE_UP in ids:
-        return NOBODY if now == sender else now
+        return NO_CONTROLLER if now == sender else now
     if ids[0] == 0:
-        return NOBODY
+        return NO_CONTROLLER
     return ids if all(0 <= value <= 255 for value in ids) else None

@@ -28,7 +28,7 @@ class MagnetometerComponent(Component):
             rates_hz={},
         )
 
-    def tell(self, reading: MagneticReading) -> None:
+    def update(self, reading: MagneticReading) -> None:
         """Send a reading that was delivered on this step."""
         self.send(
             mavlink.MAVLink_named_value_float_message(

@@ -52,9 +52,9 @@ class PayloadStation:
         payload = self._payload
         payload.step(time_us)
         if self.camera is not None and payload.frame is not None:
-            self.camera.tell(payload.frame)
+            self.camera.update(payload.frame)
         if self._magnetometer is not None and payload.reading is not None:
-            self._magnetometer.tell(payload.reading)
+            self._magnetometer.update(payload.reading)
         for component in self.components:
             component.step(time_us)
 

@@ -53,7 +53,7 @@ class _Nowhere:
         """Drop the message."""
 
 
-NOBODY: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
+NO_CLIENT: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
 """The source of commands that the autopilot gives to itself."""
 
 

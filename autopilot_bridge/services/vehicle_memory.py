@@ -6,7 +6,7 @@ from enum import Enum, auto
 from typing import Any, Final
 
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 
 LOG_ROLE: Final = "log"
 """The role of the channel that writes the vehicle's own log."""

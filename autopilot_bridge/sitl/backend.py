@@ -17,7 +17,7 @@ from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.services.vehicle_memory import PowerAction
 from autopilot_bridge.sitl.failures import FailureInjector
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
 from flightsim.interface import SensorReadings
 from flightsim.world_spec import VehicleSpec, WorldSpec

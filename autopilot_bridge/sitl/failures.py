@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.sitl.entry_units import ENTRY_UNITS
+from autopilot_bridge.sitl.received_units import RECEIVED_UNITS
 from autopilot_bridge.sitl.simulator_parameters import SimulatorParameters
 from flightsim.airframe import AirframeKind, Role
 from flightsim.sensors import SensorSuite
@@ -66,7 +66,7 @@ class FailureInjector:
         }
         self._entries: dict[int, FaultPoint] = {
             int(unit.target.unit): sensors.add_elsewhere(unit.target, size=unit.size, rate_hz=unit.rate_hz)
-            for unit in ENTRY_UNITS
+            for unit in RECEIVED_UNITS
         }
 
     def connect(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:

@@ -56,22 +56,22 @@ class SharedLink:
         intake = self._intake
         if not arrived and not intake.waiting:
             return
-        believed = [
+        accepted = [
             (peer, frame, members)
             for peer, frames in intake.take(arrived)
             for frame in frames
-            if (members := self._believing(frame))
+            if (members := self._members_for(frame))
         ]
-        self._known.update(peer for peer, _, _ in believed)
+        self._known.update(peer for peer, _, _ in accepted)
         self._peers.forget({peer for peer, _ in arrived} - self._known)
         self._known.intersection_update(self.link.peers)
-        for peer, frame, members in believed:
+        for peer, frame, members in accepted:
             for switchboard, channel in members:
                 switchboard.take(channel, (frame,))
             for other in self._peers.others(frame, peer):
                 self.link.send(frame.raw, other)
 
-    def _believing(self, frame: Frame) -> list[tuple[Switchboard, LinkChannel]]:
+    def _members_for(self, frame: Frame) -> list[tuple[Switchboard, LinkChannel]]:
         """The vehicles that get a frame: the addressed one or else all, if they accept its signature."""
         if frame.component_id == AUTOPILOT_COMPONENT and frame.system_id in self._members:
             self.echoes += 1

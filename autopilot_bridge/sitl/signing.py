@@ -207,10 +207,10 @@ class VehicleSigning:
         if self._armed():
             return _WHILE_ARMED
         if self.state.active:
-            believed = frame.signed or link.policy.accept_bad_signature
+            trusted = frame.signed or link.policy.accept_bad_signature
         else:
-            believed = reach is not Reach.NETWORK
-        if not believed:
+            trusted = reach is not Reach.NETWORK
+        if not trusted:
             return _NOT_TRUSTED
         secret = bytes(message.secret_key)
         if any(secret):
@@ -227,7 +227,7 @@ class VehicleSigning:
         return _NOT_STORED if store is not None and store.failure else ""
 
 
-def told(text: str) -> mavlink.MAVLink_statustext_message:
+def answer_to_key(text: str) -> mavlink.MAVLink_statustext_message:
     """The STATUSTEXT for the client that sent a key."""
     good = text in (_KEY_TAKEN, _KEY_REMOVED)
     severity = mavlink.MAV_SEVERITY_INFO if good else mavlink.MAV_SEVERITY_ERROR

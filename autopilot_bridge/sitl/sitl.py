@@ -15,7 +15,7 @@ from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
 from autopilot_bridge.sitl.vehicle import SitlVehicle
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogWriter
 from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, magnetic_field_of
 from flightsim.world import World, WorldParameters
@@ -108,11 +108,11 @@ class Sitl:
         if time_us >= self._next_truth_us:
             self._next_truth_us = time_us + self._truth_interval_us
             for vehicle in self.vehicles:
-                self._tell_truth(time_us, vehicle.truth_encoder.encode(time_us))
+                self._report_truth(time_us, vehicle.truth_encoder.encode(time_us))
             for frame in self._target_truth.encode(time_us):
-                self._tell_truth(time_us, frame)
+                self._report_truth(time_us, frame)
 
-    def _tell_truth(self, time_us: int, frame: bytes) -> None:
+    def _report_truth(self, time_us: int, frame: bytes) -> None:
         for listener in self._truth_listeners:
             listener(time_us, frame)
 

@@ -14,7 +14,7 @@ from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.backend import BackendLinks
 from autopilot_bridge.sitl.channel import LinkChannel
-from autopilot_bridge.sitl.signing import VehicleSigning, told
+from autopilot_bridge.sitl.signing import VehicleSigning, answer_to_key
 from autopilot_bridge.telemetry.line import LineBudget
 
 AUTOPILOT_COMPONENT: Final = 1
@@ -143,4 +143,4 @@ class Switchboard:
         assert channel.signing is not None
         text = self.signing.take_setup(frame, channel.signing, self._reach[channel])
         if text is not None:
-            channel.send(told(text))
+            channel.send(answer_to_key(text))

@@ -23,7 +23,7 @@ from autopilot_bridge.sitl.launch_crew import LaunchCrew
 from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
 from autopilot_bridge.sitl.switchboard import Switchboard
 from autopilot_bridge.sitl.truth import TruthEncoder
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.airframe import AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS

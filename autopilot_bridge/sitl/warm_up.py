@@ -75,14 +75,14 @@ def _fly_multicopter(sitl: Sitl) -> None:
     _advance(sitl, 3.0 * _PHASE_S)
     guidance.reposition(north_m=5.0, east_m=5.0, down_m=-5.0)
     _advance(sitl, _PHASE_S)
-    _tell_odometry(sitl)
+    _send_odometry(sitl)
     _advance(sitl, _PHASE_S)
     for mode in (FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND):
         commander.set_mode(mode)
         _advance(sitl, _PHASE_S)
 
 
-def _tell_odometry(sitl: Sitl) -> None:
+def _send_odometry(sitl: Sitl) -> None:
     """Send a velocity as visual odometry does."""
     autopilot = sitl.vehicles[0].autopilot
     autopilot.parameters.set("EKF2_EV_CTRL", 4)

@@ -1,10 +1,19 @@
 """The vehicle's memory card: files that persist over a boot, behind one interface."""
 
-from autopilot_bridge.storage.files import Entry, FileStore, Mode, OpenFile
+from autopilot_bridge.storage.files import (
+    FOLDER_QUOTA,
+    MEMORY_QUOTA,
+    TEMPORARY_QUOTA,
+    Entry,
+    FileStore,
+    Mode,
+    OpenFile,
+    Quota,
+    VehiclePath,
+    parse_path,
+)
 from autopilot_bridge.storage.memory import MemoryStore
 from autopilot_bridge.storage.mounts import MountTable
-from autopilot_bridge.storage.paths import VehiclePath, parse_path
-from autopilot_bridge.storage.quota import FOLDER_QUOTA, MEMORY_QUOTA, TEMPORARY_QUOTA, Quota
 
 __all__ = [
     "FOLDER_QUOTA",

@@ -1,9 +1,106 @@
-"""The interface of a file store. Errors are `OSError` with the errno that a file system would give."""
+"""The interface of a file store, its capacity, and the paths in requests of clients.
 
+Errors are `OSError` with the errno that a file system would give. A path is untrusted bytes from a link:
+split into names it has no `..`, no empty name, no control character and no byte that is not UTF-8, or
+`OSError` is raised.
+"""
+
+import errno
+import os
+from dataclasses import dataclass
 from enum import Enum, auto
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
-from autopilot_bridge.storage.paths import VehiclePath
+VehiclePath = tuple[str, ...]
+"""Names from the root on; the root is empty."""
+
+MAX_NAME_BYTES: Final = 127
+MAX_DEPTH: Final = 16
+_FORBIDDEN: Final = frozenset('\\:*?"<>|')  # as on the FAT of a real card; one separates names on Windows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quota:
+    """The size of a memory card.
+
+    Attributes:
+        size_bytes: of all files together.
+        files: files and directories.
+    """
+
+    size_bytes: int
+    files: int
+
+    def __post_init__(self) -> None:
+        for name in ("size_bytes", "files"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} {getattr(self, name)} is not at least 1")
+
+
+MEMORY_QUOTA: Final = Quota(size_bytes=4 * 1024**2, files=256)
+TEMPORARY_QUOTA: Final = Quota(size_bytes=1024**3, files=20_000)
+FOLDER_QUOTA: Final = Quota(size_bytes=8 * 1024**3, files=20_000)
+
+
+class Usage:
+    """Counts the content of a store against its quota.
+
+    Attributes:
+        size_bytes, files: in use.
+    """
+
+    def __init__(self, quota: Quota) -> None:
+        self._quota = quota
+        self.size_bytes = 0
+        self.files = 0
+
+    def check_file(self) -> None:
+        """ENOSPC when there is no space for another file."""
+        if self.files >= self._quota.files:
+            raise error(errno.ENOSPC)
+
+    def check_growth(self, size_bytes: int) -> None:
+        """ENOSPC when there is no space for so many additional bytes."""
+        if size_bytes > 0 and self.size_bytes + size_bytes > self._quota.size_bytes:
+            raise error(errno.ENOSPC)
+
+
+def error(number: int, path: VehiclePath = ()) -> OSError:
+    """An `OSError` of the system's own class for this errno (FileNotFoundError and so on)."""
+    return OSError(number, os.strerror(number), "/" + "/".join(path))
+
+
+def parse_path(data: bytes) -> VehiclePath:
+    """The names in a path of a request, up to its first NUL.
+
+    Raises:
+        OSError: EILSEQ not UTF-8 or with control characters, EACCES for `..`, ENAMETOOLONG a name or a depth
+            beyond the limits.
+    """
+    try:
+        text = data.split(b"\0", 1)[0].decode("utf-8")
+    except UnicodeDecodeError:
+        raise error(errno.EILSEQ) from None
+    if not text.isprintable():
+        raise error(errno.EILSEQ)
+    names = tuple(name for name in text.split("/") if name not in ("", "."))
+    if ".." in names:
+        raise error(errno.EACCES)
+    if len(names) > MAX_DEPTH or any(len(name.encode()) > MAX_NAME_BYTES for name in names):
+        raise error(errno.ENAMETOOLONG)
+    return names
+
+
+def check_names(path: VehiclePath) -> VehiclePath:
+    """`path`, if a memory card can store it: no characters that FAT forbids.
+
+    Raises:
+        OSError: EINVAL for such a character.
+    """
+    for name in path:
+        if not _FORBIDDEN.isdisjoint(name) or name.rstrip(". ") == "":
+            raise error(errno.EINVAL, path)
+    return path
 
 
 class Entry(NamedTuple):
@@ -46,8 +143,6 @@ class OpenFile(Protocol):
 
 class HeldBytes:
     """Reading of an open file whose bytes are in memory."""
-
-    __slots__ = ("_data",)
 
     def __init__(self, data: bytes | bytearray) -> None:
         self._data = data

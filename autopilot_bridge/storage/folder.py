@@ -14,9 +14,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from autopilot_bridge.storage.files import Entry, Mode
-from autopilot_bridge.storage.paths import VehiclePath, check_names, error
-from autopilot_bridge.storage.quota import FOLDER_QUOTA, Quota, Usage
+from autopilot_bridge.storage.files import (
+    FOLDER_QUOTA,
+    Entry,
+    Mode,
+    Quota,
+    Usage,
+    VehiclePath,
+    check_names,
+    error,
+)
 
 _DIRECTORY: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _FILE: Final = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
@@ -163,8 +170,6 @@ class FolderStore:
 
 class _FolderFile:
     """An open file of a `FolderStore`."""
-
-    __slots__ = ("_descriptor", "_store")
 
     def __init__(self, store: FolderStore, descriptor: int) -> None:
         self._store = store

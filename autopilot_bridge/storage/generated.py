@@ -4,8 +4,7 @@ import errno
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from autopilot_bridge.storage.files import Entry, HeldBytes, Mode, OpenFile
-from autopilot_bridge.storage.paths import VehiclePath, error
+from autopilot_bridge.storage.files import Entry, HeldBytes, Mode, OpenFile, VehiclePath, error
 
 Content = Callable[[Mapping[str, str]], bytes]
 """Makes a file's bytes; the argument holds the query after `?` in its name (ArduPilot)."""
@@ -80,8 +79,6 @@ class GeneratedStore:
 class _Snapshot(HeldBytes):
     """The bytes of a generated file at the time when it was opened."""
 
-    __slots__ = ()
-
     def write(self, offset: int, data: bytes) -> None:
         raise error(errno.EBADF)
 
@@ -91,8 +88,6 @@ class _Snapshot(HeldBytes):
 
 class _Upload(HeldBytes):
     """A file being written, processed as a whole when it is closed."""
-
-    __slots__ = ("_take",)
 
     _data: bytearray
 

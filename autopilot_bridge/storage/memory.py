@@ -1,10 +1,20 @@
-"""A store in memory: empty at every start, lost at the end, equal for equal runs."""
+"""A store in memory (empty at every start, lost at the end, equal for equal runs), and the memory card."""
 
 import errno
+from dataclasses import dataclass, field
 
-from autopilot_bridge.storage.files import Entry, HeldBytes, Mode
-from autopilot_bridge.storage.paths import VehiclePath, check_names, error
-from autopilot_bridge.storage.quota import MEMORY_QUOTA, Quota, Usage
+from autopilot_bridge.storage.files import (
+    MEMORY_QUOTA,
+    Entry,
+    FileStore,
+    HeldBytes,
+    Mode,
+    Quota,
+    Usage,
+    VehiclePath,
+    check_names,
+    error,
+)
 
 _Directory = dict[str, "bytearray | _Directory"]
 
@@ -133,8 +143,6 @@ class MemoryStore:
 class _MemoryFile(HeldBytes):
     """An open file of a `MemoryStore`; after its removal it can still be read, as on a disk."""
 
-    __slots__ = ("_store", "_writable")
-
     _data: bytearray
 
     def __init__(self, store: MemoryStore, data: bytearray, *, writable: bool) -> None:
@@ -156,3 +164,18 @@ class _MemoryFile(HeldBytes):
 
 def _entry(name: str, node: "bytearray | _Directory") -> Entry:
     return Entry(name, True, 0) if isinstance(node, dict) else Entry(name, False, len(node))
+
+
+@dataclass(slots=True, kw_only=True)
+class MemoryCard:
+    """The data that persist when the autopilot boots again.
+
+    Attributes:
+        files: the card's own file system; by default in memory, empty.
+        logs: flights are logged on it.
+        boots: number of boots of an autopilot with it, in this run.
+    """
+
+    files: FileStore = field(default_factory=MemoryStore)
+    logs: bool = False
+    boots: int = 0

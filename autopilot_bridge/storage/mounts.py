@@ -3,8 +3,7 @@
 import errno
 from collections.abc import Mapping
 
-from autopilot_bridge.storage.files import Entry, FileStore, Mode, OpenFile
-from autopilot_bridge.storage.paths import VehiclePath, error
+from autopilot_bridge.storage.files import Entry, FileStore, Mode, OpenFile, VehiclePath, error
 
 
 class MountTable:

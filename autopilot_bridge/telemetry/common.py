@@ -66,7 +66,7 @@ class CommonMessages:
     servo_unused_us = 0
     servo_disarmed_us = 1000
     gps_timeout_us = 4_000_000  # ArduPilot's GPS_TIMEOUT_MS
-    gps_told_before_first = True
+    gps_sent_before_first = True
 
     def __init__(self, sources: TelemetrySources) -> None:
         self.sources = sources
@@ -120,7 +120,7 @@ class CommonMessages:
         """
         gps = self.sources.readings.gps
         if gps.time_us < 0:
-            if not self.gps_told_before_first:
+            if not self.gps_sent_before_first:
                 return None
             return (self.view.time_us, _NO_GPS, 0, 0, 0, UINT16_UNKNOWN, UINT16_UNKNOWN) + (0,) * 9
         v = gps.values.tolist()

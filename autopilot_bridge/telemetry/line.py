@@ -44,8 +44,6 @@ class LineBudget:
         ValueError: the capacity is not above 0.
     """
 
-    __slots__ = ("_share_bytes", "_time_us", "backlog_bytes", "bytes_per_s", "forwarded_bytes")
-
     def __init__(self, bytes_per_s: float) -> None:
         if not 0.0 < bytes_per_s < float("inf"):
             raise ValueError(f"capacity {bytes_per_s} bytes/s is not above 0")
@@ -161,18 +159,16 @@ class RadioFlow:
         slowdown_us: added to all intervals.
     """
 
-    __slots__ = ("_control", "_heard_us", "multiplier", "slowdown_us")
-
     def __init__(self, control: FlowControl) -> None:
         self._control = control
-        self._heard_us = 0
+        self._received_us = 0
         self.multiplier = 1.0
         self.slowdown_us = 0
 
-    def heard(self, free_percent: int, time_us: int) -> None:
+    def on_radio_status(self, free_percent: int, time_us: int) -> None:
         """A RADIO_STATUS was received: free part of the transmit buffer in percent."""
         control, slowdown_ms = self._control, self.slowdown_us // 1000
-        self._heard_us = time_us
+        self._received_us = time_us
         for below, factor in control.factors:
             if free_percent < below:
                 self.multiplier = max(control.least, self.multiplier * factor)
@@ -195,5 +191,5 @@ class RadioFlow:
     def advance(self, time_us: int) -> None:
         """Forget a radio that is gone."""
         timeout_us = self._control.timeout_us
-        if timeout_us and time_us - self._heard_us > timeout_us:
+        if timeout_us and time_us - self._received_us > timeout_us:
             self.multiplier = 1.0

@@ -40,8 +40,6 @@ class PayloadSink(Protocol):
 class PayloadCache:
     """Builds and packs messages, once per physics step for all channels."""
 
-    __slots__ = ("_builders", "_packers", "_payloads", "time_us")
-
     def __init__(self, builders: Mapping[int, Builder]) -> None:
         self._builders = builders
         self._packers = {message_id: values_packer(definition(message_id)) for message_id in builders}
@@ -85,8 +83,6 @@ class _Group:
         motion: bits of the motion messages among them.
     """
 
-    __slots__ = ("due_us", "interval_us", "message_ids", "motion", "step_us")
-
     def __init__(self, interval_us: int, due_us: int) -> None:
         self.interval_us = interval_us
         self.step_us = interval_us
@@ -111,23 +107,6 @@ class StreamTable:
         motion_bits: messages that the sink frames by itself, and their bits.
         line: capacity of the channel's line; None: unlimited.
     """
-
-    __slots__ = (
-        "_cache",
-        "_defaults_us",
-        "_groups",
-        "_heap",
-        "_intervals_us",
-        "_line",
-        "_motion_bits",
-        "_serials",
-        "_sink",
-        "_sizes",
-        "_step_us",
-        "_thinning",
-        "_waiting",
-        "next_due_us",
-    )
 
     NEVER: Final = 1 << 62
 

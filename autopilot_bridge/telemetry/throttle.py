@@ -33,8 +33,6 @@ class StreamThrottle:
         radio: the state that a radio on the channel has reported.
     """
 
-    __slots__ = ("_due_us", "_forwarded_bytes", "_line", "_others_bytes_per_s", "_table", "radio")
-
     def __init__(self, table: StreamTable, line: LineBudget | None, control: FlowControl) -> None:
         self.radio = RadioFlow(control)
         self._table = table

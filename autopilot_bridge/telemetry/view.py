@@ -1,6 +1,7 @@
 """The input of telemetry, converted once per physics step to plain numbers in the wire's units."""
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -8,13 +9,53 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.telemetry.vibration import VibrationMeter
 from flightsim import interface
-from flightsim.foundation.atmosphere import SEA_LEVEL_PRESSURE_PA
+from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_PRESSURE_PA
+from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import SensorReadings
 
 UINT16_UNKNOWN: Final = 65535
 VIBRATION_RATE_HZ: Final = 50.0  # of the slow loop
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def _update(accel_frd: Array, slow: Array, level: Array, blend_slow: float, blend_level: float) -> None:
+    for i in range(3):
+        if not math.isfinite(accel_frd[i]):
+            continue
+        slow[i] += blend_slow * (accel_frd[i] - slow[i])
+        fast = accel_frd[i] - slow[i]
+        level[i] += blend_level * (fast * fast - level[i])
+
+
+class VibrationMeter:
+    """High-passed accelerometer RMS per body axis (ArduPilot: 5 Hz high pass, 2 Hz smoothing).
+
+    Args:
+        accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; values that
+            are not finite are ignored.
+        rate_hz: calls of `update` per second.
+
+    Attributes:
+        update: takes the newest sample.
+    """
+
+    def __init__(self, accel_frd_m_s2: Array, *, rate_hz: float) -> None:
+        self._level = np.zeros(3)
+        blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)
+        blend_level = min(1.0, 2.0 * math.pi * 2.0 / rate_hz)
+        slow = np.array([0.0, 0.0, -GRAVITY_M_S2])
+        self.update: Callable[[], None] = bound(
+            _update, accel_frd_m_s2, slow, self._level, blend_slow, blend_level
+        )
+
+    @property
+    def rms_m_s2(self) -> tuple[float, float, float]:
+        """RMS per axis (x, y, z)."""
+        x, y, z = np.sqrt(self._level).tolist()
+        return x, y, z
 
 
 class TelemetryView:
@@ -24,30 +65,6 @@ class TelemetryView:
     and `vel` NED m, m/s; `acc` NED m/s^2; and, when the filter has an origin, `lat_e7`,
     `lon_e7`, `alt_amsl_m`, `alt_relative_m` (to home). `time_us` and `time_ms` are always those of the step.
     """
-
-    __slots__ = (
-        "_fresh_us",
-        "_nav_state",
-        "acc",
-        "alt_amsl_m",
-        "alt_relative_m",
-        "context",
-        "has_global",
-        "heading_deg",
-        "lat_e7",
-        "lon_e7",
-        "pitch",
-        "pos",
-        "q",
-        "rates",
-        "readings",
-        "roll",
-        "time_ms",
-        "time_us",
-        "vel",
-        "vibration",
-        "yaw",
-    )
 
     def __init__(
         self, context: FlightContext, nav_state: NDArray[np.float64], readings: SensorReadings

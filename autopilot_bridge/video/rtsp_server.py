@@ -45,7 +45,7 @@ class RtspServer:
         requests = RequestReader()
         try:
             while True:
-                data = await _said(reader, player)
+                data = await _read_request(reader, player)
                 if not data:
                     break
                 for request in requests.feed(data):
@@ -62,7 +62,7 @@ class RtspServer:
                 await writer.wait_closed()
 
 
-async def _said(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
+async def _read_request(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
     """The next data of a player on its connection; empty when the player has closed it.
 
     Timeouts are counted, not measured as a total time: after a pause of this process, data received meanwhile
@@ -73,14 +73,14 @@ async def _said(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
     """
     silent = 0
     while player.held_by_connection or silent < _SILENT_LOOKS:
-        player.heard = False
+        player.received = False
         try:
             async with asyncio.timeout(_LOOK_S) as look:
                 return await reader.read(65536)
         except TimeoutError:
             if not look.expired():  # a timeout of the operating system
                 raise
-        silent = 0 if player.heard else silent + 1
+        silent = 0 if player.received else silent + 1
     raise TimeoutError
 
 
@@ -91,7 +91,7 @@ class _Ear(asyncio.DatagramProtocol):
         self._player = player
 
     def datagram_received(self, data: bytes, addr: object) -> None:
-        self._player.heard = True
+        self._player.received = True
 
 
 class RtspPlayer:
@@ -100,7 +100,7 @@ class RtspPlayer:
     Attributes:
         playing: packets are sent to it.
         lost: see `studio.Player`.
-        heard: an event that is set when UDP data of the player are received.
+        received: an event that is set when UDP data of the player are received.
     """
 
     def __init__(self, streams: Mapping[str, CameraStream], writer: asyncio.StreamWriter) -> None:
@@ -112,7 +112,7 @@ class RtspPlayer:
         self._session = ""
         self.playing = False
         self.lost = True
-        self.heard = False
+        self.received = False
 
     @property
     def held_by_connection(self) -> bool:

@@ -176,7 +176,7 @@ class VideoService:
             return ""
         view = view_to_json(self._cameras[index].camera.view(time_us))
         self._photos_under_way += 1
-        self._tell("photo", index, path=str(folder / name), view=view, notes=notes)
+        self._order("photo", index, path=str(folder / name), view=view, notes=notes)
         return name
 
     def start_recording(self, index: int, time_us: int) -> None:
@@ -186,13 +186,13 @@ class VideoService:
             return
         path = folder / f"{self._cameras[index].name}/VID_{self._videos[index]:04d}.mp4"
         self._videos[index] += 1
-        self._tell("record", index, path=str(path), rate_hz=self._parameters.rate_hz)
+        self._order("record", index, path=str(path), rate_hz=self._parameters.rate_hz)
         self._next_frame_us[index] = time_us
 
     def stop_recording(self, index: int) -> None:
         """Finish the file."""
         if self._next_frame_us.pop(index, None) is not None:
-            self._tell("stop", index)
+            self._order("stop", index)
 
     # interface to the run loop
 
@@ -214,7 +214,7 @@ class VideoService:
                 self._next_frame_us[index] = max(due_us + self._frame_us, time_us)
                 if index not in self._untaken:  # else the picture is left out: the machine is too slow
                     self._untaken.add(index)
-                    self._tell("frame", index, view=view_to_json(self._cameras[index].camera.view(time_us)))
+                    self._order("frame", index, view=view_to_json(self._cameras[index].camera.view(time_us)))
         try:
             data = self._line.recv(65536)
             if not data:
@@ -241,14 +241,14 @@ class VideoService:
             return
         if self._parameters.folder is None:
             self._process.kill()
-        elif not self._heard_out(self._line, self._process):
+        elif not self._finished(self._line, self._process):
             self._on_loss(_ENDED)
             self._process.kill()
         self._process.wait()
         self._line.close()
         self._line = self._process = None
 
-    def _heard_out(self, line: socket.socket, process: "subprocess.Popen[bytes]") -> bool:
+    def _finished(self, line: socket.socket, process: "subprocess.Popen[bytes]") -> bool:
         """Wait until the picture process has written the pending files; False: it did not finish."""
         try:
             line.settimeout(_END_S)
@@ -278,7 +278,7 @@ class VideoService:
         self._outgoing = bytearray(pack(setup_to_json(self._setup)))
         self._flush()
 
-    def _tell(self, kind: str, index: int, **more: Any) -> None:
+    def _order(self, kind: str, index: int, **more: Any) -> None:
         if self._line is None:
             self._start()
         self._outgoing += pack({"kind": kind, "camera": index, **more})

@@ -172,14 +172,14 @@ class Studio:
         try:
             save_photo(path, stream.renderer.render(view), notes)
         except OSError as error:
-            self._tell("photo", path, error)
+            self._report("photo", path, error)
 
     def _record(self, stream: CameraStream, path: Path, rate_hz: float) -> None:
         width, height = stream.size_px
         try:
             stream.recording = Recording(path, width_px=width, height_px=height, rate_hz=rate_hz)
         except OSError as error:
-            self._tell("video", path, error)
+            self._report("video", path, error)
 
     def _film(self, stream: CameraStream, view: CameraView) -> None:
         """Add to a recording, which ends when it can't be written."""
@@ -189,7 +189,7 @@ class Studio:
         try:
             recording.write(stream.picture(view), time_us=view.time_us)
         except OSError as error:
-            self._tell("video", recording.path, error)
+            self._report("video", recording.path, error)
             stream.recording = None
             with suppress(OSError):  # already reported
                 recording.close()
@@ -201,9 +201,9 @@ class Studio:
         try:
             recording.close()
         except OSError as error:
-            self._tell("video", recording.path, error)
+            self._report("video", recording.path, error)
 
-    def _tell(self, what: str, path: Path, error: OSError) -> None:
+    def _report(self, what: str, path: Path, error: OSError) -> None:
         self._writer.write(pack({"error": f"can't write {what} {path}: {error.strerror or error}"}))
 
 

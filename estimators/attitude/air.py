@@ -41,7 +41,7 @@ class AirData:
     def __init__(self, source: AirspeedSource, age_max_us: int) -> None:
         self._source = source
         self._age_max_us = age_max_us
-        self._heard_us: dict[AirspeedSource, int] = {}
+        self._received_us: dict[AirspeedSource, int] = {}
         self._ratio = 1.0
 
     @property
@@ -59,7 +59,7 @@ class AirData:
         """True airspeed, m/s; None when another source is used, or the value is invalid."""
         if not (isfinite(equivalent_m_s) and 0.0 < equivalent_m_s <= _AIRSPEED_MAX_M_S):
             return None
-        self._heard_us[source] = time_us
+        self._received_us[source] = time_us
         if source is not self._source and not (
             self._source is AirspeedSource.AUTO and self._best(time_us, source)
         ):
@@ -77,12 +77,12 @@ class AirData:
         for better in (AirspeedSource.VFR_HUD, AirspeedSource.AIRSPEED):
             if better is source:
                 return True
-            heard_us = self._heard_us.get(better)
-            if heard_us is not None and time_us - heard_us <= self._age_max_us:
+            received_us = self._received_us.get(better)
+            if received_us is not None and time_us - received_us <= self._age_max_us:
                 return False
         return True
 
     def reset(self) -> None:
         """Forget everything."""
-        self._heard_us.clear()
+        self._received_us.clear()
         self._ratio = 1.0

@@ -26,8 +26,6 @@ class BoardTrim:
         active: whether a trim is known and applied.
     """
 
-    __slots__ = ("_given", "_rows", "_trim", "active")
-
     def __init__(self, parameters: AttitudeParameters) -> None:
         self._given = {_ROLL: parameters.trim_roll_rad, _PITCH: parameters.trim_pitch_rad}
         self._trim = {name: value or 0.0 for name, value in self._given.items()}

@@ -116,7 +116,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._subject = 0
         self._restart()
         self._imu_name = ""
-        self._imu_heard_us: dict[str, int] = {}
+        self._imu_received_us: dict[str, int] = {}
 
     def _restart(self) -> None:
         """Restart the filter; the knowledge of the vehicle and the air is kept."""
@@ -170,19 +170,19 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
 
     def remarks(self) -> Mapping[str, float | str]:
         x = self._state
-        told: dict[str, float | str] = {
+        remarks: dict[str, float | str] = {
             "form": "unknown" if self._form is None else FORM_NAMES[self._form],
             "imu": self._imu_name or "none",
             "gyro_bias_rad_s": float(np.linalg.norm(x[at.GYRO_BIAS : at.GYRO_BIAS + 3])),
         }
         if self._trim.active:
-            told["note"] = self._trim.text
+            remarks["note"] = self._trim.text
         if self._form == at.ROTOR:
-            told["drag_1_s"] = float(x[at.DRAG])
+            remarks["drag_1_s"] = float(x[at.DRAG])
         elif self._form == at.WING and x[at.LIFT] > 0.0:
-            told["lift_1_m"] = float(x[at.LIFT])
-            told["alpha_mean_rad"] = float(x[at.ALPHA_MEAN])
-        return told
+            remarks["lift_1_m"] = float(x[at.LIFT])
+            remarks["alpha_mean_rad"] = float(x[at.ALPHA_MEAN])
+        return remarks
 
     # Slow messages
 
@@ -208,7 +208,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             return refused
         self._state[at.CLIMB] = message.climb
         self._state[at.THROTTLE] = 0.01 * min(100, message.throttle)
-        self._hear(time_us, self._air.airspeed(time_us, AirspeedSource.VFR_HUD, message.airspeed))
+        self._use_airspeed(time_us, self._air.airspeed(time_us, AirspeedSource.VFR_HUD, message.airspeed))
         return Outcome.USED if refused is None else refused
 
     def _airspeed(self, time_us: int, message: Message) -> Outcome:
@@ -219,7 +219,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._forget()
         elif refused is not None:
             return refused
-        self._hear(time_us, self._air.airspeed(time_us, AirspeedSource.AIRSPEED, message.airspeed))
+        self._use_airspeed(time_us, self._air.airspeed(time_us, AirspeedSource.AIRSPEED, message.airspeed))
         return Outcome.USED if refused is None else refused
 
     def _scaled_pressure(self, time_us: int, message: Message) -> Outcome:
@@ -231,10 +231,10 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         elif refused is not None:
             return refused
         self._air.static_pressure(message.press_abs)
-        self._hear(time_us, self._air.by_pressure(time_us, message.press_diff))
+        self._use_airspeed(time_us, self._air.by_pressure(time_us, message.press_diff))
         return Outcome.USED if refused is None else refused
 
-    def _hear(self, time_us: int, airspeed_m_s: float | None) -> None:
+    def _use_airspeed(self, time_us: int, airspeed_m_s: float | None) -> None:
         if airspeed_m_s is not None:
             self._state[at.AIRSPEED] = airspeed_m_s
             self._state[at.AIRSPEED_FRESH] = 1.0
@@ -252,7 +252,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         if message.id != self._instance or (updated & INERTIAL_FIELDS != INERTIAL_FIELDS and updated):
             return Outcome.IGNORED
         if updated & DIFFERENTIAL_PRESSURE and message.diff_pressure > 0.0:
-            self._hear(time_us, self._air.by_pressure(time_us, message.diff_pressure))
+            self._use_airspeed(time_us, self._air.by_pressure(time_us, message.diff_pressure))
         return self._imu(time_us, message)
 
     def _raw_imu(self, time_us: int, message: Message) -> Outcome:
@@ -296,8 +296,8 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
 
     def _chosen(self, time_us: int, name: str) -> bool:
         """Whether to change to this message: it is better and fast enough, or the one in use has stopped."""
-        last_us = self._imu_heard_us.get(name)
-        self._imu_heard_us[name] = time_us
+        last_us = self._imu_received_us.get(name)
+        self._imu_received_us[name] = time_us
         if self._imu_name and self._time_us is not None:
             gone = time_us - self._time_us > _GONE_US
             better = _IMU_NAMES.index(name) < _IMU_NAMES.index(self._imu_name)

@@ -70,7 +70,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         if message.src_component != _AUTOPILOT or name not in (self._reader.message, "HOME_POSITION"):
             return Outcome.IGNORED
         if name == "HOME_POSITION":
-            if not self._reader.hear_home(message):
+            if not self._reader.take_home(message):
                 return Outcome.IMPLAUSIBLE
             if self._reader.home is not None:
                 self.track.place_pattern(PatternFrame(self.parameters, self._reader.home))
@@ -84,10 +84,10 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         fix = self._reader.read(message)
         if fix is None or not self.track.take(time_us, fix):
             return refused or Outcome.WAITING
-        self._tell(message.src_system)
+        self._report(message.src_system)
         return refused or Outcome.UPDATED
 
-    def _tell(self, subject: int) -> None:
+    def _report(self, subject: int) -> None:
         track = self.track
         assert track.pattern is not None and track.filter.time_us is not None
         motion = track.filter
@@ -99,8 +99,8 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         if self.parameters.frequency:
             sigmas = [math.sqrt(max(0.0, float(motion.covariance[MOTION + i, MOTION + i]))) for i in (0, 1)]
         else:
-            believed = self.parameters.epsilon_rad_s if self.parameters.form is Form.PROPOSED else 0.0
-            sigmas = [math.sqrt(believed * omega) for omega in (omega_x, omega_y)]
+            drift_rad_s = self.parameters.epsilon_rad_s if self.parameters.form is Form.PROPOSED else 0.0
+            sigmas = [math.sqrt(drift_rad_s * omega) for omega in (omega_x, omega_y)]
         self._estimates = (
             LissajousEstimate(
                 time_us=motion.time_us or 0,

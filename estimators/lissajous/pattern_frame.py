@@ -21,8 +21,6 @@ class PatternFrame:
         home: home of the vehicle, for a centre that is not specified by coordinates.
     """
 
-    __slots__ = ("_cos", "_sin", "frame", "orientation_rad")
-
     def __init__(self, parameters: LissajousParameters, home: GeodeticPosition) -> None:
         p = parameters
         place = home
@@ -75,8 +73,6 @@ class Track:
         filter: filter of its motion.
         pattern: the frame; None before home or centre is known.
     """
-
-    __slots__ = ("_delay_us", "filter", "parameters", "pattern")
 
     def __init__(self, parameters: LissajousParameters) -> None:
         self.parameters = parameters

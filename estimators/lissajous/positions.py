@@ -49,15 +49,13 @@ class PositionReader:
         home: home from HOME_POSITION; None before it was received.
     """
 
-    __slots__ = ("_local", "home", "message", "source")
-
     def __init__(self, source: Source) -> None:
         self.source = source
         self.message = MESSAGES[source]
         self.home: GeodeticPosition | None = None
         self._local: LocalFrame | None = None
 
-    def hear_home(self, message: Message) -> bool:
+    def take_home(self, message: Message) -> bool:
         """Process a HOME_POSITION; returns False when its position is invalid."""
         if abs(message.latitude) > _MAX_LAT_E7 or abs(message.longitude) > _MAX_LON_E7:
             return False

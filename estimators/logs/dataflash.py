@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 from pymavlink import DFReader
 
+from estimators.errors import LogError
 from estimators.logs.dataflash_mapping import map_messages
 from estimators.logs.dataflash_time import PX4_TIME, RawTable, stamp
-from estimators.logs.errors import LogError
 from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
 from estimators.logs.sdlog2_mapping import map_sdlog2
 
@@ -31,9 +31,9 @@ def open_dataflash(path: Path) -> MappedSource:
     Raises:
         LogError: it can't be read, or contains no message.
     """
-    complaints = io.StringIO()
+    output = io.StringIO()
     try:
-        with contextlib.redirect_stdout(complaints), contextlib.redirect_stderr(complaints):
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             reader = DFReader.DFReader_binary(str(path))
     except Exception as error:  # DFReader may raise any exception for a damaged file
         raise LogError(
@@ -64,7 +64,7 @@ def open_dataflash(path: Path) -> MappedSource:
         tables,
         bytes_by_kind={"messages": message_bytes, "junk": len(data) - message_bytes},
         drops={"torn_messages": torn},
-        remarks={"formats": len(reader.formats), "complaints": complaints.getvalue().count("\n")},
+        remarks={"formats": len(reader.formats), "complaints": output.getvalue().count("\n")},
     )
 
 

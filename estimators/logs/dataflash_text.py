@@ -6,10 +6,10 @@ from typing import Any, Final
 import numpy as np
 from pymavlink import DFReader
 
+from estimators.errors import LogError
 from estimators.logs.ardupilot_firmware import firmware_of
 from estimators.logs.dataflash import META, dataflash_source
 from estimators.logs.dataflash_time import RawTable
-from estimators.logs.errors import LogError
 from estimators.logs.mapped import Array, MappedSource
 
 _TEXT_CODES: Final = frozenset("nNZ")

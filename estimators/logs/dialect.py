@@ -15,7 +15,7 @@ import pymavlink.dialects.v20
 from autopilot_bridge.mavlink import DEFINITIONS, MessageDefinition
 from autopilot_bridge.mavlink.definitions import define, define_class
 from autopilot_bridge.mavlink.event_messages import MESSAGES
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 from estimators.logs.xml_definitions import FieldText, MessageText, read_definitions
 from estimators.messages import message_class
 

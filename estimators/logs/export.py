@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log import Log
 from estimators.logs.new_file import new_file

@@ -12,7 +12,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 
 _IMUS: Final = ("HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 _PRESSURES: Final = ("SCALED_PRESSURE", "SCALED_PRESSURE2", "SCALED_PRESSURE3")

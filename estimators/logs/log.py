@@ -12,7 +12,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.logs.errors import LogError, NothingThere
+from estimators.errors import LogError, NothingThere
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log_clock import LogClock, make_clock
 from estimators.logs.source import LogSource, Positions, Stream
@@ -440,9 +440,9 @@ class Log:
     def _missing(self, name: str, system_id: int | None, component_id: int | None) -> LogError:
         senders = [f"{s.system_id}/{s.component_id}" for s in self._find((name,), None, None)]
         if senders:
-            asked = "/".join("*" if number is None else str(number) for number in (system_id, component_id))
+            sender = "/".join("*" if number is None else str(number) for number in (system_id, component_id))
             return LogError(
-                f"{self.path}: no {name.upper()} from {asked}; it comes from {', '.join(senders)}"
+                f"{self.path}: no {name.upper()} from {sender}; it comes from {', '.join(senders)}"
             )
         names = sorted({stream.name for stream in self.source.streams})
         return LogError(f"{self.path} has no {name.upper()}; it has {', '.join(names)}")

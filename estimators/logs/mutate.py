@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MessageDefinition
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, INCOMPAT_SIGNED, MAGIC_V2
+from estimators.errors import LogError
 from estimators.logs.columns import record_dtype
-from estimators.logs.errors import LogError
 from estimators.logs.faults import Fault, FaultKind
 from estimators.logs.iterate import Selection
 from estimators.logs.log import Log

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 
 
 @contextmanager

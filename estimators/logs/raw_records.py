@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 from estimators.logs.iterate import Selection
 from estimators.logs.log import Log
 from estimators.logs.new_file import new_file

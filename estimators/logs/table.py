@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.errors import LogError
 from estimators.logs.columns import Columns
 from estimators.logs.dialect import Description
-from estimators.logs.errors import LogError
 from estimators.logs.source import LogSource, Positions
 from estimators.logs.units import to_si
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, MAGIC_V2
+from estimators.errors import LogError
 from estimators.logs.columns import Columns, decode_columns
 from estimators.logs.dialect import Description, Dialect
-from estimators.logs.errors import LogError
 from estimators.logs.gaps import GapFigures, find_lead, sort_gaps
 from estimators.logs.scan import (
     FRAMES,

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from pyulog.core import ULog
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
 from estimators.logs.ulog_mapping import UlogFacts, board_rotation, map_topics
 
@@ -156,8 +156,8 @@ def _unix_offset_us(topics: dict[tuple[str, int], Records]) -> int | None:
     for name in ("vehicle_gps_position", "sensor_gps"):
         topic = topics.get((name, 0))
         if topic is not None and "time_utc_usec" in topic.columns:
-            told = topic.columns["time_utc_usec"].astype(np.int64)
-            rows = np.flatnonzero(told > 0)
+            utc_us = topic.columns["time_utc_usec"].astype(np.int64)
+            rows = np.flatnonzero(utc_us > 0)
             if len(rows):
-                return int(told[rows[0]] - topic.time_us[rows[0]])
+                return int(utc_us[rows[0]] - topic.time_us[rows[0]])
     return None

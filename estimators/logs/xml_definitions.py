@@ -12,7 +12,7 @@ from typing import Final
 
 from fastcrc.crc16 import mcrf4xx
 
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 
 TYPE_SIZES: Final = {
     "char": 1,

@@ -324,7 +324,7 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
     def remarks(self) -> Mapping[str, float | str]:
         """Numbers of detections and losses, and the pressure on the ground."""
         tracker = self.tracker
-        told: dict[str, float | str] = {
+        remarks: dict[str, float | str] = {
             "status": tracker.status.value,
             "detections_used": float(tracker.target.accepted),
             "detections_rejected": float(tracker.target.rejected),
@@ -332,11 +332,11 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
             "ground_pa": math.nan if self._height is None else self._height.ground_pa,
         }
         if self._height is None and self._armed:
-            told["warning"] = (
+            remarks["warning"] = (
                 "no pressure was received before the vehicle was armed, so its height is not known; "
                 "set ground_pa, the pressure at the start in pascals"
             )
-        return told
+        return remarks
 
 
 def _need(name: str, rate_hz: float, wanted_hz: float, purpose: str, optional: bool = False) -> Need:

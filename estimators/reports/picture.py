@@ -140,14 +140,14 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
     below.set_ylabel(f"error, {written}", fontsize=9, color=_INK)
     below.axhline(0.0, color=_INK, linewidth=0.6)
     _limit(below, c, column, factor)
-    told = [
+    labels = [
         f"{reference}: RMS {figure.rms:.3g} {written}, at most {figure.max:.3g} {written}"
         for reference, figures in c.figures.items()
         for figure in figures
         if figure.quantity == name and figure.unit == unit
     ]
     below.annotate(
-        "   ".join(told), (1.0, 1.0), xycoords="axes fraction", xytext=(-4, -3), textcoords="offset points",
+        "   ".join(labels), (1.0, 1.0), xycoords="axes fraction", xytext=(-4, -3), textcoords="offset points",
         ha="right", va="top", fontsize=8, color=_INK,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
     )  # fmt: skip

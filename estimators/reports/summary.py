@@ -83,7 +83,7 @@ def assess(
         if not fleet.team and fleet.runners:
             supplies = {s: given for s, given in supplies.items() if s in fleet.runners}
     lacking = {s: missing for s, given in supplies.items() if (missing := missing_of(given))}
-    reason = failure or _told(lacking, len(supplies)) or ("" if logs else "nothing was received")
+    reason = failure or _reason_of(lacking, len(supplies)) or ("" if logs else "nothing was received")
     compared_of = [(runner, comparisons(logs, runner, against)) for runner in fleet.runners.values()]
     compared = [c for _, own in compared_of for c in own]
     estimates = sum(len(table) for runner in fleet.runners.values() for table in runner.tables.values())
@@ -105,7 +105,7 @@ def assess(
     return Assessment(outcome=outcome, reason=reason, compared=compared, figures=figures)
 
 
-def _told(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:
+def _reason_of(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:
     """The missing inputs in one sentence."""
     parts = [
         text if vehicles == 1 else f"vehicle {system}: {text}"

@@ -1,6 +1,7 @@
 """One drone of the team: its positions, its attitudes, and its detections that could not be placed yet."""
 
 import math
+from bisect import bisect_left
 from collections import deque
 from typing import Final
 
@@ -12,12 +13,11 @@ from estimators.lissajous.model import VX, VY, Array, course, course_variance
 from estimators.lissajous.pattern_frame import Track
 from estimators.lissajous.positions import PositionReader, values_of
 from estimators.messages import Message
-from estimators.target_fusion.orientation import Orientations
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
 from estimators.target_fusion.sight import Detection, place_in_level_frame
 from estimators.target_fusion.transform import ground_target
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.foundation.vectors import Quaternion, from_euler, product, yaw_of
+from flightsim.foundation.vectors import Quaternion, between, from_euler, product, yaw_of
 
 __all__ = ["Drone"]
 
@@ -27,6 +27,56 @@ _AHEAD_US: Final = 1_000_000
 _IN_VEHICLE_FRAME: Final = 32  # GIMBAL_DEVICE_FLAGS
 _IN_EARTH_FRAME: Final = 64
 _YAW_LOCK: Final = 16
+
+__all__ = ["Orientations"]
+
+
+class Orientations:
+    """Orientations of the last seconds, by time.
+
+    Args:
+        history_us: time for which they are kept.
+        reach_us: largest time difference to the nearest orientation that may be used.
+    """
+
+    def __init__(self, history_us: int, reach_us: int) -> None:
+        self._history_us = history_us
+        self._reach_us = reach_us
+        self._times: list[int] = []
+        self._quaternions: list[Quaternion] = []
+
+    def add(self, time_us: int, q: Quaternion) -> None:
+        """Store an orientation that is newer than those before."""
+        self._times.append(time_us)
+        self._quaternions.append(q)
+        drop = bisect_left(self._times, time_us - self._history_us)
+        if drop > 16:  # removed in groups, because each removal moves the rest of the list
+            del self._times[:drop], self._quaternions[:drop]
+
+    def clear(self) -> None:
+        """Remove all orientations."""
+        self._times.clear()
+        self._quaternions.clear()
+
+    def covers(self, time_us: int) -> bool:
+        """Whether there is an orientation at or after this time."""
+        return bool(self._times) and self._times[-1] >= time_us
+
+    def at(self, time_us: int) -> Quaternion | None:
+        """Interpolate between the two neighbours of a time, or use the nearest if it is close; None when none
+        is close.
+        """
+        after = bisect_left(self._times, time_us)
+        if 0 < after < len(self._times):
+            before_us, after_us = self._times[after - 1], self._times[after]
+            if after_us - before_us <= 2 * self._reach_us:
+                share = (time_us - before_us) / (after_us - before_us)
+                return between(self._quaternions[after - 1], self._quaternions[after], share)
+        near = [i for i in (after - 1, after) if 0 <= i < len(self._times)]
+        near.sort(key=lambda i: abs(self._times[i] - time_us))
+        if not near or abs(self._times[near[0]] - time_us) > self._reach_us:
+            return None
+        return self._quaternions[near[0]]
 
 
 class Drone:
@@ -50,7 +100,7 @@ class Drone:
         self.reader = PositionReader(p.source)
         self.guard = InputGuard(max_gap_us=round(1e6 * p.max_gap_s))
         self.pending: deque[Detection] = deque(maxlen=_REMEMBERED)
-        self._heard: deque[Detection] = deque(maxlen=_REMEMBERED)
+        self._received: deque[Detection] = deque(maxlen=_REMEMBERED)
         self.newest_us = 0
         self._history_us = round(1e6 * p.history_s)
         self._attitudes = Orientations(self._history_us, _REACH_US)
@@ -66,10 +116,10 @@ class Drone:
         self._attitudes.clear()
         self._gimbal.clear()
         self.pending.clear()
-        self._heard.clear()
+        self._received.clear()
         self.newest_us = 0
 
-    def hear_position(self, time_us: int, message: Message) -> Outcome:
+    def take_position(self, time_us: int, message: Message) -> Outcome:
         """Process a position message."""
         refused = self._admit(time_us, message, values_of(self.parameters.source, message), leads=True)
         if refused not in (None, Outcome.TIME_JUMP):
@@ -81,11 +131,11 @@ class Drone:
             self._height_m = fix.alt_m - self.reader.home.alt_m
         return refused or Outcome.USED
 
-    def hear_home(self, message: Message) -> GeodeticPosition | None:
+    def take_home(self, message: Message) -> GeodeticPosition | None:
         """Process a HOME_POSITION; returns None when its position is invalid."""
-        return self.reader.home if self.reader.hear_home(message) else None
+        return self.reader.home if self.reader.take_home(message) else None
 
-    def hear_attitude(self, time_us: int, message: Message) -> Outcome:
+    def take_attitude(self, time_us: int, message: Message) -> Outcome:
         """Process an ATTITUDE."""
         angles = (message.roll, message.pitch, message.yaw)
         refused = self._admit(time_us, message, angles)
@@ -94,7 +144,7 @@ class Drone:
         self._attitudes.add(time_us, from_euler(*angles))
         return refused or Outcome.USED
 
-    def hear_gimbal(self, time_us: int, message: Message) -> Outcome:
+    def take_gimbal(self, time_us: int, message: Message) -> Outcome:
         """Process a GIMBAL_DEVICE_ATTITUDE_STATUS. The attitude is stored relative to the vehicle's heading,
         for both conventions of the message.
         """
@@ -122,7 +172,7 @@ class Drone:
         attitude = self._attitudes.at(time_us)
         return None if attitude is None else yaw_of(attitude)
 
-    def hear_detection(self, time_us: int, message: Message) -> Outcome:
+    def take_detection(self, time_us: int, message: Message) -> Outcome:
         """Process a LANDING_TARGET of the camera; it is placed when all needed data have arrived."""
         values = (message.angle_x, message.angle_y, message.distance, message.size_x, message.size_y)
         if not math.isfinite(sum(values)):
@@ -144,9 +194,9 @@ class Drone:
             message.distance,
             0.5 * (message.size_x + message.size_y),
         )
-        if detection in self._heard:
+        if detection in self._received:
             return Outcome.REPEATED
-        self._heard.append(detection)
+        self._received.append(detection)
         self.pending.append(detection)
         return Outcome.USED
 

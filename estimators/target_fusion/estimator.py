@@ -48,9 +48,9 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         self._handlers: dict[str, Callable[[int, Drone, Message], Outcome]] = {
             MESSAGES[self.parameters.source]: self._on_position,
             "HOME_POSITION": self._on_home,
-            "ATTITUDE": lambda t, drone, m: drone.hear_attitude(t, m),
-            "GIMBAL_DEVICE_ATTITUDE_STATUS": lambda t, drone, m: drone.hear_gimbal(t, m),
-            "LANDING_TARGET": lambda t, drone, m: drone.hear_detection(t, m),
+            "ATTITUDE": lambda t, drone, m: drone.take_attitude(t, m),
+            "GIMBAL_DEVICE_ATTITUDE_STATUS": lambda t, drone, m: drone.take_gimbal(t, m),
+            "LANDING_TARGET": lambda t, drone, m: drone.take_detection(t, m),
         }
         self.drones: dict[int, Drone] = {}
         self.beliefs: dict[int, TargetBelief] = {}
@@ -116,10 +116,10 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return detected if name == "LANDING_TARGET" and detected is not None else outcome
 
     def _on_position(self, time_us: int, drone: Drone, message: Message) -> Outcome:
-        return drone.hear_position(time_us, message)
+        return drone.take_position(time_us, message)
 
     def _on_home(self, time_us: int, drone: Drone, message: Message) -> Outcome:
-        home = drone.hear_home(message)
+        home = drone.take_home(message)
         if home is None:
             return Outcome.IMPLAUSIBLE
         p = self.parameters
@@ -157,7 +157,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
             last = belief.take(detection.time_us, seen)
             if last is Outcome.UPDATED:
                 self._fused += 1
-                updated[detection.target] = self._told(belief, detection.target, drone.system_id)
+                updated[detection.target] = self._estimate_of(belief, detection.target, drone.system_id)
         return updated, last
 
     def _new_belief(self) -> TargetBelief:
@@ -169,7 +169,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
             max_delay_us=round(1e6 * p.max_delay_s),
         )
 
-    def _told(self, belief: TargetBelief, target: int, vehicle: int) -> TargetEstimate:
+    def _estimate_of(self, belief: TargetBelief, target: int, vehicle: int) -> TargetEstimate:
         return self._estimate(belief.values, belief.time_us, target, vehicle)
 
     def _estimate(self, values: Array, time_us: int, target: int, vehicle: int) -> TargetEstimate:
@@ -194,7 +194,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         )
 
     def target_at(self, time_us: int, target: int = 255) -> TargetEstimate | None:
-        """The believed place of a target at a time, with the variance that has grown since it was last
+        """The estimated place of a target at a time, with the variance that has grown since it was last
         detected; None for a target that was never detected.
         """
         belief = self.beliefs.get(target)

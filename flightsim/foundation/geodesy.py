@@ -69,8 +69,6 @@ class GeodeticPosition:
 class LocalFrame:
     """Local NED tangent frame with its origin at a geodetic position."""
 
-    __slots__ = ("_m_per_deg_lat", "_m_per_deg_lon", "origin")
-
     def __init__(self, origin: GeodeticPosition) -> None:
         self.origin = origin
         cos_lat = math.cos(math.radians(origin.lat_deg))

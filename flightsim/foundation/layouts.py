@@ -12,8 +12,6 @@ class Slots:
         size: number of places so far; after the last one, the size of the array.
     """
 
-    __slots__ = ("size",)
-
     def __init__(self, first: int = 0) -> None:
         self.size = first
 

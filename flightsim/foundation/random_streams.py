@@ -22,8 +22,6 @@ class RandomStreams:
         >>> generator = np.random.Generator(np.random.PCG64(streams.child("vehicle", 0, "sensor", "imu")))
     """
 
-    __slots__ = ("_seed",)
-
     def __init__(self, seed: int) -> None:
         """Root of all streams.
 

@@ -28,8 +28,6 @@ class FaultPoint:
         failing: the points of the sensor that have a failure in force; shared with the sensor.
     """
 
-    __slots__ = ("_interval_s", "_reading", "_rng", "failing", "failure", "fault", "target")
-
     def __init__(
         self, target: FaultTarget, reading: Reading, interval_s: float, rng: np.random.Generator
     ) -> None:

@@ -23,8 +23,6 @@ class FaultPanel:
     failure.
     """
 
-    __slots__ = ("_points",)
-
     def __init__(self) -> None:
         self._points: dict[SensorUnit, FaultPoint] = {}
 

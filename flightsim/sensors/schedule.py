@@ -31,8 +31,6 @@ class Schedule:
         act: per step, the sensors' actions, called with the time in microseconds.
     """
 
-    __slots__ = ("act", "expire", "period")
-
     def __init__(self, sensors: Iterable[Sensor]) -> None:
         sensors = tuple(sensors)
         self.period = math.lcm(1, *(sensor.interval_steps for sensor in sensors))

@@ -72,25 +72,6 @@ class Sensor:
     `latency_steps` later. `Schedule` calls them.
     """
 
-    __slots__ = (
-        "_block",
-        "_deliveries_to_skip",
-        "_failing",
-        "_head",
-        "_measure",
-        "_measured_us",
-        "_ring",
-        "_rng",
-        "_row",
-        "_scratch",
-        "_tail",
-        "_taken",
-        "fault_points",
-        "interval_steps",
-        "latency_steps",
-        "reading",
-    )
-
     def __init__(
         self,
         reading: Reading,

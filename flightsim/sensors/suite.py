@@ -60,17 +60,6 @@ class SensorSuite:
         faults: switches for failures in flight.
     """
 
-    __slots__ = (
-        "_physics_rate_hz",
-        "_schedule",
-        "_seeds",
-        "_sensors",
-        "_step",
-        "_truth",
-        "faults",
-        "readings",
-    )
-
     def __init__(
         self,
         parameters: SensorSuiteParameters,

@@ -16,18 +16,18 @@ _FAILED, _INTERRUPTED = 1, 130
 _SECONDS = FiniteRange(min=0.0, min_open=True, max=1e9)
 
 
-class _Teller:
+class _LiveProgressLine:
     """Reports missing inputs when they change and, on a terminal, the progress."""
 
     def __init__(self) -> None:
         self._line = StatusLine()
-        self._told: tuple[str, ...] = ()
+        self._reported: tuple[str, ...] = ()
 
     def __call__(self, progress: "LiveProgress") -> None:
         # rates change all the time and are not compared
         lacking = tuple(text.split(" at ")[0] for text in progress.lacking)
-        if lacking != self._told:
-            self._told = lacking
+        if lacking != self._reported:
+            self._reported = lacking
             self._line.end()
             for text in progress.lacking:
                 report(text)
@@ -80,7 +80,7 @@ def estimate(**given: Any) -> int:
     from missions.estimation.live import LiveRequest
     from missions.estimation.live import estimate as run_estimator
 
-    teller = _Teller()
+    progress = _LiveProgressLine()
     try:
         key = key_from(given["signing_key"])
         result = run_estimator(
@@ -101,12 +101,12 @@ def estimate(**given: Any) -> int:
                 signing_key=key,
                 on_open=lambda: warn_if_open((given["connect"],), key),
             ),
-            teller,
+            progress,
         )
     except (AddressError, BridgeError, EstimatorError, PlanError) as error:
         raise click.UsageError(in_options(error)) from error
     finally:
-        teller.end()
+        progress.end()
     for line in table_lines([(given["connect"], result.compared)]):
         click.echo(line)
     for warning in warnings_of(result.summary):

@@ -9,7 +9,7 @@ import click
 
 from missions.cli.confirm import confirmation
 from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
-from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, tell
+from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
 from missions.cli.mission_command import FlightOption, Scope
 from missions.cli.options import SECONDS, SPEEDUP, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
@@ -257,4 +257,4 @@ def _fly(given: dict[str, Any]) -> int:
     finally:
         leave_closed_terminal()
         line.end()
-    return tell(result, mission)
+    return print_result(result, mission)

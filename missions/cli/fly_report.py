@@ -28,9 +28,9 @@ def leave_closed_terminal() -> None:
         try:
             os.write(descriptor, b"")
         except OSError:
-            nobody = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nobody, descriptor)
-            os.close(nobody)
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, descriptor)
+            os.close(null)
 
 
 class ProgressLine:
@@ -52,15 +52,15 @@ class ProgressLine:
         self._last_wall_s = now_s
         time_s = flight.elapsed_s
         factor = self._pace.factor(now_s, time_s)
-        heard = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
+        known = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
         mode, height, progress = "waiting", "", 0.0
-        if heard:
-            mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in heard))
-            if any(vehicle.link.lost for vehicle in heard):
+        if known:
+            mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in known))
+            if any(vehicle.link.lost for vehicle in known):
                 mode = "LINK LOST"
-            positions = [vehicle.latest(Position) for vehicle in heard]
+            positions = [vehicle.latest(Position) for vehicle in known]
             height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
-            progress = sum(vehicle.notes.progress for vehicle in heard) / len(heard)
+            progress = sum(vehicle.notes.progress for vehicle in known) / len(known)
         speed = "" if factor is None else f"x{factor:.1f}"
         self._line.show(f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %")
 
@@ -102,7 +102,7 @@ class Pace:
         return None if passed_s < _PACE_LEAST_S else (vehicle_s - looks[0][1]) / passed_s
 
 
-def tell(result: "RunResult", mission: "Mission[Any]") -> int:
+def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
     """Print the result of a run; returns the exit code."""
     from missions.runs.run_folder import POOR, wind_words
 
@@ -136,8 +136,8 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
             click.echo(
                 f"{whose}waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}"
             )
-    for told in mission.said(summary):
-        click.echo(told)
+    for line in mission.report_lines(summary):
+        click.echo(line)
     for block in summary["vehicles"]:
         if block["tracking"] == POOR:
             click.echo(
@@ -145,10 +145,10 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
                 f"path at most, more than the acceptance radius of {block['acceptance_m']:g} m"
             )
     click.echo(f"run: {result.folder}")
-    return _tell_estimator(summary["estimator"]) if "estimator" in summary else 0
+    return _print_estimator(summary["estimator"]) if "estimator" in summary else 0
 
 
-def _tell_estimator(summary: Mapping[str, Any]) -> int:
+def _print_estimator(summary: Mapping[str, Any]) -> int:
     """Print the result of the flight's estimator; returns the exit code."""
     from estimators.reports import warnings_of
 
@@ -161,9 +161,9 @@ def _tell_estimator(summary: Mapping[str, Any]) -> int:
                 for key in subject
                 if key.endswith(f"_rms_{unit}")
             ]
-            told = f": {', '.join(errors)} RMS off {subject['reference']}" if errors else ""
+            suffix = f": {', '.join(errors)} RMS off {subject['reference']}" if errors else ""
             click.echo(
-                f"{summary['estimator']}, {subject['subject']}: {subject['estimates']} estimates{told}"
+                f"{summary['estimator']}, {subject['subject']}: {subject['estimates']} estimates{suffix}"
             )
     for warning in warnings_of(summary):
         report(f"{name}: {warning}")

@@ -84,8 +84,8 @@ def _open(path: Path, dialect: str | None) -> "Log":
 
 
 def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
+    from estimators.errors import NothingThere
     from estimators.logs.condition import Condition
-    from estimators.logs.errors import NothingThere
     from estimators.logs.raw_records import window
 
     names = [name.strip() for group in given["types"] for name in group.split(",") if name.strip()]

@@ -115,11 +115,11 @@ def run_command_line(arguments: list[str] | None = None) -> int:
         click.echo("interrupted", err=True)
         return INTERRUPTED
     except OSError as error:
-        said = str(error)
+        text = str(error)
         if error.filename is None and error.errno in _NOT_WRITTEN:
             _let_go_of_output()
-            said = f"can't write the output: {error.strerror}"
-        report(said)
+            text = f"can't write the output: {error.strerror}"
+        report(text)
         return FAILED
     return result if isinstance(result, int) else DONE
 

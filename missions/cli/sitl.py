@@ -295,10 +295,10 @@ def sitl(
 
         if spec.vehicles[0].autopilot == "ardupilot" and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
-            server.wait_for_client(lambda: ending.asked)
+            server.wait_for_client(lambda: ending.requested)
         try:
             server.run(
-                lambda: ending.asked,
+                lambda: ending.requested,
                 report=report if line.terminal else None,
                 until_us=None if duration is None else round(duration * 1e6),
             )

@@ -34,8 +34,8 @@ class VehicleCards:
 
     def __init__(self, storage: str | None, count: int) -> None:
         from autopilot_bridge.storage import FOLDER_QUOTA, TEMPORARY_QUOTA
-        from autopilot_bridge.storage.card import MemoryCard
         from autopilot_bridge.storage.folder import FolderStore
+        from autopilot_bridge.storage.memory import MemoryCard
 
         self._stores: list[FolderStore] = []
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
@@ -80,16 +80,16 @@ class Losses:
         """The log can no longer be written; reported once."""
         if not self._log_ended:
             self._log_ended = True
-            self._tell(f"{why}; the log ends here, the vehicles fly on")
+            self._warn(f"{why}; the log ends here, the vehicles fly on")
 
     def keys_not_stored(self, why: str) -> None:
         """The store of signing keys can't be written."""
-        self._tell(f"{why}; signing keys and times are kept in memory, a restart forgets them")
+        self._warn(f"{why}; signing keys and times are kept in memory, a restart forgets them")
 
     def picture_lost(self, why: str) -> None:
         """A photo, or the rest of a video, could not be written."""
-        self._tell(why)
+        self._warn(why)
 
-    def _tell(self, text: str) -> None:
+    def _warn(self, text: str) -> None:
         self.any = True
         report(text)

@@ -82,15 +82,15 @@ def with_client(
     from missions.vehicle_client.listening import SIGNED, listen
 
     async def whole() -> T:
-        heard = False
+        answered = False
         try:
             async with open_client(link, timeout_s=given["timeout"], system_id=given["system_id"]) as client:
-                heard = True
+                answered = True
                 if asks:
                     await client.require_answers()
                 return await work(client)
         except VehicleTimeout as error:
-            if heard and (await listen(link, _LISTEN_S, given["system_id"])).signed:
+            if answered and (await listen(link, _LISTEN_S, given["system_id"])).signed:
                 raise VehicleTimeout(f"{error}; {SIGNED}") from error
             raise
         raise AssertionError("not reached")

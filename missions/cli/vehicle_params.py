@@ -29,13 +29,13 @@ def list_(pattern: str, **given: Any) -> int:
 
     values = with_client(given, read_all)
     kept = {name: value for name, value in values.items() if fnmatch.fnmatchcase(name, pattern.upper())}
-    _tell_values(kept, as_json=given["as_json"])
+    _print_values(kept, as_json=given["as_json"])
     if not kept:
         report(f"no parameter matches {pattern!r} among {len(values)}")
     return 0 if kept else FAILED
 
 
-def _tell_values(values: "Mapping[str, Value]", *, as_json: bool) -> None:
+def _print_values(values: "Mapping[str, Value]", *, as_json: bool) -> None:
     if as_json:
         print_json({name: {"value": value.number, "type": value.type} for name, value in values.items()})
         return
@@ -53,7 +53,7 @@ def get(names: tuple[str, ...], **given: Any) -> int:
     async def work(client: "VehicleClient") -> "dict[str, Value]":
         return {name.upper(): await read_one(client, name.upper()) for name in names}
 
-    _tell_values(with_client(given, work), as_json=given["as_json"])
+    _print_values(with_client(given, work), as_json=given["as_json"])
     return 0
 
 
@@ -84,7 +84,7 @@ def set_(name: str, value: float, **given: Any) -> int:
 @connected
 def save(file: Path, **given: Any) -> int:
     """Save all parameters to FILE: .params (QGroundControl), .parm or .param (ArduPilot, MAVProxy)."""
-    from estimators.logs.errors import LogError
+    from estimators.errors import LogError
     from estimators.logs.new_file import new_file
     from missions.vehicle_client.parameters import format_values, read_all
 
@@ -126,7 +126,7 @@ def load(file: Path, yes: bool, **given: Any) -> int:
         settable = [change for change in changes if change.vehicle is not None]
         if settable:
             if not given["as_json"]:
-                _tell_differences(settable)
+                _print_differences(settable)
             noun = "parameter" if len(settable) == 1 else "parameters"
             await confirm(f"set {len(settable)} {noun} of vehicle {client.system_id}", yes)
         return changes, await client_parameters.load(client, settable, lambda line: None)
@@ -170,12 +170,12 @@ def compare(other: str, **given: Any) -> int:
         )
     else:
         if found:
-            _tell_differences(found)
+            _print_differences(found)
         click.echo(f"{len(found)} differ" if found else "no difference")
     return FAILED if found else 0
 
 
-def _tell_differences(found: "list[Difference]") -> None:
+def _print_differences(found: "list[Difference]") -> None:
     from missions.vehicle_client.parameters import Value
 
     click.echo(f"{'name':<16} {'vehicle':>16} {'other':>16}")

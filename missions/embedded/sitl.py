@@ -8,7 +8,7 @@ from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
-from estimators.logs.errors import LogError
+from estimators.errors import LogError
 from estimators.logs.new_file import new_file
 from flightsim.airframe import load_airframe
 from flightsim.foundation.geodesy import GeodeticPosition

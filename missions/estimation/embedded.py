@@ -98,7 +98,7 @@ class FlightEstimators:
             log: the log that it writes.
         """
         self._tap = EstimatorTap(recorder, self.fleet, self._on_estimate, log=log)
-        self._watch = RateWatch(self.fleet.needs, self._tap.heard)
+        self._watch = RateWatch(self.fleet.needs, self._tap.received)
         return self._tap
 
     @asynccontextmanager

@@ -118,7 +118,7 @@ class _Process:
         self._recorder = recorder
         self._publisher = Publisher(self._say)
         self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None, log=log)
-        self._watch = RateWatch(fleet.needs, self._tap.heard)
+        self._watch = RateWatch(fleet.needs, self._tap.received)
         self._look_us = 0
         self._stop = asyncio.Event()
         self._met = False
@@ -156,17 +156,17 @@ class _Process:
         """Run until the duration is over, the link is silent, the estimator fails, or the user stops it."""
         request, clock, tap = self._request, self._clock, self._tap
         async with self.connection:
-            heard, heard_wall_s = 0, wall_time_s()
+            count, received_wall_s = 0, wall_time_s()
             first_us: int | None = None  # when the vehicle, or its time, was first received
             timed = False
             while not self.stopped:
                 wall_s = wall_time_s()
                 newest = sum(tap.autopilots[system_id] for system_id in self._vehicles())
-                if newest != heard:
-                    heard, heard_wall_s = newest, wall_s
+                if newest != count:
+                    count, received_wall_s = newest, wall_s
                     self._meet()
                     self._keep_time()
-                if first_us is None and heard:
+                if first_us is None and count:
                     first_us = clock.time_us
                 if not timed and clock.vehicle_time_us is not None:
                     timed = True
@@ -175,10 +175,10 @@ class _Process:
                 if tap.failure or self._recorder.failure:
                     self.reason = tap.failure or self._recorder.failure
                     return
-                if wall_s - heard_wall_s > request.silence_s:
-                    self.reason = self._silence(heard)
+                if wall_s - received_wall_s > request.silence_s:
+                    self.reason = self._silence(count)
                     return
-                if heard:
+                if count:
                     self._look(clock.time_us)
                 since_us = 0 if first_us is None else clock.time_us - first_us
                 if on_progress is not None:
@@ -193,16 +193,16 @@ class _Process:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), wait_s)
                 # time in which this process was delayed is not silence
-                heard_wall_s += max(0.0, wall_time_s() - due_s)
+                received_wall_s += max(0.0, wall_time_s() - due_s)
 
     def _vehicles(self) -> tuple[int, ...]:
         """System ids of the vehicles to use: the one specified, the one received first, or all of a team."""
-        heard = tuple(self._tap.autopilots)
+        received = tuple(self._tap.autopilots)
         if self._fleet.team:
-            return heard
+            return received
         if self._request.system_id is not None:
             return (self._request.system_id,)
-        return tuple(self._fleet.runners) or heard[:1]
+        return tuple(self._fleet.runners) or received[:1]
 
     def _meet(self) -> None:
         """Use the vehicle's system id as sender id, once it is known."""
@@ -234,9 +234,9 @@ class _Process:
             for system_id, name, rate_hz in requests:
                 self.connection.send(interval_request(system_id, name, rate_hz))
 
-    def _silence(self, heard: int) -> str:
+    def _silence(self, count: int) -> str:
         request = self._request
-        if heard:
+        if count:
             return f"{request.connect} has been silent for {request.silence_s:g} s; what came before is kept"
         which = "vehicle" if request.system_id is None else f"vehicle {request.system_id}"
         others = ", ".join(map(str, sorted(self._tap.autopilots)))

@@ -82,8 +82,8 @@ def replay_logs(
     def make() -> Estimator[Any]:
         return found(parameters)
 
-    together = found.TEAM
-    groups = [list(request.logs)] if together else [[path] for path in request.logs]
+    team = found.TEAM
+    groups = [list(request.logs)] if team else [[path] for path in request.logs]
     results: list[tuple[str, EstimationResult | str]] = []
     for paths in groups:
         label = ", ".join(path.name for path in paths)
@@ -114,9 +114,9 @@ def _replay_one(
     wall_s = wall_time_s() - begun_s
     failure = done.failure
     if request.system_id is not None and not done.supplies:
-        heard = sorted({key.system_id for log in logs for key in log.keys if key.component_id == 1})
+        ids = sorted({key.system_id for log in logs for key in log.keys if key.component_id == 1})
         failure = (
-            f"there is no vehicle {request.system_id} in it; there are {', '.join(map(str, heard)) or 'none'}"
+            f"there is no vehicle {request.system_id} in it; there are {', '.join(map(str, ids)) or 'none'}"
         )
     return report(
         ReportRequest(

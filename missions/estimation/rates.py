@@ -39,7 +39,7 @@ class RateWatch:
 
     Args:
         needs: messages and rates that the estimator needs.
-        heard: frame counts by (system id, message id); the caller updates them.
+        received: frame counts by (system id, message id); the caller updates them.
 
     Attributes:
         lacking: description of what was missing at the newest check.
@@ -48,12 +48,12 @@ class RateWatch:
         starved_s: the part of that time in which a message was missing or too slow.
     """
 
-    def __init__(self, needs: Sequence[Need], heard: Mapping[tuple[int, int], int]) -> None:
+    def __init__(self, needs: Sequence[Need], received: Mapping[tuple[int, int], int]) -> None:
         self._needs = needs
-        self._heard = heard
+        self._received = received
         self._before: Counter[tuple[int, int]] = Counter()
         self._before_us: int | None = None
-        self._asked: Counter[tuple[int, int]] = Counter()
+        self._requests: Counter[tuple[int, int]] = Counter()
         self.lacking: list[str] = []
         self.enough = False
         self.measured_s = 0.0
@@ -85,7 +85,7 @@ class RateWatch:
             (system id, message name, rate) to request; the first call only begins the measurement.
         """
         before_us, before = self._before_us, self._before
-        self._before_us, self._before = time_us, Counter(self._heard)
+        self._before_us, self._before = time_us, Counter(self._received)
         if before_us is None or time_us <= before_us:
             return []
         elapsed_s = (time_us - before_us) * 1e-6
@@ -99,8 +99,8 @@ class RateWatch:
             for index, need in enumerate(self._needs):
                 if NOT_STREAMED.issuperset(need.messages):
                     continue
-                asked = self._to_ask(system_id, index, need, rate_hz)
-                requests += [(system_id, name, asked_hz) for name, asked_hz in asked]
+                requested = self._to_request(system_id, index, need, rate_hz)
+                requests += [(system_id, name, requested_hz) for name, requested_hz in requested]
         self.enough = not self.lacking
         if self.enough or self.measured_s:
             self.measured_s += elapsed_s
@@ -116,28 +116,28 @@ class RateWatch:
 
         def rate_hz(name: str) -> float:
             key = (system_id, definition(name).message_id)
-            count = self._heard.get(key, 0)
+            count = self._received.get(key, 0)
             # A message that may come at any rate may be absent in this period (a target out of sight).
             return (count - (0 if name in seldom else before.get(key, 0))) / elapsed_s
 
         return rate_hz
 
-    def _to_ask(
+    def _to_request(
         self, system_id: int, index: int, need: Need, rate_hz: Callable[[str], float]
     ) -> list[tuple[str, float]]:
         """Messages and rates to request; empty when one is fast enough, or requests had no effect."""
-        heard_hz, best = max((rate_hz(name), -k) for k, name in enumerate(need.messages))
+        received_hz, best = max((rate_hz(name), -k) for k, name in enumerate(need.messages))
         wanted_hz = wanted_rate_hz(need)
-        served = heard_hz > 0.0 and heard_hz >= RATE_TOLERANCE * need.rate_hz
-        if served and (not need.rate_hz or heard_hz >= RATE_TOLERANCE * wanted_hz):
+        served = received_hz > 0.0 and received_hz >= RATE_TOLERANCE * need.rate_hz
+        if served and (not need.rate_hz or received_hz >= RATE_TOLERANCE * wanted_hz):
             return []
-        times = self._asked[system_id, index]
+        times = self._requests[system_id, index]
         if served:  # sufficient; a higher rate is requested once
-            self._asked[system_id, index] += 1
+            self._requests[system_id, index] += 1
             return [] if times else [(need.messages[-best], wanted_hz)]
         if need.optional and times >= _ROUNDS * len(need.messages):
             return []
-        self._asked[system_id, index] += 1
+        self._requests[system_id, index] += 1
         name = need.messages[times % len(need.messages)]
         # An autopilot that refuses the second rate as too fast has already accepted the first.
         enough_hz = _MARGIN * need.rate_hz

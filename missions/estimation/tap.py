@@ -17,7 +17,7 @@ from estimators.errors import EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
 from estimators.observations import SUFFIX, Observation, ObservationWriter
-from estimators.runner import Runner, why_unheard
+from estimators.runner import Runner, why_excluded
 from missions.vehicle.connection import Recorder
 
 __all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
@@ -41,7 +41,7 @@ class EstimatorTap:
     Attributes:
         failure: message of an error that an estimator raised; it receives no more frames after that. ""
             without an error.
-        heard: number of frames by (system id, message id) that estimators may receive, for rates.
+        received: number of frames by (system id, message id) that estimators may receive, for rates.
         autopilots: number of frames of autopilots, by system id.
     """
 
@@ -55,7 +55,7 @@ class EstimatorTap:
     ) -> None:
         self.fleet = fleet
         self.failure = ""
-        self.heard: Counter[tuple[int, int]] = Counter()
+        self.received: Counter[tuple[int, int]] = Counter()
         self.autopilots: Counter[int] = Counter()
         self._record = recorder.record
         self._on_estimate = on_estimate
@@ -67,8 +67,10 @@ class EstimatorTap:
         self._record(frames, time_us)
         for frame in frames:
             self._frames += 1
-            if frame.system_id < GROUND_SYSTEM and not why_unheard(frame.definition.name, frame.component_id):
-                self.heard[frame.system_id, frame.message_id] += 1
+            if frame.system_id < GROUND_SYSTEM and not why_excluded(
+                frame.definition.name, frame.component_id
+            ):
+                self.received[frame.system_id, frame.message_id] += 1
                 if frame.component_id == AUTOPILOT_COMPONENT:
                     self.autopilots[frame.system_id] += 1
             self._pass_on(partial(self.fleet.feed, frame), time_us)

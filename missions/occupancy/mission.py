@@ -36,7 +36,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
 
     name = "occupancy"
     world_defaults = WorldDefaults(model="aerosonde", wind="5@270", turbulence="light")
-    together = True
+    flies_as_team = True
 
     def __init__(self) -> None:
         self._flown: _Flown | None = None
@@ -92,7 +92,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
             return {"target_found": False, "time_to_find_s": None}
         return search_figures(flown.team, debriefing)
 
-    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         detected = f"probability of detection {summary.get('probability_of_detection', 0.0):.2f}"
         if not summary["target_found"]:
             return (f"target not found, {detected}",)

@@ -119,7 +119,7 @@ class OrbitFlight:
             _raise_if_ended(looking)
             await vehicle.clock.sleep(0.1)
             self._require_flying()
-            p, attitude = await vehicle.position(), self._told_attitude()
+            p, attitude = await vehicle.position(), self._reported_attitude()
             (target_n, target_e), _ = self._observer.target_ne(self._now_us)
             n, e, _ = LocalFrame(home).ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
             away_m = math.hypot(n - target_n, e - target_e)
@@ -156,7 +156,7 @@ class OrbitFlight:
         place = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
         await self._vehicle.wing.loiter(place, radius_m=radius_m, clockwise=True, wait=False)
 
-    def _told_attitude(self) -> telemetry.Attitude:
+    def _reported_attitude(self) -> telemetry.Attitude:
         attitude = self._vehicle.latest(telemetry.Attitude)
         if attitude is None:
             raise MissionError(
@@ -232,7 +232,7 @@ class OrbitFlight:
     def _fly_on(self, entered_us: int) -> AttitudeSetpoint:
         """Compute the current command, and note the state of the flight."""
         now_us, options, tracker = self._now_us, self._options, self._tracker
-        attitude = self._told_attitude()
+        attitude = self._reported_attitude()
         assert self._pilot is not None
         stamp_us = self._stamp_us
         unseen_s = tracker.unseen_s(stamp_us)
@@ -265,7 +265,7 @@ class OrbitFlight:
                 notes.marks["orbit_captured_after_s"] = (now_us - entered_us) * 1e-6
             elif now_us - entered_us > _CAPTURE_LIMIT_S * 1e6:
                 raise MissionError(
-                    f"the circle was not reached within {_CAPTURE_LIMIT_S:g} s: believed "
+                    f"the circle was not reached within {_CAPTURE_LIMIT_S:g} s: estimated "
                     f"{command.radius_m:.0f} m from "
                     f"the target; {self._vehicle.link.last_received()}"
                 )

@@ -2,7 +2,7 @@
 
 Everything is relative: p is the horizontal offset to the target, v = -dp/dt the velocity of the aircraft
 against it. The angle from v to p, chi = atan2((v x p)_3, v . p), is +90 deg with the target abeam to the
-right (the paper's formula for it, with norms, loses the sign). Equation 35 asks for
+right (the paper's formula for it, with norms, loses the sign). Equation 35 requires
 
     chi_d = lambda (pi/2 - atan(k_o (rho - rho_d))),
 

@@ -43,8 +43,8 @@ class OrbitOptions(MissionOptions):
         direction: +1 clockwise seen from above, -1 counter-clockwise.
         duration_s: time on the circle.
         airspeed_m_s: equivalent airspeed; None: the aircraft's default.
-        target_ne_m: believed position of the target from home, when the vehicle is first received.
-        target_speed_m_s, target_heading_rad: believed motion of the target, along a straight line.
+        target_ne_m: estimated position of the target from home, when the vehicle is first received.
+        target_speed_m_s, target_heading_rad: estimated motion of the target, along a straight line.
         target_wanders: the path of the target is not known, only that it stays within 100 m of its place.
         target_ground_m: height of the ground at the target, above home.
         entry_bearing_rad: bearing from the target to the place where GPS is lost.

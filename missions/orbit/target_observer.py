@@ -21,7 +21,7 @@ from missions.vehicle.vehicle import Vehicle
 
 TICK_HZ: Final = 25.0
 _GIMBAL_LEAD_S: Final = 0.15
-_BELIEVED_TO_M: Final = 20.0  # standard deviation of a place from another source (paper: 20 m)
+_GIVEN_SIGMA_M: Final = 20.0  # standard deviation of a place from another source (paper: 20 m)
 _OLD_US: Final = 1_000_000
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
 _INERTIAL_HZ: Final = (25.0, 40.0)
@@ -46,7 +46,7 @@ class TargetObserver:
                 attitude="filter" if options.attitude is AttitudeFrom.FILTER else "autopilot",
                 target_north_m=options.target_ne_m[0],
                 target_east_m=options.target_ne_m[1],
-                target_sigma_m=WANDERING_M if options.target_wanders else _BELIEVED_TO_M,
+                target_sigma_m=WANDERING_M if options.target_wanders else _GIVEN_SIGMA_M,
             )
         )
         source = self._estimator.attitude
@@ -111,14 +111,14 @@ class TargetObserver:
         now_us = vehicle.clock.stamp_us
         tracker.height(height_m - self._options.target_ground_m)
         if self.with_gps and tracker.status is not TargetStatus.SEEN:
-            self._believe(now_us, airspeed_m_s)
+            self._use_given_place(now_us, airspeed_m_s)
         tracker.step(now_us, airspeed_m_s, pilot.climb_m_s)
         angles = tracker.pointing(now_us, _GIMBAL_LEAD_S)
         if angles is not None:
             vehicle.payload.point_gimbal(pitch_rad=angles[1], yaw_rad=angles[0])
 
-    def _believe(self, now_us: int, airspeed_m_s: float) -> None:
-        """While there is GPS and the target was not seen: use its believed place relative to the aircraft."""
+    def _use_given_place(self, now_us: int, airspeed_m_s: float) -> None:
+        """While there is GPS and the target was not seen: use its given place relative to the aircraft."""
         p = self._vehicle.latest(telemetry.Position)
         attitude = self._vehicle.latest(telemetry.Attitude)
         if p is None or attitude is None or not self.informed:
@@ -140,12 +140,12 @@ class TargetObserver:
     @property
     def informed(self) -> bool:
         """Whether the vehicle's position and attitude are recent; after a link loss they are old."""
-        told = (self._vehicle.latest(telemetry.Position), self._vehicle.latest(telemetry.Attitude))
+        reports = (self._vehicle.latest(telemetry.Position), self._vehicle.latest(telemetry.Attitude))
         now_us = self._vehicle.clock.stamp_us
-        return all(t is not None and now_us - t.time_us < _OLD_US for t in told)
+        return all(t is not None and now_us - t.time_us < _OLD_US for t in reports)
 
     def target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Believed position and velocity of the target, from home."""
+        """Estimated position and velocity of the target, from home."""
         o = self._options
         if o.target_wanders:  # its place is known only approximately
             return o.target_ne_m, (0.0, 0.0)

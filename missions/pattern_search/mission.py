@@ -70,7 +70,7 @@ class PatternMission(Mission[FlightOptions]):
         assert isinstance(debriefing.options, FlightOptions)
         return self.estimator_settings(debriefing.options)
 
-    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         if "omega_x_rad_s" not in summary:
             return ()
         x, y = summary["omega_x_rad_s"], summary["omega_y_rad_s"]

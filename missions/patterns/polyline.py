@@ -29,8 +29,6 @@ _BERNSTEIN: Final = np.array(  # power-basis coefficients (rows: powers 0..5) of
 class _Pieces:
     """A chain of plane quintics; piece k is flown while the parameter runs from k to k + 1."""
 
-    __slots__ = ("_coefficients", "_first", "_second")
-
     def __init__(self, coefficients: Array) -> None:
         """coefficients (pieces, 6, 2): power basis, north and east."""
         self._coefficients = coefficients

@@ -127,10 +127,10 @@ class EnergyController:
 
         total_error = climb_d + gain_d - state.climb_m_s - gain_now
         drag = p.bank_climb_m_s * (load - 1.0)
-        asked = climb_d + gain_d + drag + p.total_gain * total_error + self._total
-        span = p.throttle_max - p.throttle_trim if asked > 0.0 else p.throttle_trim - p.throttle_min
-        rate = p.climb_full_throttle_m_s if asked > 0.0 else p.sink_idle_m_s
-        raw = p.throttle_trim + asked * span / rate
+        commanded = climb_d + gain_d + drag + p.total_gain * total_error + self._total
+        span = p.throttle_max - p.throttle_trim if commanded > 0.0 else p.throttle_trim - p.throttle_min
+        rate = p.climb_full_throttle_m_s if commanded > 0.0 else p.sink_idle_m_s
+        raw = p.throttle_trim + commanded * span / rate
         throttle = max(p.throttle_min, min(p.throttle_max, raw))
         if raw == throttle or (raw - throttle) * total_error < 0.0:
             self._total += p.total_integral_per_s * total_error * dt_s

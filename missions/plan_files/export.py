@@ -45,7 +45,7 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
         )
     exported = _Exported(mission, path)
     with TemporaryDirectory() as folder:
-        asked = replace(
+        request_with_plan = replace(
             request,
             out=Path(folder) / "run",
             picture=False,
@@ -53,7 +53,7 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
             estimator=None,
             max_error_m=None,
         )
-        result = fly(exported, asked)
+        result = fly(exported, request_with_plan)
     if result.outcome == INTERRUPTED:
         raise EndedBySignal(result.signal)
     if result.outcome != COMPLETED:

@@ -48,7 +48,7 @@ def write_mission_file(
         PlanError: the suffix is unknown, or the file exists or can't be written.
     """
     # imported only for writing, because the modules of logs are slow to load
-    from estimators.logs.errors import LogError
+    from estimators.errors import LogError
     from estimators.logs.new_file import new_file
 
     check_suffix(path)

@@ -100,13 +100,13 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
 
 async def _acceptance_m(vehicle: Vehicle, document: MissionDocument, stops: tuple[Stop, ...]) -> float:
     """The largest radius within which places of the mission count as reached."""
-    asked = {
+    altitudes = {
         document.items[stop.index].param2
         for stop in stops
         if document.items[stop.index].command == NAV_WAYPOINT
     }
     radii = [
         await vehicle.adapter.acceptance_m(a if a > 0.0 else await vehicle.adapter.own_acceptance_m())
-        for a in sorted(asked or {0.0}, key=lambda a: (math.isnan(a), a))
+        for a in sorted(altitudes or {0.0}, key=lambda a: (math.isnan(a), a))
     ]
     return max(radii)

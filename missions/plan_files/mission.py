@@ -184,7 +184,7 @@ class FileMission(Mission[FileOptions]):
                 legs.append({"from": a.index + 1, "to": b.index + 1, **_cross_track(a, b, flown)})
         return legs
 
-    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         block = summary["mission_file"]
         reached = {entry["item"] for entry in block["reached"]}
         places = {

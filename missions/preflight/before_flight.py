@@ -2,18 +2,17 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from autopilot_bridge.fence_shapes import fence_shapes
+from autopilot_bridge.fence_shapes import FenceShape, Point, fence_shapes, outside_shapes
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import MissionError
 from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.outline import Outline
-from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level, ok, problem, warning
 from missions.preflight.health import health_findings
 from missions.preflight.lost_link import PARAMETERS, lost_link_words
@@ -32,10 +31,34 @@ FARTHEST_M: Final = 10_000.0
 _FAR_M: Final = 1000.0
 _PLAN_HOME_M: Final = 200.0
 _RESERVE: Final = 1.3
-_ASKED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
-_SHOWN: Final = (*_ASKED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
+_REQUESTED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
+_SHOWN: Final = (*_REQUESTED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
 _LISTEN_S: Final = 1.5
 _PARAMETERS_AT_ONCE: Final = 4
+
+_STEP_M: Final = 5.0
+
+
+def first_outside(shapes: tuple[FenceShape, ...], way: Iterable[Point], *, join: bool) -> Point | None:
+    """The first point of a path (straight between its points) that a fence forbids; None: the whole path is
+    inside.
+
+    Args:
+        shapes: shapes of the fence, north and east of home.
+        way: points of the path, north and east of home, m.
+        join: whether being inside one of several inclusion shapes is enough.
+    """
+    last: Point | None = None
+    for point in way:
+        start = point if last is None else last
+        steps = 1 if last is None else max(1, math.ceil(math.dist(start, point) / _STEP_M))
+        for k in range(1, steps + 1):
+            f = k / steps
+            here = (start[0] + f * (point[0] - start[0]), start[1] + f * (point[1] - start[1]))
+            if outside_shapes(shapes, here, join=join):
+                return here
+        last = point
+    return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,10 +113,10 @@ async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
 
 
 async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
-    for name in (*_ASKED, FILTER_STATUS[vehicle.autopilot]):
+    for name in (*_REQUESTED, FILTER_STATUS[vehicle.autopilot]):
         if vehicle.link.message(name) is None:
             await vehicle.commands.set_message_rate(name, 2.0)
-    told: list[Mapping[str, Any]] = []  # reports of the navigation filter
+    reports: list[Mapping[str, Any]] = []  # reports of the navigation filter
     with vehicle.link.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)
@@ -102,14 +125,14 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
         except MissionError:  # an autopilot without a fence
             fence_items = []
         while (status := stream.take()) is not None:
-            told.append(status.to_dict())
+            reports.append(status.to_dict())
     messages: dict[str, Mapping[str, Any]] = {}
     for name in _SHOWN:
         message = vehicle.link.message(name)
         if message is not None:
             messages[name] = message.to_dict()
-    if told:
-        messages[FILTER_STATUS[vehicle.autopilot]] = usual(told)
+    if reports:
+        messages[FILTER_STATUS[vehicle.autopilot]] = usual(reports)
     return Snapshot(
         flavour=vehicle.autopilot,
         kind=vehicle.kind,

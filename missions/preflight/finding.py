@@ -29,8 +29,8 @@ class Finding:
     advice: str = ""
 
     def __str__(self) -> str:
-        told = f"{self.level:<8} {self.subject}: {self.text}"
-        return f"{told}; {self.advice}" if self.advice else told
+        line = f"{self.level:<8} {self.subject}: {self.text}"
+        return f"{line}; {self.advice}" if self.advice else line
 
 
 def ok(subject: str, text: str) -> Finding:

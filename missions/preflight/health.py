@@ -118,12 +118,12 @@ def arming(snapshot: Snapshot) -> Finding:
     base_mode = snapshot.whole("HEARTBEAT", "base_mode") or 0
     if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
         return warning("arming", "the vehicle is armed", "keep away from it")
-    said = reasons_against_arming(snapshot.texts)
+    reasons = reasons_against_arming(snapshot.texts)
     if health is None:
         return problem("arming", "it is not known whether it could be armed", "wait, or look at the link")
     if health & PREARM_BIT:
         return ok("arming", "the pre-arm checks are passed")
-    why = ": " + " / ".join(said) if said else ", and the autopilot does not say why"
+    why = ": " + " / ".join(reasons) if reasons else ", and the autopilot does not say why"
     return problem("arming", f"the pre-arm checks are not passed{why}", "mend what it names")
 
 

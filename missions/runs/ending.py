@@ -129,17 +129,17 @@ class EndRequests(EndSignalHandler):
     """A context in which such a signal ends the command with an orderly shutdown.
 
     At first a signal raises KeyboardInterrupt, so that it stops the start at any point; after `remember` it
-    only sets `asked`. SIGHUP stays ignored if it is ignored on entry (`nohup`). For the main thread only.
+    only sets `requested`. SIGHUP stays ignored if it is ignored on entry (`nohup`). For the main thread only.
 
     Attributes:
-        asked: whether such a signal was received.
+        requested: whether such a signal was received.
     """
 
     always = (signal.SIGINT, signal.SIGTERM)
 
     def __init__(self) -> None:
         super().__init__()
-        self.asked = False
+        self.requested = False
         self._raises = True
 
     def remember(self) -> None:
@@ -150,10 +150,10 @@ class EndRequests(EndSignalHandler):
                 a finaliser).
         """
         self._raises = False
-        if self.asked:
+        if self.requested:
             raise KeyboardInterrupt
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        again, self.asked = self.asked, True
+        again, self.requested = self.requested, True
         if self._raises and not again:  # at the second signal the command is already ending
             raise KeyboardInterrupt

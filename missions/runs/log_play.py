@@ -80,17 +80,17 @@ def play(
                 now_us = min(due_us, now_us + _LONGEST_WAIT_US)
                 pace.wait_until(now_us)
                 link.receive()
-                _tell(played, now_us, on_progress)
+                _report_progress(played, now_us, on_progress)
             if pace is None and played.frames % 1000 == 0:
                 link.receive()
-                _tell(played, due_us, on_progress)
+                _report_progress(played, due_us, on_progress)
             while pace is None and link.congested:
                 link.receive()
                 _wait()
             link.send(frame if sign is None else sign(frame))
             played.frames += 1
             played.log_s = due_us * 1e-6
-        _tell(played, round(played.log_s * 1e6), on_progress)
+        _report_progress(played, round(played.log_s * 1e6), on_progress)
         if not loop:
             _drain(link)
             return played
@@ -114,7 +114,7 @@ def _drain(link: Link) -> None:
         _wait()
 
 
-def _tell(played: Played, now_us: int, on_progress: Callable[[Played], None] | None) -> None:
+def _report_progress(played: Played, now_us: int, on_progress: Callable[[Played], None] | None) -> None:
     played.log_s = now_us * 1e-6
     if on_progress is not None:
         on_progress(played)

@@ -183,10 +183,10 @@ def _fly_interruptible(
     try:
         recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
         flight.recorder = recorder
-        heard_by = recorder if estimators is None else estimators.around(recorder, folder / LOG_NAME)
-        stage.on_truth(heard_by.record_truth)
+        tap = recorder if estimators is None else estimators.around(recorder, folder / LOG_NAME)
+        stage.on_truth(tap.record_truth)
         try:
-            ending.run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
+            ending.run(_fly(mission, request, stage, tap, flight, estimators, on_progress), stage.loop)
         except KeyboardInterrupt as interrupt:
             outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
         except (MissionError, PlanError, BridgeError) as error:
@@ -275,15 +275,15 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     except MissionError as error:
         where = f" on {', '.join(request.connect)}" if request.connect else ""
         which = "" if wanted is None else f" with system id {wanted}"
-        others = ", ".join(map(str, vehicle.link.connection.autopilots_heard))
-        heard = f" (received: vehicle {others})" if others else ""
+        others = ", ".join(map(str, vehicle.link.connection.autopilots_received))
+        received = f" (received: vehicle {others})" if others else ""
         signing = vehicle.link.connection.signing
         if signing is not None and signing.counters.refused_frames:
-            heard += f" (refused by the signing key: {signing.counters.reasons})"
-        asked = "is it on, and sending there?"
+            received += f" (refused by the signing key: {signing.counters.reasons})"
+        hint = "is it on, and sending there?"
         if request.connect and request.signing_key is None and not others:
-            asked += " Does it ask for signatures (`signing_key`)?"
-        raise MissionError(f"no vehicle{which} was received{where}{heard}: {error}; {asked}") from error
+            hint += " Does it require signatures (`signing_key`)?"
+        raise MissionError(f"no vehicle{which} was received{where}{received}: {error}; {hint}") from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.link.regain_s = request.regain_s if request.connect else 0.0
     vehicle.notes.autopilot = vehicle.autopilot
@@ -300,8 +300,8 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
     for index, vehicle in enumerate(vehicles):
         vehicle.forecast_wind_m_s = request.planning_wind_m_s
         limits, home = await vehicle.limits(), vehicle.home
-        asked = replace(vehicle_options(request.options, index), centre=centre)
-        own, _ = adapted(mission, asked, limits, home.alt_m)
+        own_options = replace(vehicle_options(request.options, index), centre=centre)
+        own, _ = adapted(mission, own_options, limits, home.alt_m)
         options.append(own)
         vehicle.notes.options = own
     if request.confirm is not None:
@@ -312,7 +312,7 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
     if not mission.commands:
         await run_concurrently([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
         return
-    if not mission.together:
+    if not mission.flies_as_team:
         await run_concurrently(
             [
                 _fly_one(mission.fly(vehicle, own), vehicle, request)

@@ -36,7 +36,7 @@ class Adapter(Protocol):
         """Start the uploaded mission, on the ground or in the air."""
         ...
 
-    async def acceptance_m(self, asked_m: float) -> float:
+    async def acceptance_m(self, requested_m: float) -> float:
         """The radius within which a waypoint counts as reached."""
         ...
 

@@ -72,10 +72,12 @@ class ArduPilot:
         await self._commands.set_mode(Mode.MISSION)
         await self._commands.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
 
-    async def acceptance_m(self, asked_m: float) -> float:
+    async def acceptance_m(self, requested_m: float) -> float:
         if self._plane:
-            return min(asked_m, _PLANE_RADIUS_M)
-        return 0.01 * await self._parameters.read_or("WPNAV_RADIUS", 100.0 * asked_m)  # param2 is not used
+            return min(requested_m, _PLANE_RADIUS_M)
+        return 0.01 * await self._parameters.read_or(
+            "WPNAV_RADIUS", 100.0 * requested_m
+        )  # param2 is not used
 
     async def own_acceptance_m(self) -> float:
         if self._plane:

@@ -59,7 +59,7 @@ class VehicleCommands:
                     return await anext(stream)
             except TimeoutError:
                 raise VehicleTimeout(
-                    f"no {name} within {timeout_s:g} s of asking; {self.link.last_received()}"
+                    f"no {name} within {timeout_s:g} s of the request; {self.link.last_received()}"
                 ) from None
 
     async def set_message_rate(self, name: str, rate_hz: float) -> None:

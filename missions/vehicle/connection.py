@@ -239,7 +239,7 @@ class Connection:
         return self._newest.latest((system_id, component_id), definition(name).message_id)
 
     @property
-    def autopilots_heard(self) -> list[int]:
+    def autopilots_received(self) -> list[int]:
         """System ids of the autopilots received on this link, in ascending order."""
         return sorted(s for s, component in self._newest.components if component == AUTOPILOT_COMPONENT)
 

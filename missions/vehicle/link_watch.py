@@ -24,7 +24,7 @@ class LinkWatch:
 
     Args:
         clock: vehicle time.
-        heard: text of what was received last, for the error.
+        last_received: text of what was received last, for the error.
 
     Attributes:
         regain_s: longest time for which a lost link may stay lost.
@@ -33,25 +33,25 @@ class LinkWatch:
         on_lost, on_regained: called when the link is lost, and when it is back.
     """
 
-    def __init__(self, clock: Clock, heard: Callable[[], str]) -> None:
+    def __init__(self, clock: Clock, last_received: Callable[[], str]) -> None:
         self.regain_s = 0.0
         self.quiet = False
         self.lost = False
         self.on_lost: Callable[[], None] = lambda: None
         self.on_regained: Callable[[], None] = lambda: None
         self._clock = clock
-        self._heard = heard
-        self._heard_s: float | None = None
+        self._last_received = last_received
+        self._received_s: float | None = None
         self._back_s: float | None = None
         self._scopes: list[asyncio.Timeout] = []
         self._timer: asyncio.TimerHandle | None = None
 
     def on_heartbeat(self) -> None:
         """Note that a heartbeat of the vehicle was received."""
-        self._heard_s = asyncio.get_running_loop().time()
+        self._received_s = asyncio.get_running_loop().time()
         if self.quiet:
             self.quiet = False
-            self._back_s = self._heard_s
+            self._back_s = self._received_s
         if self.lost:
             self.lost = False
             self.on_regained()
@@ -83,11 +83,11 @@ class LinkWatch:
                 raise
             raise LinkClosed(
                 f"link lost: no heartbeat for {self._silence_s():.0f} s while waiting for {awaited()}; "
-                f"{self._heard()}"
+                f"{self._last_received()}"
             ) from None
 
     def _silence_s(self) -> float:
-        return 0.0 if self._heard_s is None else asyncio.get_running_loop().time() - self._heard_s
+        return 0.0 if self._received_s is None else asyncio.get_running_loop().time() - self._received_s
 
     def _slowness(self) -> float:
         """Wall seconds per vehicle second, for a vehicle slower than real time."""
@@ -105,8 +105,8 @@ class LinkWatch:
         if not self._scopes:
             return
         now_s = asyncio.get_running_loop().time()
-        if self._heard_s is not None:
-            self._heard_s = min(now_s, self._heard_s + max(0.0, now_s - due_s))
+        if self._received_s is not None:
+            self._received_s = min(now_s, self._received_s + max(0.0, now_s - due_s))
         silence_s, slowness = self._silence_s(), self._slowness()
         self.quiet = self.quiet or silence_s >= QUIET_AFTER_S * slowness
         if silence_s >= LOST_AFTER_S * slowness and not self.lost:

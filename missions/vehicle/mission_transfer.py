@@ -75,27 +75,28 @@ async def _send_plan(
 ) -> None:
     what = _NAMES[mission_type]
     names = ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK")
-    asked = -1
+    requested = -1
     with link.messages(*names) as replies:
         count = dialect.MAVLink_mission_count_message(link.system_id, 1, len(items), int(mission_type))
         link.send(count)
         attempts = 0
         errors = 0
         while True:
-            all_sent = asked + 1 >= len(items)
+            all_sent = requested + 1 >= len(items)
             try:
                 async with link.deadline(
-                    _RETRY_S if asked < 0 or all_sent else _STUCK_S, f"a request for an item of the {what}"
+                    _RETRY_S if requested < 0 or all_sent else _STUCK_S,
+                    f"a request for an item of the {what}",
                 ):
                     reply = await anext(replies)
             except TimeoutError:
                 attempts += 1
-                if attempts > _RETRIES or not (asked < 0 or all_sent):
+                if attempts > _RETRIES or not (requested < 0 or all_sent):
                     raise VehicleTimeout(
-                        f"the vehicle stopped asking for items of the {what} after {asked + 1} of "
+                        f"the vehicle stopped requesting items of the {what} after {requested + 1} of "
                         f"{len(items)}; {link.last_received()}"
                     ) from None
-                if asked < 0:
+                if requested < 0:
                     link.send(count)
                 else:  # the acknowledgement was lost: PX4 repeats it
                     link.send(_item_message(items[-1], len(items) - 1, link.system_id, mission_type))
@@ -109,31 +110,31 @@ async def _send_plan(
                     continue  # belongs to an earlier transfer
                 if reply.type == dialect.MAV_MISSION_INVALID_SEQUENCE:
                     continue  # answers an item that was sent twice: the transfer stays open (ArduPilot)
-                if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
+                if reply.type == dialect.MAV_MISSION_ERROR and all_sent and requested >= 0:
                     # "no transfer": it has ended, and the message with its result was lost
                     raise VehicleTimeout(
                         f"how the vehicle took the {what} is not known; {link.last_received()}"
                     )
-                if reply.type in _GIVEN_UP and asked >= 0:
+                if reply.type in _GIVEN_UP and requested >= 0:
                     # long silence: PX4 (after 5 s) reports the timeout at the next item, ArduPilot (after 8
                     # s) immediately
                     raise VehicleTimeout(
-                        f"the vehicle gave the {what} up after {asked + 1} of {len(items)} items: "
+                        f"the vehicle gave the {what} up after {requested + 1} of {len(items)} items: "
                         f"{_result_name(reply.type)}; {link.last_received()}"
                     )
                 errors += 1
-                if reply.type in _GIVEN_UP and asked < 0 and errors <= _ERRORS_BORNE:
+                if reply.type in _GIVEN_UP and requested < 0 and errors <= _ERRORS_BORNE:
                     continue  # may answer a repeated item of an earlier transfer
                 where = ""
-                if asked >= 0:
-                    where = f" at item {asked - before + 1} ({command_name(items[asked].command)})"
+                if requested >= 0:
+                    where = f" at item {requested - before + 1} ({command_name(items[requested].command)})"
                 raise CommandRejected(
                     f"the vehicle refused the {what}{where}: {_result_name(reply.type)}; "
                     f"{link.last_received()}",
                     reply.type,
                 )
             if reply.seq < len(items):
-                asked = max(asked, reply.seq)
+                requested = max(requested, reply.seq)
                 link.send(_item_message(items[reply.seq], reply.seq, link.system_id, mission_type))
 
 

@@ -19,7 +19,7 @@ SURVEY_MAGNETOMETER_COMPONENT: Final = 158
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 
 # within this time the gimbal manager reports which component has the control
-_CONTROL_TOLD_US: Final = 3_000_000
+_CONTROL_REPORTED_US: Final = 3_000_000
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 
@@ -160,7 +160,7 @@ class Payload:
 
     def _warn_when_taken(self) -> None:
         since_us = self._control_since_us
-        if since_us is None or self._link.clock.time_us - since_us < _CONTROL_TOLD_US:
+        if since_us is None or self._link.clock.time_us - since_us < _CONTROL_REPORTED_US:
             return
         other = self.gimbal_taken_by()
         if other is not None:

@@ -21,8 +21,6 @@ class NewestFrames:
     is received again. Autopilots named with `keep` are never removed.
     """
 
-    __slots__ = ("_decoded", "_frames", "_kept")
-
     def __init__(self) -> None:
         self._frames: dict[ComponentId, dict[int, Frame]] = {}
         self._decoded: dict[ComponentId, dict[int, tuple[Frame, MAVLinkMessage]]] = {}

@@ -109,14 +109,14 @@ class VehiclePlans:
         tracker = self._tracker or ItemTracker([MissionStep(index=k) for k in range(sequence + 1)])
         mode = MissionModeWatch(self._link.firmware.modes[Mode.MISSION])
         wanted = tracker.place_of(sequence - tracker.first)
-        told = 0
+        reported = 0
 
         def there() -> bool:
-            nonlocal told
-            for index, _ in tracker.reached[told:]:
+            nonlocal reported
+            for index, _ in tracker.reached[reported:]:
                 if progress is not None:
                     progress(tracker.first + index)
-            told = len(tracker.reached)
+            reported = len(tracker.reached)
             return tracker.behind > wanted
 
         def handle(message: Any) -> bool:

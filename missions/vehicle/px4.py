@@ -54,10 +54,10 @@ class Px4:
             await self.prepare_arming()
             await self._commands.arm()
 
-    async def acceptance_m(self, asked_m: float) -> float:
+    async def acceptance_m(self, requested_m: float) -> float:
         if self._link.kind is VehicleKind.MULTICOPTER:
-            return asked_m  # a waypoint's param2 is used
-        return max(asked_m, await self.own_acceptance_m())
+            return requested_m  # a waypoint's param2 is used
+        return max(requested_m, await self.own_acceptance_m())
 
     async def own_acceptance_m(self) -> float:
         return await self._parameters.read_or("NAV_ACC_RAD", 10.0)

@@ -5,6 +5,7 @@ import json
 from collections import deque
 from collections.abc import AsyncIterator, Collection, Container, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 from typing import Any, Final
 
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, MavsdkConnectionError, System
@@ -14,13 +15,22 @@ from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkDirectError, MavlinkMessage
 
 from autopilot_bridge.errors import BridgeError
-from autopilot_bridge.links import Address
+from autopilot_bridge.links import (
+    VEHICLE_FORMS,
+    Address,
+    ReplayLog,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpClient,
+    UdpPeer,
+    UdpServer,
+)
 from autopilot_bridge.mavlink import definition, dialect
-from missions.errors import MissionError, VehicleTimeout
+from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
 from missions.vehicle.firmware_records import FIRMWARES
-from missions.vehicle_client.addresses import mavsdk_url
 from missions.vehicle_client.listening import listen
 
 _AUTOPILOT: Final = 1
@@ -37,6 +47,27 @@ WANTED: Final[Mapping[str, tuple[str, ...]]] = {
                   "BATTERY_STATUS", "EXTENDED_SYS_STATE", "RC_CHANNELS", "SYSTEM_TIME"),
 }  # fmt: skip
 """Messages that report the state of a vehicle."""
+
+
+def mavsdk_url(address: Address) -> str:
+    """The MAVSDK connection string for a link.
+
+    Raises:
+        PlanError: MAVSDK does not support this kind of link.
+    """
+    match address:
+        case UdpServer():
+            return f"udpin://{address.host}:{address.port}"
+        case UdpClient():
+            return f"udpout://{address.host}:{address.port}"
+        case TcpClient():
+            return f"tcpout://{address.host}:{address.port}"
+        case TcpServer():
+            return f"tcpin://{address.host}:{address.port}"
+        case SerialPort():
+            return f"serial://{Path(address.device).absolute()}:{address.baud}"
+        case UdpPeer() | ReplayLog():
+            raise PlanError(f"`connect` {address}: not for this command; accepted: {VEHICLE_FORMS}")
 
 
 class VehicleClient:
@@ -216,10 +247,10 @@ async def open_client(
             received.
     """
     url = mavsdk_url(address)
-    said: list[str] = []
+    texts: list[str] = []
 
     def keep(_level: object, message: str, _file: object, _line: int) -> bool:
-        said.append(message)
+        texts.append(message)
         return True  # do not print it on the terminal
 
     log_subscribe(keep)
@@ -230,7 +261,7 @@ async def open_client(
         try:
             await mavsdk.add_any_connection(url)
         except MavsdkConnectionError as error:
-            why = said[-1] if said else str(error)
+            why = texts[-1] if texts else str(error)
             raise MissionError(f"{address} can't be opened: {why}") from error
         system = await _find(mavsdk, timeout_s, system_id)
         if system is not None:
@@ -246,7 +277,7 @@ async def open_client(
     if client is None:
         which = "autopilot" if system_id is None else f"autopilot with system id {system_id}"
         raise VehicleTimeout(
-            f"no {which} was received on {address} within {timeout_s:g} s; {await _heard(address)}"
+            f"no {which} was received on {address} within {timeout_s:g} s; {await _received_instead(address)}"
         )
 
 
@@ -262,10 +293,10 @@ async def _find(mavsdk: Mavsdk, timeout_s: float, system_id: int | None) -> Syst
     return None
 
 
-async def _heard(address: Address) -> str:
+async def _received_instead(address: Address) -> str:
     """Description of what is received on a link without the requested autopilot."""
     try:
         quality = await listen(address, _LISTEN_S)
     except BridgeError as error:
         return str(error)
-    return quality.heard()
+    return quality.description()

@@ -103,21 +103,21 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
     events = EventsAsync(client.system)
     # provides the names of the events
     await ComponentMetadataAsync(client.system).request_autopilot_component()
-    telling = asyncio.create_task(_next_report(events))
+    report = asyncio.create_task(_next_report(events))
     try:
         for _ in range(_REPORTS):
             await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
-            if (await asyncio.wait({telling}, timeout=_REPORT_S))[0]:
+            if (await asyncio.wait({report}, timeout=_REPORT_S))[0]:
                 break
         else:
             return []
     finally:
-        telling.cancel()
+        report.cancel()
     found = []
-    for entry in telling.result().current_mode_intention.problems:
+    for entry in report.result().current_mode_intention.problems:
         text = " ".join(f"{entry.message} {entry.description}".split())
-        told = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
-        found.append(told("arming check", text, f"look at {entry.health_component or 'it'}"))
+        level = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
+        found.append(level("arming check", text, f"look at {entry.health_component or 'it'}"))
     return found
 
 
@@ -128,13 +128,13 @@ async def _next_report(events: EventsAsync) -> HealthAndArmingCheckReport:
 
 
 def _clock(snapshot: Snapshot, unix_time_us: int, begun_s: float) -> Finding:
-    told_us = snapshot.whole("SYSTEM_TIME", "time_unix_usec")
-    if not told_us:
+    reported_us = snapshot.whole("SYSTEM_TIME", "time_unix_usec")
+    if not reported_us:
         return warning(
             "clock", "the vehicle doesn't report the date", "its logs are undated until it has GPS time"
         )
     now_us = unix_time_us + (asyncio.get_running_loop().time() - begun_s) * 1e6
-    off_s = (told_us - now_us) * 1e-6
+    off_s = (reported_us - now_us) * 1e-6
     if abs(off_s) > _CLOCK_S:
         off = f"{off_s:+.0f} s" if abs(off_s) < _DAY_S else f"{off_s / _DAY_S:+.0f} days"
         return warning("clock", f"{off} off this machine's", "set this machine's, or wait for GPS time")
@@ -166,6 +166,6 @@ def _link(quality: LinkQuality, client: VehicleClient, missing: list[str]) -> Fi
                        "they should come once a second")  # fmt: skip
     if missing:
         return warning(
-            "link", f"{text}; not sent when asked for: {', '.join(missing)}", "is it too slow a line?"
+            "link", f"{text}; not sent when requested: {', '.join(missing)}", "is it too slow a line?"
         )
     return ok("link", text)

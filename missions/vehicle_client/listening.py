@@ -50,7 +50,7 @@ class LinkQuality:
         """Share of the autopilot's frames that were lost, 0..1."""
         return self.lost / max(1, self.frames + self.lost)
 
-    def heard(self) -> str:
+    def description(self) -> str:
         """What was received, as text for an error."""
         if not self.bytes_total:
             return f"nothing was received in {self.seconds:.0f} s: is it on, is this the right link?"

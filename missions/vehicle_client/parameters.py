@@ -210,7 +210,7 @@ def differences(
 
 
 async def load(
-    client: VehicleClient, changes: Iterable[Difference], tell: Callable[[str], None]
+    client: VehicleClient, changes: Iterable[Difference], on_change: Callable[[str], None]
 ) -> list[str]:
     """Set all parameters that differ; returns the names that the vehicle did not accept, with its reasons."""
     refused = []
@@ -222,5 +222,5 @@ async def load(
         except (MissionError, PlanError) as error:
             refused.append(str(error))
             continue
-        tell(f"{change.name}: {change.vehicle} -> {kept}")
+        on_change(f"{change.name}: {change.vehicle} -> {kept}")
     return refused

@@ -21,7 +21,7 @@ from tests.bridge.clock_world import STEP_US, World
 
 
 class Wall:
-    """A wall clock that moves only when somebody sleeps or works."""
+    """A wall clock that moves only when a task sleeps or works."""
 
     def __init__(self):
         self.now_s = 50.0

@@ -103,7 +103,7 @@ def test_a_change_of_speed_is_noticed_while_waiting():
 def test_deadlines_expire_on_a_dead_link():
     async def main(clock, world):
         with pytest.raises(TimeoutError):
-            async with clock.timeout(5.0):  # nothing was ever heard
+            async with clock.timeout(5.0):  # nothing was ever received
                 await asyncio.Event().wait()
         assert world.now_us == pytest.approx(5_000_000, abs=10_000)
         telling = asyncio.create_task(stream(clock, world, start_us=60_000_000, rate=4.0))

@@ -45,10 +45,10 @@ def test_all_peers_together_have_theirs():
     intake = Intake()
     served = intake.take([(peer, command() * 100) for peer in range(30)])
     assert len(served) < 30 and frames_in(served) <= TOTAL / FRAME_WORK + 50
-    heard = {peer for peer, _ in served}
+    received = {peer for peer, _ in served}
     for _ in range(15):  # those who waited come first
-        heard |= {peer for peer, _ in intake.take([])}
-    assert heard == set(range(30))
+        received |= {peer for peer, _ in intake.take([])}
+    assert received == set(range(30))
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_an_inbox_is_bounded():
     assert 0 <= fed - rest <= INBOX_BYTES
 
 
-def test_a_crowd_of_strangers_pushes_nobody_out():
+def test_a_crowd_of_strangers_displaces_no_peer():
     intake = Intake()
     whole = command()
     intake.take([("true", whole + whole[:20])])

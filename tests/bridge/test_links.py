@@ -34,7 +34,7 @@ DEADLINE_MS = 5000
 
 
 class WallClock:
-    """A wall clock that stands still until told otherwise."""
+    """A wall clock that stands still until set otherwise."""
 
     def __init__(self):
         self.now_s = 100.0
@@ -85,7 +85,7 @@ class SerialCable:
 
 @pytest.fixture(params=["memory", "udp", "udppeer", "tcp"])
 def link_pair(request):
-    """(a, b): what a sends, b receives; b has heard of a."""
+    """(a, b): what a sends, b receives; b has received of a."""
     if request.param == "memory":
         a, b = memory_pair()
     elif request.param == "udp":
@@ -159,16 +159,16 @@ def test_garbage_on_every_link_is_accounted_for(link_pair):
 def test_udp_server_sends_to_all_who_spoke():
     server = open_link("udpin:0")
     clients = [open_link(UdpClient("127.0.0.1", server.port)) for _ in range(3)]
-    server.send(b"nobody hears this")
+    server.send(b"not received")
     assert server.counters.writes == 0
     for index, client in enumerate(clients):
         client.send(bytes([index]))
-    heard = receive(server, 3)
-    assert sorted(heard.values()) == [b"\0", b"\1", b"\2"]
+    received = receive(server, 3)
+    assert sorted(received.values()) == [b"\0", b"\1", b"\2"]
     server.send(b"all")
     for client in clients:
         assert list(receive(client, 3).values()) == [b"all"]
-    one = next(peer for peer, data in heard.items() if data == b"\1")
+    one = next(peer for peer, data in received.items() if data == b"\1")
     server.send(b"one", to=one)
     assert list(receive(clients[1], 3).values()) == [b"one"]
     assert clients[0].receive() == [] and clients[2].receive() == []
@@ -198,7 +198,7 @@ def test_udp_server_keeps_those_who_were_there_before_a_crowd():
         clock.now_s += 0.01
         client.send(b"x")
         receive(server, 1)
-    assert len(server.peers) == 32 and server.counters.connects == 32  # the others are heard all the same
+    assert len(server.peers) == 32 and server.counters.connects == 32  # the others are received all the same
     first, clients[:1] = server.peers[0], []
     clock.now_s += 5.0
     for client in clients[:31]:
@@ -209,7 +209,7 @@ def test_udp_server_keeps_those_who_were_there_before_a_crowd():
     assert first not in server.peers and len(server.peers) == 32  # whoever is silent makes room
 
 
-def test_udp_links_forget_whom_they_are_told_to():
+def test_udp_links_forget_the_peers_that_they_are_commanded_to():
     server = open_link("udpin:0")
     stranger = open_link(UdpClient("127.0.0.1", server.port))
     stranger.send(b"?")
@@ -253,7 +253,7 @@ def test_tcp_clients_are_bounded_and_those_who_talk_stay():
         client.close()
 
 
-def test_tcp_client_that_never_reads_holds_nobody_back_and_is_parted_from():
+def test_tcp_client_that_never_reads_delays_no_other_and_is_parted_from():
     clock = WallClock()
     server = TcpServerLink(TcpServer("127.0.0.1", 0), monotonic=clock)
     deaf = socket.create_connection(("127.0.0.1", server.port))
@@ -282,7 +282,7 @@ def test_udp_peer_sends_first_and_takes_the_first_sender_for_its_partner():
     assert list(receive(speaker, 6).values()) == [b"answer"]
     late = open_link(UdpClient("127.0.0.1", vehicle.port))
     late.send(b"me too")
-    assert list(receive(vehicle, 6).values()) == [b"me too"]  # heard, but the partner stays
+    assert list(receive(vehicle, 6).values()) == [b"me too"]  # received, but the partner stays
     vehicle.send(b"again")
     assert list(receive(speaker, 5).values()) == [b"again"]
     assert late.receive() == [] and other.receive() == [] and third.receive() == []
@@ -294,7 +294,7 @@ def test_udp_refusal_is_counted_and_the_link_lives_on():
     client = open_link(UdpClient("127.0.0.1", port))
     server.close()
     for _ in range(20):
-        client.send(b"anybody?")
+        client.send(b"any?")
         client.receive()
     assert client.counters.errors > 0
     server = open_link(UdpServer("127.0.0.1", port))
@@ -314,12 +314,12 @@ def test_tcp_server_keeps_clients_apart():
     frame = FrameEncoder(1, 1).encode(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3))
     for client in clients:
         client.send(frame[:7])
-    heard = receive(server, 21)
+    received = receive(server, 21)
     for client in clients:
         client.send(frame[7:])
     for peer, data in receive(server, 3 * len(frame) - 21).items():
-        heard[peer] += data
-    assert list(heard.values()) == [frame] * 3 and set(heard) == set(server.peers)
+        received[peer] += data
+    assert list(received.values()) == [frame] * 3 and set(received) == set(server.peers)
     server.send(b"all")
     for client in clients:
         assert list(receive(client, 3).values()) == [b"all"]
@@ -329,8 +329,8 @@ def test_tcp_server_keeps_clients_apart():
         server.receive()
     server.send(b"left")
     assert list(receive(clients[2], 4).values()) == [b"left"]
-    gone = next(iter(set(heard) - set(server.peers)))
-    server.send(b"to nobody", to=gone)
+    gone = next(iter(set(received) - set(server.peers)))
+    server.send(b"to no peer", to=gone)
     assert server.counters.dropped == 1
 
 
@@ -369,7 +369,7 @@ def test_tcp_client_reconnects():
     client.send(b"lost")
     assert client.counters.dropped == 1 and client.peers == ()
     clock.now_s += 2.0
-    client.receive()  # refused: nobody listens
+    client.receive()  # refused: no listener
     clock.now_s += 2.0
     client.receive()
     assert not client.connected and client.counters.errors >= 1
@@ -383,7 +383,7 @@ def test_tcp_client_reconnects():
     assert client.counters.connects == 2
 
 
-def test_a_server_that_hangs_up_at_once_is_told_as_one_that_can_not_be_opened(monkeypatch):
+def test_a_server_that_hangs_up_at_once_is_reported_as_one_that_can_not_be_opened(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
         opened = socket.create_connection(("127.0.0.1", port))
@@ -506,6 +506,6 @@ def test_a_serial_port_in_use_says_so():
     cable.unplug()
 
 
-def test_servers_listen_on_loopback_unless_told_otherwise():
+def test_servers_listen_on_loopback_by_default():
     assert open_link("udpin:0").host == "127.0.0.1"
     assert open_link("tcpin:0").host == "127.0.0.1"

@@ -33,15 +33,15 @@ def payloads(link):
 
 
 def test_push_delivery_happens_at_once():
-    heard = []
-    a, b = memory_pair("vehicle", "mission", on_receive_b=heard.append)
+    received = []
+    a, b = memory_pair("vehicle", "mission", on_receive_b=received.append)
     a.send(b"now")
-    assert heard == [b"now"] and b.receive() == []
+    assert received == [b"now"] and b.receive() == []
     b.send(b"back")
     assert a.receive() == [(("mission", 0), b"back")]
     b.close()
     a.send(b"late")
-    assert heard == [b"now"] and a.counters.dropped == 1 and a.peers == ()
+    assert received == [b"now"] and a.counters.dropped == 1 and a.peers == ()
 
 
 @given(st.lists(st.binary(min_size=1), max_size=20))
@@ -105,12 +105,12 @@ def test_same_seed_same_faults():
 
     def run(seed):
         link, far, world = lossy(impairment, seed)
-        heard = []
+        received = []
         for piece in pieces(300):
             world.now_us += 4000
             link.send(piece)
-            heard.append((world.now_us, payloads(far)))
-        return heard
+            received.append((world.now_us, payloads(far)))
+        return received
 
     assert run(7) == run(7) != run(8)
 

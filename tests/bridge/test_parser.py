@@ -110,7 +110,7 @@ def test_every_good_frame_between_junk_is_found(count, version, sizes, junk):
     assert parser.counters.frames_lost == 0
 
 
-def test_versions_and_signatures_are_told():
+def test_versions_and_signatures_are_reported():
     parser = FrameParser()
     one, two, signed = parser.feed(frames_of(1, version=1)[0] + frames_of(1)[0] + signed_frame(1))
     assert [(frame.version, frame.signed) for frame in (one, two, signed)] == [
@@ -153,7 +153,7 @@ def test_unknown_incompatibility_flags_are_dropped():
 def test_unknown_messages_are_skipped_whole_and_named():
     good = frames_of(2)
     parser = FrameParser()
-    # The payload of the unknown message holds a good frame that nobody sent to us.
+    # The payload of the unknown message holds a good frame that was not sent to us.
     inner = (
         b"\xfd" + bytes([len(good[0]), 0, 0, 7, 1, 1]) + (99999).to_bytes(3, "little") + good[0] + b"\x12\x34"
     )

@@ -41,7 +41,7 @@ def test_broadcast_goes_everywhere_but_back():
     assert router().route(command(0, 0), "ground") == ["autopilot", "camera", "second ground"]
 
 
-def test_a_component_is_reached_where_it_was_heard():
+def test_a_component_is_reached_where_it_was_received():
     assert router().route(command(1, 100), "ground") == ["camera"]
     assert router().route(command(1, 1), "ground") == ["autopilot"]
 
@@ -55,7 +55,7 @@ def test_an_unknown_target_is_not_forwarded():
     assert router().route(command(1, 154), "ground") == []
 
 
-def test_a_system_heard_only_at_the_source_is_not_sent_back():
+def test_a_system_received_only_at_the_source_is_not_sent_back():
     assert router().route(command(255, 190, 1, 1), "ground") == []
 
 
@@ -66,7 +66,7 @@ def test_senders_are_learned_per_channel():
     assert made.destinations(7, 1) == ["second ground"]
     made.route(heartbeat(7), "ground")
     assert made.destinations(7, 1) == ["ground", "second ground"]
-    assert made.heard("ground") == {(255, 190), (7, 1)}
+    assert made.senders("ground") == {(255, 190), (7, 1)}
     made.remove("ground")
     assert made.destinations(7, 1) == ["second ground"]
     assert made.channels == ("autopilot", "camera", "second ground")

@@ -244,7 +244,7 @@ def test_a_new_stream_may_be_a_minute_behind():
     assert refused(link(), signed(pymavlink_with(timestamp=NOW - MINUTE - 1))) is Refusal.OLD
 
 
-def test_a_forged_late_timestamp_shuts_nobody_out():
+def test_a_forged_late_timestamp_shuts_no_client_out():
     ours = link()
     assert refused(ours, signed(pymavlink_with(OTHER_KEY, NOW + 1000 * MINUTE))) is Refusal.BAD_SIGNATURE
     assert refused(ours, signed(pymavlink_with())) is None
@@ -277,7 +277,7 @@ def test_policies(policy, unsigned, wrong):
     admitted = link(policy).admit(frames_of(signed(pymavlink_with(OTHER_KEY))))
     assert len(admitted) == wrong
     if policy is TRUSTED:
-        assert not admitted[0].signed  # nobody believes the signature
+        assert not admitted[0].signed  # the signature is not accepted
 
 
 def test_without_a_key_all_is_taken_and_nothing_signed():
@@ -308,7 +308,7 @@ def test_key_files(content, key):
 @pytest.mark.parametrize(
     "content", [b"", b"\n", bytes(32), b"two\nlines", b"\xff\xfe\x00" * 5, b"a" * 5000, b"0" * 64]
 )
-def test_no_key_is_told_without_what_was_read(content):
+def test_no_key_is_reported_without_what_was_read(content):
     with pytest.raises(SigningKeyError) as error:
         SigningKey.parse(content)
     assert "accepted" in str(error.value) or "zeros" in str(error.value)

@@ -2,8 +2,8 @@
 
 A test says what it is about by `@pytest.mark.compatibility(client=..., feature=...)` and on which vehicle by
 its parameter `vehicle` (or another one: `parameter=`; or the marker's `vehicle=`; `plane=True`: aircraft).
-What the firmware does not offer is a test, too: it passes when the client is told so, and gives the reason by
-`not_offered(request, "...")`.
+What the firmware does not offer is a test, too: it passes when the client gets a refusal, and gives the
+reason by `not_offered(request, "...")`.
 
 `python -m pytest tests/clients -m '' --write-compatibility` writes the page; it refuses when a test of the
 page was not run. Every other run compares what it has with the page, and fails when they differ.
@@ -30,7 +30,7 @@ What other people's clients do with the emulated vehicles, headless, as the test
 `python -m pytest tests/clients -m '' --write-compatibility` writes this page.
 
 "pass": the client's own calls did what its documentation says, seen on the client's side. Other words: what
-the firmware does not offer or the client can't do, and the test saw that the client is told so. An empty
+the firmware does not offer or the client can't do, and the test saw that the client gets a refusal. An empty
 cell: not tried there; aircraft fly what MAVSDK's action, offboard and mission plugins have for them in one
 flight, and carry the camera.
 
@@ -48,7 +48,7 @@ class Cell(NamedTuple):
 
 
 def not_offered(request: pytest.FixtureRequest, reason: str) -> None:
-    """The test passes because the client was told that this is not to be had; `reason` goes onto the page."""
+    """The test passes because the client got the firmware's refusal; `reason` goes onto the page."""
     request.node.user_properties.append((_NOTE, reason))
 
 
@@ -172,7 +172,7 @@ class CompatibilityPlugin:
 
 
 def _agree(seen: str, page: str) -> bool:
-    """What some of a cell's tests told is on the page."""
+    """What some of a cell's tests reported is on the page."""
     return seen == page or set(seen.split("; ")) - {_PASS} <= set(page.split("; ")) - {_PASS} != set()
 
 

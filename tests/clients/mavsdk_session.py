@@ -228,8 +228,8 @@ class SynchronousSession(Session):
 
     def _first(self, plugin: str, stream: str, found: Found, each: Each, wait_s: float) -> Any:
         owner = self.plugin(plugin)
-        heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        handle = getattr(owner, f"subscribe_{stream}")(lambda data, _user: heard.put(data))
+        received: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        handle = getattr(owner, f"subscribe_{stream}")(lambda data, _user: received.put(data))
         deadline_s = time.monotonic() + wait_s
         last: Any = None
         try:
@@ -237,7 +237,7 @@ class SynchronousSession(Session):
                 if each is not None:
                     each()
                 try:
-                    last = heard.get(timeout=0.025 if each is not None else 0.5)
+                    last = received.get(timeout=0.025 if each is not None else 0.5)
                 except queue.Empty:
                     continue
                 if found(last):
@@ -248,25 +248,25 @@ class SynchronousSession(Session):
         raise AssertionError(f"{plugin}.{stream} was not seen; last: {worded(last)}")
 
     def collect(self, plugin: str, method: str, *arguments: Any) -> list[Any]:
-        heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        received: queue.SimpleQueue[Any] = queue.SimpleQueue()
         getattr(self.plugin(plugin), f"{method}_async")(
-            *arguments, lambda result, data, _user: heard.put((result, data))
+            *arguments, lambda result, data, _user: received.put((result, data))
         )
         elements: list[Any] = []
         while True:
-            result, data = heard.get(timeout=2 * WALL_DEADLINE_S)
+            result, data = received.get(timeout=2 * WALL_DEADLINE_S)
             elements.append((result, data))
             if result.name != "NEXT":
                 assert result.name == "SUCCESS", result
                 return elements
 
     def cut_short(self, plugin: str, method: str, stop: str, found: Found) -> str:
-        heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        received: queue.SimpleQueue[Any] = queue.SimpleQueue()
         owner = self.plugin(plugin)
-        getattr(owner, f"{method}_async")(lambda result, data, _user: heard.put((result.name, data)))
+        getattr(owner, f"{method}_async")(lambda result, data, _user: received.put((result.name, data)))
         stopped = False
         while True:
-            name, data = heard.get(timeout=WALL_DEADLINE_S)
+            name, data = received.get(timeout=WALL_DEADLINE_S)
             if name != "NEXT":
                 return str(name)
             if not stopped and found(data):

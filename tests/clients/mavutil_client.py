@@ -128,7 +128,7 @@ class Client:
         return self._acknowledged(command)
 
     def _catch_up(self) -> None:
-        """Read what has come while nobody read: the answer to what is asked now needs the room."""
+        """Read what has come since the last read: the answer to the next request needs the room."""
         for _ in range(BUFFERED):
             if (message := self.link.recv_match()) is None:
                 return

@@ -42,7 +42,7 @@ class PluginSitl:
     def session(self, client: str) -> Session:
         """One of MAVSDK's interfaces, connected to a vehicle that is ready to be armed."""
         session = SESSIONS[client](f"udpin://127.0.0.1:{self.ports[client]}", system_id=GCS_SYSTEM)
-        session.plugin("events")  # hears from the start what is told once
+        session.plugin("events")  # receives from the start what is sent once
         if self.flavour == "ardupilot":
             for stream in ("position", "position_velocity_ned", "attitude_euler", "in_air", "health"):
                 session.call("telemetry", f"set_rate_{stream}", 10.0)
@@ -53,7 +53,7 @@ class PluginSitl:
     def _choose_guided(self, session: Session) -> None:
         """After a landing it stays in RTL or LAND, and MAVSDK has no word for GUIDED but a take-off.
 
-        MAVSDK, which calls it OFFBOARD, has to have heard of it: as long as it takes the mode for RTL, it
+        MAVSDK, which calls it OFFBOARD, has to have received of it: as long as it takes the mode for RTL, it
         arms in BRAKE, which ArduPilot refuses.
         """
         self.script.set_mode("GUIDED")

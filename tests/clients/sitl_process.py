@@ -20,7 +20,7 @@ _candidates = itertools.cycle((*_PORTS[os.getpid() * 37 % len(_PORTS) :], *_PORT
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:
-    """A port that nobody uses at the moment, and that no socket without a port of its own is given.
+    """A port that no process uses at the moment, and that no socket without a port of its own is given.
 
     Those get theirs from the ephemeral range, which on a busy machine is soon where a test wanted to listen.
     """

@@ -29,7 +29,7 @@ def test_a_log_is_listed_downloaded_and_erased(flavour: str, tmp_path: Path) -> 
         if flavour == "ardupilot":
             station.types_until("mode guided", "Mode GUIDED", 1.0)
         station.types_until("arm throttle", "ARMED", 2.0)
-        station.sees("DISARMED")  # by itself, as nobody takes off
+        station.sees("DISARMED")  # by itself, as no takeoff follows
         number = FIRST[flavour]
         listed = station.types_until("log list", f"Log {number}  numLogs", 3.0)
         while True:  # the log goes on for a while after disarming

@@ -160,7 +160,7 @@ async def fly_attitudes(pilot: Pilot) -> None:
 
 
 async def fly_waypoints(pilot: Pilot) -> None:
-    """Waypoints alone: PX4 asks aircraft for a landing, unless it is told not to."""
+    """Waypoints alone: PX4 asks aircraft for a landing, unless a parameter says otherwise."""
     assert await pilot.param.get_param_int("MIS_TKO_LAND_REQ") == 2
     await pilot.param.set_param_int("MIS_TKO_LAND_REQ", 0)
     places = [pilot.runway.geodetic(pilot.runway.along(*at), 60.0) for at in ((400.0, 0.0), (0.0, 200.0))]

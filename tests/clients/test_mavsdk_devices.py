@@ -51,12 +51,12 @@ def test_calibration(mavsdk: Session, sitl: PluginSitl, client: str, request: py
         return
     names = ["gyro", "level_horizon", "accelerometer"] + ["magnetometer"] * (client == ASYNCIO)
     for name in names:
-        told = mavsdk.collect("calibration", f"calibrate_{name}")
-        assert told[-1][0].name == "SUCCESS"
-        progress = [data.progress for _, data in told if data.has_progress]
+        reported = mavsdk.collect("calibration", f"calibrate_{name}")
+        assert reported[-1][0].name == "SUCCESS"
+        progress = [data.progress for _, data in reported if data.has_progress]
         assert progress == sorted(progress) and progress[0] == 0.0 and progress[-1] == 1.0
         if name in ("accelerometer", "magnetometer"):
-            texts = [data.status_text for _, data in told if data.has_status_text]
+            texts = [data.status_text for _, data in reported if data.has_status_text]
             for side in ("down", "up", "left", "right", "front", "back"):
                 assert any(f"{side} orientation detected" in text for text in texts)
 
@@ -126,9 +126,9 @@ def test_transponder(mavsdk: Session, sitl: PluginSitl) -> None:
         )
 
     mavsdk.call("transponder", "set_rate_transponder", 2.0)
-    heard = mavsdk.first("transponder", "transponder", lambda v: v.icao_address == address, report)
-    assert heard.latitude_deg == pytest.approx(here.latitude_deg + 0.02, abs=1e-6)
-    assert heard.callsign == "TEST1234"
+    received = mavsdk.first("transponder", "transponder", lambda v: v.icao_address == address, report)
+    assert received.latitude_deg == pytest.approx(here.latitude_deg + 0.02, abs=1e-6)
+    assert received.callsign == "TEST1234"
 
 
 @compatibility(feature="rtk")

@@ -148,7 +148,7 @@ def test_follow_me(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest
     altitude = Config.FollowAltitudeMode.CONSTANT
     mavsdk.call("follow_me", "set_config", Config(10.0, behind_m, 0.1, altitude, 8.0, 180.0))
     mavsdk.call("follow_me", "start")
-    # MAVSDK takes a target from when it has heard of the mode; then it repeats it by itself
+    # MAVSDK takes a target from when it has received of the mode; then it repeats it by itself
     mavsdk.until("a place to follow", lambda: accepted(mavsdk, "follow_me", "set_target_location", target))
     assert mavsdk.call("follow_me", "is_active")
     mavsdk.first(

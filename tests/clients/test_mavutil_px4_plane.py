@@ -17,7 +17,7 @@ QUIET = (
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU,
     mavlink.MAVLINK_MSG_ID_ODOMETRY,
 )
-"""Fast messages that nobody reads here: without them, Python keeps up."""
+"""Fast messages that the client does not read here: without them, Python keeps up."""
 SLOWER_HZ = {mavlink.MAVLINK_MSG_ID_ATTITUDE: 20.0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0}
 VELOCITY_ONLY = 0b110111000111
 
@@ -35,7 +35,7 @@ def parked() -> Iterator[AircraftClient]:
 
 @pytest.fixture(scope="module")
 def flying(parked: AircraftClient) -> AircraftClient:
-    """Taken off from the runway by command, to the place and the height it was told."""
+    """Taken off from the runway by command, to the place and the height it was reported."""
     place = parked.runway.along(400.0, 100.0)
     lat, lon, height_m = parked.geodetic(place, parked.runway.alt_m + 60.0)
     parked.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, lat, lon, height_m)

@@ -60,7 +60,7 @@ def test_mavparm(script: Client, tmp_path: Path) -> None:
     name = "COM_DISARM_LAND" if script.flavour == "px4" else "BATT_LOW_VOLT"
     table = mavparm.MAVParmDict()
     count = 0
-    heard: set[int] = set()
+    received: set[int] = set()
     script.link.param_fetch_all()
 
     def complete(message: Any) -> bool:
@@ -69,14 +69,14 @@ def test_mavparm(script: Client, tmp_path: Path) -> None:
             return False
         table[message.param_id] = message.param_value
         if message.param_index != UNASKED:
-            heard.add(message.param_index)
+            received.add(message.param_index)
             count = message.param_count
-        return len(heard) == count > 0
+        return len(received) == count > 0
 
     def missing() -> None:
         """What a busy machine has dropped is asked for again, as every client does."""
         if count and not script.link.mav.total_packets_received % 50:
-            for index in sorted(set(range(count)) - heard)[:20]:
+            for index in sorted(set(range(count)) - received)[:20]:
                 script.link.mav.param_request_read_send(1, 1, b"", index)
 
     script.until("parameters", complete, missing)
@@ -218,7 +218,7 @@ def test_devices(script: Client, vehicle: str, request: pytest.FixtureRequest) -
 
 @compatibility(client="pymavlink (mavutil)", feature="sticks: RC_CHANNELS_OVERRIDE, MANUAL_CONTROL")
 def test_overrides_are_seen(script: Client) -> None:
-    """On PX4 the radio is heard, and by default (COM_RC_IN_MODE 1) steers nothing."""
+    """On PX4 the radio is received, and by default (COM_RC_IN_MODE 1) steers nothing."""
     script.message_rate(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, 10.0)
 
     def each() -> None:

@@ -103,7 +103,7 @@ class Station:
 
 @contextmanager
 def attacks(port: int, recorded: list[bytes]) -> Iterator[None]:
-    """Somebody on the same port, without a key, with another, and with what he has recorded."""
+    """A client on the same port, without a key, with another, and with what it has recorded."""
     done = threading.Event()
 
     def attack() -> None:
@@ -209,7 +209,7 @@ def test_our_mission_flies_signed(tmp_path: Path, key_file: Path) -> None:
     port = free_port()
     options = ("--signing-key", str(key_file))
     with running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=8.0, options=options):
-        for key, code, told in (("another one", 1, "bad signature"), (PASSPHRASE, 0, "completed")):
+        for key, code, reported in (("another one", 1, "bad signature"), (PASSPHRASE, 0, "completed")):
             arguments = ["fly", "square.py", "--connect", f"udpin:127.0.0.1:{port}"]
             (tmp_path / "square.py").write_text(
                 "async def fly(vehicle, options):\n"
@@ -228,12 +228,12 @@ def test_our_mission_flies_signed(tmp_path: Path, key_file: Path) -> None:
                 timeout=120.0,
             )
             assert done.returncode == code, done.stderr
-            assert told in done.stdout + done.stderr
+            assert reported in done.stdout + done.stderr
 
 
 @pytest.mark.slow
-def test_who_has_no_key_is_told_what_may_be_missing(key_file: Path, tmp_path: Path) -> None:
-    """Everything is heard and nothing answered, and that takes no minutes to be said."""
+def test_who_has_no_key_gets_what_may_be_missing(key_file: Path, tmp_path: Path) -> None:
+    """Everything is received and nothing answered, and that takes no minutes to be said."""
     port, doctors_port = free_port(), free_port()
     links = [f"udpout:127.0.0.1:{number}" for number in (port, doctors_port)]
     commands = (

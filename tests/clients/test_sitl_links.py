@@ -41,7 +41,7 @@ def reset(port: int) -> None:
     client.close()
 
 
-def test_clients_share_links_and_one_that_dies_in_flight_disturbs_nobody() -> None:
+def test_clients_share_links_and_one_that_dies_in_flight_disturbs_no_other() -> None:
     tcp, udp = free_port(socket.SOCK_STREAM), free_port()
     with running_sitl("px4", [f"tcpin:127.0.0.1:{tcp}", f"udpin:127.0.0.1:{udp}"]) as sitl:
         first, second = connect(f"tcp:127.0.0.1:{tcp}"), connect(f"tcp:127.0.0.1:{tcp}", 254)

@@ -150,6 +150,6 @@ def test_mavproxy_flies_one_of_five_on_one_link(tmp_path: Path) -> None:
     ):
         station.sees("online system")
         station.type("vehicle 3")
-        # before it has heard of this vehicle's type MAVProxy takes it for an aircraft, with other numbers
+        # before it has received of this vehicle's type MAVProxy takes it for an aircraft, with other numbers
         station.types_until("mode guided", "Mode GUIDED", 2.0)
         station.take_off(10)

@@ -33,7 +33,7 @@ class Said:
 
 
 class User:
-    """Somebody at a terminal, with a SITL beside them; a script flies it over `script_port`."""
+    """A user at a terminal, with a SITL beside it; a script flies it over `script_port`."""
 
     def __init__(self, flavour: str, port: int, script_port: int = 0) -> None:
         self.flavour = flavour
@@ -149,7 +149,7 @@ def test_doctor(user: User) -> None:
     assert "0.0 % lost" in link["text"]
 
 
-def test_nobody_there_is_one_line() -> None:
+def test_no_vehicle_is_one_line() -> None:
     user = User("px4", free_port())
     done = user.run("info", "--timeout", "1")
     assert done.returncode == 1
@@ -180,7 +180,7 @@ def logged_flight(user: User) -> None:
         assert "it is armed" in refused.stderr
         while script.link.recv_match() is not None:
             continue  # what came meanwhile: the answer needs room in the socket's buffer
-        # nobody has read what the vehicle sent meanwhile: an acknowledgement may not fit any more
+        # no client has read what the vehicle sent meanwhile: an acknowledgement may not fit any more
         script.link.mav.command_long_send(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, *(0.0,) * 7)
         script.next("HEARTBEAT", lambda m: not m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
     finally:

@@ -36,13 +36,13 @@ class Flight:
         self.catch_up()
         params = (*values, *(0.0,) * (7 - len(values)))
         self.client.link.mav.command_long_send(1, component, command, 0, *params)
-        return self.hear(reply, component)
+        return self.receive(reply, component)
 
-    def hear(self, name: str, component: int = CAMERA) -> Any:
+    def receive(self, name: str, component: int = CAMERA) -> Any:
         return self.client.until(name, lambda m: m.get_type() == name and m.get_srcComponent() == component)
 
-    def heard(self, name: str, component: int = CAMERA) -> list[Any]:
-        """What has come of a name while nobody listened; all else is passed over."""
+    def received(self, name: str, component: int = CAMERA) -> list[Any]:
+        """What has come of a name while the test did not listen; all else is passed over."""
         found = []
         while (message := self.client.link.recv_match()) is not None:
             if message.get_type() == name and message.get_srcComponent() == component:
@@ -50,8 +50,8 @@ class Flight:
         return found
 
     def catch_up(self) -> None:
-        """Pass over what has come while nobody listened."""
-        self.heard("")
+        """Pass over what has come while the test did not listen."""
+        self.received("")
 
     def uri(self) -> str:
         number = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
@@ -114,19 +114,19 @@ def test_video_capture_shows_the_target_where_the_detector_says(flight: Flight) 
     seen = []
     for _ in range(60):  # those that have waited while it was opened
         capture.read()
-        seen += flight.heard("LANDING_TARGET")
+        seen += flight.received("LANDING_TARGET")
     picture = picture_where(capture, lambda p: 0 in tags(p), "tag 0")
-    seen += flight.heard("LANDING_TARGET")
+    seen += flight.received("LANDING_TARGET")
     height, width = picture.shape[:2]
     assert (width, height) == (1280, 720)
     middle = tags(picture)[0]
     focal_px = 0.5 * width / math.tan(math.radians(30.0))
-    told = [
+    reported = [
         (0.5 * width + focal_px * math.tan(m.angle_x), 0.5 * height + focal_px * math.tan(m.angle_y))
         for m in seen
     ]
     # the picture is as late as its stream: one of the messages is of its moment
-    assert min(math.dist(middle, place) for place in told) < 5.0
+    assert min(math.dist(middle, place) for place in reported) < 5.0
     assert plate_middle(yellow(picture)) == pytest.approx(tuple(middle), abs=4.0)
     capture.release()
 
@@ -206,7 +206,7 @@ def test_a_killed_sitl_leaves_no_process_behind() -> None:
         capture.release()
 
 
-def test_a_busy_port_is_told() -> None:
+def test_a_busy_port_is_reported() -> None:
     import socket
 
     with socket.socket() as busy:

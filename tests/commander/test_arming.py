@@ -175,7 +175,7 @@ def test_leaning_is_in_the_way() -> None:
 def test_a_px4_client_must_be_there_when_its_loss_would_act() -> None:
     rig = Rig("px4", NAV_DLL_ACT=2)
     assert rig.commander.arm().reasons == (Reason.GCS_LOST,)
-    rig.commander.pilot.hear_gcs(rig.time_us)
+    rig.commander.pilot.on_gcs(rig.time_us)
     assert rig.commander.arm().accepted
 
 

@@ -45,7 +45,7 @@ def silent(seconds: float) -> Callable[[Rig], None]:
     return lambda rig: rig.run(seconds)
 
 
-def heard(rig: Rig) -> None:
+def received(rig: Rig) -> None:
     heartbeats(rig, 1.0)
 
 
@@ -138,7 +138,7 @@ CASES = (
         "ground station",
         "px4",
         silent(11.0),
-        heard,
+        received,
         events=("Connection to ground control station lost",),
         cleared_events=("GCS connection regained",),
     ),
@@ -185,7 +185,7 @@ CASES = (
         "ground station",
         "ardupilot",
         silent(6.0),
-        heard,
+        received,
         ("GCS Failsafe",),
         ("GCS Failsafe Cleared",),
     ),
@@ -245,7 +245,7 @@ class Listener:
         return texts, [kind for kind in kinds if kind not in texts]
 
 
-def told(texts: list[str], expected: tuple[str, ...]) -> None:
+def reported(texts: list[str], expected: tuple[str, ...]) -> None:
     """Each of these once or more, and nothing else; texts may go on with numbers."""
     for beginning in expected:
         assert any(text.startswith(beginning) for text in texts), texts
@@ -253,7 +253,7 @@ def told(texts: list[str], expected: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.flavour} {case.name}")
-def test_what_clients_are_told(case: Case) -> None:
+def test_what_clients_receive(case: Case) -> None:
     rig = Rig(case.flavour)
     for name, value in PARAMETERS[case.flavour].items():
         rig.set_parameter(name, value)
@@ -264,14 +264,14 @@ def test_what_clients_are_told(case: Case) -> None:
     if case.events[:1] == ("Manual control lost",):
         sticks(rig)
     if case.name == "ground station":
-        heard(rig)
+        received(rig)
     rig.run(0.2)
     status, listener = StatusReport(rig.flavour, rig.commander), Listener(rig)
     listener.new()
     before = status.sys_status()
     case.spoil(rig)
     texts, kinds = listener.new()
-    told(texts, case.texts)
+    reported(texts, case.texts)
     if case.flavour == "px4":
         assert tuple(kinds) == case.events
     # what breaks an inertial sensor breaks both of its halves
@@ -280,7 +280,7 @@ def test_what_clients_are_told(case: Case) -> None:
         return
     case.mend(rig)
     texts, kinds = listener.new()
-    told(texts, case.cleared)
+    reported(texts, case.cleared)
     if case.flavour == "px4":
         assert tuple(kinds) == case.cleared_events
     assert status.sys_status()[2] == before[2]
@@ -300,7 +300,7 @@ def test_sticks_that_never_were_there_are_not_missed() -> None:
     assert present & health & RECEIVER
 
 
-def test_how_long_a_link_was_away_is_told() -> None:
+def test_how_long_a_link_was_away_is_reported() -> None:
     rig = Rig("px4")
     sticks(rig)
     rig.run(5.0)

@@ -113,7 +113,7 @@ def test_slow_streams_hold_offboard(rate_hz: float) -> None:
 def heartbeats(rig: Rig, seconds: float) -> None:
     for tick in range(round(seconds * 1e6) // PERIOD_US):
         if tick % 50 == 0:
-            rig.commander.pilot.hear_gcs(rig.time_us)
+            rig.commander.pilot.on_gcs(rig.time_us)
         rig.tick()
 
 

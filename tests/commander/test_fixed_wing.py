@@ -277,14 +277,14 @@ def test_arduplane_failsafe_on_the_ground_does_not_disarm() -> None:
     rig = aircraft("ardupilot", FS_GCS_ENABL=1, FS_LONG_ACTN=1)
     rig.commander.set_mode(FlightMode.FBWA)
     assert rig.commander.arm().accepted
-    rig.commander.pilot.hear_gcs(rig.time_us)
+    rig.commander.pilot.on_gcs(rig.time_us)
     rig.run(7.0)
     assert rig.commander.armed and rig.commander.mode is FlightMode.RETURN
 
 
 @pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
 @pytest.mark.parametrize("angle_deg", [65.0, -65.0, 55.0, -55.0])
-def test_px4_attitude_beyond_its_limits_is_told(axis: int, angle_deg: float) -> None:
+def test_px4_attitude_beyond_its_limits_is_reported(axis: int, angle_deg: float) -> None:
     """60 degrees to either side (FD_FAIL_R, FD_FAIL_P)."""
     rig = flying("px4", FlightMode.HOLD)
     euler_rad = [0.0, 0.0, 0.0]

@@ -427,7 +427,7 @@ def test_px4_fence_by_the_receivers_position() -> None:
         lat, lon, alt = FRAME.geodetic_from_ned(north_m, 0.0, -10.0)
         gps[interface.GPS_LAT_DEG], gps[interface.GPS_LON_DEG] = lat + 1e-9 * (rig.time_us % 7), lon
         gps[interface.GPS_ALT_M] = alt
-        rig.context.nav[nav.POS_NED_M] = (80.0, 0.0, -10.0)  # what the filter believes
+        rig.context.nav[nav.POS_NED_M] = (80.0, 0.0, -10.0)  # what the filter estimates
 
     rig.spoil = receiver
     rig.run(0.3)

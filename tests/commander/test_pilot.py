@@ -53,5 +53,5 @@ def test_a_pilot_who_never_was_there_is_infinitely_old() -> None:
     pilot = PilotInput(built_in_radio=False)
     assert pilot.sticks_age_s(1, timeout_s=0.5) == math.inf
     assert pilot.gcs_age_s(1) == math.inf
-    pilot.hear_gcs(0)
+    pilot.on_gcs(0)
     assert pilot.gcs_age_s(3_000_000) == pytest.approx(3.0)

@@ -24,7 +24,7 @@ def test_non_finite_values_are_kept_out_and_leave_no_trace(bad):
     assert guard.check(40, "imu", VALUES) is None  # the time of the bad one doesn't count
 
 
-def test_the_same_sample_once_more_is_told_from_another_with_the_same_time():
+def test_the_same_sample_once_more_is_distinguished_from_another_with_the_same_time():
     guard = InputGuard()
     guard.check(100, "airspeed", VALUES)
     assert guard.check(100, "airspeed", VALUES) is Outcome.REPEATED

@@ -30,19 +30,19 @@ def test_the_library_alone_imports_no_estimator():
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "reported"),
     [
         ("atitude", "'atitude' is not known; there are attitude, lissajous, orbit-target, target-fusion"),
         ("nowhere.py", "nowhere.py does not exist"),
     ],
 )
-def test_unknown_names_are_told_with_those_that_there_are(name, told):
-    with pytest.raises(EstimatorError, match=told):
+def test_unknown_names_are_reported_with_those_that_there_are(name, reported):
+    with pytest.raises(EstimatorError, match=reported):
         estimator_class(name)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("x = 1", "holds no estimator"),
         ("def f(:", "can't be loaded: SyntaxError"),
@@ -50,10 +50,10 @@ def test_unknown_names_are_told_with_those_that_there_are(name, told):
         ("from estimators.attitude import *", "holds no estimator"),
     ],
 )
-def test_a_file_that_is_no_estimator_says_why(tmp_path, text, told):
+def test_a_file_that_is_no_estimator_says_why(tmp_path, text, reported):
     path = tmp_path / "mine.py"
     path.write_text(text)
-    with pytest.raises(EstimatorError, match=told):
+    with pytest.raises(EstimatorError, match=reported):
         estimator_class(str(path))
 
 
@@ -81,7 +81,7 @@ def test_parameters_from_text(level, setting, value):
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "reported"),
     [
         ("weight", "'weight' is not NAME=VALUE"),
         ("wieght=1", "level has no parameter 'wieght'; there are: weight, samples, publish"),
@@ -95,13 +95,13 @@ def test_parameters_from_text(level, setting, value):
         ("axes=1", "axes: '1' is not 2 values"),
     ],
 )
-def test_wrong_parameters_are_named_with_what_is_accepted(level, setting, told):
-    with pytest.raises(EstimatorError, match=told):
+def test_wrong_parameters_are_named_with_what_is_accepted(level, setting, reported):
+    with pytest.raises(EstimatorError, match=reported):
         make_estimator(level, [setting])
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ('NAME = "level"', "pass", "NAME is None; give letters"),
         ('NAME = "level"', 'NAME = "../level"', "NAME is '../level'; give letters"),
@@ -111,11 +111,11 @@ def test_wrong_parameters_are_named_with_what_is_accepted(level, setting, told):
         ("class Shape(", "raise SystemExit(4)\nclass Shape(", "can't be loaded: SystemExit: 4"),
     ],
 )
-def test_what_an_estimator_file_lacks_is_told(tmp_path, level, old, new, told):
+def test_what_an_estimator_file_lacks_is_reported(tmp_path, level, old, new, reported):
     path = tmp_path / "mine.py"
     text = Path(level).read_text()
     assert old in text
     path.write_text(text.replace(old, new))
     with pytest.raises(EstimatorError) as raised:
         make_estimator(str(path))
-    assert told in str(raised.value) and str(path) in str(raised.value)
+    assert reported in str(raised.value) and str(path) in str(raised.value)

@@ -13,7 +13,7 @@ from estimators.interface import Estimator, Need, Outcome
 from estimators.library import estimator_class
 from estimators.log_replay import replay
 from estimators.logs import open_log
-from estimators.team_time import TeamTime
+from estimators.vehicle_time import TeamTime
 from tests.recorded_logs import each_recorded_log
 
 UNIX_S = 1.7e9
@@ -31,8 +31,8 @@ class Nothing:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Heard:
-    """That something was heard."""
+class Received:
+    """That something was received."""
 
     COLUMNS: ClassVar = ("roll_rad",)
     time_us: int
@@ -51,7 +51,7 @@ class Ears(Estimator[Nothing]):
     estimates = ()
 
     def handle(self, time_us, message):
-        self.estimates = (Heard(time_us=time_us, subject=message.src_system, roll_rad=message.roll),)
+        self.estimates = (Received(time_us=time_us, subject=message.src_system, roll_rad=message.roll),)
         return Outcome.UPDATED
 
     def reset(self):
@@ -111,7 +111,7 @@ def test_team_time_takes_every_vehicle_to_one_time(make_log):
                 log.attitude(own, roll=0.001 * k, system=system)
     together = replay(open_log(one.close()), Ears)
     merged = replay([open_log(log.close()) for log in apart.values()], Ears)
-    tables = [result.fleet.runners[0].tables["Heard"] for result in (together, merged)]
+    tables = [result.fleet.runners[0].tables["Received"] for result in (together, merged)]
     assert tables[0].time_us.tolist() == tables[1].time_us.tolist()
     assert tables[0].subject.tolist() == tables[1].subject.tolist()
     for compared in comparisons(merged.logs, merged.fleet.runners[0]):  # with each one's log, in its own time
@@ -122,7 +122,7 @@ def test_team_time_takes_every_vehicle_to_one_time(make_log):
     live = Fleet(Ears)
     for _, frame in TlogReader(one.path):
         live.feed(frame)
-    assert live.runners[0].tables["Heard"].time_us.tolist() == tables[0].time_us.tolist()
+    assert live.runners[0].tables["Received"].time_us.tolist() == tables[0].time_us.tolist()
 
 
 def test_without_a_calendar_vehicle_times_stay_as_they_are():

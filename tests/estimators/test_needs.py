@@ -15,7 +15,7 @@ def rates(**known):
 
 
 @pytest.mark.parametrize(
-    ("heard", "message", "met", "text"),
+    ("received", "message", "met", "text"),
     [
         ({"HIGHRES_IMU": 50.0, "RAW_IMU": 50.0}, "HIGHRES_IMU", True, "HIGHRES_IMU at 50 Hz"),
         ({"HIGHRES_IMU": 2.0, "RAW_IMU": 25.0}, "RAW_IMU", True, "RAW_IMU at 25 Hz"),
@@ -24,8 +24,8 @@ def rates(**known):
         ({}, "", False, "no HIGHRES_IMU or RAW_IMU; needs 20 Hz or more for angular rate"),
     ],
 )
-def test_the_first_that_is_fast_enough_serves(heard, message, met, text):
-    (supply,) = supplies([IMU], rates(**heard))
+def test_the_first_that_is_fast_enough_serves(received, message, met, text):
+    (supply,) = supplies([IMU], rates(**received))
     assert (supply.message, supply.met, supply.text) == (message, met, text)
 
 

@@ -41,8 +41,8 @@ def test_statistics():
     error = np.radians([1.0, -3.0, np.nan, 100.0])
     found = error_figures("roll_rad", error, np.array([True, True, True, False]))
     assert found.samples == 2
-    told = found.as_summary()
-    assert told == pytest.approx(
+    reported = found.as_summary()
+    assert reported == pytest.approx(
         {"roll_mean_deg": -1.0, "roll_rms_deg": 5.0**0.5, "roll_mse_deg2": 5.0, "roll_max_deg": 3.0}
     )
     assert set(error_figures("north_m_s", error, error < 1.0).as_summary()) == {

@@ -1,4 +1,4 @@
-"""The one loop: who is heard, boots, columns, failures; frames and logs give the same."""
+"""The one loop: who is received, boots, columns, failures; frames and logs give the same."""
 
 import random
 from dataclasses import dataclass
@@ -76,7 +76,7 @@ def test_estimates_become_columns(make_log, make):
         table["yaw_rad"]
 
 
-def test_truth_and_estimators_are_not_heard(make_log, make):
+def test_truth_and_estimators_are_not_received(make_log, make):
     log = make_log()
     for k in range(20):
         t = 1.0 + 0.05 * k
@@ -90,8 +90,8 @@ def test_truth_and_estimators_are_not_heard(make_log, make):
     assert np.allclose(runner.tables["Level"]["roll_rad"], 0.1)
 
 
-def test_what_an_onboard_computer_measures_is_heard(make_log):
-    """A camera's software on a companion computer is heard, estimates from there are not."""
+def test_what_an_onboard_computer_measures_is_received(make_log):
+    """A camera's software on a companion computer is received, estimates from there are not."""
     log = make_log()
     for k in range(50):
         t = 1.0 + 0.1 * k
@@ -217,7 +217,7 @@ def test_an_error_of_the_estimator_names_message_and_time(make_log, make):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"handle": lambda *_: None}, "handle gave None, which is no Outcome"),
         ({"handle": lambda *_: "updated"}, "handle gave 'updated', which is no Outcome"),
@@ -228,12 +228,12 @@ def test_an_error_of_the_estimator_names_message_and_time(make_log, make):
         ({"estimates": property(lambda _: [Wrong(time_us=0.5, values=(1.0,))])}, "'float' object"),
     ],
 )
-def test_what_is_no_estimate_is_the_estimators_failure(make_log, make, changes, told):
+def test_what_is_no_estimate_is_the_estimators_failure(make_log, make, changes, reported):
     log = make_log()
     for k in range(30):
         log.attitude(2.5 + 0.05 * k)
     found = replay(open_log(log.close()), type("Odd", (type(make()),), changes))
-    assert told in found.failure and "level failed at ATTITUDE of 2.500 s" in found.failure
+    assert reported in found.failure and "level failed at ATTITUDE of 2.500 s" in found.failure
     for table in found.fleet.runners[1].tables.values():
         assert len(table) == len(table.values) == 0
 
@@ -248,9 +248,13 @@ def test_what_can_not_be_published_is_the_estimators_failure(make):
     def too_large(_self):
         return [dialect.MAVLink_attitude_message(-1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
 
-    for publish, told in ((too_large, "time_boot_ms"), (lambda _: [3], "int"), (lambda _: 1 / 0, "division")):
+    for publish, reported in (
+        (too_large, "time_boot_ms"),
+        (lambda _: [3], "int"),
+        (lambda _: 1 / 0, "division"),
+    ):
         runner = Runner(type("Odd", (type(make()),), {"publish": publish})())
-        with pytest.raises(EstimatorFailure, match=rf"level\.publish\(\) failed.*{told}"):
+        with pytest.raises(EstimatorFailure, match=rf"level\.publish\(\) failed.*{reported}"):
             runner.publish()
 
 

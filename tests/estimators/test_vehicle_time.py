@@ -126,7 +126,7 @@ def test_other_components_count_while_they_agree_with_the_autopilot():
     ) == [10_000_000, 10_400_000, 10_000_000, 10_000_000, 10_000_000]
 
 
-def test_autopilot_takes_over_from_who_was_heard_before_it():
+def test_autopilot_takes_over_from_who_was_received_before_it():
     clock = VehicleTime()
     times = [clock.stamp(item) for item in (attitude(90_000, component=154), speed(), attitude(10_000))]
     assert (times, clock.boot(1)) == ([90_000_000, 90_000_000, 10_000_000], 0)

@@ -288,7 +288,7 @@ def test_the_nose_follows_a_place(item: MissionItem, rules: PlanRules) -> None:
     assert turned_from(yaw_deg(log[-1]), bearing_deg(log[-1], *SPOT)) < 6.0  # in the delay, too
     flight.run(30.0)
     assert turned_from(yaw_deg(flight.rig.nav), 0.0) < 10.0
-    assert flight.commanded == [1, 4]  # the gimbal is told as well
+    assert flight.commanded == [1, 4]  # the gimbal gets the command as well
 
 
 def test_a_gimbal_that_turns_by_itself_leaves_the_nose_alone() -> None:

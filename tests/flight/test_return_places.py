@@ -232,9 +232,9 @@ def test_a_return_along_the_plan(
     assert rig.ctx.on_ground
     assert np.linalg.norm(track[-1][:2] - ends) < 0.7
     assert np.linalg.norm(track[:, :2] - passes, axis=1).min() < 2.1
-    if ends == (0.0, 0.0):  # a plan of its own: nobody is told of its items
-        told = [e for e in rig.ctx.events if isinstance(e, WaypointReached | MissionFinished)]
-        assert not told
+    if ends == (0.0, 0.0):  # a plan of its own: no event reports its items
+        reported = [e for e in rig.ctx.events if isinstance(e, WaypointReached | MissionFinished)]
+        assert not reported
         assert store.current == current
 
 

@@ -257,7 +257,7 @@ def test_circle_starts_ahead_and_counts_turns() -> None:
 def test_offboard_kinds() -> None:
     task = OffboardTask()
     rig = flying(task)
-    rig.run(2.0)  # nothing heard yet: holds
+    rig.run(2.0)  # nothing received yet: holds
     assert np.linalg.norm(velocities(rig.run(0.5))[-1]) < 0.2
     task.set_trajectory(velocity_ned_m_s=(3.0, 0.0, -1.0), yaw_rate_rad_s=0.5)
     log = rig.run(5.0)

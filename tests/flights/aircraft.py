@@ -129,7 +129,7 @@ class AircraftFlight(Flight):
     ) -> int | None:
         """COMMAND_INT at a place over home; its last answer within half a second."""
         lat, lon = self.geodetic(north_m, east_m)
-        heard = len(self.acks)
+        received = len(self.acks)
         self.send(
             dialect.MAVLink_command_int_message(
                 SYSTEM_ID,
@@ -145,7 +145,7 @@ class AircraftFlight(Flight):
             )
         )
         self.fly(0.5)
-        answers = [result for _, number, result in self.acks[heard:] if number == command]
+        answers = [result for _, number, result in self.acks[received:] if number == command]
         return answers[-1] if answers else None
 
     def upload(self, items: Sequence[Item]) -> None:

@@ -126,7 +126,7 @@ class Flight:
         self._repeated: list[tuple[int, Callable[[float], Any]]] = []
         self._due_us: list[int] = []
 
-    # what is heard
+    # what is received
 
     def _hear(self, data: bytes) -> None:
         for frame in self._parser.feed(data):
@@ -166,7 +166,7 @@ class Flight:
         return f"{self.custom_mode:#x}" if self.flavour == "px4" else str(self.custom_mode)
 
     def text_time(self, part: str, after_s: float = 0.0) -> float:
-        """When a text that contains `part` was heard first; infinity when it was not."""
+        """When a text that contains `part` was received first; infinity when it was not."""
         return next((s for s, text in self.texts if part in text and s >= after_s), math.inf)
 
     # the truth, for the tests
@@ -218,10 +218,10 @@ class Flight:
 
     def result(self, command: int, *parameters: float) -> int | None:
         """COMMAND_LONG, and its last answer within half a second."""
-        heard = len(self.acks)
+        received = len(self.acks)
         self.command(command, *parameters)
         self.fly(0.5)
-        answers = [result for _, number, result in self.acks[heard:] if number == command]
+        answers = [result for _, number, result in self.acks[received:] if number == command]
         return answers[-1] if answers else None
 
     def ask_mode(self, name: str) -> None:

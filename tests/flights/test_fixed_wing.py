@@ -131,7 +131,7 @@ def test_launched(flavour: str, launch: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_nobody_launches_an_aircraft_that_does_not_ask(flavour: str) -> None:
+def test_no_crew_launches_an_aircraft_that_does_not_ask(flavour: str) -> None:
     flight = AircraftFlight(flavour, launch="catapult")
     flight.get_ready()
     if flavour == "ardupilot":
@@ -197,7 +197,7 @@ def test_returns_home(flavour: str) -> None:
     assert flight.distance_m(0.0, 0.0) < 130.0
 
 
-def test_px4_lands_where_it_is_told() -> None:
+def test_px4_lands_where_commanded() -> None:
     flight = AircraftFlight("px4")
     flight.take_off(50.0, (0.0, 0.0))
     flight.set_mode("land")
@@ -277,11 +277,11 @@ def test_arduplane_boots_initialising() -> None:
 @pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_same_seed_same_bytes(flavour: str) -> None:
     def recorded() -> bytes:
-        heard = bytearray()
+        received = bytearray()
         flight = AircraftFlight(flavour, seed=7, environment=WIND)
-        flight.sitl.connect(0).on_receive = heard.extend
+        flight.sitl.connect(0).on_receive = received.extend
         flight.start()
         flight.fly(20.0)
-        return bytes(heard)
+        return bytes(received)
 
     assert recorded() == recorded()

@@ -59,7 +59,7 @@ def test_arduplane_goes_on_in_guided_without_a_ground_station() -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_gps_lost_while_circling(flavour: str) -> None:
-    """Dead reckoning on airspeed and wind: the mode stays, the accuracy told grows with the true error."""
+    """Dead reckoning on airspeed and wind: the mode stays, the reported accuracy grows as the true error."""
     flight = circling(flavour)
     mode = flight.mode
     flight.inject(GPS, OFF)

@@ -72,7 +72,7 @@ def test_altitude_mode_tilts_with_the_stick_and_keeps_the_height(flight: Flight)
     figures = fly_with_sticks(flight, "altitude" if flight.flavour == "px4" else "alt_hold")
     assert 4.0 < figures["tilt_deg"] < 16.0
     assert figures["ahead"] > 0.9
-    assert figures["left_m_s"] > 0.5  # nobody brakes
+    assert figures["left_m_s"] > 0.5  # no brakes
     assert figures["height_m"] == pytest.approx(HEIGHT_M, abs=1.0)
     assert 0.4 < figures["climb_m_s"] < 2.5
 

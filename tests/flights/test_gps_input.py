@@ -179,7 +179,7 @@ def test_fixes_that_are_none(changed: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_nobody_listens_unless_told_to(flavour: str) -> None:
+def test_no_service_listens_by_default(flavour: str) -> None:
     flight = Flight(flavour)
     show_fixes(flight)
     flight.repeat(RATE_HZ, Receiver(flight, lat=0, lon=0, satellites_visible=3).gps_input)
@@ -226,7 +226,7 @@ def test_gps_time_takes_out_what_the_way_differs() -> None:
 
 
 def test_whatever_is_sent_the_vehicle_goes_on() -> None:
-    """Extreme values of every field, in whatever mixture: nothing raises, and what is told can be packed."""
+    """Extreme values of every field, in any mixture: nothing raises, and what is reported can be packed."""
     flight = copter(**MAV)
     rng = np.random.Generator(np.random.PCG64(11))
     floats = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-40, 0.0, 1e5 - 1.0, 399.0, -399.0, 65535.0)

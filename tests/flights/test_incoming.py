@@ -118,7 +118,7 @@ class Leader:
             return 20.0, 0.0, 0.0, 0.0
         return (20.0 + 3.0 * (k - 10.0), 0.0, 3.0, 0.0) if k < 30.0 else (80.0, 3.0 * (k - 30.0), 0.0, 3.0)
 
-    def tell(self, time_s: float) -> None:
+    def deliver(self, time_s: float) -> None:
         north, east, vn, ve = self.motion(time_s)
         lat, lon, alt = self.frame.geodetic_from_ned(north, east, 0.0)
         place = round(lat * 1e7), round(lon * 1e7)
@@ -145,22 +145,22 @@ def test_follows_a_leader_and_holds_when_it_is_lost(flavour: str) -> None:
     flight.take_off(10.0)
     leader = Leader(flight)
     next_s = [flight.time_s]
-    told = [True]
+    reported = [True]
 
-    def tell() -> None:
-        if told[0] and flight.time_s >= next_s[0]:
+    def report() -> None:
+        if reported[0] and flight.time_s >= next_s[0]:
             next_s[0] += 1.0
-            leader.tell(flight.time_s)
+            leader.deliver(flight.time_s)
 
-    flight.fly(2.0, tell)
+    flight.fly(2.0, report)
     flight.set_mode("follow")
-    flight.fly(26.0, tell)
+    flight.fly(26.0, report)
     assert leader.off() == pytest.approx((-8.0, 0.0, -8.0), abs=0.8)
     assert flight.velocity_ned_m_s[0] == pytest.approx(3.0, abs=0.3)
     assert abs(math.remainder(flight.yaw_rad, math.tau)) < 0.1  # to the leader
-    flight.fly(30.0, tell)
+    flight.fly(30.0, report)
     assert leader.off() == pytest.approx((0.0, -8.0, -8.0), abs=0.9)  # behind it again
-    told[0] = False
+    reported[0] = False
     flight.fly(8.0)
     place = flight.position_ned_m
     flight.fly(4.0)
@@ -295,7 +295,7 @@ def test_stops_before_a_wall(flavour: str, slide: bool) -> None:
 
 
 def test_no_data_no_flight_and_old_data_are_none() -> None:
-    """PX4 doesn't go where nobody looks (CP_GO_NO_DATA 0), nor by what was seen long ago."""
+    """PX4 doesn't go where no sensor looks (CP_GO_NO_DATA 0), nor by what was seen long ago."""
     flight = Flight("px4", parameters={"CP_DIST": 3.0})
     flight.take_off(10.0)
     flight.sticks(pitch=1.0)
@@ -349,7 +349,7 @@ def test_radio_and_mavlink_signals_fail() -> None:
     flight.set_mode("hold")
     flight.inject(105, OFF)
     since = flight.time_s
-    flight.ask_mode("land")  # not heard
+    flight.ask_mode("land")  # not received
     flight.fly_until(lambda: flight.text_time("Failsafe activated", since) < math.inf, 15.0, "link loss")
     flight.fly_until(lambda: flight.mode == "return", 15.0, "return")
     flight.inject(105, OK)
@@ -394,9 +394,9 @@ def test_sim_parameters_break_the_world() -> None:
     put("SIM_GPS_DISABLE", 0.0)
     put("SIM_GPS_GLITCH_X", 0.001)
     put("SIM_GPS_GLITCH_Y", -0.002)  # degrees, whatever a degree measures there
-    truth, told = flight.vehicle.vehicle.truth, flight.vehicle.sensors.readings.gps.values
-    assert told[interface.GPS_LAT_DEG] - math.degrees(truth[t.LAT_RAD]) == pytest.approx(0.001, abs=5e-5)
-    assert told[interface.GPS_LON_DEG] - math.degrees(truth[t.LON_RAD]) == pytest.approx(-0.002, abs=5e-5)
+    truth, reported = flight.vehicle.vehicle.truth, flight.vehicle.sensors.readings.gps.values
+    assert reported[interface.GPS_LAT_DEG] - math.degrees(truth[t.LAT_RAD]) == pytest.approx(0.001, abs=5e-5)
+    assert reported[interface.GPS_LON_DEG] - math.degrees(truth[t.LON_RAD]) == pytest.approx(-0.002, abs=5e-5)
     put("SIM_ENGINE_MUL", 0.0)
     put("SIM_ENGINE_FAIL", 1.0)
     assert flight.vehicle.vehicle.motor_effectiveness(0) == 0.0

@@ -1,7 +1,7 @@
 """How closely the patterns are flown: truth against the commanded curve, over the whole stack.
 
-A flight's path error is made of how well the vehicle follows what its filter believes, which the control laws
-answer for, and of how far the filter drifts from where it was when the vehicle was armed, which the slow
+A flight's path error is made of how well the vehicle follows what its filter estimates, which the control
+laws answer for, and of how far the filter drifts from where it was when the vehicle was armed, which the slow
 errors of receiver and barometer decide. The bounds are put to every flight, a tighter one to the first part.
 """
 

@@ -63,7 +63,7 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
     pitches: list[float] = []
     original = flight._link.on_receive
 
-    def hear(data: bytes) -> None:
+    def receive(data: bytes) -> None:
         original(data)
         newest = flight.newest.pop("CAMERA_IMAGE_CAPTURED", None)
         if newest is not None:
@@ -73,7 +73,7 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
             w, x, y, z = status.q
             pitches.append(math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))))
 
-    flight._link.on_receive = hear
+    flight._link.on_receive = receive
     flight.take_off(15.0)
     plan = [
         at(flight, 16, 3.0, 0.0, 15.0),

@@ -142,14 +142,14 @@ def test_attitude_error(recorded: Recorded) -> None:
         (cr, cp, cy), (sr, sp, sy) = (
             [function(a) for a in (m.roll, m.pitch, m.yaw)] for function in (math.cos, math.sin)
         )
-        r_told = np.array(
+        r_reported = np.array(
             [
                 [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
                 [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
                 [-sp, cp * sr, cp * cr],
             ]
         )
-        cosine = 0.5 * (np.trace(r_told.T @ r_true) - 1.0)
+        cosine = 0.5 * (np.trace(r_reported.T @ r_true) - 1.0)
         worst_deg = max(worst_deg, math.degrees(math.acos(min(1.0, cosine))))
     assert recorded.summary["max_attitude_error_deg"] == pytest.approx(worst_deg, rel=0.1)
     assert worst_deg < 4.0

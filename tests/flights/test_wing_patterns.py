@@ -71,7 +71,7 @@ def test_setpoints_follow_the_curve_in_still_air(flown: Any, pattern: str, flavo
     flight = flown("lissajous", flavour, None, windy=False, pattern=pattern)
     well_flown(flight, STILL_RMS_M)
     assert flight["path_max_error_m"] < 3.0 * STILL_RMS_M
-    assert "waypoints" not in flight  # setpoints are what an aircraft flies unless told otherwise
+    assert "waypoints" not in flight  # setpoints are what an aircraft flies by default
 
 
 @pytest.mark.slow

@@ -107,10 +107,10 @@ def test_a_gear_stands_a_firm_landing_and_breaks_beyond(
     vehicle = touch_down(model, sink_m_s=sink_m_s, speed_m_s=speed_m_s, height_m=height_m)
     assert (vehicle.crash is not None) == breaks, vehicle.crash
     if vehicle.crash is not None:
-        told = re.fullmatch(r"hit the ground at (\d+) m/s, sinking at ([0-9.]+) m/s", vehicle.crash)
-        assert told is not None, vehicle.crash
-        assert float(told[1]) == pytest.approx(math.hypot(speed_m_s, sink_m_s), abs=1.5)
-        assert float(told[2]) == pytest.approx(sink_m_s, abs=1.2)
+        reported = re.fullmatch(r"hit the ground at (\d+) m/s, sinking at ([0-9.]+) m/s", vehicle.crash)
+        assert reported is not None, vehicle.crash
+        assert float(reported[1]) == pytest.approx(math.hypot(speed_m_s, sink_m_s), abs=1.5)
+        assert float(reported[2]) == pytest.approx(sink_m_s, abs=1.2)
 
 
 def test_a_description_says_what_its_gear_stands(tmp_path: Path) -> None:
@@ -124,18 +124,18 @@ def test_a_description_says_what_its_gear_stands(tmp_path: Path) -> None:
         load_airframe(model)
 
 
-def test_a_crash_is_told_with_the_speed_before_the_blow() -> None:
+def test_a_crash_is_reported_with_the_speed_before_the_blow() -> None:
     """What JSBSim makes of the glider within the blow is not how fast it came."""
     vehicle = dive("sgs126", speed_m_s=30.0, pitch_deg=-45.0, roll_deg=120.0)
     while vehicle.crash is None:
         vehicle.step(np.zeros(MAX_ACTUATORS))
-    told = re.fullmatch(r"hit the ground at (\d+) m/s, sinking at ([0-9.]+) m/s", vehicle.crash)
-    assert told is not None
-    assert float(told[1]) == pytest.approx(32.0, abs=3.0)
-    assert float(told[2]) == pytest.approx(math.sqrt(0.5 * 30.0**2 + 2 * G_M_S2 * 15.0), abs=4.0)
+    reported = re.fullmatch(r"hit the ground at (\d+) m/s, sinking at ([0-9.]+) m/s", vehicle.crash)
+    assert reported is not None
+    assert float(reported[1]) == pytest.approx(32.0, abs=3.0)
+    assert float(reported[2]) == pytest.approx(math.sqrt(0.5 * 30.0**2 + 2 * G_M_S2 * 15.0), abs=4.0)
 
 
-def test_of_bounces_the_hardest_is_told() -> None:
+def test_of_bounces_the_hardest_is_reported() -> None:
     touches, truth = Touches(2500), np.zeros(t.TRUTH_SIZE)
     for step, sink, touching in ((0, 1.0, False), (5, 4.0, False), (10, -2.0, True), (15, -2.0, False)):
         truth[t.VEL_NED_M_S] = (3.0, 0.0, sink)

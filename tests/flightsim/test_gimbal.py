@@ -296,7 +296,7 @@ def test_angular_velocity_is_that_of_the_attitude() -> None:
 
 
 def test_what_it_measures_is_honest_about_its_errors() -> None:
-    """Many gimbals: tilt and heading errors as told; it steadies by its own wrong reference."""
+    """Many gimbals: tilt and heading errors as specified; it steadies by its own wrong reference."""
     parameters = GimbalParameters(tilt_error_rad=0.01, heading_error_rad=0.03)
     tilts, headings, tracking = [], [], []
     for seed in range(150):

@@ -118,7 +118,7 @@ def test_held_in_turbulence() -> None:
     np.testing.assert_allclose(vehicle.truth[:2], place[:2], atol=1e-8)
 
 
-def test_a_runway_needs_nobody() -> None:
+def test_a_runway_needs_no_crew() -> None:
     vehicle = make("aerosonde", None)
     assert vehicle.launcher is None
     vehicle.launch()

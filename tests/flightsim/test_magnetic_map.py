@@ -231,7 +231,7 @@ def test_main_field_is_wmm(home: Home) -> None:
     np.testing.assert_allclose(main.total_nt * main.direction_ned, field, atol=0.1)
 
 
-def test_geology_has_the_size_and_the_place_it_was_told() -> None:
+def test_geology_has_the_size_and_the_place_it_was_given() -> None:
     grid = made(south_m=-1000.0, west_m=-3000.0, north_m=5000.0, east_m=3050.0, anomaly_nt=40.0)
     assert grid.north_m[0] == -1000.0 and grid.north_m[-1] == 5000.0
     assert grid.east_m[0] == -3000.0 and 3050.0 <= grid.east_m[-1] < 3150.0
@@ -250,7 +250,7 @@ def test_the_ground_adds_a_layer_of_its_own() -> None:
     assert roughness[0] > 1.5 * roughness[1]
 
 
-def test_geology_has_the_spectrum_it_was_told() -> None:
+def test_geology_has_the_spectrum_it_was_given() -> None:
     """Radial amplitude spectrum: ln A + b/2 ln k falls with the slope -depth (Spector and Grant)."""
     depth_m, spacing_m = 300.0, 50.0
     logs = []

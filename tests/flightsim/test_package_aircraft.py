@@ -39,8 +39,8 @@ def test_the_command_line_refuses_a_model_in_one_line(
     capsys: pytest.CaptureFixture[str], tmp_path: object
 ) -> None:
     assert run_command_line(["fly", "lissajous", "--model", "F450", "--out", f"{tmp_path}/run"]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("flightstack: vehicle 'F450' can't") and told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert reported.startswith("flightstack: vehicle 'F450' can't") and reported.count("\n") == 1
     refused = CliRunner().invoke(sitl, ["--model", "minisgs", "--link", "udpin:127.0.0.1:0"])
     assert refused.exit_code == 2
     assert "vehicle 'minisgs' can't be simulated" in refused.output

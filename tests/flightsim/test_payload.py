@@ -1,4 +1,4 @@
-"""The composed payload and the survey magnetometer: errors as told, streams apart, same seed same bits."""
+"""The composed payload and the survey magnetometer: errors as specified, separate streams, bits of a seed."""
 
 import math
 from dataclasses import replace

@@ -163,7 +163,7 @@ def test_imu_white_and_wandering_parts_are_independent(channel: int) -> None:
     assert np.var(steps) == pytest.approx(expected, rel=0.05)
 
 
-def test_imu_specimens_spread_as_told() -> None:
+def test_imu_specimens_spread_as_specified() -> None:
     """Turn-on bias, scale and cross-axis errors over many specimens."""
     truth = still_truth()
     parameters = ImuParameters(

@@ -216,7 +216,7 @@ def test_wrong_truth_vector_is_refused(truth: NDArray[np.floating]) -> None:
 
 
 class Thermometer:
-    """A sensor nobody foresaw: parameters and model in one."""
+    """A sensor that the suite does not know: parameters and model in one."""
 
     rate_hz = 10
     latency_s = 0.0

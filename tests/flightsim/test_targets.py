@@ -88,13 +88,13 @@ def test_a_walk_keeps_its_speed_and_stays_in_its_box(turn_rad: float, speed_m_s:
     assert np.ptp(states[:, 1]) > 60.0
 
 
-def test_walks_start_anywhere_in_the_box_or_where_told() -> None:
+def test_walks_start_anywhere_in_the_box_or_where_given() -> None:
     starts = np.array([make(WALK, seed=seed).positions_ned_m[0, :2] for seed in range(400)])
     half = np.array([70.0, 135.0])
     np.testing.assert_allclose(starts.std(axis=0), half / math.sqrt(3.0), rtol=0.1)
     assert np.all(np.abs(starts.mean(axis=0)) < 5.0 * half / math.sqrt(3.0 * 400))
-    told = RandomWalk(**BOX, speed_m_s=2.0, start_m=(10.0, 20.0), course_rad=0.0)
-    targets = make(told)
+    reported = RandomWalk(**BOX, speed_m_s=2.0, start_m=(10.0, 20.0), course_rad=0.0)
+    targets = make(reported)
     np.testing.assert_array_equal(targets.positions_ned_m[0], (10.0, 20.0, 0.0))
     np.testing.assert_allclose(targets.velocities_ned_m_s[0], (2.0, 0.0, 0.0), atol=1e-12)
 

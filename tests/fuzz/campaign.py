@@ -71,12 +71,12 @@ class Campaign:
         self._round = 0
         compile_flight_code((VehicleSpec(model=model),))
 
-    def run(self, count: int, *, told: Callable[[str], None] = lambda text: None) -> Figures:
+    def run(self, count: int, *, reported: Callable[[str], None] = lambda text: None) -> Figures:
         """Fire so many messages: five of six in rounds that are harmless."""
         with objects_kept():
-            return self._run(count, told)
+            return self._run(count, reported)
 
-    def _run(self, count: int, told: Callable[[str], None]) -> Figures:
+    def _run(self, count: int, reported: Callable[[str], None]) -> Figures:
         figures = self.figures
         while figures.messages < count:
             flying = self._fresh()
@@ -87,7 +87,7 @@ class Campaign:
             if figures.messages < count:
                 self._fire(flying, min(count - figures.messages, ORDERS_ROUND), orders=True)
             figures.memory_bytes.append(resident_bytes())
-            told(f"{self.name}: {figures.messages} messages")
+            reported(f"{self.name}: {figures.messages} messages")
         return figures
 
     def one_round(self, count: int, *, orders: bool) -> Figures:
@@ -162,7 +162,7 @@ class _Log(TlogWriter):
 
     def __init__(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
-            super().__init__(Path(folder) / "nobody.tlog")
+            super().__init__(Path(folder) / "discarded.tlog")
 
     def flush(self) -> None:
         assert not self._split()

@@ -1,4 +1,4 @@
-"""Endless MAVLink messages that nobody should send, from a seed: every message of the dialect, with fields
+"""Endless malformed and out-of-range MAVLink messages, from a seed: every message of the dialect, with fields
 from plausible to absurd, and the sequences of messages that the services take.
 
 A message is either *harmless* (an autopilot in hold must keep its place, whatever it answers) or an *order*
@@ -15,7 +15,7 @@ from pymavlink.generator.mavcrc import x25crc
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, MAVLinkMessage, MessageDefinition, dialect
 
 VEHICLE: Final = 1
-NOBODY: Final = 77
+ABSENT_SYSTEM: Final = 77
 AUTOPILOT: Final = 1
 CAMERA: Final = 100
 GIMBAL: Final = 154
@@ -138,7 +138,7 @@ class Generator:
         return [self._dressed(frame) for frame in frames]
 
     def _dressed(self, frame: bytes) -> bytes:
-        """The frame, sometimes as MAVLink 1, sometimes with a signature of nobody."""
+        """The frame, sometimes as MAVLink 1, sometimes with a signature of an unknown key."""
         kind = self._rng.random()
         if kind > 0.1:
             return frame
@@ -157,7 +157,11 @@ class Generator:
         rng = self._rng
         item = rng.choice(self._definitions)
         order = item.name in ORDER_MESSAGES
-        target = VEHICLE if (self._orders or not order) and rng.random() < 0.8 else rng.choice((NOBODY, 255))
+        target = (
+            VEHICLE
+            if (self._orders or not order) and rng.random() < 0.8
+            else rng.choice((ABSENT_SYSTEM, 255))
+        )
         payload = self._payload(item, target)
         return rng.choice(self._encoders).encode_payload(item.message_id, payload)
 
@@ -263,7 +267,7 @@ class Generator:
         for value in (float("nan"), float("inf")):
             yield dialect.MAVLink_param_set_message(VEHICLE, 1, self._name(), value, rng.randrange(256))
         yield dialect.MAVLink_param_set_message(VEHICLE, 1, b"NO_SUCH_NAME", 1.0, 9)
-        yield dialect.MAVLink_param_set_message(NOBODY, 1, self._name(), self._float(), 9)
+        yield dialect.MAVLink_param_set_message(ABSENT_SYSTEM, 1, self._name(), self._float(), 9)
 
     def _requests(self) -> Iterator[MAVLinkMessage]:
         rng = self._rng
@@ -297,7 +301,7 @@ class Generator:
         )
 
     def _positions(self) -> Iterator[MAVLinkMessage]:
-        """Positions of others, and estimates of somebody else's that can't be."""
+        """Positions of others, and estimates of another component that can't be."""
         rng = self._rng
         number = self._float
         whole = rng.getrandbits
@@ -314,21 +318,21 @@ class Generator:
             65_535, 65_535,
         )  # fmt: skip
         yield dialect.MAVLink_timesync_message(rng.choice((0, 1, -1, 2**63 - 1, -(2**63))), whole(62))
-        yield dialect.MAVLink_ping_message(whole(60), whole(32), rng.choice((0, VEHICLE, NOBODY)), 0)
+        yield dialect.MAVLink_ping_message(whole(60), whole(32), rng.choice((0, VEHICLE, ABSENT_SYSTEM)), 0)
         yield dialect.MAVLink_statustext_message(rng.randrange(256), self._text()[:50], whole(16), 255)
         yield dialect.MAVLink_tunnel_message(VEHICLE, 1, whole(16), 255, list(rng.randbytes(128)))
         yield dialect.MAVLink_radio_status_message(0, 0, rng.choice((0, 60, 100, 100, 255)), 0, 0, 0, 0)
 
     def _strangers(self) -> Iterator[MAVLinkMessage]:
-        """Orders to somebody else."""
+        """Commands to another vehicle."""
         rng = self._rng
-        yield self._command_long(NOBODY, rng.choice(self._commands))
-        yield self._command_int(NOBODY, rng.choice(self._commands))
-        yield dialect.MAVLink_set_mode_message(NOBODY, 1, rng.getrandbits(32))
-        yield self._local_setpoint(NOBODY)
-        yield dialect.MAVLink_manual_control_message(NOBODY, *(1000,) * 4, 0)
-        yield dialect.MAVLink_rc_channels_override_message(NOBODY, 1, *(2000,) * 8)
-        yield dialect.MAVLink_mission_clear_all_message(NOBODY, 1, 0)
+        yield self._command_long(ABSENT_SYSTEM, rng.choice(self._commands))
+        yield self._command_int(ABSENT_SYSTEM, rng.choice(self._commands))
+        yield dialect.MAVLink_set_mode_message(ABSENT_SYSTEM, 1, rng.getrandbits(32))
+        yield self._local_setpoint(ABSENT_SYSTEM)
+        yield dialect.MAVLink_manual_control_message(ABSENT_SYSTEM, *(1000,) * 4, 0)
+        yield dialect.MAVLink_rc_channels_override_message(ABSENT_SYSTEM, 1, *(2000,) * 8)
+        yield dialect.MAVLink_mission_clear_all_message(ABSENT_SYSTEM, 1, 0)
 
     # services, orders
 

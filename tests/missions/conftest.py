@@ -81,7 +81,7 @@ class FakeAutopilot:
         self.arm_refusals = 0
         self.mission_result = 0
         self.commands = []
-        self.heartbeats_heard = 0
+        self.heartbeats_received = 0
         self.on_truth = None
 
     @property
@@ -111,7 +111,7 @@ class FakeAutopilot:
         self.send(dialect.MAVLink_command_ack_message(command, result, 0, 0, *sender))
 
     def on_heartbeat(self, m):
-        self.heartbeats_heard += 1
+        self.heartbeats_received += 1
 
     # commands
 

@@ -38,7 +38,7 @@ def test_nothing_is_asked_on_links_of_this_machine() -> None:
 
 
 @pytest.mark.parametrize("connection", [*SERIAL, "udpin:0.0.0.0:14550"])
-def test_where_nobody_can_be_asked_nothing_flies(connection: str) -> None:
+def test_where_no_user_can_be_asked_nothing_flies(connection: str) -> None:
     result = CliRunner().invoke(fly, ["lissajous", "--connect", connection])
     assert result.exit_code == 2
     assert "there is no terminal to confirm the flight; give --yes" in " ".join(result.output.split())

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from autopilot_bridge.clock import Clock
 from missions.cli.fly import fly
-from missions.cli.fly_report import Pace, tell
+from missions.cli.fly_report import Pace, print_result
 from missions.cli.mission_command import FlightOption
 from missions.cli.pattern_command import ratio_of
 from missions.errors import PlanError
@@ -127,16 +127,16 @@ def test_each_option_of_a_flight_is_under_a_heading() -> None:
     assert not loose
 
 
-def test_the_pace_on_a_link_is_that_of_the_vehicle_since_it_was_heard() -> None:
+def test_the_pace_on_a_link_is_that_of_the_vehicle_since_it_was_received() -> None:
     pace = Pace()
-    told = [
+    reported = [
         pace.factor(wall_s, 0.5 * wall_s) for wall_s in (0.0, 0.3)
     ]  # nothing received: this machine's time
-    assert told == [None, None]
+    assert reported == [None, None]
     # the vehicle reports that it booted an hour ago: elapsed time begins anew
-    told = [pace.factor(0.5 + wall_s, 0.01 + 2.0 * wall_s) for wall_s in (0.0, 0.2, 0.6, 10.0)]
-    assert told[:2] == [None, None]
-    assert told[2:] == [pytest.approx(2.0), pytest.approx(2.0)]
+    reported = [pace.factor(0.5 + wall_s, 0.01 + 2.0 * wall_s) for wall_s in (0.0, 0.2, 0.6, 10.0)]
+    assert reported[:2] == [None, None]
+    assert reported[2:] == [pytest.approx(2.0), pytest.approx(2.0)]
     late = [pace.factor(10.5 + wall_s, 20.0 + 5.0 * wall_s) for wall_s in (0.0, 2.0, 4.0, 6.0, 8.0)]
     assert late[-1] == pytest.approx(5.0)  # of the last seconds, not of the whole flight
 
@@ -167,7 +167,7 @@ def test_the_wind_in_words(speed_m_s: float, profile: str, turbulence: str, word
 @pytest.mark.parametrize(
     ("arguments", "planned_m_s"),
     [
-        (["orbit"], 5.0),  # what blows there unless somebody asks for it is not looked at
+        (["orbit"], 5.0),  # the default wind there is not looked at
         (["orbit", "--wind", "8@270", "--wind-profile", "uniform"], 8.0),  # the user's word
         (["orbit", "--wind", "8@270", "--expect-wind", "3"], 3.0),
         (["orbit", "--connect", "udpin:127.0.0.1:0"], 5.0),
@@ -252,10 +252,10 @@ def test_the_wind_that_was_flown_is_in_the_last_lines_and_above_the_picture(
     wind = {"speed_m_s": 5.0, "from_deg": 270.0, "profile": "uniform", "turbulence": "light"}
     summary = flown_summary(wind=wind)
     result = RunResult(outcome="completed", reason="", folder=tmp_path, summary=summary)
-    assert tell(result, MISSIONS["sector"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert told[0].endswith("139.0 s, 1.01 times real time")
-    assert told[1] == "wind 5 m/s from 270 degrees, light turbulence"
+    assert print_result(result, MISSIONS["sector"]) == 0
+    reported = capsys.readouterr().out.splitlines()
+    assert reported[0].endswith("139.0 s, 1.01 times real time")
+    assert reported[1] == "wind 5 m/s from 270 degrees, light turbulence"
     debriefing = Debriefing(records=cast(FlightRecords, None), flights=[], options=FlightOptions())
     title = run_title(MISSIONS["sector"], debriefing, summary)
     assert title.splitlines()[-1] == "wind 5 m/s from 270 degrees, light turbulence"

@@ -55,7 +55,7 @@ def test_export(log, flight, tmp_path):
     assert code == 1 and "overwritten" in err
 
 
-def test_what_is_not_there_is_told(log, flight, tmp_path):
+def test_what_is_not_there_is_reported(log, flight, tmp_path):
     code, _, err = log("cut", flight, tmp_path / "part.tlog", "--types", "ATTITUDE,HIGHRES_IMU")
     assert code == 0 and err.endswith("flight.tlog has no HIGHRES_IMU\n")
 
@@ -87,11 +87,11 @@ def test_play_to_a_link(log, flight):
         receiver.bind(("127.0.0.1", 0))
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         receiver.settimeout(10.0)
-        parser, heard = FrameParser(), []
+        parser, received = FrameParser(), []
 
         def listen():
-            while len(heard) < 150:
-                heard.extend(parser.feed(receiver.recv(4096)))
+            while len(received) < 150:
+                received.extend(parser.feed(receiver.recv(4096)))
 
         listener = threading.Thread(target=listen)
         listener.start()
@@ -102,13 +102,13 @@ def test_play_to_a_link(log, flight):
         listener.join()
     assert code == 0 and "played: 205 frames" in out
     expected = [frame.raw for _, frame in TlogReader(flight) if frame.message_id in (0, 30)]
-    assert [frame.raw for frame in heard[:150]] == expected[-205:][:150]
+    assert [frame.raw for frame in received[:150]] == expected[-205:][:150]
 
 
 def test_play_as_a_server_waits_for_a_client_and_loses_nothing(log, flight):
     """As fast as the client reads, though its window is small and it reads in bits."""
     port = free_port(socket.SOCK_STREAM)
-    parser, heard = FrameParser(), []
+    parser, received = FrameParser(), []
 
     def listen():
         deadline = threading.Event()
@@ -120,14 +120,14 @@ def test_play_as_a_server_waits_for_a_client_and_loses_nothing(log, flight):
         with client:
             client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             while data := client.recv(1500):
-                heard.extend(frame.raw for frame in parser.feed(data))
+                received.extend(frame.raw for frame in parser.feed(data))
 
     listener = threading.Thread(target=listen)
     listener.start()
     code, out, err = log("play", flight, "--link", f"tcpin:127.0.0.1:{port}", "--speed", "max")
     listener.join()
     expected = [frame.raw for _, frame in TlogReader(flight)]
-    assert code == 0 and heard == expected
+    assert code == 0 and received == expected
     assert f"played: {len(expected)} frames, " in out and "waiting for a client" in err
 
 

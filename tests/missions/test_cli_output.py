@@ -1,4 +1,4 @@
-"""Output that nobody takes: a full disk, a reader that has gone, no output at all."""
+"""Output that no process takes: a full disk, a reader that has gone, no output at all."""
 
 import os
 import subprocess

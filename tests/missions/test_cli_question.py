@@ -46,7 +46,7 @@ from missions.preflight.before_flight import Look, confirmed
 async def flight():
     line = ProgressLine()
     line._last_wall_s = -1e9
-    progress = asyncio.create_task(tell(line))
+    progress = asyncio.create_task(count_up(line))
     await asyncio.sleep(0.3)
     confirm = confirmation(["serial:/dev/ttyACM0:57600"], yes=False, check=False, screen=line.held)
     await confirmed([Look(system_id=1, findings=())], confirm)
@@ -55,7 +55,7 @@ async def flight():
     line.end()
     print("flown")
 
-async def tell(line):
+async def count_up(line):
     while True:
         line(SimpleNamespace(clock=object(), vehicles=[], elapsed_s=1.0))
         await asyncio.sleep(0.02)
@@ -94,7 +94,7 @@ ERASE_QUESTION = "delete all logs (3) of vehicle 1? Type yes (or y): "
 
 
 @pytest.mark.parametrize(
-    ("answer", "code", "told"),
+    ("answer", "code", "reported"),
     [
         ("yes\n", 0, "flown"),
         ("  Yes \r", 0, "flown"),
@@ -106,14 +106,14 @@ ERASE_QUESTION = "delete all logs (3) of vehicle 1? Type yes (or y): "
     ],
 )
 def test_what_is_typed_is_the_answer_and_the_link_is_kept_up_meanwhile(
-    answer: str, code: int, told: str
+    answer: str, code: int, reported: str
 ) -> None:
     with at_terminal("-c", FLY) as terminal:
         terminal.wait_for(FLY_QUESTION)
         terminal.wait_for("....")
         terminal.type(answer)
         assert terminal.wait_for_end() == code
-        assert told in terminal.seen
+        assert reported in terminal.seen
         assert "left safe" in terminal.seen
 
 
@@ -142,20 +142,20 @@ def test_ctrl_c_at_the_question_before_a_flight_ends_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("answer", "code", "told"),
+    ("answer", "code", "reported"),
     [
         ("yes\n", 0, "they are gone"),
         ("Y\n", 0, "they are gone"),
         ("no\n", 1, "not confirmed, nothing was done"),
     ],
 )
-def test_a_vehicle_s_logs_are_erased_after_a_yes(answer: str, code: int, told: str) -> None:
+def test_a_vehicle_s_logs_are_erased_after_a_yes(answer: str, code: int, reported: str) -> None:
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
     with at_terminal("-c", ERASE) as terminal:
         terminal.wait_for(ERASE_QUESTION)
         terminal.type(answer)
         assert terminal.wait_for_end() == code
-        assert told in terminal.seen
+        assert reported in terminal.seen
         assert ("they are gone" in terminal.seen) == (code == 0)
 
 
@@ -171,7 +171,7 @@ def test_ctrl_c_at_a_question_about_a_vehicle_is_no_answer_and_the_end() -> None
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (
             "fly lissajous --connect serial:/dev/ttyNONE:57600",
@@ -183,7 +183,7 @@ def test_ctrl_c_at_a_question_about_a_vehicle_is_no_answer_and_the_end() -> None
         ),
     ],
 )
-def test_where_the_input_is_closed_nobody_can_be_asked(words: str, told: str) -> None:
+def test_where_the_input_is_closed_no_user_can_be_asked(words: str, reported: str) -> None:
     done = subprocess.run(
         ["/bin/sh", "-c", f'exec "{sys.executable}" -m missions {words} <&-'],
         capture_output=True,
@@ -191,4 +191,4 @@ def test_where_the_input_is_closed_nobody_can_be_asked(words: str, told: str) ->
         timeout=120.0,
     )
     assert done.returncode == 2
-    assert told in done.stderr and done.stderr.count("\n") == 1
+    assert reported in done.stderr and done.stderr.count("\n") == 1

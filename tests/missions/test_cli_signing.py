@@ -109,7 +109,7 @@ def test_a_file_without_a_key_is_refused_by_name(command: str, content: bytes | 
     assert str(path) in done.output and "Traceback" not in done.output
 
 
-def test_an_embedded_flight_has_nobody_to_sign_for(key_file: Path) -> None:
+def test_an_embedded_flight_has_no_signatures(key_file: Path) -> None:
     done = flightstack("fly", "lissajous", "--signing-key", str(key_file))
     assert done.exit_code == 2 and "--connect" in done.output
 
@@ -122,7 +122,7 @@ def test_a_store_of_keys_that_is_none_is_refused_by_name(tmp_path: Path) -> None
 
 
 def test_a_log_is_played_under_a_key(tmp_path: Path, key_file: Path) -> None:
-    """Frames that were signed by somebody else get the signature of whoever plays them."""
+    """Frames that were signed with another key get the signature of the player."""
     other = LinkSigning(SigningState(read_key(key_file), clock=lambda: 5), link_id=3)
     encoder = FrameEncoder(1, 1)
     with TlogWriter(tmp_path / "flight.tlog") as log:

@@ -36,16 +36,18 @@ def test_payload_speaks_on_the_vehicles_links_and_targets_are_in_the_log(tmp_pat
         "--map", str(survey_map), "--map-target", "100,-50", "--log", str(log),
     )  # fmt: skip
     assert result.exit_code == 0, result.output
-    heard = Counter((f.system_id, f.component_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log))
+    received = Counter(
+        (f.system_id, f.component_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log)
+    )
     for component in (100, 154, 158):
-        assert heard[1, component, "HEARTBEAT"] == 3
-    assert heard[1, 158, "NAMED_VALUE_FLOAT"] == 30
+        assert received[1, component, "HEARTBEAT"] == 3
+    assert received[1, 158, "NAMED_VALUE_FLOAT"] == 30
     for target in (1, 2):
-        assert heard[251, target, "HIL_STATE_QUATERNION"] == 150
+        assert received[251, target, "HIL_STATE_QUATERNION"] == 150
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (("--target", "5,5"), "add --camera"),
         (("--camera", "--target", "5"), "--target '5' is not 2 or 4 numbers"),
@@ -56,10 +58,10 @@ def test_payload_speaks_on_the_vehicles_links_and_targets_are_in_the_log(tmp_pat
         (("--map", "nowhere.npz"), "nowhere.npz is not a magnetic map"),
     ],
 )
-def test_payload_that_can_not_be_is_refused_by_name(arguments, told):
+def test_payload_that_can_not_be_is_refused_by_name(arguments, reported):
     result = sitl(*LINK, *arguments)
     assert result.exit_code == 2
-    assert told in result.output
+    assert reported in result.output
     assert "starting" not in result.output  # what is wrong is said at once
 
 
@@ -92,7 +94,7 @@ def test_the_log_has_what_every_vehicle_says(tmp_path, autopilot):
     log = tmp_path / "said.tlog"
     result = sitl("--autopilot", autopilot, "--no-wait", "--count", "2", "--duration", "6", "--log", str(log))
     assert result.exit_code == 0, result.output
-    heard = Counter((f.system_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log))
+    received = Counter((f.system_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log))
     for system_id in (1, 2):
-        assert heard[system_id, "ATTITUDE"] >= 15
-        assert heard[system_id, "HIL_STATE_QUATERNION"] > 250
+        assert received[system_id, "ATTITUDE"] >= 15
+        assert received[system_id, "HIL_STATE_QUATERNION"] > 250

@@ -171,11 +171,13 @@ def test_keys_that_can_not_be_stored_any_more_do_not_end_the_flight(
     in_flight(lambda: shutil.rmtree(folder))
     done = sitl(*key, "--signing-store", str(folder / "store"))
     assert done.return_value == 1 and "stopped at 2.0 s" in done.output
-    told = f"flightstack: can't write {folder / 'store'}: No such file or directory; signing keys and times"
-    assert done.output.count(told) == 1
+    reported = (
+        f"flightstack: can't write {folder / 'store'}: No such file or directory; signing keys and times"
+    )
+    assert done.output.count(reported) == 1
 
 
-def test_pictures_that_are_lost_are_told_and_the_command_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_that_are_lost_are_reported_and_the_command_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     def lose(world: Sitl, video: str | None, pictures: Path | None, on_loss: Callable[[str], None]) -> None:
         on_loss("can't write photo IMG_0000.jpg: No space left on device")
 

@@ -36,7 +36,7 @@ def test_half_a_parameter_file_does_not_stay_on_a_full_disk(
     assert "nothing is overwritten" in capsys.readouterr().err
 
 
-def test_where_the_input_is_closed_nobody_can_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_the_input_is_closed_no_user_can_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", None)
     with pytest.raises(
         click.UsageError, match="delete all: not confirmed; there is no terminal to ask on: give --yes"

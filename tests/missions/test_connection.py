@@ -177,11 +177,11 @@ class Elsewhere(threading.Thread):
         self.autopilot, self.end = autopilot, threading.Event()
 
     def run(self):
-        time_us = heard_us = 0
-        while not self.end.wait(0.05 if time_us - heard_us > self.BEHIND_US else 0.0004):
+        time_us = received_us = 0
+        while not self.end.wait(0.05 if time_us - received_us > self.BEHIND_US else 0.0004):
             for _peer, data in self.autopilot.link.receive():
                 self.autopilot.receive(data)
-                heard_us = time_us
+                received_us = time_us
             time_us += 20_000
             self.autopilot.step(time_us)
         self.autopilot.link.close()

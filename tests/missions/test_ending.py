@@ -126,15 +126,15 @@ def test_one_that_is_ignored_stays_ignored(number: signal.Signals, elsewhere: An
     assert (result.outcome, result.reason, result.signal) == ("completed", "", 0)
 
 
-def test_a_handler_of_somebody_else_s_stays_theirs() -> None:
-    heard: list[int] = []
-    before = signal.signal(signal.SIGTERM, lambda number, _frame: heard.append(number))
+def test_a_handler_of_another_module_stays_theirs() -> None:
+    received: list[int] = []
+    before = signal.signal(signal.SIGTERM, lambda number, _frame: received.append(number))
     try:
         with EndingSignals():
             signal.raise_signal(signal.SIGTERM)
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert heard == [signal.SIGTERM]
+    assert received == [signal.SIGTERM]
 
 
 def test_a_thread_leaves_signals_alone() -> None:

@@ -1,4 +1,4 @@
-"""A mission without the key of a vehicle that signs: what it can tell of that."""
+"""A mission without the key of a vehicle that signs: what it can report of that."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A link that is lost and comes back: what goes on, what ends, and what is told."""
+"""A link that is lost and comes back: what goes on, what ends, and what is reported."""
 
 import asyncio
 import math
@@ -80,7 +80,7 @@ def test_a_link_that_does_not_come_back_in_time_ends_the_mission(flown, flavour)
 
 
 def test_setpoints_wait_where_they_were_and_go_on(flown):
-    """The vehicle still hears us and stays guided; it is not led on while nobody sees where it is."""
+    """The vehicle still receives our messages and stays guided; it waits while no position is received."""
 
     async def script(vehicle, autopilot):
         vehicle.link.regain_s = 60.0
@@ -129,7 +129,7 @@ def test_setpoints_end_when_the_mode_is_no_longer_ours(flown):
 @both
 @pytest.mark.parametrize("asking", ["command", "mode", "parameter"])
 def test_what_is_asked_in_the_silence_is_answered_after_it(flown, flavour, asking):
-    """A command is sent five times, a second apart, and nobody hears it for much longer."""
+    """A command is sent five times, a second apart, and is not received for much longer."""
 
     async def script(vehicle, autopilot):
         vehicle.link.regain_s = 60.0

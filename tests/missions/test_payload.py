@@ -1,4 +1,4 @@
-"""What payload components say and are told, in messages; attitude commands and their masks."""
+"""What payload components say and are reported, in messages; attitude commands and their masks."""
 
 import math
 from types import SimpleNamespace
@@ -86,11 +86,11 @@ class Rig:
     ("primary", "warned"),
     [(None, False), ((0, 0), False), ((255, 190), False), ((255, 191), True), ((42, 190), True)],
 )
-def test_a_gimbal_that_somebody_else_points_is_warned_of_once(primary, warned):
+def test_a_gimbal_that_another_client_points_is_warned_of_once(primary, warned):
     rig = Rig()
     payload = Payload(rig)
     payload.take_gimbal_control()
-    rig.primary = (42, 190)  # it takes the manager some time to tell who has it
+    rig.primary = (42, 190)  # it takes the manager some time to report the controller
     payload.point_gimbal(pitch_rad=-0.5, yaw_rad=0.0)
     assert rig.notes.warnings == []
     rig.primary = primary
@@ -144,10 +144,10 @@ def test_attitudes_that_are_none_are_refused(values, words):
 
 def test_pointing_speaks_gimbal_protocol(flown):
     async def mission(vehicle, autopilot):
-        heard, parser, receive = [], FrameParser(), autopilot.receive
+        received, parser, receive = [], FrameParser(), autopilot.receive
 
         def tap(data):
-            heard.extend(decode(frame) for frame in parser.feed(data))
+            received.extend(decode(frame) for frame in parser.feed(data))
             receive(data)
 
         autopilot.link.on_receive = tap
@@ -155,20 +155,20 @@ def test_pointing_speaks_gimbal_protocol(flown):
         vehicle.payload.point_gimbal(pitch_rad=-0.5, yaw_rad=1.2)
         vehicle.payload.turn_gimbal(pitch_rate_rad_s=0.1, yaw_rate_rad_s=-0.2)
         vehicle.payload.point_gimbal_at(47.4, 8.5, 500.0)
-        return heard
+        return received
 
-    heard = flown(mission)
-    pointed = [m for m in heard if m.get_type() == "GIMBAL_MANAGER_SET_PITCHYAW"]
+    received = flown(mission)
+    pointed = [m for m in received if m.get_type() == "GIMBAL_MANAGER_SET_PITCHYAW"]
     assert (pointed[0].pitch, pointed[0].yaw) == pytest.approx((-0.5, 1.2))
     assert pointed[0].flags == d.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
     assert math.isnan(pointed[1].pitch)
     assert math.isnan(pointed[1].yaw)
     assert (pointed[1].pitch_rate, pointed[1].yaw_rate) == pytest.approx((0.1, -0.2))
-    commands = [m for m in heard if m.get_type() == "COMMAND_LONG"]
+    commands = [m for m in received if m.get_type() == "COMMAND_LONG"]
     assert commands[0].command == d.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
     assert commands[0].target_component == GIMBAL_COMPONENT
     assert (commands[0].param1, commands[0].param2) == (255.0, 190.0)
-    roi = next(m for m in heard if m.get_type() == "COMMAND_INT")
+    roi = next(m for m in received if m.get_type() == "COMMAND_INT")
     assert (roi.command, roi.x) == (d.MAV_CMD_DO_SET_ROI_LOCATION, 474_000_000)
 
 

@@ -289,7 +289,7 @@ def test_nothing_is_flown_on_a_full_disk(scripted, tmp_path, monkeypatch):
     assert all(phase["name"] != "takeoff" for phase in result.summary["vehicles"][0]["phases"])
 
 
-def test_a_summary_that_finds_no_room_is_told(scripted, tmp_path, monkeypatch):
+def test_a_summary_that_finds_no_room_is_reported(scripted, tmp_path, monkeypatch):
     def full(folder, summary):
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -299,7 +299,7 @@ def test_a_summary_that_finds_no_room_is_told(scripted, tmp_path, monkeypatch):
     assert "No space left on device; check the disk" in result.reason
 
 
-def test_a_picture_that_finds_no_room_is_told_in_the_summary_too(scripted, tmp_path, monkeypatch):
+def test_a_picture_that_finds_no_room_is_reported_in_the_summary_too(scripted, tmp_path, monkeypatch):
     def full(_mission, path, _title, _debriefing):
         path.write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -358,17 +358,19 @@ def lissajous_off_by(monkeypatch, offset_m):
 
 
 @pytest.mark.parametrize(("offset_m", "word"), [(1.9, "within the acceptance radius"), (2.1, "poor")])
-def test_poor_tracking_is_told(scripted, tmp_path, capsys, monkeypatch, offset_m, word):
+def test_poor_tracking_is_reported(scripted, tmp_path, capsys, monkeypatch, offset_m, word):
     lissajous_off_by(monkeypatch, offset_m)
     code, out, _err = command_line(
         capsys, "fly", "lissajous", "--size", "40", "--via", "setpoints", "--out", str(tmp_path / "run"),
         "--no-picture",
     )  # fmt: skip
-    assert code == 0  # it was flown; how well, nobody has set a bound to
+    assert code == 0  # it was flown; no bound is set for how well
     block = json.loads((tmp_path / "run" / "summary.json").read_text())["vehicles"][0]
     assert (block["tracking"], block["acceptance_m"]) == (word, 2.0)
-    told = "poor tracking: vehicle 1 was 2.1 m off the path at most, more than the acceptance radius of 2 m"
-    assert (told in out) == (word == "poor")
+    reported = (
+        "poor tracking: vehicle 1 was 2.1 m off the path at most, more than the acceptance radius of 2 m"
+    )
+    assert (reported in out) == (word == "poor")
 
 
 @pytest.mark.parametrize(("bound", "code"), [("1.5", 1), ("2", 0)])
@@ -384,7 +386,7 @@ def test_a_bound_of_the_path_error_is_a_check(scripted, tmp_path, capsys, monkey
     assert outcome == ("failed" if code else "completed")
 
 
-def test_a_bound_of_a_path_error_that_nobody_measures_is_no_success(scripted, tmp_path, capsys):
+def test_a_bound_of_a_path_error_that_is_not_measured_is_no_success(scripted, tmp_path, capsys):
     script = tmp_path / "idle.py"
     script.write_text("async def fly(vehicle, options):\n    await vehicle.clock.sleep(1.0)\n")
     code, _out, err = command_line(
@@ -394,7 +396,7 @@ def test_a_bound_of_a_path_error_that_nobody_measures_is_no_success(scripted, tm
     assert "flew no path whose error --max-error could limit" in err
 
 
-def test_warnings_are_told_once(scripted, tmp_path, capsys):
+def test_warnings_are_reported_once(scripted, tmp_path, capsys):
     script = tmp_path / "wary.py"
     script.write_text(
         "async def fly(vehicle, options):\n    for _ in range(3):\n        vehicle.notes.warn('low sun')\n"

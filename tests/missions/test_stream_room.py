@@ -44,10 +44,10 @@ class Line:
         self._link.on_receive = take
 
 
-def heard(flavour: str, *, told: bool, room: bool) -> tuple[list[str], Counter[str]]:
+def received(flavour: str, *, reported: bool, room: bool) -> tuple[list[str], Counter[str]]:
     """What was slowed down, and what came in ten seconds after."""
     sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),)))
-    line = Line(sitl.connect(0, bytes_per_s=BAUD_57600), BAUD_57600 if told else None)
+    line = Line(sitl.connect(0, bytes_per_s=BAUD_57600), BAUD_57600 if reported else None)
 
     async def main() -> list[str]:
         async with Connection(line, LoopClock()) as connection:  # type: ignore[arg-type]
@@ -67,8 +67,8 @@ def heard(flavour: str, *, told: bool, room: bool) -> tuple[list[str], Counter[s
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_what_is_needed_gets_its_rate(flavour: str) -> None:
-    _, before = heard(flavour, told=True, room=False)
-    slowed, after = heard(flavour, told=True, room=True)
+    _, before = received(flavour, reported=True, room=False)
+    slowed, after = received(flavour, reported=True, room=True)
     assert before["ATTITUDE"] < 0.8 * NEEDED_HZ["ATTITUDE"] * SECONDS  # it was narrow
     for name, rate_hz in NEEDED_HZ.items():
         assert after[name] > 0.9 * rate_hz * SECONDS, name
@@ -79,5 +79,5 @@ def test_what_is_needed_gets_its_rate(flavour: str) -> None:
 
 
 def test_a_link_that_does_not_tell_is_left_as_it_is() -> None:
-    slowed, _ = heard("px4", told=False, room=True)
+    slowed, _ = received("px4", reported=False, room=True)
     assert slowed == []

@@ -1,4 +1,4 @@
-"""A command in a process of its own: how it ends is told, whatever ends it."""
+"""A command in a process of its own: how it ends is reported, whatever ends it."""
 
 import signal
 import subprocess
@@ -40,7 +40,7 @@ def start(body: str, setup: str = "") -> "subprocess.Popen[str]":
         ("os.kill(os.getpid(), signal.SIGKILL)", 1, "", "flightstack: the library crashed (SIGKILL)\n"),
     ],
 )
-def test_how_it_ended_is_told(body: str, code: int, out: str, err: str) -> None:
+def test_how_it_ended_is_reported(body: str, code: int, out: str, err: str) -> None:
     process = start(body)
     said = process.communicate(timeout=60.0)
     assert process.returncode == code
@@ -52,9 +52,9 @@ SLOW_TO_WATCH = "os.register_at_fork(after_in_parent=lambda: time.sleep(0.5))"
 """The child is well under way before the process that watches it does its next step."""
 SLOW_TO_NOTICE = """
 import threading
-waitpid, kill, told = os.waitpid, os.kill, threading.Event()
-os.kill = lambda *signal: (told.set(), kill(*signal))
-os.waitpid = lambda *which: (waitpid(*which), print("ended", flush=True), told.wait(60.0))[0]
+waitpid, kill, reported = os.waitpid, os.kill, threading.Event()
+os.kill = lambda *signal: (reported.set(), kill(*signal))
+os.waitpid = lambda *which: (waitpid(*which), print("ended", flush=True), reported.wait(60.0))[0]
 """
 """What watches the child learns that it has ended only after it was asked to end it."""
 

@@ -80,7 +80,7 @@ def test_not_ready_says_what_is_missing(flown, flavour):
     flown(script, flavour, ready=False, setup=never)
 
 
-def test_no_heartbeat_says_that_nothing_was_heard(flown):
+def test_no_heartbeat_says_that_nothing_was_received(flown):
     async def script(vehicle, autopilot):
         autopilot.streams.clear()
         with pytest.raises(VehicleTimeout, match=r"no heartbeat .* within 4 s; nothing was received"):
@@ -90,7 +90,7 @@ def test_no_heartbeat_says_that_nothing_was_heard(flown):
 
 
 @both
-def test_arming_is_tried_again_and_then_told_why(flown, flavour):
+def test_arming_is_tried_again_and_then_refused_with_the_reason(flown, flavour):
     async def script(vehicle, autopilot):
         autopilot.arm_refusals = 3
         await vehicle.arm()
@@ -117,7 +117,7 @@ def test_command_is_repeated_with_confirmation_until_answered(flown):
     flown(script)
 
 
-def test_px4_first_mode_acknowledgement_is_not_believed(flown):
+def test_px4_first_mode_acknowledgement_is_not_accepted(flown):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(5.0)
         autopilot.refuse_modes.add("return")
@@ -314,7 +314,7 @@ def test_a_refused_arming_leaves_nothing_in_doubt(flown):
     assert flown(script) is False
 
 
-def test_a_disarmed_heartbeat_long_after_arming_is_believed(flown):
+def test_a_disarmed_heartbeat_long_after_arming_is_accepted(flown):
     async def script(vehicle, autopilot):
         await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         autopilot.armed = False
@@ -347,9 +347,9 @@ def test_telemetry_in_si_units(flown):
 
 def test_heartbeats_are_sent_once_a_second(flown):
     async def script(vehicle, autopilot):
-        before = autopilot.heartbeats_heard
+        before = autopilot.heartbeats_received
         await asyncio.sleep(10.0)
-        return autopilot.heartbeats_heard - before
+        return autopilot.heartbeats_received - before
 
     assert flown(script) in (10, 11)
 
@@ -442,12 +442,12 @@ def test_one_of_several_vehicles_on_a_link_is_chosen_by_its_id(make_sitl):
             vehicle = Vehicle(connection, 2)
             await vehicle.wait_ready()
             home = vehicle.home
-            return vehicle.system_id, home.lon_deg, connection.autopilots_heard
+            return vehicle.system_id, home.lon_deg, connection.autopilots_received
 
-    system_id, lon_deg, heard = run(main(), sitl.loop)
+    system_id, lon_deg, received = run(main(), sitl.loop)
     assert system_id == 2
     assert lon_deg == pytest.approx(sitl.autopilots[1].home.lon_deg, abs=2e-7)
-    assert heard == [1, 2]
+    assert received == [1, 2]
 
 
 def test_the_clock_of_a_connection_is_that_of_its_vehicle():

@@ -1,4 +1,4 @@
-"""What a mission is told when the link dies, a failsafe takes over, or it asks for what can't be."""
+"""The errors of a mission when the link dies, a failsafe takes over, or it asks for what can't be."""
 
 import asyncio
 import math
@@ -289,7 +289,7 @@ def test_an_impossible_takeoff_is_refused_before_anything_is_sent(flown, altitud
 
 @both
 @pytest.mark.parametrize("good_s", [-1.0, 2.0])
-def test_a_source_of_something_else_is_told_what_it_gave(flown, flavour, good_s):
+def test_a_source_of_something_else_is_shown_what_it_gave(flown, flavour, good_s):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(10.0)
         good = Setpoint(position_ned_m=(0.0, 0.0, -10.0))
@@ -304,7 +304,7 @@ def test_a_source_of_something_else_is_told_what_it_gave(flown, flavour, good_s)
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_what_keeps_a_vehicle_from_arming_is_told(flown, flavour):
+def test_what_keeps_a_vehicle_from_arming_is_reported(flown, flavour):
     def unready(autopilot):
         autopilot.ready_after_us = 10**12
         autopilot.text("PreArm: Compass not healthy")  # long ago, and mended since

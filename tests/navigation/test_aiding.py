@@ -276,7 +276,7 @@ def test_velocity_of_a_landing_without_position_is_claimed_only_when_it_is_zero(
     bench.suite.faults.inject(SensorUnit.GPS, FaultType.OFF)
     bench.run(20.0)
     assert health.constant_position and not health.velocity_horizontal
-    nav._solution.change_velocity(5.0, -3.0, sigma_m_s=0.1)  # five wrong metres per second, believed
+    nav._solution.change_velocity(5.0, -3.0, sigma_m_s=0.1)  # five wrong metres per second, accepted
     nav.vehicle_at_rest = True
     claimed: list[float] = []
 
@@ -300,7 +300,7 @@ def test_attitude_stays_good_indoors(hover: Array) -> None:
 
 
 @pytest.mark.parametrize("failure", [FaultType.GARBAGE, FaultType.STUCK])
-def test_a_lying_receiver_is_not_believed(flight: Array, failure: FaultType) -> None:
+def test_a_lying_receiver_is_not_accepted(flight: Array, failure: FaultType) -> None:
     bench = Bench(flight).run(30.0)
     bench.suite.faults.inject(SensorUnit.GPS, failure)
     worst = 0.0
@@ -347,7 +347,7 @@ def test_standalone_receiver_wanders_as_much_as_it_says(flight: Array) -> None:
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_a_reported_accuracy_that_gets_worse_is_believed_at_once(flight: Array, seed: int) -> None:
+def test_a_reported_accuracy_that_gets_worse_is_accepted_at_once(flight: Array, seed: int) -> None:
     """Corrections end: metres of slow error from one fix to the next. They don't move the position."""
     degraded = (*FIX_AT_BOOT, replace(FIX_AT_BOOT[0], start_s=30.0, error_scale=10.0))
     receiver = GpsParameters(

@@ -295,7 +295,7 @@ def test_nonsense_is_counted_and_moves_nothing(flight: Array, name: str) -> None
     fused = counts.fused
     odometry.change = spoil(name, np.random.Generator(np.random.PCG64(7)))
     bench.run(23.0, odometry)
-    assert counts.fused - fused < 12  # what is still to be told from good ones
+    assert counts.fused - fused < 12  # those that can't yet be distinguished from good ones
     assert position_error_m(odometry) < 3.0  # inertial for three seconds
     bench.run(40.0, odometry)
     health = bench.filter.health
@@ -349,11 +349,11 @@ def test_poor_and_late_samples_are_refused(flight: Array) -> None:
 
 
 def test_no_parameters_no_effect(flight: Array) -> None:
-    """Messages that nobody asked for change no bit of the estimate."""
-    told, quiet = Bench(flight), Bench(flight)
-    told.run(30.0, Odometry(told))
+    """Messages that were not requested change no bit of the estimate."""
+    reported, quiet = Bench(flight), Bench(flight)
+    reported.run(30.0, Odometry(reported))
     quiet.run(30.0)
-    assert told.filter.state.tobytes() == quiet.filter.state.tobytes()
+    assert reported.filter.state.tobytes() == quiet.filter.state.tobytes()
 
 
 def test_the_sensor_sits_off_the_centre(flight: Array) -> None:

@@ -23,7 +23,7 @@ def pitot_at(pressure_pa: float, static_pa: float, temperature_c: float, **chang
     readings.airspeed.values[:] = pressure_pa, temperature_c
     readings.airspeed.time_us = 1000
     pitot.look(2000)
-    pitot.update_density(believed=True)
+    pitot.update_density(trusted=True)
     return pitot
 
 
@@ -125,7 +125,7 @@ def test_innovations_add_up_and_pass_again() -> None:
     assert run_check(check, 70.0, 90.0, 1.0) == pytest.approx(75.0, abs=0.3)
 
 
-def test_never_believed_again_if_so_set() -> None:
+def test_never_used_again_if_so_set() -> None:
     check = AirspeedCheck()
     run_check(check, 0.0, 10.0, 20.0, airspeed_start_delay_s=1e9)
     run_check(check, 10.0, 60.0, 0.0, airspeed_start_delay_s=1e9)

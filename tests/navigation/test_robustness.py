@@ -222,7 +222,7 @@ def test_terrain_follows_a_step() -> None:
         terrain.predict(k * 40_000, 0.0)
         terrain.fuse(k * 40_000, 10.0 + rng.normal(0.0, 0.02), 1.0, -10.0)
     assert terrain.valid(2_000_000) and terrain.down_m == pytest.approx(0.0, abs=0.03)
-    for k in range(50, 100):  # a roof of 4 m: refused at first, then believed
+    for k in range(50, 100):  # a roof of 4 m: refused at first, then accepted
         terrain.predict(k * 40_000, 0.0)
         terrain.fuse(k * 40_000, 6.0, 1.0, -10.0)
         if k == 55:
@@ -234,7 +234,7 @@ def test_terrain_follows_a_step() -> None:
     assert not terrain.valid(10_000_000) and math.isnan(terrain.down_m)
 
 
-def test_a_receiver_that_repeats_itself_is_not_believed() -> None:
+def test_a_receiver_that_repeats_itself_is_not_accepted() -> None:
     """Frozen position and velocity would have the vehicle run away from its own estimate."""
     quality = GpsQuality(PARAMETERS)
     sample = np.array([47.0, 8.0, 500.0, 0.03, -0.02, 0.01, 0.3, 0.6, 0.1, 3.0, 10.0, 0.7, 1.1])

@@ -202,7 +202,7 @@ def test_a_receiver_that_returns_far_off_is_refused_first() -> None:
     bench.suite.faults.inject(SensorUnit.GPS, FaultType.WRONG, bias=(500.0, 0.0, 0.0))
     bench.run(96.0)
     assert bench.position_error_m < 20.0
-    bench.run(101.0)  # PX4 believes it in the end
+    bench.run(101.0)  # PX4 accepts it in the end
     assert bench.position_error_m == pytest.approx(500.0, abs=5.0)
     assert math.hypot(*health.position_reset_ne_m) > 400.0
 

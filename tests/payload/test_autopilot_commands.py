@@ -98,7 +98,7 @@ def test_the_shutter_is_released_through_the_autopilot(talk):
 
 
 @pytest.mark.parametrize(("flavour", "answer"), [("px4", []), ("ardupilot", [m.MAV_RESULT_UNSUPPORTED])])
-def test_without_devices_nobody_is_there_to_do_it(flavour, answer):
+def test_without_devices_no_device_executes_it(flavour, answer):
     talk = Talk(flavour, NOTHING)
     for number in (
         m.MAV_CMD_DO_DIGICAM_CONTROL,

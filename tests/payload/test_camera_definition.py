@@ -32,7 +32,7 @@ class Ftp:
         length = len(data) if size is None else size
         payload = HEADER.pack(self.sequence, session, opcode, length, 0, 0, offset) + data
         before = len(self.world.frames)
-        self.world.tell(
+        self.world.deliver(
             m.MAVLink_file_transfer_protocol_message(0, SYSTEM, CAMERA_COMPONENT, payload.ljust(251, b"\0"))
         )
         self.world.run(0.1)
@@ -58,7 +58,7 @@ def definition(world: World) -> ElementTree.Element:
 
 def settings(world: World) -> dict[str, int]:
     world.frames.clear()
-    world.tell(m.MAVLink_param_ext_request_list_message(SYSTEM, CAMERA_COMPONENT))
+    world.deliver(m.MAVLink_param_ext_request_list_message(SYSTEM, CAMERA_COMPONENT))
     world.run(0.1)
     values = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
     assert [value.param_index for value in values] == list(range(values[0].param_count))
@@ -72,7 +72,7 @@ def number(message) -> int:
 
 
 def set_to(world: World, name: bytes, value: int, kind: int = m.MAV_PARAM_EXT_TYPE_UINT8):
-    world.tell(
+    world.deliver(
         m.MAVLink_param_ext_set_message(
             SYSTEM, CAMERA_COMPONENT, name, bytes((value,)).ljust(128, b"\0"), kind
         )
@@ -115,15 +115,15 @@ def test_mode_is_one_thing_by_command_and_by_setting(world):
     assert world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_SETTINGS).mode_id == m.CAMERA_MODE_VIDEO
     world.frames.clear()
     assert world.command(CAMERA_COMPONENT, m.MAV_CMD_SET_CAMERA_MODE, 0, m.CAMERA_MODE_IMAGE) == ACCEPTED
-    told = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
-    assert [(value.param_id, number(value)) for value in told] == [("CAM_MODE", m.CAMERA_MODE_IMAGE)]
+    reported = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
+    assert [(value.param_id, number(value)) for value in reported] == [("CAM_MODE", m.CAMERA_MODE_IMAGE)]
 
 
 def test_one_setting_by_name_or_number(world):
     read = m.MAVLink_param_ext_request_read_message
-    world.tell(read(SYSTEM, CAMERA_COMPONENT, b"CAM_AUTOFOCUS", -1))
-    world.tell(read(SYSTEM, CAMERA_COMPONENT, b"", 1))
-    world.tell(read(SYSTEM, CAMERA_COMPONENT, b"NO_SUCH", -1))
-    world.tell(read(SYSTEM, CAMERA_COMPONENT, b"", 99))
-    told = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
-    assert [value.param_id for value in told] == ["CAM_AUTOFOCUS", "CAM_PHOTOQUAL"]
+    world.deliver(read(SYSTEM, CAMERA_COMPONENT, b"CAM_AUTOFOCUS", -1))
+    world.deliver(read(SYSTEM, CAMERA_COMPONENT, b"", 1))
+    world.deliver(read(SYSTEM, CAMERA_COMPONENT, b"NO_SUCH", -1))
+    world.deliver(read(SYSTEM, CAMERA_COMPONENT, b"", 99))
+    reported = world.messages(m.MAVLINK_MSG_ID_PARAM_EXT_VALUE, CAMERA_COMPONENT)
+    assert [value.param_id for value in reported] == ["CAM_AUTOFOCUS", "CAM_PHOTOQUAL"]

@@ -25,7 +25,7 @@ def say(world: World, command: int, *values: float, sender=(255, 190)) -> int | 
 
 
 def place(world: World, *, vx: float = 0.0, boot_ms: int = 0) -> None:
-    world.tell(
+    world.deliver(
         m.MAVLink_global_position_int_message(
             boot_ms,
             round(HOME.lat_deg * 1e7),
@@ -49,13 +49,13 @@ def settings(world: World):
     return world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_SETTINGS)
 
 
-def test_a_photo_says_where_and_when_by_what_the_vehicle_told(world):
+def test_a_photo_says_where_and_when_by_what_the_vehicle_reported(world):
     world.run(2.0)
     assert say(world, START, 0, 0, 1) == ACCEPTED
     unplaced = photos(world)[-1]
     assert (unplaced.lat, unplaced.lon, unplaced.time_utc) == (0, 0, 0)
     place(world)
-    world.tell(m.MAVLink_system_time_message(1_700_000_000_000_000, 0), sender=AUTOPILOT)
+    world.deliver(m.MAVLink_system_time_message(1_700_000_000_000_000, 0), sender=AUTOPILOT)
     world.command(GIMBAL_COMPONENT, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -30.0, 20.0)
     world.run(2.0)
     place(world)
@@ -81,7 +81,9 @@ def test_an_old_position_is_none(world):
 
 
 def test_others_positions_are_not_ours(world):
-    world.tell(m.MAVLink_global_position_int_message(0, 10, 20, 30, 40, 0, 0, 0, 0), sender=(SYSTEM + 1, 1))
+    world.deliver(
+        m.MAVLink_global_position_int_message(0, 10, 20, 30, 40, 0, 0, 0, 0), sender=(SYSTEM + 1, 1)
+    )
     say(world, START, 0, 0, 1)
     assert photos(world)[-1].lat == 0
 
@@ -91,7 +93,7 @@ def test_a_command_sent_again_takes_no_second_photo(world):
         assert say(world, START, 0, 0, 1, 7) == ACCEPTED
     assert len(photos(world)) == 1
     assert say(world, START, 0, 0, 1, 8) == ACCEPTED
-    assert say(world, START, 0, 0, 1, 8, sender=(254, 190)) == ACCEPTED  # somebody else's eighth
+    assert say(world, START, 0, 0, 1, 8, sender=(254, 190)) == ACCEPTED  # its eighth, of another component
     assert len(photos(world)) == 3
     world.run(5.0)
     assert say(world, START, 0, 0, 1, 8, sender=(254, 190)) == ACCEPTED  # he has started anew
@@ -162,10 +164,10 @@ def test_videos(world):
     assert say(world, start, 0, 2.0) == ACCEPTED
     before = len(world.messages(m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS))
     world.run(5.0)
-    told = world.messages(m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)[before:]
-    assert len(told) == 10
-    assert [status.recording_time_ms for status in told] == [500 * n for n in range(1, 11)]
-    assert {status.video_status for status in told} == {1}
+    reported = world.messages(m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)[before:]
+    assert len(reported) == 10
+    assert [status.recording_time_ms for status in reported] == [500 * n for n in range(1, 11)]
+    assert {status.video_status for status in reported} == {1}
     assert say(world, start, 0, 0) == m.MAV_RESULT_TEMPORARILY_REJECTED
     assert say(world, m.MAV_CMD_STORAGE_FORMAT, 1, 1, 1) == m.MAV_RESULT_TEMPORARILY_REJECTED
     assert say(world, stop) == ACCEPTED

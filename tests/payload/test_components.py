@@ -84,14 +84,14 @@ class World:
             self.targets.step(self.time_us)
             self.station.step(self.time_us)
 
-    def tell(self, message, sender=(255, 190)) -> None:
+    def deliver(self, message, sender=(255, 190)) -> None:
         encoder = self._clients.setdefault(sender, FrameEncoder(*sender))
         self.station.receive(encoder.encode(message))
 
     def command(self, component: int, command: int, *values: float, sender=(255, 190)) -> int | None:
         before = len(self.frames)
         params = (*values, *(0.0,) * (7 - len(values)))
-        self.tell(m.MAVLink_command_long_message(SYSTEM, component, command, 0, *params), sender)
+        self.deliver(m.MAVLink_command_long_message(SYSTEM, component, command, 0, *params), sender)
         acks = [decode(f) for f in self.frames[before:] if f.message_id == m.MAVLINK_MSG_ID_COMMAND_ACK]
         assert len(acks) <= 1
         if not acks:
@@ -175,7 +175,7 @@ def test_gimbal_points_and_camera_tells_where_the_target_is(world):
 def test_locked_yaw_is_from_north_and_followed_yaw_from_the_nose():
     world = World(heading_rad=math.radians(60.0))
     flags = m.GIMBAL_MANAGER_FLAGS_YAW_LOCK | m.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
-    world.tell(
+    world.deliver(
         m.MAVLink_gimbal_manager_set_pitchyaw_message(
             SYSTEM, GIMBAL_COMPONENT, flags, 0, math.radians(-20.0), math.radians(100.0), math.nan, math.nan
         )
@@ -185,7 +185,7 @@ def test_locked_yaw_is_from_north_and_followed_yaw_from_the_nose():
     assert look.in_earth
     assert (look.pitch, look.yaw) == pytest.approx((-20.0, 100.0), abs=4.0)
     assert look.delta == pytest.approx(60.0, abs=4.0)
-    world.tell(
+    world.deliver(
         m.MAVLink_gimbal_manager_set_pitchyaw_message(
             SYSTEM, GIMBAL_COMPONENT, m.GIMBAL_MANAGER_FLAGS_PITCH_LOCK, 0, 0.0, math.radians(30.0), 0.0, 0.0
         )
@@ -198,7 +198,7 @@ def test_locked_yaw_is_from_north_and_followed_yaw_from_the_nose():
 
 def test_rates_turn_the_gimbal(world):
     world.run(2.0)
-    world.tell(
+    world.deliver(
         m.MAVLink_gimbal_manager_set_pitchyaw_message(
             SYSTEM, GIMBAL_COMPONENT, 0, 0, math.nan, math.nan, 0.0, math.radians(10.0)
         )
@@ -211,11 +211,11 @@ def test_sticks_steer_the_gimbal_by_what_they_give(world):
     world.run(2.0)
     steer = m.MAVLink_gimbal_manager_set_manual_control_message
     unset = math.nan
-    world.tell(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, -0.5, unset, unset, unset))
+    world.deliver(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, -0.5, unset, unset, unset))
     world.run(3.0)
     look = pointing(world)
     assert (look.pitch, look.yaw) == pytest.approx((-45.0, 0.0), abs=1.0)
-    world.tell(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, unset, unset, unset, 0.25))
+    world.deliver(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, unset, unset, unset, 0.25))
     world.run(2.0)
     assert pointing(world).yaw == pytest.approx(30.0, abs=2.0)
 
@@ -227,7 +227,7 @@ def test_who_has_control_points_and_others_do_not(world):
     other = (1, 191)
     pitchyaw = m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
     assert world.command(GIMBAL_COMPONENT, pitchyaw, -60.0, sender=other) == m.MAV_RESULT_DENIED
-    world.tell(
+    world.deliver(
         m.MAVLink_gimbal_manager_set_pitchyaw_message(SYSTEM, GIMBAL_COMPONENT, 0, 0, -1.0, 0.0, 0.0, 0.0),
         sender=other,
     )
@@ -250,14 +250,14 @@ def test_region_of_interest_is_looked_at(world):
         0.0, 0.0, 0.0, 0.0, round((HOME.lat_deg + 100.0 / 111_180.0) * 1e7), round(HOME.lon_deg * 1e7), 0.0,
     )  # fmt: skip
     world.run(1.0)
-    world.tell(roi)
+    world.deliver(roi)
     acks = world.messages(m.MAVLINK_MSG_ID_COMMAND_ACK)
     assert acks[-1].result == m.MAV_RESULT_TEMPORARILY_REJECTED  # it doesn't know where it is
     position = m.MAVLink_global_position_int_message(
         0, round(HOME.lat_deg * 1e7), round(HOME.lon_deg * 1e7), 580_000, 100_000, 0, 0, 0, 0
     )
-    world.tell(position, sender=(SYSTEM, 1))
-    world.tell(roi)
+    world.deliver(position, sender=(SYSTEM, 1))
+    world.deliver(roi)
     world.run(3.0)
     look = pointing(world)
     assert (look.pitch, look.yaw) == pytest.approx((-45.0, 0.0), abs=4.0)
@@ -366,8 +366,8 @@ SHARED = World()
 )
 def test_extreme_values_never_raise(component, command, values, flags):
     world = SHARED
-    world.tell(m.MAVLink_command_long_message(SYSTEM, component, command, 0, *values))
-    world.tell(
+    world.deliver(m.MAVLink_command_long_message(SYSTEM, component, command, 0, *values))
+    world.deliver(
         m.MAVLink_command_int_message(
             SYSTEM, component, 6, command, 0, 0, *values[:4], 2**31 - 1, -(2**31), values[6]
         )
@@ -376,8 +376,8 @@ def test_extreme_values_never_raise(component, command, values, flags):
         m.MAVLink_gimbal_manager_set_pitchyaw_message,
         m.MAVLink_gimbal_manager_set_manual_control_message,
     ):
-        world.tell(kind(SYSTEM, GIMBAL_COMPONENT, flags, 0, *values[:4]))
-    world.tell(
+        world.deliver(kind(SYSTEM, GIMBAL_COMPONENT, flags, 0, *values[:4]))
+    world.deliver(
         m.MAVLink_gimbal_manager_set_attitude_message(
             SYSTEM, GIMBAL_COMPONENT, flags, 0, values[:4], *values[4:7]
         )

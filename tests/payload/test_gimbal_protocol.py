@@ -18,7 +18,7 @@ M_PER_DEG_LAT = 111_180.0
 def world() -> World:
     world = World()
     world.run(1.0)
-    tell_place(world, 0.0, 100.0, sender=AUTOPILOT)
+    report_place(world, 0.0, 100.0, sender=AUTOPILOT)
     return world
 
 
@@ -26,8 +26,8 @@ def say(world: World, command: int, *values: float, sender=GROUND) -> int | None
     return world.command(GIMBAL_COMPONENT, command, *values, sender=sender)
 
 
-def tell_place(world: World, north_m: float, height_m: float, *, sender, vx: float = 0.0) -> None:
-    world.tell(
+def report_place(world: World, north_m: float, height_m: float, *, sender, vx: float = 0.0) -> None:
+    world.deliver(
         m.MAVLink_global_position_int_message(
             0,
             round((HOME.lat_deg + north_m / M_PER_DEG_LAT) * 1e7),
@@ -46,13 +46,13 @@ def tell_place(world: World, north_m: float, height_m: float, *, sender, vx: flo
 def test_another_system_is_looked_at_and_taken_on(world):
     assert say(world, m.MAV_CMD_DO_SET_ROI_SYSID, SYSTEM + 1) == ACCEPTED
     world.run(1.0)
-    assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)  # not heard of yet
-    tell_place(world, 100.0, 0.0, sender=OTHER_VEHICLE, vx=20.0)
+    assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)  # not received of yet
+    report_place(world, 100.0, 0.0, sender=OTHER_VEHICLE, vx=20.0)
     world.run(2.5)
     look = pointing(world)
     # 150 m ahead by now, 100 m down
     assert (look.pitch, look.yaw) == pytest.approx((-math.degrees(math.atan2(100.0, 150.0)), 0.0), abs=4.0)
-    tell_place(world, -100.0, 0.0, sender=(SYSTEM + 2, 1))  # somebody else
+    report_place(world, -100.0, 0.0, sender=(SYSTEM + 2, 1))  # another vehicle
     world.run(0.4)
     assert abs(pointing(world).yaw) < 10.0
     world.run(3.0)  # no word for longer than is taken on: it stays where it looks
@@ -64,7 +64,7 @@ def test_another_system_is_looked_at_and_taken_on(world):
 def test_a_ground_station_that_moves_is_looked_at(world):
     assert say(world, m.MAV_CMD_DO_SET_ROI_SYSID, GROUND[0]) == ACCEPTED
     zeros = [0.0] * 3
-    world.tell(
+    world.deliver(
         m.MAVLink_follow_target_message(
             0,
             1,
@@ -87,10 +87,10 @@ def test_a_ground_station_that_moves_is_looked_at(world):
 
 def test_pointing_by_hand_ends_the_region_of_interest(world):
     say(world, m.MAV_CMD_DO_SET_ROI_SYSID, SYSTEM + 1)
-    tell_place(world, 100.0, 0.0, sender=OTHER_VEHICLE)
+    report_place(world, 100.0, 0.0, sender=OTHER_VEHICLE)
     world.run(1.0)
     assert say(world, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -10.0, 0.0) == ACCEPTED
-    tell_place(world, 100.0, 0.0, sender=OTHER_VEHICLE)
+    report_place(world, 100.0, 0.0, sender=OTHER_VEHICLE)
     world.run(2.0)
     assert pointing(world).pitch == pytest.approx(-10.0, abs=1.0)
 
@@ -106,7 +106,7 @@ def test_the_mount_of_before(world):
     mount = world.request(GIMBAL_COMPONENT, m.MAVLINK_MSG_ID_MOUNT_ORIENTATION)
     assert (mount.pitch, mount.yaw) == pytest.approx((-35.0, 15.0), abs=1.0)
     there = (0.0, HOME.lat_deg + 100.0 / M_PER_DEG_LAT, HOME.lon_deg)  # over home
-    tell_place(world, 0.0, 100.0, sender=AUTOPILOT)
+    report_place(world, 0.0, 100.0, sender=AUTOPILOT)
     assert say(world, control, 0, 0, 0, *there, float(m.MAV_MOUNT_MODE_GPS_POINT)) == ACCEPTED
     world.run(2.5)
     assert pointing(world).pitch == pytest.approx(-45.0, abs=4.0)
@@ -120,25 +120,27 @@ def test_the_mount_of_before(world):
     assert say(world, control, math.inf, 0, 0, 0, 0, 0, targeting) == DENIED
 
 
-def test_a_change_of_control_is_told_at_once(world):
-    def told() -> list:
+def test_a_change_of_control_is_reported_at_once(world):
+    def reported() -> list:
         return world.messages(m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
 
     configure = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-    before = len(told())
+    before = len(reported())
     assert say(world, configure, *GROUND, 254, 1, 0, 0, GIMBAL_COMPONENT) == ACCEPTED
-    assert len(told()) == before + 1
-    status = told()[-1]
+    assert len(reported()) == before + 1
+    status = reported()[-1]
     assert (status.primary_control_sysid, status.primary_control_compid) == GROUND
     assert (status.secondary_control_sysid, status.secondary_control_compid) == (254, 1)
     assert say(world, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, sender=(254, 1)) == ACCEPTED
     assert say(world, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, sender=(253, 1)) == DENIED
     assert say(world, configure, -1, -1, -1, -1) == ACCEPTED
-    assert len(told()) == before + 1  # nothing has changed
+    assert len(reported()) == before + 1  # nothing has changed
     assert say(world, configure, 300, 1, -1, -1) == DENIED
     assert say(world, configure, *GROUND, -1, -1, 0, 0, 99) == UNSUPPORTED
-    assert say(world, configure, 0, 0, 0, 0, sender=(253, 1)) == ACCEPTED  # nobody, says anybody
-    assert told()[-1].primary_control_sysid == 0
+    assert (
+        say(world, configure, 0, 0, 0, 0, sender=(253, 1)) == ACCEPTED
+    )  # no controller, says another component
+    assert reported()[-1].primary_control_sysid == 0
 
 
 def test_the_own_autopilot_always_points(world):
@@ -152,7 +154,7 @@ def test_an_attitude_with_roll(world):
     half = math.radians(10.0)
     q = [math.cos(half), math.sin(half), 0.0, 0.0]
     flags = m.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | m.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
-    world.tell(
+    world.deliver(
         m.MAVLink_gimbal_manager_set_attitude_message(
             SYSTEM, GIMBAL_COMPONENT, flags, GIMBAL_COMPONENT, q, math.nan, math.nan, math.nan
         )

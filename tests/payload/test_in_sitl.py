@@ -1,4 +1,4 @@
-"""Payload on a vehicle of the SITL: routed beside the autopilot, told to the log, and to nobody's cost."""
+"""Payload on a vehicle of the SITL: routed beside the autopilot, recorded in the log, at no peer's cost."""
 
 import numpy as np
 import pytest
@@ -37,13 +37,13 @@ def frames_after(sitl: Sitl, seconds: float, *links):
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_components_are_heard_and_can_be_spoken_to_over_the_vehicles_link(flavour):
+def test_components_are_received_and_can_be_spoken_to_over_the_vehicles_link(flavour):
     sitl = Sitl(
         WorldSpec(vehicles=(VehicleSpec(system_id=4, autopilot=flavour, payload=CAMERA),), targets=(TARGET,))
     )
     client, other = sitl.connect(0), sitl.connect(0, role="gcs")
-    heard, also = frames_after(sitl, 3.0, client, other)
-    for frames in (heard, also):
+    received, also = frames_after(sitl, 3.0, client, other)
+    for frames in (received, also):
         assert {f.component_id for f in frames if f.system_id == 4} == {1, CAMERA_COMPONENT, GIMBAL_COMPONENT}
     command = m.MAVLink_command_long_message(
         4,
@@ -54,11 +54,13 @@ def test_components_are_heard_and_can_be_spoken_to_over_the_vehicles_link(flavou
         *(0.0,) * 6,
     )
     client.send(FrameEncoder(255, 190).encode(command))
-    (heard,) = frames_after(sitl, 0.2, client)
-    answers = [f.message_id for f in heard if f.component_id == GIMBAL_COMPONENT]
+    (received,) = frames_after(sitl, 0.2, client)
+    answers = [f.message_id for f in received if f.component_id == GIMBAL_COMPONENT]
     assert m.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION in answers
     assert m.MAVLINK_MSG_ID_COMMAND_ACK in answers
-    acks = [decode(f) for f in heard if f.message_id == m.MAVLINK_MSG_ID_COMMAND_ACK and f.component_id == 1]
+    acks = [
+        decode(f) for f in received if f.message_id == m.MAVLINK_MSG_ID_COMMAND_ACK and f.component_id == 1
+    ]
     assert acks == []  # not the autopilot's business
 
 
@@ -67,8 +69,8 @@ def test_targets_are_in_the_truth_and_nowhere_else():
     client = sitl.connect(0)
     truth = []
     sitl.on_truth(lambda time_us, frame: truth.append((time_us, frame)))
-    (heard,) = frames_after(sitl, 2.0, client)
-    assert not [f for f in heard if f.system_id == TARGET_SYSTEM]
+    (received,) = frames_after(sitl, 2.0, client)
+    assert not [f for f in received if f.system_id == TARGET_SYSTEM]
     parser = FrameParser()
     frames = [f for _, raw in truth for f in parser.feed(raw) if f.system_id == TARGET_SYSTEM]
     newest = decode(frames[-1])
@@ -87,9 +89,9 @@ def test_magnetometer_measures_the_map():
     carried = PayloadParameters(magnetometer=SurveyMagnetometerParameters())
     sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(payload=carried),), magnetic_field=MagneticField(survey)))
     client = sitl.connect(0)
-    (heard,) = frames_after(sitl, 2.0, client)
+    (received,) = frames_after(sitl, 2.0, client)
     values = [
-        decode(f).value for f in heard if f.component_id == MAGNETOMETER_COMPONENT and f.message_id == 251
+        decode(f).value for f in received if f.component_id == MAGNETOMETER_COMPONENT and f.message_id == 251
     ]
     assert len(values) == 20
     assert np.mean(values) == pytest.approx(48_123.0, abs=2.0)
@@ -110,7 +112,7 @@ def test_payload_changes_nothing_of_the_autopilots_own_telemetry():
                 m.MAVLink_param_set_message(1, 1, b"SR0_EXTRA1", 10.0, m.MAV_PARAM_TYPE_REAL32)
             )
         )
-        (heard,) = frames_after(sitl, 3.0, link)
-        return [f.raw for f in heard if f.component_id == 1]
+        (received,) = frames_after(sitl, 3.0, link)
+        return [f.raw for f in received if f.component_id == 1]
 
     assert telemetry(CAMERA) == telemetry(PayloadParameters())

@@ -134,7 +134,7 @@ class ServiceRig(Rig):
         assert self.handle(message)
         for event in self.commander.drain_events():
             self.events.append(event)
-            self.status.tell(event)
+            self.status.report(event)
         return [sent.result for sent in self.channel.sent if sent.get_msgId() == 77]
 
     def _set_current(self, item: int) -> bool:

@@ -66,18 +66,18 @@ class Vehicle:
     def mission(self) -> tuple[MissionItem, ...]:
         return self.stores[MissionType.MISSION].items
 
-    def tell(self, message: Any, source: Source | None = None) -> list[Any]:
+    def deliver(self, message: Any, source: Source | None = None) -> list[Any]:
         source = source or self.gcs
         deliver(message, source, self.time_us, self.service)
         return source.channel.take()  # type: ignore[attr-defined]
 
     def tick(self, seconds: float) -> list[tuple[float, Any]]:
-        start, heard = self.time_us, []
+        start, received = self.time_us, []
         while self.time_us < start + seconds * 1e6:
             self.time_us += 20_000
             self.service.tick(self.time_us)
-            heard += [((self.time_us - start) / 1e6, message) for message in self.channel.take()]
-        return heard
+            received += [((self.time_us - start) / 1e6, message) for message in self.channel.take()]
+        return received
 
     def take_texts(self) -> list[tuple[int, str]]:
         texts, self.texts = self.texts, []
@@ -127,9 +127,9 @@ def names(messages: list[Any]) -> list[str]:
 
 def upload(vehicle: Vehicle, items: list[Any], kind: int = 0) -> Any:
     """Upload obediently; the MISSION_ACK that ends it."""
-    (reply,) = vehicle.tell(count(len(items), kind))
+    (reply,) = vehicle.deliver(count(len(items), kind))
     for _ in range(3 * len(items) + 3):
         if reply.get_type() == "MISSION_ACK":
             return reply
-        (reply,) = vehicle.tell(items[reply.seq])
+        (reply,) = vehicle.deliver(items[reply.seq])
     return reply

@@ -8,7 +8,7 @@ from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
 from autopilot_bridge.services.plans.protocol import new_stores
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
-from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.memory import MemoryCard
 from tests.services.command_rig import ServiceRig
 
 DATA = {"px4": px4_services, "ardupilot": ardupilot_services}

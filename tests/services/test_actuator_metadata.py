@@ -102,12 +102,12 @@ def test_it_is_true_of_the_vehicle(kind: AirframeKind) -> None:
     assert set(outputs) <= set(FUNCTIONS)
 
 
-def test_choices_are_told_with_the_parameters() -> None:
+def test_choices_are_reported_with_the_parameters() -> None:
     entries: Any = parameter_metadata(table(AirframeKind.MULTICOPTER))["parameters"]
     by_name = {entry["name"]: entry for entry in entries}
-    told = {choice["value"]: choice["description"] for choice in by_name["PWM_MAIN_FUNC1"]["values"]}
-    assert told == FUNCTIONS
-    assert told[101] == "Motor 1" and told[208] == "Servo 8"
+    reported = {choice["value"]: choice["description"] for choice in by_name["PWM_MAIN_FUNC1"]["values"]}
+    assert reported == FUNCTIONS
+    assert reported[101] == "Motor 1" and reported[208] == "Servo 8"
     assert "values" not in by_name["MPC_XY_CRUISE"]
 
 

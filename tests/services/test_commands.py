@@ -192,7 +192,7 @@ def test_ardupilot_reposition(frame: int, latitude: int, flags: int, state: str,
         rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, flags, 0, 0, latitude, HERE[1], 20.0, frame=frame) == acks
     )
     if frame == 1:
-        assert rig.channel.texts() == []  # nobody greeted this channel
+        assert rig.channel.texts() == []  # nothing was received on this channel
     rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, 0, latitude, HERE[1], 20.0, frame=1)
     assert rig.channel.texts() == ["Unknown mavlink coordinate frame 1"]

@@ -14,7 +14,7 @@ from autopilot_bridge.services.commands.handlers import Command
 from tests.services.command_rig import Channel, ServiceRig
 from tests.services.dispatch import deliver
 from tests.services.parts_rig import parts_of
-from tests.services.test_small_services import Vehicle
+from tests.services.test_device_services import Vehicle
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NAN = float("nan")

@@ -98,7 +98,7 @@ def test_refused_arming_brings_the_reasons() -> None:
     assert ids[-1] == px4_events.HEALTH_SUMMARY.event_id
 
 
-def test_report_comes_to_a_station_that_is_heard_and_to_who_asks() -> None:
+def test_report_comes_to_a_station_that_is_received_and_to_who_asks() -> None:
     rig = Rig()
     rig.service.tick(10_000_000)
     first = rig.sent()
@@ -109,8 +109,8 @@ def test_report_comes_to_a_station_that_is_heard_and_to_who_asks() -> None:
     assert rig.sent() == []
     asked = Command(mavlink.MAV_CMD_RUN_PREARM_CHECKS, *(0.0,) * 7, None)
     assert rig.service.commands[asked.id](asked, Source(rig.link, 255, 190)) is Result.ACCEPTED
-    told = [message.id for message in rig.sent()]
-    assert not rig.commander.arming_reasons and px4_events.HEALTH_SUMMARY.event_id in told
+    reported = [message.id for message in rig.sent()]
+    assert not rig.commander.arming_reasons and px4_events.HEALTH_SUMMARY.event_id in reported
 
 
 def test_report_comes_once_until_it_changes() -> None:

@@ -317,7 +317,7 @@ def test_old_and_absent_sectors_limit_nothing() -> None:
     assert circle.speed_limit(0.0, 600_000, **asked) == math.inf
     circle.take(0.0, math.tau, math.inf, 700_000)
     assert circle.speed_limit(0.0, 700_000, **asked) == math.inf
-    assert int((circle.told_us == 700_000).sum()) == SECTORS
+    assert int((circle.measured_us == 700_000).sum()) == SECTORS
 
 
 # a target's motion

@@ -56,7 +56,7 @@ class GroundStation:
         self.send = send
         self.items = [self._item(seq, altitude_m) for seq in range(size)]
         self.result: int | None = None
-        self.heard = False
+        self.received = False
         self.got: dict[int, Any] = {}
         self.total: int | None = None
         self.downloading = False
@@ -75,7 +75,7 @@ class GroundStation:
             return
         if not self.downloading:
             if kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT") and message.seq < len(self.items):
-                self.heard = True
+                self.received = True
                 self.send(self.items[message.seq])
             elif kind == "MISSION_ACK" and message.type != mavlink.MAV_MISSION_INVALID_SEQUENCE:
                 self.result = message.type
@@ -97,7 +97,7 @@ class GroundStation:
             self._ask(now_us)
         elif now_us >= GIVE_UP_US // 2:
             self.downloading = True
-        elif not self.heard:  # from then on it is the vehicle that repeats itself
+        elif not self.received:  # from then on it is the vehicle that repeats itself
             self.asked_us = now_us
             self.send(mavlink.MAVLink_mission_count_message(1, 1, len(self.items)))
 

@@ -87,30 +87,30 @@ def test_ardupilot_refuses_a_circle_of_no_radius(ardupilot: Vehicle) -> None:
 
 def test_px4_download(px4: Vehicle) -> None:
     end = upload(px4, [item(0, TAKEOFF, frame=RELATIVE), item(1, frame=0, params=(1, 2, 3, -90)), item(2)])
-    (total,) = px4.tell(request_list())
+    (total,) = px4.deliver(request_list())
     assert (total.count, total.opaque_id) == (3, end.opaque_id)
-    got = [px4.tell(request(seq))[0] for seq in range(3)]
+    got = [px4.deliver(request(seq))[0] for seq in range(3)]
     assert names(got) == ["MISSION_ITEM_INT"] * 3
     assert [message.frame for message in got] == [6, 5, 6]
     assert [message.current for message in got] == [1, 0, 0]
     assert (got[1].x, got[1].y, got[1].z) == (LAT, LON, 10.0)
     # PX4 keeps hold time, radius and heading (0..360) of a waypoint, and nothing of the third parameter
     assert (got[1].param1, got[1].param2, got[1].param3, got[1].param4) == (1, 2, 0, 270)
-    (repeated,) = px4.tell(request(2, as_int=False))
+    (repeated,) = px4.deliver(request(2, as_int=False))
     assert (repeated.get_type(), repeated.frame) == ("MISSION_ITEM", 3)
-    assert px4.tell(ack(0)) == []
-    assert px4.tell(request(0)) == []
+    assert px4.deliver(ack(0)) == []
+    assert px4.deliver(request(0)) == []
 
 
 def test_px4_download_refuses_jumps_and_ends_in_silence(px4: Vehicle) -> None:
     upload(px4, plan(4))
-    assert px4.tell(request(0)) == []
-    px4.tell(request_list())
-    (reply,) = px4.tell(request(99))
+    assert px4.deliver(request(0)) == []
+    px4.deliver(request_list())
+    (reply,) = px4.deliver(request(99))
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", 1)
     assert px4.take_texts() == [(2, "WPM: REJ. CMD: Req. WP was unexpected")]
-    px4.tell(request_list())
-    (reply,) = px4.tell(count(3))
+    px4.deliver(request_list())
+    (reply,) = px4.deliver(count(3))
     assert reply.type == 1
     assert px4.take_texts() == [(2, "WPM: IGN MISSION_COUNT: Busy")]
     px4.tick(5.1)
@@ -122,43 +122,43 @@ def test_a_slow_download_goes_on_while_requests_come(px4: Vehicle) -> None:
     """The timeout of 5 s counts from the last request, whenever the download began."""
     upload(px4, plan(4))
     px4.tick(100.0)
-    px4.tell(request_list())
+    px4.deliver(request_list())
     for seq in range(4):
         px4.tick(4.5)
-        assert names(px4.tell(request(seq))) == ["MISSION_ITEM_INT"]
+        assert names(px4.deliver(request(seq))) == ["MISSION_ITEM_INT"]
     assert px4.take_texts() == []
 
 
 def test_a_download_shows_one_plan_though_another_is_uploaded_meanwhile(px4: Vehicle) -> None:
     upload(px4, plan(4))
-    px4.tell(request_list())
+    px4.deliver(request_list())
     stranger = Source(px4.other, 254, 1)
-    px4.tell(count(1), stranger)
-    px4.tell(item(0, TAKEOFF, z=77.0), stranger)
+    px4.deliver(count(1), stranger)
+    px4.deliver(item(0, TAKEOFF, z=77.0), stranger)
     assert len(px4.mission) == 1
-    assert [px4.tell(request(seq))[0].z for seq in range(4)] == [10.0] * 4
+    assert [px4.deliver(request(seq))[0].z for seq in range(4)] == [10.0] * 4
 
 
 def test_ardupilot_download(ardupilot: Vehicle) -> None:
-    (total,) = ardupilot.tell(request_list())
+    (total,) = ardupilot.deliver(request_list())
     assert total.count == 0
     rtl = item(3, 20, frame=2, params=(0, 0, 0, 0), x=0, y=0)
     upload(ardupilot, [item(0, z=3.0), item(1, TAKEOFF), item(2, frame=0), rtl])
-    (home,) = ardupilot.tell(request(0))
+    (home,) = ardupilot.deliver(request(0))
     assert (home.command, home.frame, home.x, home.y) == (16, 0, 473977400, 85455900)
     assert home.z == pytest.approx(489.4)
-    got = [ardupilot.tell(request(seq))[0] for seq in (3, 1, 2)]
+    got = [ardupilot.deliver(request(seq))[0] for seq in (3, 1, 2)]
     assert [(message.seq, message.command, message.frame) for message in got] == [
         (3, 20, 0),
         (1, TAKEOFF, 3),
         (2, 16, 0),
     ]
     assert not any(message.current for message in got)
-    failed = ardupilot.tell(request(4))
+    failed = ardupilot.deliver(request(4))
     assert names(failed) == ["MISSION_ACK", "MISSION_COUNT"]
     assert (failed[0].type, failed[1].count) == (1, 4)
     ardupilot.take_texts()
-    (single,) = ardupilot.tell(request(1, as_int=False))
+    (single,) = ardupilot.deliver(request(1, as_int=False))
     assert single.get_type() == "MISSION_ITEM"
     assert ardupilot.take_texts() == [(4, "got MISSION_REQUEST; use MISSION_REQUEST_INT!")]
 
@@ -166,10 +166,10 @@ def test_ardupilot_download(ardupilot: Vehicle) -> None:
 def test_ardupilot_home_follows_the_vehicle(ardupilot: Vehicle) -> None:
     ardupilot.home = None
     upload(ardupilot, [item(0, z=math.nan), item(1, TAKEOFF)])
-    (home,) = ardupilot.tell(request(0))
+    (home,) = ardupilot.deliver(request(0))
     assert home.z == 0.0
     ardupilot.home = HOME
-    (home,) = ardupilot.tell(request(0))
+    (home,) = ardupilot.deliver(request(0))
     assert home.z == pytest.approx(489.4)
 
 
@@ -178,14 +178,14 @@ def test_ardupilot_partial_write(ardupilot: Vehicle) -> None:
     ardupilot.take_texts()
     write = mavlink.MAVLink_mission_write_partial_list_message
     for start, end in ((3, 4), (-1, 0), (2, 1)):
-        (reply,) = ardupilot.tell(write(1, 1, start, end, 0))
+        (reply,) = ardupilot.deliver(write(1, 1, start, end, 0))
         assert reply.type == 1
         assert ardupilot.take_texts() == [(4, "Flight plan update rejected")]
-    (asked,) = ardupilot.tell(write(1, 1, 1, 2, 0))
+    (asked,) = ardupilot.deliver(write(1, 1, 1, 2, 0))
     assert asked.seq == 1
-    ardupilot.tell(item(1, z=55.0))
+    ardupilot.deliver(item(1, z=55.0))
     assert [each.z for each in ardupilot.mission[1:]] == [10.0, 10.0, 10.0]
-    (end,) = ardupilot.tell(item(2, z=56.0))
+    (end,) = ardupilot.deliver(item(2, z=56.0))
     assert end.type == 0
     assert [each.z for each in ardupilot.mission[1:]] == [55.0, 56.0, 10.0]
 
@@ -193,8 +193,8 @@ def test_ardupilot_partial_write(ardupilot: Vehicle) -> None:
 def test_partial_messages_that_get_no_answer(px4: Vehicle, ardupilot: Vehicle) -> None:
     for vehicle in (px4, ardupilot):
         upload(vehicle, plan(4))
-        assert vehicle.tell(mavlink.MAVLink_mission_request_partial_list_message(1, 1, 0, 2, 0)) == []
-    assert px4.tell(mavlink.MAVLink_mission_write_partial_list_message(1, 1, 1, 2, 0)) == []
+        assert vehicle.deliver(mavlink.MAVLink_mission_request_partial_list_message(1, 1, 0, 2, 0)) == []
+    assert px4.deliver(mavlink.MAVLink_mission_write_partial_list_message(1, 1, 1, 2, 0)) == []
 
 
 # --- progress -----------------------------------------------------------------------------------------------
@@ -208,14 +208,14 @@ def test_set_current(px4: Vehicle, ardupilot: Vehicle) -> None:
         upload(vehicle, plan(4))
         vehicle.take_texts()
         vehicle.tick(0.02)
-    assert px4.tell(choose(2)) == []
-    ((_, told),) = px4.tick(0.02)
-    assert (told.get_type(), told.seq, told.total) == ("MISSION_CURRENT", 2, 4)
-    assert px4.tell(choose(77)) == []
+    assert px4.deliver(choose(2)) == []
+    ((_, reported),) = px4.tick(0.02)
+    assert (reported.get_type(), reported.seq, reported.total) == ("MISSION_CURRENT", 2, 4)
+    assert px4.deliver(choose(77)) == []
     assert px4.take_texts() == [(2, "WPM: WP CURR CMD: Not in list")]
-    (told,) = ardupilot.tell(choose(2))
-    assert (told.get_type(), told.seq, told.total) == ("MISSION_CURRENT", 2, 3)
-    assert ardupilot.tell(choose(4)) == []
+    (reported,) = ardupilot.deliver(choose(2))
+    assert (reported.get_type(), reported.seq, reported.total) == ("MISSION_CURRENT", 2, 3)
+    assert ardupilot.deliver(choose(4)) == []
     assert ardupilot.take_texts() == []
 
 
@@ -239,8 +239,8 @@ def test_mission_current_on_the_wire_is_what_px4_sent() -> None:
 def test_plan_identifiers_pass_an_encoder_that_does_not_know_them(px4: Vehicle) -> None:
     payloads: list[tuple[int, bytes]] = []
     px4.channel.send_payload = lambda number, payload: payloads.append((number, payload))  # type: ignore[attr-defined]
-    px4.tell(count(1))
-    px4.tell(item(0, TAKEOFF))
+    px4.deliver(count(1))
+    px4.deliver(item(0, TAKEOFF))
     plan_id = px4.stores[MissionType.MISSION].plan_id
     assert payloads == [(mavlink.MAVLINK_MSG_ID_MISSION_ACK, b"\xff\xbe\0\0" + plan_id.to_bytes(4, "little"))]
 
@@ -272,11 +272,11 @@ def test_item_reached(px4: Vehicle, ardupilot: Vehicle) -> None:
         vehicle.tick(0.1)
         vehicle.other.take()
         vehicle.service.item_reached(1)
-        heard = vehicle.tick(0.02)
-        assert [message.seq for _, message in heard] == [1]
-        heard = vehicle.tick(20.0)
-        assert names([message for _, message in heard]) == ["MISSION_ITEM_REACHED"] * repeats
-        assert [round(when) for when, _ in heard] == list(range(1, repeats + 1))
+        received = vehicle.tick(0.02)
+        assert [message.seq for _, message in received] == [1]
+        received = vehicle.tick(20.0)
+        assert names([message for _, message in received]) == ["MISSION_ITEM_REACHED"] * repeats
+        assert [round(when) for when, _ in received] == list(range(1, repeats + 1))
         assert len(vehicle.other.take()) == repeats + 1
 
 
@@ -305,12 +305,12 @@ def test_upload_while_the_mission_is_flown(px4: Vehicle, ardupilot: Vehicle) -> 
 
 
 def test_guided_items_of_old_clients(ardupilot: Vehicle, px4: Vehicle) -> None:
-    (reply,) = ardupilot.tell(item(0, z=30.0, current=2, params=(0, 0, 0, 0)))
+    (reply,) = ardupilot.deliver(item(0, z=30.0, current=2, params=(0, 0, 0, 0)))
     assert reply.type == 0
     assert [each.z for each in ardupilot.guided] == [30.0]
-    (reply,) = ardupilot.tell(item(0, x=2**31 - 1, current=2, params=(0, 0, 0, 0)))
+    (reply,) = ardupilot.deliver(item(0, x=2**31 - 1, current=2, params=(0, 0, 0, 0)))
     assert reply.type == mavlink.MAV_MISSION_INVALID_PARAM5_X
-    px4.tell(item(0, current=2))
+    px4.deliver(item(0, current=2))
     assert px4.guided == []
 
 

@@ -28,44 +28,44 @@ from tests.services.mission_rig import (
 
 def test_px4_asks_for_the_first_item_ever_with_the_float_message(px4: Vehicle) -> None:
     items = plan(3)
-    (first,) = px4.tell(count(3))
+    (first,) = px4.deliver(count(3))
     assert (first.get_type(), first.seq) == ("MISSION_REQUEST", 0)
-    (second,) = px4.tell(items[0])
+    (second,) = px4.deliver(items[0])
     assert (second.get_type(), second.seq) == ("MISSION_REQUEST_INT", 1)
-    px4.tell(items[1])
-    (end,) = px4.tell(items[2])
+    px4.deliver(items[1])
+    (end,) = px4.deliver(items[2])
     assert (end.get_type(), end.type) == ("MISSION_ACK", 0)
     assert (end.target_system, end.target_component) == (255, 190)
     assert end.opaque_id == px4.stores[MissionType.MISSION].plan_id != 0
-    (again,) = px4.tell(count(3))
+    (again,) = px4.deliver(count(3))
     assert again.get_type() == "MISSION_REQUEST_INT"
     assert len(px4.mission) == 3
     assert px4.changes == [MissionType.MISSION]
 
 
 def test_px4_turns_to_the_integer_message_when_the_float_one_is_refused(px4: Vehicle) -> None:
-    px4.tell(count(2))
-    (asked,) = px4.tell(ack(mavlink.MAV_MISSION_UNSUPPORTED))
+    px4.deliver(count(2))
+    (asked,) = px4.deliver(ack(mavlink.MAV_MISSION_UNSUPPORTED))
     assert (asked.get_type(), asked.seq) == ("MISSION_REQUEST_INT", 0)
 
 
 def test_ardupilot_always_asks_with_mission_request(ardupilot: Vehicle) -> None:
     items = plan(3)
-    asked = ardupilot.tell(count(3)) + ardupilot.tell(items[0]) + ardupilot.tell(items[1])
+    asked = ardupilot.deliver(count(3)) + ardupilot.deliver(items[0]) + ardupilot.deliver(items[1])
     assert [(message.get_type(), message.seq) for message in asked] == [
         ("MISSION_REQUEST", 0),
         ("MISSION_REQUEST", 1),
         ("MISSION_REQUEST", 2),
     ]
-    (end,) = ardupilot.tell(items[2])
+    (end,) = ardupilot.deliver(items[2])
     assert (end.get_type(), end.type, end.opaque_id) == ("MISSION_ACK", 0, 0)
     assert ardupilot.take_texts() == [(mavlink.MAV_SEVERITY_INFO, "Flight plan received")]
 
 
 def test_float_items_are_taken(vehicle: Vehicle) -> None:
-    vehicle.tell(count(2))
+    vehicle.deliver(count(2))
     for seq in range(2):
-        (reply,) = vehicle.tell(
+        (reply,) = vehicle.deliver(
             mavlink.MAVLink_mission_item_message(
                 1, 1, seq, RELATIVE, TAKEOFF if seq == 0 else WAYPOINT, 0, 1, 0, 0, 0, 0, 47.5, 8.5, 10.0
             )
@@ -85,15 +85,15 @@ def test_silence(flavour: str, retry_s: float, timeout_s: float, text: tuple[int
     upload(vehicle, plan(3))
     before = vehicle.mission
     vehicle.take_texts()
-    vehicle.tell(count(5))
-    vehicle.tell(plan(5)[0])
-    heard = vehicle.tick(12.0)
-    again = [(when, message) for when, message in heard if "REQUEST" in message.get_type()]
+    vehicle.deliver(count(5))
+    vehicle.deliver(plan(5)[0])
+    received = vehicle.tick(12.0)
+    again = [(when, message) for when, message in received if "REQUEST" in message.get_type()]
     assert again[0][0] == pytest.approx(retry_s, abs=0.03)
     assert all(message.seq == 1 for _, message in again)
     assert timeout_s - retry_s - 0.05 < again[-1][0] <= timeout_s + 0.03
     assert vehicle.take_texts() == [text]
-    ends = [(when, message.type) for when, message in heard if message.get_type() == "MISSION_ACK"]
+    ends = [(when, message.type) for when, message in received if message.get_type() == "MISSION_ACK"]
     assert ends == ([] if flavour == "px4" else [(pytest.approx(8.02, abs=0.03), 15)])
     assert vehicle.mission == before
     assert upload(vehicle, plan(2)).type == 0
@@ -101,44 +101,44 @@ def test_silence(flavour: str, retry_s: float, timeout_s: float, text: tuple[int
 
 def test_px4_ignores_items_out_of_sequence(px4: Vehicle) -> None:
     items = plan(4)
-    px4.tell(count(4))
-    assert px4.tell(items[2]) == []
+    px4.deliver(count(4))
+    assert px4.deliver(items[2]) == []
     assert [message.seq for _, message in px4.tick(0.3)] == [0]
 
 
 def test_ardupilot_refuses_items_out_of_sequence_and_goes_on(ardupilot: Vehicle) -> None:
     items = plan(3)
-    ardupilot.tell(count(3))
-    ardupilot.tell(items[0])
+    ardupilot.deliver(count(3))
+    ardupilot.deliver(items[0])
     for wrong in (items[0], items[2]):
-        (reply,) = ardupilot.tell(wrong)
+        (reply,) = ardupilot.deliver(wrong)
         assert (reply.get_type(), reply.type) == ("MISSION_ACK", mavlink.MAV_MISSION_INVALID_SEQUENCE)
-    ardupilot.tell(items[1])
-    (end,) = ardupilot.tell(items[2])
+    ardupilot.deliver(items[1])
+    (end,) = ardupilot.deliver(items[2])
     assert end.type == 0
 
 
 def test_second_count(px4: Vehicle, ardupilot: Vehicle) -> None:
     for vehicle in (px4, ardupilot):
-        vehicle.tell(count(4))
-        vehicle.tell(plan(4)[0])
-    (reply,) = px4.tell(count(4))
+        vehicle.deliver(count(4))
+        vehicle.deliver(plan(4)[0])
+    (reply,) = px4.deliver(count(4))
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", 1)
     assert px4.take_texts() == [(2, "WPM: REJ. CMD: Busy")]
-    (asked,) = px4.tell(plan(4)[1])
+    (asked,) = px4.deliver(plan(4)[1])
     assert asked.seq == 2
-    (restarted,) = ardupilot.tell(count(2))
+    (restarted,) = ardupilot.deliver(count(2))
     assert (restarted.get_type(), restarted.seq) == ("MISSION_REQUEST", 0)
 
 
 def test_a_count_again_before_the_first_item_is_answered_again(px4: Vehicle) -> None:
-    px4.tell(count(4))
-    (asked,) = px4.tell(count(4))
+    px4.deliver(count(4))
+    (asked,) = px4.deliver(count(4))
     assert (asked.get_type(), asked.seq) == ("MISSION_REQUEST", 0)
 
 
 def test_unsolicited_items(vehicle: Vehicle) -> None:
-    (reply,) = vehicle.tell(item(3))
+    (reply,) = vehicle.deliver(item(3))
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", mavlink.MAV_MISSION_ERROR)
     px4 = vehicle.policy is PX4_MISSION_POLICY
     assert ((2, "IGN MISSION_ITEM: No transfer") in vehicle.texts) == px4
@@ -147,17 +147,17 @@ def test_unsolicited_items(vehicle: Vehicle) -> None:
 def test_px4_acknowledges_the_last_item_again(px4: Vehicle) -> None:
     items = plan(3)
     first = upload(px4, items)
-    (again,) = px4.tell(items[-1])
+    (again,) = px4.deliver(items[-1])
     assert (again.type, again.opaque_id) == (0, first.opaque_id)
 
 
 @pytest.mark.parametrize(("flavour", "capacity"), [("px4", 10_000), ("ardupilot", 650)])
 def test_capacity(flavour: str, capacity: int) -> None:
     vehicle = Vehicle(flavour)
-    (asked,) = vehicle.tell(count(capacity))
+    (asked,) = vehicle.deliver(count(capacity))
     assert "REQUEST" in asked.get_type()
     vehicle = Vehicle(flavour)
-    (reply,) = vehicle.tell(count(capacity + 1))
+    (reply,) = vehicle.deliver(count(capacity + 1))
     assert reply.type == mavlink.MAV_MISSION_NO_SPACE
     assert vehicle.texts == ([] if flavour == "px4" else [(4, "Only 650 items are supported")])
 
@@ -165,7 +165,7 @@ def test_capacity(flavour: str, capacity: int) -> None:
 def test_count_zero_and_clear_all_empty_the_plan(vehicle: Vehicle) -> None:
     for emptying in (count(0), mavlink.MAVLink_mission_clear_all_message(1, 1, 0)):
         upload(vehicle, plan(3))
-        (reply,) = vehicle.tell(emptying)
+        (reply,) = vehicle.deliver(emptying)
         assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0)
         assert vehicle.mission == ()
         assert not vehicle.service.mission_valid()
@@ -174,15 +174,15 @@ def test_count_zero_and_clear_all_empty_the_plan(vehicle: Vehicle) -> None:
 def test_clear_all_types(px4: Vehicle, ardupilot: Vehicle) -> None:
     upload(px4, plan(3))
     for kind in (255, 7):
-        (reply,) = px4.tell(mavlink.MAVLink_mission_clear_all_message(1, 1, kind))
+        (reply,) = px4.deliver(mavlink.MAVLink_mission_clear_all_message(1, 1, kind))
         assert reply.type == 0
     assert px4.mission == ()
     upload(ardupilot, plan(3))
     for kind in (255, 7):
-        (reply,) = ardupilot.tell(mavlink.MAVLink_mission_clear_all_message(1, 1, kind))
+        (reply,) = ardupilot.deliver(mavlink.MAVLink_mission_clear_all_message(1, 1, kind))
         assert reply.type == mavlink.MAV_MISSION_UNSUPPORTED
     ardupilot.task.active = True
-    (reply,) = ardupilot.tell(mavlink.MAVLink_mission_clear_all_message(1, 1, 0))
+    (reply,) = ardupilot.deliver(mavlink.MAVLink_mission_clear_all_message(1, 1, 0))
     assert reply.type == mavlink.MAV_MISSION_ERROR
     assert len(ardupilot.mission) == 3
 
@@ -191,9 +191,9 @@ def test_the_partner_can_cancel(vehicle: Vehicle) -> None:
     upload(vehicle, plan(3))
     vehicle.tick(0.1)
     before = vehicle.mission
-    vehicle.tell(count(4))
-    vehicle.tell(plan(4)[0])
-    assert vehicle.tell(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED)) == []
+    vehicle.deliver(count(4))
+    vehicle.deliver(plan(4)[0])
+    assert vehicle.deliver(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED)) == []
     vehicle.take_texts()
     assert vehicle.tick(10.0) == []
     assert vehicle.take_texts() == []
@@ -202,14 +202,14 @@ def test_the_partner_can_cancel(vehicle: Vehicle) -> None:
 
 def test_another_partner_does_not_disturb_an_upload(vehicle: Vehicle) -> None:
     items = plan(3)
-    vehicle.tell(count(3))
+    vehicle.deliver(count(3))
     stranger = Source(vehicle.other, 254, 1)
-    (reply,) = vehicle.tell(count(2), stranger)
+    (reply,) = vehicle.deliver(count(2), stranger)
     assert reply.type == vehicle.policy.foreign_count_result
-    vehicle.tell(item(0, z=99.0), stranger)
-    vehicle.tell(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED), stranger)
+    vehicle.deliver(item(0, z=99.0), stranger)
+    vehicle.deliver(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED), stranger)
     for each in items:
-        (reply,) = vehicle.tell(each)
+        (reply,) = vehicle.deliver(each)
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0)
     assert vehicle.mission[1].z == 10.0
 
@@ -217,24 +217,24 @@ def test_another_partner_does_not_disturb_an_upload(vehicle: Vehicle) -> None:
 @pytest.mark.parametrize("changed", [{"system_id": 254}, {"component_id": 191}])
 def test_a_partner_is_a_component_on_a_channel(vehicle: Vehicle, changed: dict[str, int]) -> None:
     """The answers go to the client that sent the message; a cancellation by another one has no effect."""
-    vehicle.tell(count(3))
+    vehicle.deliver(count(3))
     stranger = vehicle.gcs._replace(**changed)
-    (reply,) = vehicle.tell(count(2), stranger)
+    (reply,) = vehicle.deliver(count(2), stranger)
     assert reply.type == vehicle.policy.foreign_count_result
     assert (reply.target_system, reply.target_component) == (stranger.system_id, stranger.component_id)
     twin = vehicle.gcs._replace(channel=vehicle.other)
     for other in (stranger, twin):
-        assert vehicle.tell(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED), other) == []
-        assert vehicle.tell(ack(mavlink.MAV_MISSION_UNSUPPORTED), other) == []
+        assert vehicle.deliver(ack(mavlink.MAV_MISSION_OPERATION_CANCELLED), other) == []
+        assert vehicle.deliver(ack(mavlink.MAV_MISSION_UNSUPPORTED), other) == []
     for each in plan(3):
-        (reply,) = vehicle.tell(each)
+        (reply,) = vehicle.deliver(each)
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0) and len(vehicle.stores[0].items) == 3
 
 
 def test_an_item_of_another_partner_is_refused_as_each_firmware_does(vehicle: Vehicle) -> None:
-    vehicle.tell(count(3))
+    vehicle.deliver(count(3))
     stranger = vehicle.gcs._replace(component_id=191)
-    replies = vehicle.tell(item(0, z=99.0), stranger)
+    replies = vehicle.deliver(item(0, z=99.0), stranger)
     if vehicle.policy is PX4_MISSION_POLICY:
         assert replies == [] and vehicle.texts[-1][1] == "REJ. MIS ITEM: partner id mismatch"
     else:
@@ -249,7 +249,7 @@ def test_the_last_item_again_is_acknowledged_again_for_its_sender(
     items = plan(2)
     upload(px4, items)
     plan_id = px4.stores[MissionType.MISSION].plan_id
-    (again,) = px4.tell(items[1])
+    (again,) = px4.deliver(items[1])
     assert (again.type, again.opaque_id) == (0, plan_id)
     for message, source in (
         (items[0], px4.gcs),
@@ -258,7 +258,7 @@ def test_the_last_item_again_is_acknowledged_again_for_its_sender(
         (items[1], px4.gcs._replace(channel=px4.other)),
     ):
         px4.take_texts()
-        (refused,) = px4.tell(message, source)
+        (refused,) = px4.deliver(message, source)
         assert refused.type == mavlink.MAV_MISSION_ERROR
         assert px4.take_texts()[-1][1] == "IGN MISSION_ITEM: No transfer"
 
@@ -270,13 +270,13 @@ def test_when_an_item_is_requested_again_and_when_the_upload_ends(
     flavour: str, retry_s: float, timeout_s: float, ends: list[int]
 ) -> None:
     vehicle = Vehicle(flavour)
-    vehicle.tell(count(2))
-    heard = vehicle.tick(timeout_s + 3.0)
-    asked = [at for at, message in heard if message.get_type().startswith("MISSION_REQUEST")]
+    vehicle.deliver(count(2))
+    received = vehicle.tick(timeout_s + 3.0)
+    asked = [at for at, message in received if message.get_type().startswith("MISSION_REQUEST")]
     tick_s = 0.02
     step_s = tick_s * (math.floor(retry_s / tick_s + 1e-9) + 1)  # after the time, not at it
     assert asked == pytest.approx([step_s * (k + 1) for k in range(int(timeout_s / step_s + 1e-9))])
-    acks = [(at, message.type) for at, message in heard if message.get_type() == "MISSION_ACK"]
+    acks = [(at, message.type) for at, message in received if message.get_type() == "MISSION_ACK"]
     assert [kind for _, kind in acks] == ends
     assert [at for at, _ in acks] == pytest.approx([timeout_s + tick_s] * len(ends))
 
@@ -289,14 +289,14 @@ def test_a_part_of_a_plan_is_uploaded_again(
 ) -> None:
     upload(ardupilot, plan(3))
     message = mavlink.MAVLink_mission_write_partial_list_message(1, 1, first, last, 0)
-    (reply,) = ardupilot.tell(message)
+    (reply,) = ardupilot.deliver(message)
     assert (reply.get_type() == "MISSION_REQUEST") == accepted
     if not accepted:
         assert reply.type == mavlink.MAV_MISSION_ERROR
         return
     for seq in range(first, last + 1):
         assert reply.seq == seq
-        (reply,) = ardupilot.tell(item(seq, z=77.0))
+        (reply,) = ardupilot.deliver(item(seq, z=77.0))
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0)
     changed = [index for index, each in enumerate(ardupilot.mission) if each.z == 77.0]
     assert len(ardupilot.mission) == 3 and set(changed) == set(range(first, last + 1)) - {0}  # 0 is home
@@ -305,10 +305,10 @@ def test_a_part_of_a_plan_is_uploaded_again(
 def test_a_part_is_refused_for_another_partner_and_an_unknown_type(ardupilot: Vehicle) -> None:
     upload(ardupilot, plan(3))
     unknown = mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 1, 77)
-    assert ardupilot.tell(unknown)[0].type == mavlink.MAV_MISSION_UNSUPPORTED
-    ardupilot.tell(count(2))
+    assert ardupilot.deliver(unknown)[0].type == mavlink.MAV_MISSION_UNSUPPORTED
+    ardupilot.deliver(count(2))
     part = mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 1, 0)
-    (reply,) = ardupilot.tell(part, ardupilot.gcs._replace(component_id=191))
+    (reply,) = ardupilot.deliver(part, ardupilot.gcs._replace(component_id=191))
     assert reply.type == mavlink.MAV_MISSION_DENIED
 
 
@@ -358,15 +358,15 @@ def test_item_results(bad: Any, px4_result: int, ardupilot_result: int) -> None:
             continue
         assert vehicle.mission == before
         assert vehicle.texts == ([(2, "IGN MISSION_ITEM: Invalid item")] if flavour == "px4" else [])
-        (after,) = vehicle.tell(item(2))
+        (after,) = vehicle.deliver(item(2))
         assert after.type == mavlink.MAV_MISSION_ERROR
 
 
 def test_unknown_mission_types(px4: Vehicle, ardupilot: Vehicle) -> None:
     for vehicle in (px4, ardupilot):
-        (reply,) = vehicle.tell(count(2, kind=7))
+        (reply,) = vehicle.deliver(count(2, kind=7))
         assert reply.type == mavlink.MAV_MISSION_UNSUPPORTED
-    (reply,) = px4.tell(request_list(7))
+    (reply,) = px4.deliver(request_list(7))
     assert (reply.get_type(), reply.count) == ("MISSION_COUNT", 0)
-    (reply,) = ardupilot.tell(request_list(7))
+    (reply,) = ardupilot.deliver(request_list(7))
     assert reply.type == mavlink.MAV_MISSION_UNSUPPORTED

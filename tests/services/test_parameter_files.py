@@ -40,7 +40,7 @@ def test_reads_both_formats() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("\nMPC_XY_CRUISE fast\n", "f.parm, line 2: 'MPC_XY_CRUISE fast': accepted is a finite number"),
         ("MPC_XY_CRUISE nan", "line 1: 'MPC_XY_CRUISE nan': accepted is a finite number"),
@@ -49,10 +49,10 @@ def test_reads_both_formats() -> None:
         ("MPC_XY_CRUISE_SPEED 6", "line 1: name 'MPC_XY_CRUISE_SPEED'; accepted: up to 16 ASCII characters"),
     ],
 )
-def test_errors_give_line_value_and_what_is_accepted(text: str, told: str) -> None:
+def test_errors_give_line_value_and_what_is_accepted(text: str, reported: str) -> None:
     with pytest.raises(ParameterError) as caught:
         parse_untyped_parameters(text, source="f.parm")
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 @pytest.mark.parametrize("table", [PX4_PARAMETERS, ARDUPILOT_PARAMETERS], ids=["px4", "ardupilot"])

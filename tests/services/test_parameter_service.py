@@ -56,15 +56,15 @@ class Vehicle:
         self.service = ParameterService(self.store, policy, self, on_list=self.listed_by.append)
         self.time_us = 0
 
-    def tell(self, message: Any) -> list[Any]:
+    def deliver(self, message: Any) -> list[Any]:
         assert deliver(message, Source(self.asking, 255, 190), self.time_us, self.service)
         return self.asking.take()
 
     def read(self, name: str = "", index: int = -1) -> list[Any]:
-        return self.tell(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), index))
+        return self.deliver(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), index))
 
     def write(self, name: str, value: float, kind: int) -> list[Any]:
-        return self.tell(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
+        return self.deliver(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
 
     def tick(self, times: int = 1) -> None:
         for _ in range(times):
@@ -155,7 +155,7 @@ def test_px4_silently_refuses_wrong_types_and_nan(px4: Vehicle, name: str, value
     assert px4.store.as_dict() == before
     px4.write("MPC_XY_CRUISE", 6.0, 9)
     px4.asking.take()
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     px4.tick(60)
     assert len(px4.asking.take()) == px4.store.count + 1
 
@@ -169,8 +169,8 @@ def test_ardupilot_set_is_echoed_once_to_everybody(ardupilot: Vehicle) -> None:
     for _ in range(2):
         (reply,) = ardupilot.write("WPNAV_SPEED", 800.0, 9)
         assert (reply.param_id, reply.param_value, reply.param_index) == ("WPNAV_SPEED", 800.0, 65535)
-        (heard,) = ardupilot.other.take()
-        assert heard.param_value == 800.0
+        (received,) = ardupilot.other.take()
+        assert received.param_value == 800.0
 
 
 @pytest.mark.parametrize(
@@ -187,7 +187,7 @@ def test_ardupilot_ignores_nan(ardupilot: Vehicle) -> None:
 
 
 def test_px4_list_starts_with_the_hash(px4: Vehicle) -> None:
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     px4.tick()
     first = px4.asking.take()
     assert 1 < len(first) < px4.store.count  # not in one burst
@@ -219,7 +219,7 @@ def test_px4_hash_is_the_crc_of_names_and_raw_values(px4: Vehicle) -> None:
 
 
 def test_px4_setting_the_hash_ends_the_list(px4: Vehicle) -> None:
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     px4.tick()
     px4.asking.take()
     assert px4.write("_HASH_CHECK", 0.0, 5) == []
@@ -228,7 +228,7 @@ def test_px4_setting_the_hash_ends_the_list(px4: Vehicle) -> None:
 
 
 def test_ardupilot_list_in_order_with_the_banner_hook(ardupilot: Vehicle) -> None:
-    ardupilot.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    ardupilot.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     assert ardupilot.listed_by == [ardupilot.asking]
     ardupilot.tick(33)  # 0.65 s
     messages = ardupilot.asking.take()
@@ -237,7 +237,7 @@ def test_ardupilot_list_in_order_with_the_banner_hook(ardupilot: Vehicle) -> Non
 
 
 def test_a_slow_channel_loses_nothing(px4: Vehicle) -> None:
-    px4.tell(mavlink.MAVLink_param_request_list_message(1, 1))
+    px4.deliver(mavlink.MAVLink_param_request_list_message(1, 1))
     for tick in range(400):
         px4.asking.congested = tick % 4 != 0
         px4.tick()
@@ -301,7 +301,7 @@ def test_address_rules() -> None:
 def test_whatever_arrives_nothing_raises(flavour: str, messages: list[Any]) -> None:
     vehicle = Vehicle(flavour)
     for message in messages:
-        vehicle.tell(message)
+        vehicle.deliver(message)
         vehicle.tick()
     packer = mavlink.MAVLink(None, 1, 1)
     for message in vehicle.other.take():
@@ -313,22 +313,22 @@ def test_whatever_arrives_nothing_raises(flavour: str, messages: list[Any]) -> N
     ("flavour", "name", "given"),
     [("px4", "MAV_SYS_ID", 3), ("px4", "MAV_COMP_ID", 1), ("ardupilot", "SYSID_THISMAV", 3)],
 )
-def test_the_ids_of_a_vehicle_are_told_and_stay(flavour: str, name: str, given: int) -> None:
+def test_the_ids_of_a_vehicle_are_reported_and_stay(flavour: str, name: str, given: int) -> None:
     """A change is answered with the value that is kept, and a text."""
     sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour, system_id=3, parameters={name: 9.0}),)))
     link, parser = sitl.connect(0), FrameParser()
 
-    def heard(message: Any, seconds: float) -> list[Any]:
+    def received(message: Any, seconds: float) -> list[Any]:
         link.send(FrameEncoder(255, 190).encode(message))
         until_us = sitl.time_us + round(seconds * 1e6)
         while sitl.time_us < until_us:
             sitl.advance()
         return [decode(frame) for _, data in link.receive() for frame in parser.feed(data)]
 
-    heard(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), 3.0)
+    received(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), 3.0)
     wanted = struct.unpack("<f", struct.pack("<i", 7))[0] if flavour == "px4" else 7.0
     kind = 6 if flavour == "px4" else 4
-    messages = heard(mavlink.MAVLink_param_set_message(3, 1, name.encode(), wanted, kind), 0.5)
+    messages = received(mavlink.MAVLink_param_set_message(3, 1, name.encode(), wanted, kind), 0.5)
     (value,) = [m.param_value for m in messages if m.get_type() == "PARAM_VALUE" and m.param_id == name]
     assert (struct.unpack("<i", struct.pack("<f", value))[0] if flavour == "px4" else value) == given
     texts = "".join(m.text for m in messages if m.get_type() == "STATUSTEXT")

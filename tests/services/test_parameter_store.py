@@ -35,7 +35,7 @@ def test_values_are_stored_in_their_type() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "told"),
+    ("name", "value", "reported"),
     [
         ("SPEED", 7.0, "SPEED = 7: accepted is a number in 0..5 m/s"),
         ("SPEED", math.nan, "SPEED = nan: not finite"),
@@ -45,12 +45,12 @@ def test_values_are_stored_in_their_type() -> None:
         ("SPED", 1.0, "no parameter 'SPED'; did you mean SPEED?"),
     ],
 )
-def test_errors_name_parameter_value_and_what_is_accepted(name: str, value: float, told: str) -> None:
+def test_errors_name_parameter_value_and_what_is_accepted(name: str, value: float, reported: str) -> None:
     parameters = store()
     before = parameters.as_dict()
     with pytest.raises(ParameterError) as caught:
         parameters.set(name, value)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
     assert parameters.as_dict() == before
     with pytest.raises(ParameterError):
         store(**{name: value})
@@ -93,13 +93,13 @@ def test_a_used_range_overlaps_the_documented_one(flavour: str) -> None:
 
 def test_subscribers_hear_changes_only() -> None:
     parameters = store()
-    heard: list[tuple[str, float]] = []
-    unsubscribe = parameters.subscribe(lambda name, value: heard.append((name, value)))
+    received: list[tuple[str, float]] = []
+    unsubscribe = parameters.subscribe(lambda name, value: received.append((name, value)))
     assert parameters.set("MODE", 4)
     assert not parameters.set("MODE", 4)
     unsubscribe()
     parameters.set("MODE", 5)
-    assert heard == [("MODE", 4)]
+    assert received == [("MODE", 4)]
     assert parameters.get("MODE") == 5
 
 

@@ -147,7 +147,7 @@ def test_arduplane_says_why_a_mode_is_refused(number: int, text: str) -> None:
     assert rig.channel.texts() == [text]
 
 
-def test_aircraft_follow_nobody() -> None:
+def test_aircraft_follow_no_target() -> None:
     """PX4's Follow Target (AUTO 8) is refused in the air; ArduCopter's FOLLOW (23) is another mode here."""
     rig = rig_of("px4", "flying")
     before = rig.commander.mode
@@ -183,7 +183,7 @@ def test_arduplane_reposition_takes_radius_and_direction(radius_m: float, yaw: f
     assert rig.centre() == pytest.approx((400.0, 300.0, -120.0), abs=0.05)
 
 
-def test_arduplane_reposition_changes_the_mode_only_when_told() -> None:
+def test_arduplane_reposition_changes_the_mode_only_when_commanded() -> None:
     rig = rig_of("ardupilot", "flying")
     rig.commander.set_mode(FlightMode.HOLD)
     place = rig.place(400.0, 0.0)
@@ -230,7 +230,7 @@ def test_px4_takeoff_goes_to_the_place_given() -> None:
     assert place == pytest.approx((400.0, 100.0, -60.0), abs=0.5)
 
 
-def test_arduplane_change_speed_is_told() -> None:
+def test_arduplane_change_speed_is_reported() -> None:
     rig = rig_of("ardupilot", "flying")
     assert rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, 0, 30, 0) == [0]
     assert rig.channel.texts() == ["Set airspeed 30 m/s"]

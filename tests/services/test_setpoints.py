@@ -336,9 +336,9 @@ def test_long_texts_come_in_chunks() -> None:
     assert parts[-1][2] == b""
 
 
-def test_ardupilot_is_silent_until_somebody_says_hello() -> None:
+def test_ardupilot_is_silent_until_a_client_sends() -> None:
     rig = ServiceRig("ardupilot")
-    rig.status.announce(6, "nobody hears this")
+    rig.status.announce(6, "not received")
     assert rig.channel.sent == []
     rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     rig.status.banner(rig.channel)

@@ -132,7 +132,7 @@ NO_COMMAND = MissionItem(command=9999, x=47.0, y=8.0, z=5.0)
         (MissionType.RALLY, pack_plan(PLANS[MissionType.RALLY] * 60, MissionType.RALLY, 1)),
     ],
 )  # fmt: skip
-def test_what_would_not_be_taken_is_kept_aside_and_told(
+def test_what_would_not_be_taken_is_kept_aside_and_reported(
     flavour: str, kind: MissionType, content: bytes
 ) -> None:
     files = MemoryStore()
@@ -150,7 +150,7 @@ def test_what_would_not_be_taken_is_kept_aside_and_told(
     assert Vehicle(files, flavour).texts == []
 
 
-def test_a_full_card_is_told_and_the_old_plan_stays() -> None:
+def test_a_full_card_is_reported_and_the_old_plan_stays() -> None:
     files = MemoryStore(Quota(size_bytes=400, files=10))
     vehicle = Vehicle(files)
     vehicle.stores[MissionType.RALLY].replace(PLANS[MissionType.RALLY], 1)

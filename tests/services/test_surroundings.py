@@ -238,7 +238,9 @@ class Circle:
     def take(self, message: Any, source: Source = ONBOARD) -> dict[int, float]:
         """Deliver; the known distances, by sector of 5 degrees."""
         deliver(message, source, NOW_US, self.service)
-        return {int(k): float(self.map.distances_m[k]) for k in np.flatnonzero(self.map.told_us == NOW_US)}
+        return {
+            int(k): float(self.map.distances_m[k]) for k in np.flatnonzero(self.map.measured_us == NOW_US)
+        }
 
 
 def distances(*values_cm: int, **changed: Any) -> Any:

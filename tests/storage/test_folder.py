@@ -1,4 +1,4 @@
-"""A store in a folder: nobody gets out of it."""
+"""A store in a folder: no path leads out of it."""
 
 import errno
 import os

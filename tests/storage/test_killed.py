@@ -118,7 +118,7 @@ def test_stored_parameters_are_the_old_or_the_new(tmp_path: Path, steps: int) ->
     card = FolderStore(tmp_path)
     found = set(parameters(card)[0].as_dict().values())
     assert found == ({1.0} if killed else {2.0})
-    save(card, 3.0)  # what the killed one left behind is in nobody's way
+    save(card, 3.0)  # what the killed one left behind is no obstacle
     assert [entry.name for entry in card.entries(())] == [LAYOUT.parameters[-1]]
     assert set(parameters(card)[0].as_dict().values()) == {3.0}
     assert steps < STEPS - 1 or not killed

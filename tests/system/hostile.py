@@ -1,4 +1,4 @@
-"""Bytes and frames that nobody should send, from a seed."""
+"""Bytes and frames that are malformed or out of range, from a seed."""
 
 import random
 import struct

@@ -52,7 +52,7 @@ def mavutil_counts(path: Path) -> Counter[str]:
 
 
 def modes(path: Path) -> list[str]:
-    """The autopilot's modes in the order in which heartbeats told them, without repetitions."""
+    """The autopilot's modes in the order in which heartbeats reported them, without repetitions."""
     names: list[str] = []
     for _, frame in TlogReader(path):
         if frame.message_id == HEARTBEAT and frame.component_id == 1:

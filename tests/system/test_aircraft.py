@@ -71,7 +71,7 @@ def test_unknown_launches_and_models_are_refused() -> None:
 
 
 @pytest.mark.parametrize(("launch", "detects"), [("runway", 0.0), ("catapult", 1.0), ("hand", 1.0)])
-def test_the_firmware_is_told_how_the_aircraft_is_launched(launch: str, detects: float) -> None:
+def test_the_firmware_knows_how_the_aircraft_is_launched(launch: str, detects: float) -> None:
     autopilot = aircraft(launch=launch).vehicles[0].autopilot
     assert autopilot.parameters.get("FW_LAUN_DETCN_ON") == detects
     own = aircraft(launch=launch, parameters={"FW_LAUN_DETCN_ON": 1.0 - detects}).vehicles[0].autopilot

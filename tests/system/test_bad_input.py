@@ -214,9 +214,9 @@ def test_busy_port(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.fixture(scope="module")
-def nobody_there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+def no_vehicle_there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     """A flight that waits for a vehicle that never comes."""
-    folder = tmp_path_factory.mktemp("nobody") / "run"
+    folder = tmp_path_factory.mktemp("no_vehicle") / "run"
     address = f"udpin:127.0.0.1:{free_port()}"
     with started(folder, *SHORT, "--connect", address) as run:
         yield run
@@ -240,12 +240,12 @@ def test_a_parameter_out_of_range_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_no_heartbeat(nobody_there: Run) -> None:
-    """Fails with a line that says where nobody was heard, leaves a whole run folder, exit code 1."""
-    text = nobody_there.finish(exit_code=FAILED)
+def test_no_heartbeat(no_vehicle_there: Run) -> None:
+    """Fails with a line that says where no vehicle was received, leaves a whole run folder, exit code 1."""
+    text = no_vehicle_there.finish(exit_code=FAILED)
     assert "no vehicle was received on udpin:127.0.0.1" in text
     assert len([line for line in text.splitlines() if line.startswith("flightstack: ")]) == 1
-    summary = nobody_there.summary
+    summary = no_vehicle_there.summary
     assert summary["outcome"] == "failed"
     assert "no vehicle was received" in summary["reason"]
     assert set(summary["message_counts"]) <= {"HEARTBEAT"}

@@ -262,7 +262,7 @@ def test_an_unusable_map(name: str, place: Path, capsys: pytest.CaptureFixture[s
 def test_a_map_too_far_away_is_refused_before_anything_flies(
     away_deg: float, model: str, place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """28 and 7 km: the embedded vehicles' home is known before they are heard."""
+    """28 and 7 km: the embedded vehicles' home is known before they are received."""
     write_map(place / "far.npz", home_lat_deg=ZURICH["home_lat_deg"] + away_deg)
     line = refused(capsys, ["fly", "occupancy", "--map", "far.npz", "--model", model, "--out", "run"])
     assert "from the vehicle's home" in line

@@ -47,7 +47,7 @@ def serial_line() -> Iterator[Ends]:
                     if key.fd == stop_read:
                         return
                     data = os.read(key.fd, 4096)
-                    with contextlib.suppress(BlockingIOError):  # nobody reads there: lost, as on a cable
+                    with contextlib.suppress(BlockingIOError):  # no reader there: lost, as on a cable
                         os.write(other[key.fd], data)
 
     worker = threading.Thread(target=pump)

@@ -1,4 +1,4 @@
-"""One vehicle's crash is its own: clients are told, the autopilot of the wreck talks on, the others fly."""
+"""One vehicle's crash is its own: clients get a text, the autopilot of the wreck sends on, the others fly."""
 
 import math
 
@@ -25,18 +25,18 @@ def test_a_crash_ends_nothing_but_the_aircraft(flavour: str) -> None:
     def fly(*, crash: bool) -> tuple[Sitl, list[bytes]]:
         vehicles = team(2, model=["aerosonde", "iris"], autopilot=flavour, parameters={})
         sitl = Sitl(WorldSpec(vehicles=vehicles, seed=4))
-        heard: list[bytes] = []
-        sitl.connect(0).on_receive = heard.append
+        received: list[bytes] = []
+        sitl.connect(0).on_receive = received.append
         if crash:
             sitl.vehicles[0].vehicle.reset(DIVE)
         for _ in range(1500):
             sitl.advance()
-        return sitl, heard
+        return sitl, received
 
-    sitl, heard = fly(crash=True)
+    sitl, received = fly(crash=True)
     wrecked, other = sitl.vehicles
     assert wrecked.crashed and not other.crashed
-    frames = FrameParser().feed(b"".join(heard))
+    frames = FrameParser().feed(b"".join(received))
     texts = [
         (frame.component_id, decode(frame).text)
         for frame in frames

@@ -49,7 +49,7 @@ def healthy(flight: AircraftFlight, bit: int) -> bool:
 
 @pytest.mark.parametrize("failure", [OFF, STUCK])
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_airspeed_lost_is_told(flavour: str, failure: int) -> None:
+def test_airspeed_lost_is_reported(flavour: str, failure: int) -> None:
     flight = circling(flavour)
     lost_text, found_text = TEXTS[flavour]
     assert healthy(flight, AIRSPEED_BIT)
@@ -79,7 +79,7 @@ def test_px4_uses_an_airspeed_sensor_again_where_it_may() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_gps_lost_is_told(flavour: str) -> None:
+def test_gps_lost_is_reported(flavour: str) -> None:
     """Dead reckoning on airspeed: PX4 tells how well the position is still known, ArduPilot no longer calls
     it absolute.
     """

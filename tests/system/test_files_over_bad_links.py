@@ -13,8 +13,8 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.services.files.ftp_protocol import MAX_DATA, FtpError, Opcode
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage import MemoryStore, Mode, Quota
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import make_directories, read_whole
+from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
 HEADER = struct.Struct("<HBBBBBBI")
@@ -44,13 +44,13 @@ class Station:
         self.request: tuple[int, bytes] = (0, b"")
 
     def run(self, seconds: float) -> list[Any]:
-        heard: list[Any] = []
+        received: list[Any] = []
         until_us = self.sitl.time_us + round(seconds * 1e6)
         while self.sitl.time_us < until_us:
             self.sitl.advance()
             for _, data in self.link.receive():
-                heard += [decode(frame) for frame in self.parser.feed(data)]
-        return heard
+                received += [decode(frame) for frame in self.parser.feed(data)]
+        return received
 
     def ask(
         self, opcode: int, data: bytes = b"", *, session: int = 0, offset: int = 0, size: int | None = None

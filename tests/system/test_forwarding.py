@@ -15,13 +15,13 @@ class Client:
 
     def __init__(self, sitl: Sitl, system_id: int, component_id: int) -> None:
         self.encoder = FrameEncoder(system_id, component_id)
-        self.heard: list[Frame] = []
+        self.received: list[Frame] = []
         self.parser = FrameParser()
         self.link: MemoryLink = sitl.connect(0)
-        self.link.on_receive = self.hear
+        self.link.on_receive = self.receive
 
-    def hear(self, data: bytes) -> None:
-        self.heard += [
+    def receive(self, data: bytes) -> None:
+        self.received += [
             frame for frame in self.parser.feed(data) if frame.system_id != 1 or frame.component_id != 1
         ]
 
@@ -32,8 +32,8 @@ class Client:
         message = dialect.MAVLink_command_long_message(system, component, 31000, 0, *[0.0] * 7)
         self.link.send(self.encoder.encode(message))
 
-    def commands_heard(self) -> int:
-        return sum(frame.message_id == dialect.MAVLINK_MSG_ID_COMMAND_LONG for frame in self.heard)
+    def commands_received(self) -> int:
+        return sum(frame.message_id == dialect.MAVLINK_MSG_ID_COMMAND_LONG for frame in self.received)
 
 
 @pytest.fixture
@@ -51,15 +51,15 @@ def test_commands_reach_the_component_they_are_for(
     ground, camera = Client(sitl, 255, 190), Client(sitl, 1, 100)
     camera.say_hello()
     ground.command(*target)
-    assert camera.commands_heard() == forwarded
-    assert ground.commands_heard() == 0
+    assert camera.commands_received() == forwarded
+    assert ground.commands_received() == 0
 
 
 def test_a_sender_of_addressed_frames_is_learnt(sitl: Sitl) -> None:
     ground, camera = Client(sitl, 255, 190), Client(sitl, 1, 100)
     ground.command(1, 1)
     camera.command(255, 190)
-    assert ground.commands_heard() == 1
+    assert ground.commands_received() == 1
 
 
 def test_own_words_are_not_passed_on(sitl: Sitl) -> None:

@@ -205,7 +205,7 @@ def test_damaged_frames_change_nothing_at_all(damage: list[bytes]) -> None:
 
 @pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
 def test_frames_for_other_systems(flavour: str) -> None:
-    """Every message there is, and every command, for somebody else: forwarded perhaps, never obeyed."""
+    """Every message there is, and every command, for another vehicle: forwarded perhaps, never obeyed."""
     flying = hovering(flavour)
     watch = Watch(flying)
     before = flying.autopilot.parameters.as_dict()

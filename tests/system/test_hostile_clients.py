@@ -23,13 +23,13 @@ POLL_FRAMES = 60
 
 
 class Client:
-    """Somebody on a UDP socket."""
+    """A client on a UDP socket."""
 
     def __init__(self, port: int, system_id: int = 255) -> None:
         self.link: Link = open_link(f"udpout:127.0.0.1:{port}")
         self.encoder = FrameEncoder(system_id, 190)
         self.parser = FrameParser()
-        self.heard: list[Frame] = []
+        self.received: list[Frame] = []
 
     def say(self, message: Any) -> None:
         self.link.send(self.encoder.encode(message))
@@ -40,14 +40,14 @@ class Client:
 
     def listen(self) -> None:
         for _, data in self.link.receive():
-            self.heard += self.parser.feed(data)
+            self.received += self.parser.feed(data)
 
     def count(self, name: str) -> int:
-        return sum(frame.definition.name == name for frame in self.heard)
+        return sum(frame.definition.name == name for frame in self.received)
 
 
 class Scene:
-    """A vehicle that holds its place in the air, with a port for anybody."""
+    """A vehicle that holds its place in the air, with a port for any client."""
 
     def __init__(self, flavour: str, stack: ExitStack) -> None:
         self.flying = Flying(flavour)
@@ -98,10 +98,10 @@ def test_every_message_at_a_kilohertz(flavour: str) -> None:
         for number in DEFINITIONS:
             client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1000)
         there.on(3.0, client)
-        client.heard.clear()
+        client.received.clear()
         there.on(1.0, client)
-        heard = Counter(frame.message_id for frame in client.heard)
-        assert max(heard.values()) <= 250  # nothing is faster than the physics
+        received = Counter(frame.message_id for frame in client.received)
+        assert max(received.values()) <= 250  # nothing is faster than the physics
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -169,7 +169,7 @@ def test_a_thousand_ports() -> None:
             if number % 10 == 0:
                 there.on(0.004, true)
         assert len(there.channel.link.peers) <= 32
-        true.heard.clear()
+        true.received.clear()
         true.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         there.on(1.0, true)
         assert true.count("AUTOPILOT_VERSION") == 1 and true.count("ATTITUDE") > 90
@@ -190,12 +190,12 @@ def test_who_speaks_in_the_vehicles_name_is_not_listened_to(flavour: str) -> Non
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_stranger_does_not_disarm_in_the_air_unless_by_force(flavour: str) -> None:
-    """As the firmware does: without the magic number it is denied; the denial is told to who asked."""
+    """As the firmware does: without the magic number it is denied; that client gets the denial."""
     with scene(flavour) as there:
         stranger = there.client(66)
         stranger.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)
         there.on(1.0, stranger)
-        (ack,) = [frame for frame in stranger.heard if frame.definition.name == "COMMAND_ACK"]
+        (ack,) = [frame for frame in stranger.received if frame.definition.name == "COMMAND_ACK"]
         assert ack.payload[2] != dialect.MAV_RESULT_ACCEPTED
 
 

@@ -26,11 +26,11 @@ def fly_into(run: Run, mode: str) -> None:
 def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
     lines = [line for line in text.splitlines() if line]
     summary = run.summary
-    told = f"was commanded to {on_failure}"
-    assert [block["left"] for block in summary["vehicles"]] == [told] * len(summary["vehicles"])
+    reported = f"was commanded to {on_failure}"
+    assert [block["left"] for block in summary["vehicles"]] == [reported] * len(summary["vehicles"])
     ids = [block["system_id"] for block in summary["vehicles"]]
-    who = ", ".join(f"vehicle {system_id} {told}" for system_id in ids)
-    who = who if len(ids) > 1 else f"the vehicle {told}"
+    who = ", ".join(f"vehicle {system_id} {reported}" for system_id in ids)
+    who = who if len(ids) > 1 else f"the vehicle {reported}"
     assert lines == [f"flightstack: interrupted; {who}; the log is in {run.folder}"]
     assert summary["outcome"] == "interrupted"
     assert counts(run.log) == summary["message_counts"]
@@ -42,7 +42,7 @@ def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
     [slow("px4", "return", "waypoints"), ("px4", "hold", "setpoints"), ("ardupilot", "land", "waypoints")],
 )
 def test_ctrl_c_in_an_embedded_flight(flavour: str, on_failure: str, via: str, tmp_path: Path) -> None:
-    """The vehicle is told what to do, and answers, before the run ends."""
+    """The vehicle is commanded, and answers, before the run ends."""
     flight = ("--autopilot", flavour, "--via", via, "--on-failure", on_failure, "--speedup", "40")
     with started(tmp_path / "run", *LONG, *flight) as run:
         if via == "waypoints":
@@ -72,7 +72,7 @@ def test_ctrl_c_on_a_vehicle_elsewhere(flavour: str, tmp_path: Path) -> None:
 
 
 def watch_landing(port: int) -> None:
-    """Somebody else on another link sees the vehicle disarm."""
+    """Another client on another link sees the vehicle disarm."""
     from pymavlink import mavutil
 
     client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", dialect="all")

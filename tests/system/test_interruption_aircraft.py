@@ -54,11 +54,11 @@ def gps_switched_off(frame: Frame) -> bool:
 
 def last_modes(path: Path, systems: int) -> list[int]:
     """The last custom mode of each system's autopilot."""
-    told: dict[int, int] = {}
+    reported: dict[int, int] = {}
     for _, frame in records(path):
         if frame.message_id == HEARTBEAT and frame.component_id == 1:
-            told[frame.system_id] = decode(frame).custom_mode
-    return [told[system] for system in range(1, systems + 1)]
+            reported[frame.system_id] = decode(frame).custom_mode
+    return [reported[system] for system in range(1, systems + 1)]
 
 
 @pytest.mark.parametrize("flavour", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])

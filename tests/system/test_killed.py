@@ -17,8 +17,8 @@ from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.mavlink import Frame, decode, definition
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.sitl import Sitl
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.folder import FolderStore
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogReader
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
@@ -47,7 +47,7 @@ NUMBERS = {
 def sitl_and_watcher(
     flavour: str, folder: Path, parameters: str, *more: str
 ) -> Iterator[tuple[SitlProcess, str, "Watcher", Path]]:
-    """A SITL with parameters and a log, the link for a mission, and somebody who only looks."""
+    """A SITL with parameters and a log, the link for a mission, and a client that only looks."""
     port, watched = free_port(), free_port()
     given, log = folder / "given.parm", folder / "sitl.tlog"
     given.write_text(parameters)
@@ -87,18 +87,18 @@ class Watcher:
         """Wait for a mode."""
         number = NUMBERS[self.flavour, mode]
 
-        def told() -> bool:
+        def reported() -> bool:
             heartbeat = self.heartbeat()
             return heartbeat is not None and heartbeat.custom_mode == number
 
-        wait_until(told, 30.0)
+        wait_until(reported, 30.0)
 
     def sees_it_disarmed(self) -> None:
-        def told() -> bool:
+        def reported() -> bool:
             heartbeat = self.heartbeat()
             return heartbeat is not None and not heartbeat.base_mode & 128
 
-        wait_until(told, 60.0)
+        wait_until(reported, 60.0)
 
 
 def check_readable(log: Path, *, by_others: bool = True) -> None:
@@ -237,8 +237,8 @@ def test_an_estimator_is_killed(tmp_path: Path) -> None:
             wait_until(lambda: any(log.stat().st_size > 300_000 for log in folder.glob("*.tlog")))
         finally:
             estimator.kill()
-            told, _ = estimator.communicate()
-        assert b"Traceback" not in told
+            reported, _ = estimator.communicate()
+        assert b"Traceback" not in reported
         run.finish()
     assert run.summary["outcome"] == "completed"
     assert "offboard" not in modes(run.log)

@@ -30,9 +30,9 @@ class Looking:
         self.link.receive()
         self.link.send(self.encoder.encode(mavlink.MAVLink_command_long_message(1, 1, number, 0, *values)))
         self.flying.step(0.1)
-        heard = [decode(f) for _, data in self.link.receive() for f in self.parser.feed(data)]
+        received = [decode(f) for _, data in self.link.receive() for f in self.parser.feed(data)]
         return next(
-            m.result for m in reversed(heard) if m.get_type() == "COMMAND_ACK" and m.command == number
+            m.result for m in reversed(received) if m.get_type() == "COMMAND_ACK" and m.command == number
         )
 
     def look(self, number: int = ROI, east_deg: float = EAST_DEG) -> int:

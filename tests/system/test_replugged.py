@@ -40,7 +40,7 @@ class Cable:
 
 
 class Bench:
-    """A vehicle at one end of a cable, and somebody at the other."""
+    """A vehicle at one end of a cable, and a client at the other."""
 
     def __init__(self, flavour: str, folder: Path) -> None:
         self.cable = Cable(folder / "ttyVehicle")
@@ -54,17 +54,17 @@ class Bench:
         self._parser = FrameParser()
 
     def run(self, seconds: float, *, listen: bool = True) -> list[Any]:
-        """What is heard at the other end in so many seconds of the vehicle's time."""
-        heard: list[Any] = []
+        """What is received at the other end in so many seconds of the vehicle's time."""
+        received: list[Any] = []
         until_us = self.sitl.time_us + round(seconds * 1e6)
         while self.sitl.time_us < until_us:
             self.sitl.advance()
             if listen:
                 try:
-                    heard += [decode(frame) for frame in self._parser.feed(os.read(self.cable.far, 65536))]
+                    received += [decode(frame) for frame in self._parser.feed(os.read(self.cable.far, 65536))]
                 except BlockingIOError:
                     continue
-        return heard
+        return received
 
     def greet(self) -> list[Any]:
         """Ask who it is; the answers."""

@@ -79,7 +79,7 @@ def test_mavlogdump_reads_it(run: Run) -> None:
 
 
 @pytest.fixture
-def heard(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, bytes]]:
+def received(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, bytes]]:
     """Every frame that any memory link of a run carries, with the system's time."""
     from autopilot_bridge.links import MemoryLink
 
@@ -94,16 +94,16 @@ def heard(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, bytes]]:
     return carried
 
 
-def test_truth_reaches_nobody(
-    heard: list[tuple[int, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_truth_reaches_no_client(
+    received: list[tuple[int, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No link carries it, and a flight whose truth frames are falsified is the same flight: nobody on the
+    """No link carries it, and a flight whose truth frames are falsified is the same flight: no client on the
     vehicle's side, the mission included, looks at them.
     """
     arguments = ["fly", *SHORT, "--seed", "4"]
     assert run_command_line([*arguments, "--out", str(tmp_path / "honest")]) == 0
-    honest = list(heard)
-    heard.clear()
+    honest = list(received)
+    received.clear()
     on_truth = Sitl.on_truth
 
     def falsified(self: Sitl, listener: TruthListener) -> None:
@@ -117,7 +117,7 @@ def test_truth_reaches_nobody(
 
     monkeypatch.setattr(Sitl, "on_truth", falsified)
     assert run_command_line([*arguments, "--out", str(tmp_path / "falsified")]) == 0
-    assert heard == honest
+    assert received == honest
     parser = FrameParser()
     frames = [frame for _, data in honest for frame in parser.feed(data)]
     assert parser.counters.bytes_dropped == 0 and len(frames) > 1000

@@ -55,7 +55,7 @@ def longest_gap_s(log: Path, name: str) -> float:
 
 @pytest.mark.parametrize(("flavour", "via"), [slow("px4", "setpoints"), ("ardupilot", "waypoints")])
 def test_a_mission_at_57600_baud(flavour: str, via: str, tmp_path: Path) -> None:
-    """Told the true rate of the line, which at this speedup is so much higher in wall time."""
+    """With the true rate of the line, which at this speedup is so much higher in wall time."""
     with (
         serial_line(tmp_path / "line", round(BAUD * QUICK)) as line,
         running_sitl(flavour, [line.vehicle], speedup=QUICK),

@@ -28,7 +28,7 @@ class Client:
         self.link = open_link(url)
         self.encoder = FrameEncoder(system_id, component_id)
         self.ids = system_id, component_id
-        self.heard: list[Frame] = []
+        self.received: list[Frame] = []
         self._parser = FrameParser()
         self.sign: Callable[[bytes], bytes] = bytes
 
@@ -43,16 +43,16 @@ class Client:
 
     def listen(self) -> None:
         for _, data in self.link.receive():
-            self.heard += self._parser.feed(data)
+            self.received += self._parser.feed(data)
 
     def senders(self, message_id: int) -> Counter[tuple[int, int]]:
         return Counter(
-            (frame.system_id, frame.component_id) for frame in self.heard if frame.message_id == message_id
+            (frame.system_id, frame.component_id) for frame in self.received if frame.message_id == message_id
         )
 
 
 class World:
-    """Vehicles, and clients that are told apart."""
+    """Vehicles, and clients that are distinguished."""
 
     def __init__(self, count: int = 1, flavour: str = "px4", **signing: Any) -> None:
         vehicles = team(count, model="iris", autopilot=flavour, parameters={})
@@ -129,10 +129,10 @@ def test_clients_of_one_link_hear_the_vehicle_and_each_other(kind: str, worlds: 
     world.until(lambda: ground.senders(ACK)[1, 1] == 1)
     world.on(0.5)
     assert companion.senders(COMMAND) == {(255, 190): 1}  # the command to the autopilot is not for it
-    assert not ground.senders(HEARTBEAT)[255, 190] and not ground.senders(COMMAND)  # nobody hears himself
+    assert not ground.senders(HEARTBEAT)[255, 190] and not ground.senders(COMMAND)  # not received
 
 
-def test_a_target_that_nobody_knows_is_passed_to_nobody(worlds: Callable[..., World]) -> None:
+def test_a_frame_for_an_unknown_target_is_not_forwarded(worlds: Callable[..., World]) -> None:
     world = worlds()
     url = world.listen("udpin")
     first, second = world.client(url, 255), world.client(url, 254)
@@ -157,7 +157,7 @@ def test_a_client_that_says_nonsense_is_not_spoken_to(worlds: Callable[..., Worl
     stranger.link.send(b"\xfd\x09 let me in " * 20)
     world.until(lambda: true.senders(HEARTBEAT)[1, 1])
     world.on(1.0)
-    assert stranger.heard == []
+    assert stranger.received == []
 
 
 def test_under_a_key_the_unsigned_are_not_spoken_to(worlds: Callable[..., World]) -> None:
@@ -172,10 +172,10 @@ def test_under_a_key_the_unsigned_are_not_spoken_to(worlds: Callable[..., World]
         stranger.command(255, 190)
         true.say_hello()
         world.on(0.1)
-    assert stranger.heard == [] and not true.senders(COMMAND) and not true.senders(HEARTBEAT)[66, 190]
+    assert stranger.received == [] and not true.senders(COMMAND) and not true.senders(HEARTBEAT)[66, 190]
 
 
-def test_nobody_speaks_in_the_vehicles_name(worlds: Callable[..., World]) -> None:
+def test_no_client_sends_in_the_vehicles_name(worlds: Callable[..., World]) -> None:
     """What claims to be the autopilot reaches neither the autopilot nor other clients."""
     world = worlds()
     url = world.listen("udpin")
@@ -208,7 +208,7 @@ def test_five_vehicles_on_one_link(kind: str, flavour: str, worlds: Callable[...
     world.until(lambda: ground.senders(ACK))
     world.on(0.2)
     assert ground.senders(ACK) == {(3, 1): 1}
-    ground.heard.clear()
+    ground.received.clear()
     ground.say(dialect.MAVLink_param_request_read_message(4, 1, b"SYSID_THISMAV", -1))
     ground.say(dialect.MAVLink_param_request_read_message(4, 1, b"MAV_SYS_ID", -1))
     world.until(lambda: ground.senders(dialect.MAVLINK_MSG_ID_PARAM_VALUE))
@@ -259,10 +259,10 @@ def test_a_shared_link_under_a_key(worlds: Callable[..., World]) -> None:
         client.command(2)
     world.until(lambda: true.senders(ACK)[2, 1])
     world.on(1.0)
-    assert stranger.heard == []
+    assert stranger.received == []
     assert true.senders(ACK) == {(2, 1): 1}
     checking = LinkSigning(SigningState(KEY, clock=lambda: 0), link_id=0)
-    assert len(checking.admit(true.heard)) == len(true.heard)
+    assert len(checking.admit(true.received)) == len(true.received)
 
 
 def test_impostors_on_a_shared_link(worlds: Callable[..., World]) -> None:
@@ -284,15 +284,15 @@ def test_impostors_on_a_shared_link(worlds: Callable[..., World]) -> None:
 def test_a_client_is_kept_on_a_shared_link_whatever_else_it_sends(
     odd: bytes | str, worlds: Callable[..., World]
 ) -> None:
-    """A line's end, half a frame, a vehicle's frame brought back: once believed, a client is sent to."""
+    """A line's end, half a frame, a vehicle's frame brought back: once accepted, a client is sent to."""
     world = worlds(2)
     ground = world.client(world.listen("udpin", shared=True), 255)
     ground.say_hello()
     vehicles = {(1, 1), (2, 1)}
     world.until(lambda: vehicles <= set(ground.senders(HEARTBEAT)))
-    ground.link.send(odd if isinstance(odd, bytes) else ground.heard[0].raw)
+    ground.link.send(odd if isinstance(odd, bytes) else ground.received[0].raw)
     world.on(0.1)
-    ground.heard.clear()
+    ground.received.clear()
     world.until(lambda: vehicles <= set(ground.senders(HEARTBEAT)))
 
 
@@ -303,6 +303,6 @@ def test_strangers_on_a_shared_link_are_not_spoken_to(worlds: Callable[..., Worl
     ground.say_hello()
     stranger.link.send(b"\xfd\x09 let me in " * 20)
     world.until(lambda: ground.senders(HEARTBEAT)[2, 1])
-    stranger.link.send(ground.heard[0].raw)
+    stranger.link.send(ground.received[0].raw)
     world.on(1.0)
-    assert stranger.heard == []
+    assert stranger.received == []

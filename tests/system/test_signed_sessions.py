@@ -86,15 +86,15 @@ def test_a_signed_session_flies(flavour: str) -> None:
 
 
 def test_the_same_session_twice_is_the_same_bytes() -> None:
-    def heard() -> list[bytes]:
+    def received() -> list[bytes]:
         flying = Flying(key=KEY, reach=Reach.NETWORK)
         received: list[bytes] = []
         flying.link.on_receive = received.append
         flying.step(3.0)
         return received
 
-    first = heard()
-    assert first == heard() and len(first) > 100
+    first = received()
+    assert first == received() and len(first) > 100
     assert all(packet[2] == 1 for packet in first)
 
 
@@ -114,8 +114,8 @@ class Attacked:
         self.flying = Flying(key=KEY, reach=Reach.NETWORK)
         self.other = self.flying.sitl.connect(0, reach=Reach.NETWORK)
         self.flying.take_off(10.0)
-        self.heard: list[bytes] = []
-        self.flying.link.on_receive = self.heard.append
+        self.received: list[bytes] = []
+        self.flying.link.on_receive = self.received.append
 
     @property
     def outcome(self) -> tuple[bytes, dict[str, float], SigningKey | None]:
@@ -154,20 +154,20 @@ def test_an_attacker_changes_nothing_at_all(
     flight.flying.step(5.0)
     assert flight.outcome == left_alone.outcome
     assert (
-        flight.heard == left_alone.heard and len(flight.heard) > 100
+        flight.received == left_alone.received and len(flight.received) > 100
     )  # no answer, no text, no faster stream
 
 
 @pytest.mark.parametrize(
-    ("reach", "believed"), [(Reach.CABLE, True), (Reach.MACHINE, False), (Reach.NETWORK, False)]
+    ("reach", "accepted"), [(Reach.CABLE, True), (Reach.MACHINE, False), (Reach.NETWORK, False)]
 )
-def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Reach, believed: bool) -> None:
+def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Reach, accepted: bool) -> None:
     sitl = Sitl(WorldSpec(), signing=SigningParameters(key=KEY))
     link = sitl.connect(0, reach=reach)
     setting = dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9)
     link.send(FrameEncoder(255, 190).encode(setting))
     taken = sitl.vehicles[0].autopilot.parameters.as_dict()["MIS_TAKEOFF_ALT"]
-    assert taken == (7.0 if believed else 2.5)
+    assert taken == (7.0 if accepted else 2.5)
 
 
 def test_a_radio_on_the_line_passes_unsigned() -> None:
@@ -190,10 +190,10 @@ def test_payload_speaks_under_the_vehicles_key() -> None:
     parser, components = FrameParser(), set()
     unsigned = FrameParser()
 
-    def hear(data: bytes) -> None:
+    def receive(data: bytes) -> None:
         components.update(frame.component_id for frame in checking.admit(parser.feed(data)))
 
-    link.on_receive = hear
+    link.on_receive = receive
     mine.on_receive = lambda data: (unsigned.feed(data), None)[1]
     while sitl.time_us < 3_000_000:
         sitl.advance()
@@ -205,7 +205,7 @@ def test_payload_speaks_under_the_vehicles_key() -> None:
 
 
 class Keys:
-    """A vehicle on the ground, and somebody who brings keys."""
+    """A vehicle on the ground, and a client that brings keys."""
 
     def __init__(self, reach: Reach, **parameters: Any) -> None:
         self.sitl = Sitl(WorldSpec(), signing=SigningParameters(**parameters))
@@ -214,13 +214,13 @@ class Keys:
         self.texts: list[str] = []
         self.elsewhere: list[int] = []
         self.parser, self.other_parser = FrameParser(), FrameParser()
-        self.link.on_receive = self.hear
+        self.link.on_receive = self.receive
         self.other.on_receive = lambda data: self.elsewhere.extend(
             frame.message_id for frame in self.other_parser.feed(data)
         )
         self.encoder = FrameEncoder(255, 190)
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         self.texts += [
             decode(frame).text for frame in self.parser.feed(data) if frame.definition.name == "STATUSTEXT"
         ]
@@ -256,7 +256,7 @@ def test_the_next_key_comes_from_the_holder_of_the_old_one(reach: Reach, unsigne
         assert keys.key == (OTHER_KEY if holder or trusted else KEY)
 
 
-def test_a_key_for_somebody_else_is_not_taken() -> None:
+def test_a_key_for_another_vehicle_is_not_taken() -> None:
     keys = Keys(Reach.MACHINE)
     keys.bring(KEY.secret, target=2)
     assert keys.key is None and keys.texts == [] and keys.elsewhere == []
@@ -312,31 +312,31 @@ def test_a_store_keeps_key_and_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", ["nonsense", "1 2 xyz\n", "1 5 " + "00" * 32 + "\n", "1 2 3 4 5\n"])
-def test_a_store_that_is_none_is_told(tmp_path: Path, content: str) -> None:
+def test_a_store_that_is_none_is_reported(tmp_path: Path, content: str) -> None:
     path = tmp_path / "keys"
     path.write_text(content)
     with pytest.raises(ValueError, match="is not a store of signing keys"):
         SigningStore(path)
 
 
-def test_a_store_that_can_not_be_written_is_told_when_it_is_opened(tmp_path: Path) -> None:
+def test_a_store_that_can_not_be_written_is_reported_when_it_is_opened(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"can't write .*keys: No such file or directory"):
         SigningStore(tmp_path / "nowhere" / "keys")
     SigningStore(tmp_path / "keys")
     assert list(tmp_path.iterdir()) == []  # trying leaves nothing
 
 
-def test_a_store_that_can_not_be_written_any_more_is_told_and_the_key_works(tmp_path: Path) -> None:
-    folder, told = tmp_path / "stored", []
+def test_a_store_that_can_not_be_written_any_more_is_reported_and_the_key_works(tmp_path: Path) -> None:
+    folder, reported = tmp_path / "stored", []
     folder.mkdir()
-    store = SigningStore(folder / "keys", told.append)
+    store = SigningStore(folder / "keys", reported.append)
     keys = Keys(Reach.MACHINE, store=store)
     folder.rmdir()
     keys.bring(KEY.secret)
     keys.bring(OTHER_KEY.secret, signer(KEY, 1 << 46))
     assert keys.key == OTHER_KEY
     assert keys.texts == ["Signing key set, but can't be stored"] * 2
-    assert told == [store.failure] and "No such file or directory" in store.failure
+    assert reported == [store.failure] and "No such file or directory" in store.failure
     folder.mkdir()
     keys.bring(KEY.secret, signer(OTHER_KEY, 1 << 47))
     assert keys.texts[2:] == ["Signing key set"] and not store.failure

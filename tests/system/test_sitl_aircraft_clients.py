@@ -28,7 +28,7 @@ class Client:
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
         self.link.mav.command_long_send(1, 1, command, 0, *values)
 
-    def hear(self, kind: str) -> object:
+    def receive(self, kind: str) -> object:
         """The next message of a kind, or None within a tenth of a second."""
         self.link.mav.heartbeat_send(6, 8, 0, 0, 4)
         return self.link.recv_match(type=kind, blocking=True, timeout=0.1)
@@ -38,14 +38,14 @@ class Client:
 
         def done() -> bool:
             self.ask(asked, *parameters)
-            message = self.hear(kind)
+            message = self.receive(kind)
             return message is not None and all(getattr(message, k) == v for k, v in expected.items())
 
         wait_until(done, 60.0)
 
     def climbs_above(self, height_m: float) -> None:
         def high() -> bool:
-            position = self.hear("GLOBAL_POSITION_INT")
+            position = self.receive("GLOBAL_POSITION_INT")
             return position is not None and position.relative_alt > 1000.0 * height_m  # type: ignore[attr-defined]
 
         wait_until(high, 60.0)

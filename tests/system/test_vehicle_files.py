@@ -12,9 +12,9 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage import MemoryStore, Quota
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import exists, read_whole
 from autopilot_bridge.storage.folder import FolderStore
+from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogReader
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
@@ -33,30 +33,30 @@ class Client:
         self.vehicle = self.sitl.vehicles[0]
         self.link = self.sitl.connect(0)
         self.parser, self.encoder = FrameParser(), FrameEncoder(255, 190)
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
 
     def run(self, seconds: float) -> None:
         until_us = self.sitl.time_us + round(seconds * 1e6)
         while self.sitl.time_us < until_us:
             self.sitl.advance()
             for _, data in self.link.receive():
-                self.heard += [decode(frame) for frame in self.parser.feed(data)]
+                self.received += [decode(frame) for frame in self.parser.feed(data)]
 
     def send(self, message: Any) -> None:
         self.link.send(self.encoder.encode(message))
 
     def all(self, name: str) -> list[Any]:
-        return [message for message in self.heard if message.get_type() == name]
+        return [message for message in self.received if message.get_type() == name]
 
     def command(self, number: int, *values: float) -> int | None:
-        self.heard.clear()
+        self.received.clear()
         self.send(mavlink.MAVLink_command_long_message(1, 1, number, 0, *values, *[0.0] * (7 - len(values))))
         self.run(0.1)
         acks = [message.result for message in self.all("COMMAND_ACK") if message.command == number]
         return acks[-1] if acks else None
 
     def upload(self, kind: MissionType, items: list[MissionItem]) -> None:
-        self.heard.clear()
+        self.received.clear()
         self.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), kind))
         for _ in range(100):
             self.run(0.02)
@@ -64,7 +64,7 @@ class Client:
             if self.all("MISSION_ACK"):
                 assert self.all("MISSION_ACK")[0].type == 0
                 return
-            self.heard.clear()
+            self.received.clear()
             for request in asked:
                 item = items[request.seq]
                 place = (round(item.x * 1e7), round(item.y * 1e7), item.z)
@@ -81,7 +81,7 @@ class Client:
         self.run(1.0)
 
     def get(self, name: str) -> float:
-        self.heard.clear()
+        self.received.clear()
         self.send(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
         self.run(0.2)
         return float(self.all("PARAM_VALUE")[0].param_value)
@@ -96,7 +96,7 @@ class Client:
 
     def download(self, number: int, size: int) -> bytes:
         """A log, as MAVProxy asks for it."""
-        self.heard.clear()
+        self.received.clear()
         self.send(mavlink.MAVLink_log_request_data_message(1, 1, number, 0, 0xFFFFFFFF))
         data = bytearray(size)
         for _ in range(1000):
@@ -125,7 +125,7 @@ def test_a_flight_is_logged_listed_and_downloaded(
     memory = card()
     client = Client(flavour, memory)
     client.fly()
-    client.heard.clear()
+    client.received.clear()
     client.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
     client.run(0.1)
     (entry,) = client.all("LOG_ENTRY")
@@ -158,7 +158,7 @@ def test_logs_of_an_armed_vehicle(flavour: str, sent: bool) -> None:
     client = Client(flavour, card(), {"SDLOG_MODE": 2} if flavour == "px4" else {})
     client.fly()
     listing = mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF)
-    client.heard.clear()
+    client.received.clear()
     client.send(listing)
     client.run(0.1)
     size = client.all("LOG_ENTRY")[0].size
@@ -166,7 +166,7 @@ def test_logs_of_an_armed_vehicle(flavour: str, sent: bool) -> None:
     assert client.command(ARM, 1) == 0
     client.run(1.0)
     assert bool(client.all("LOG_DATA")) is sent
-    client.heard.clear()
+    client.received.clear()
     for _ in range(3):
         client.send(listing)
         client.run(0.1)
@@ -273,7 +273,7 @@ def test_ardupilot_reset_takes_effect_at_boot() -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_a_damaged_parameter_file_is_kept_and_told(flavour: str, tmp_path: Path) -> None:
+def test_a_damaged_parameter_file_is_kept_and_reported(flavour: str, tmp_path: Path) -> None:
     file = tmp_path / LAYOUT[flavour][0]
     file.write_bytes(b"\xff\x00 nonsense")
     store = FolderStore(tmp_path)
@@ -299,9 +299,9 @@ def test_reboot_starts_again_from_zero(flavour: str) -> None:
     before = client.vehicle.autopilot
     assert client.command(REBOOT, 1) == 0
     client.run(0.4)
-    client.heard.clear()
+    client.received.clear()
     client.run(0.5)
-    assert client.heard == []  # it is down
+    assert client.received == []  # it is down
     client.run(2.0)
     after = client.vehicle.autopilot
     assert after is not before and not after.commander.armed
@@ -332,10 +332,10 @@ def test_shutdown_is_for_good() -> None:
     client.run(3.0)
     assert client.command(REBOOT, 2) == 0
     client.run(1.0)
-    client.heard.clear()
+    client.received.clear()
     client.command(REBOOT, 1)
     client.run(3.0)
-    assert client.heard == []
+    assert client.received == []
 
 
 def test_packed_parameters_read_back() -> None:

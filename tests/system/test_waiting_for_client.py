@@ -1,4 +1,4 @@
-"""ArduPilot's SITL waits for somebody on its first port, whatever the vehicle carries."""
+"""ArduPilot's SITL waits for a client on its first port, whatever the vehicle carries."""
 
 import pytest
 
@@ -12,7 +12,7 @@ PORTS = [Port(parse_address("tcpin:127.0.0.1:0"), "gcs"), Port(parse_address("tc
 
 
 @pytest.mark.parametrize("payload", [PayloadParameters(), PayloadParameters(camera=CameraParameters())])
-def test_it_goes_on_when_somebody_comes(payload: PayloadParameters) -> None:
+def test_it_goes_on_when_a_client_comes(payload: PayloadParameters) -> None:
     vehicle = VehicleSpec(autopilot="ardupilot", payload=payload)
     sitl = Sitl(WorldSpec(vehicles=(vehicle,)))
     server = SitlServer(sitl, speedup=None, monotonic=wall_time_s)
@@ -20,7 +20,7 @@ def test_it_goes_on_when_somebody_comes(payload: PayloadParameters) -> None:
         server.wait_for_client(lambda: True)
     first, second = (address.replace("tcpin", "tcp") for _, _, address in server.open([PORTS]))
     elsewhere = open_link(second)
-    assert not server.wait_for_client(lambda: True)  # nobody is there, so it asks whether to stop
+    assert not server.wait_for_client(lambda: True)  # no client is there, so it asks whether to stop
     client = open_link(first)
     assert server.wait_for_client(lambda: False)
     for link in (client, elsewhere):

@@ -56,7 +56,7 @@ ARDUPILOT_AT_4_HZ = {
 """docs/firmware/ardupilot.md, section 2: everything that REQUEST_DATA_STREAM(ALL, 4 Hz) gives, disarmed."""
 
 NOT_ON_OUR_VEHICLE = {"SCALED_IMU3", "SCALED_PRESSURE2", "SIMSTATE"}
-"""It has no third IMU and no second barometer, and truth is not the autopilot's to tell."""
+"""It has no third IMU and no second barometer, and truth is not sent by the autopilot."""
 
 ONLY_ON_OUR_VEHICLE = {"DISTANCE_SENSOR"}
 """It has a rangefinder, which ArduPilot's default simulated copter has not."""

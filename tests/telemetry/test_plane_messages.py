@@ -181,7 +181,7 @@ def test_wind_and_airspeed() -> None:
         assert fields("SCALED_PRESSURE", messages.scaled_pressure())["press_diff"] == pytest.approx(3.5)
 
 
-def test_wind_is_told_from_the_first_flight_on() -> None:
+def test_wind_is_reported_from_the_first_flight_on() -> None:
     aircraft = Aircraft()
     aircraft.context.landed_state = LandedState.ON_GROUND
     assert aircraft.px4.wind_cov() is None

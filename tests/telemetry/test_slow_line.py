@@ -170,7 +170,7 @@ def test_a_radio_with_a_full_buffer_slows_the_streams_down(flavour: str) -> None
 
 def test_px4_forgets_a_radio_that_is_gone() -> None:
     flow = RadioFlow(px4_services.FLOW_CONTROL)
-    flow.heard(5, 1_000_000)
+    flow.on_radio_status(5, 1_000_000)
     flow.advance(3_000_000)
     assert flow.multiplier == 0.8
     flow.advance(6_100_000)
@@ -180,13 +180,13 @@ def test_px4_forgets_a_radio_that_is_gone() -> None:
 def test_ardupilot_slows_down_to_two_seconds() -> None:
     flow = RadioFlow(ardupilot_services.FLOW_CONTROL)
     for _ in range(100):
-        flow.heard(0, 0)
+        flow.on_radio_status(0, 0)
     assert flow.slowdown_us == 2_040_000
-    flow.heard(96, 0)
+    flow.on_radio_status(96, 0)
     assert flow.slowdown_us == 2_000_000
-    flow.heard(91, 0)
+    flow.on_radio_status(91, 0)
     assert flow.slowdown_us == 1_980_000
-    flow.heard(70, 0)
+    flow.on_radio_status(70, 0)
     assert flow.slowdown_us == 1_980_000
 
 

@@ -1,4 +1,4 @@
-"""Pictures change nothing of a flight: the same bytes whether somebody watches, keeps them, or not."""
+"""Pictures change nothing of a flight: the same bytes whether a client watches, keeps them, or not."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def flight(tmp_path: Path | None, *, look: bool) -> bytes:
     service = None
     lost: list[str] = []
     if tmp_path is not None:
-        # the photos' names are told; a stream would be, too
+        # the photos' names are reported; a stream would be, too
         service = show_cameras(sitl, VideoParameters(port=None, folder=tmp_path / "pictures"), lost.append)
         sitl.poll_every(4000)
     camera = sitl.vehicles[0].payload.camera

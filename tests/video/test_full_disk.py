@@ -1,4 +1,4 @@
-"""Photos and videos that can't be written: nothing torn is left, and it is told."""
+"""Photos and videos that can't be written: nothing torn is left, and it is reported."""
 
 import resource
 import signal
@@ -89,7 +89,7 @@ def test_a_photo_that_does_not_fit_leaves_nothing(tmp_path: Path) -> None:
     assert path.stat().st_size > FULL_BYTES
 
 
-def test_photos_and_videos_that_do_not_fit_are_told_and_the_next_ones_are_whole(show: Show) -> None:
+def test_photos_and_videos_that_do_not_fit_are_reported_and_the_next_ones_are_whole(show: Show) -> None:
     folder = show.folder
     show.fill_up(True)
     show.service.photo(0, 0, NOTES)
@@ -113,7 +113,7 @@ def test_photos_and_videos_that_do_not_fit_are_told_and_the_next_ones_are_whole(
         assert next(container.decode(video=0)).width == 320
 
 
-def test_what_is_lost_at_the_end_is_told_too(show: Show) -> None:
+def test_what_is_lost_at_the_end_is_reported_too(show: Show) -> None:
     show.fill_up(True)
     show.service.photo(0, 0, NOTES)
     show.service.start_recording(0, show.time_us)
@@ -123,7 +123,7 @@ def test_what_is_lost_at_the_end_is_told_too(show: Show) -> None:
 
 
 @pytest.mark.parametrize("under_way", ["photo", "video", "nothing"])
-def test_a_picture_process_that_dies_is_told_when_it_matters(show: Show, under_way: str) -> None:
+def test_a_picture_process_that_dies_is_reported_when_it_matters(show: Show, under_way: str) -> None:
     process = show.service._process
     assert process is not None
     process.send_signal(signal.SIGSTOP)

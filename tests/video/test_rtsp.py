@@ -151,7 +151,7 @@ def test_a_player_gets_h264_from_a_key_picture_on():
             assert (await talk.ask_for(connection, "OPTIONS"))[0] == 200
             status, answer = await talk.ask_for(connection, "DESCRIBE")
             assert status == 200 and "a=rtpmap:96 H264/90000" in answer
-            assert talk.asked == 0  # nobody watches yet
+            assert talk.asked == 0  # no client watches yet
             await talk.play(connection)
             channel, first = await packet(reader)
             while channel != 0:
@@ -162,7 +162,7 @@ def test_a_player_gets_h264_from_a_key_picture_on():
             async with asyncio.timeout(20.0):
                 while talk.stream._players:
                     await asyncio.sleep(0.01)
-            assert talk.stream._task is None  # nobody watches any more, and nothing is rendered
+            assert talk.stream._task is None  # no client watches any more, and nothing is rendered
 
     asyncio.run(watch())
 
@@ -227,7 +227,7 @@ def test_a_udp_player_that_vanished_is_not_rendered_for(short_looks):
 
 
 @pytest.mark.parametrize("how", ["RTCP", "GET_PARAMETER"])
-def test_a_udp_player_that_is_heard_goes_on(how, short_looks):
+def test_a_udp_player_that_is_received_goes_on(how, short_looks):
     async def watch() -> None:
         async with Talk() as talk:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as media:

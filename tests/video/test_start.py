@@ -1,4 +1,4 @@
-"""The picture process before anybody watches."""
+"""The picture process before any client watches."""
 
 import time
 
@@ -14,7 +14,7 @@ DEADLINE_S = 100.0
 
 
 def test_it_is_ready_before_the_first_player_comes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It makes a picture that nobody asked for, and ends at once with the vehicles."""
+    """It makes a picture that no client requested, and ends at once with the vehicles."""
     payload = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
     sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(payload=payload),)))
     looked: list[int] = []

@@ -34,7 +34,7 @@ class FixedWingController:
     * throttle, but no height: the pitch flies the airspeed;
     * throttle and a height rate without a height: the pitch flies the height rate alone, even into the stall
       (the flare);
-    * airspeed not known: pitch flies height, the throttle what the energy of the climb asks for.
+    * airspeed not known: pitch flies height, the throttle what the energy of the climb requires.
 
     Levels OFF and IDLE, unknown levels, and an unknown attitude (except with SURFACES_DIRECT) stop the
     propeller and centre the surfaces.
@@ -49,8 +49,6 @@ class FixedWingController:
         setpoint: layout `control.fixed_wing.setpoint`; starts at level OFF.
         actuators: roles of `flightsim.interface`, `AILERON` ... `BRAKE`.
     """
-
-    __slots__ = ("_packed", "_parameters", "_state", "actuators", "setpoint", "step")
 
     def __init__(
         self, parameters: FixedWingParameters | None = None, *, physics_rate_hz: float, nav: Array
@@ -95,7 +93,7 @@ class FixedWingController:
 
     @property
     def hover_thrust(self) -> float:
-        """0.5: an aircraft has none; here so that either controller can be asked."""
+        """0.5: an aircraft has none; here so that both controllers have the property."""
         return _HOVER_THRUST
 
     @property

@@ -36,7 +36,7 @@ _POWERLESS_S: Final = 3.0  # so long full throttle may fail to keep the energy u
 _POWERLESS_DOUBT: Final = 0.4  # of that time: a gust downwards passes
 _GLIDE_SHARE: Final = 1.1  # of the lowest airspeed at this bank
 _FULL_THROTTLE: Final = 0.95  # of its limit
-_PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change asked for when pitch alone flies the airspeed
+_PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change commanded when pitch alone flies the airspeed
 
 
 @kernel
@@ -108,7 +108,7 @@ def _trim_pitch(airspeed: float, p: Array, s: Array) -> float:
 
 @kernel
 def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bool) -> float:
-    """Climb rate to fly, m/s; NaN where nothing asks for one. `hold`: the present height unless told else."""
+    """Climb rate to fly, m/s; NaN: no climb rate is commanded. `hold`: the present height by default."""
     height, climb = -nav[n.POS + 2], -nav[n.VEL + 2]
     wanted, rate = -sp[to.DOWN_M], sp[to.HEIGHT_RATE_M_S]
     if math.isfinite(wanted) or not (math.isfinite(rate) or not hold):

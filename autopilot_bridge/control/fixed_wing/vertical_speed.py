@@ -1,9 +1,9 @@
 """Vertical speed by pitch alone, throttle given: short final and flare, where the energy control is too slow.
 
-The lift that a vertical acceleration asks for at the airspeed of this moment is flown by angle of attack, so
+The lift that a vertical acceleration requires at the airspeed of this moment is flown by angle of attack, so
 that a gust along the flight path is answered before it has changed the sink. What lift there is, the
-accelerometers tell: angle of attack that the pitch over the path has and the lift has not, or the other way
-round, is a gust from below or above (or a wing that is not as believed), and the pitch makes up for it.
+accelerometers show: angle of attack that the pitch over the path has and the lift has not, or the other way
+round, is a gust from below or above (or a wing that differs from its model), and the pitch makes up for it.
 Incremental inversion does the same with differences (Sieberling, Chu and Mulder 2010). Airspeed is no concern
 of the pitch here; the task's throttle sees to it.
 """

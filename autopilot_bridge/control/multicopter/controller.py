@@ -186,8 +186,6 @@ class MulticopterController:
         actuators: motor commands 0..1 (front right, rear left, front left, rear right), then zeros.
     """
 
-    __slots__ = ("_packed", "_parameters", "_state", "actuators", "setpoint", "step")
-
     def __init__(
         self, parameters: MulticopterParameters | None = None, *, physics_rate_hz: float, nav: Array
     ) -> None:

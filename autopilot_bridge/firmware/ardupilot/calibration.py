@@ -29,7 +29,7 @@ _POSITIONS: Final = (
     (mavlink.ACCELCAL_VEHICLE_POS_BACK, "on its BACK"),
 )
 _MEASURE_US: Final = 1_500_000
-_ASK_AGAIN_US: Final = 1_000_000
+_REPEAT_US: Final = 1_000_000
 _PATIENCE_US: Final = 300_000_000
 """Without an answer for this time the calibration ends; otherwise the vehicle could never arm again."""
 _FULL, _TRIM, _SIMPLE, _FORCED = 1, 2, 4, 76  # param5
@@ -46,7 +46,7 @@ class ArdupilotCalibration(Microservice):
         self._commander = parts.commander
         self._position: int | None = None  # index of the requested position
         self._measured_us: int | None = None
-        self._asked_us = 0
+        self._requested_us = 0
         self._begun_us = 0
 
     @property
@@ -78,15 +78,15 @@ class ArdupilotCalibration(Microservice):
                 self._ask(self._position + 1)
         elif time_us - self._begun_us >= _PATIENCE_US:
             self._end(mavlink.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
-        elif time_us - self._asked_us >= _ASK_AGAIN_US:
+        elif time_us - self._requested_us >= _REPEAT_US:
             self._send(_POSITIONS[self._position][0])
 
     def _calibrate(self, command: Command, source: Source) -> Result:
         if self._commander.armed:
             self._parts.announce(_NOTICE, "Disarm to allow calibration")
             return Result.FAILED
-        asked = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
-        gyro, _, barometer, _, accelerometer, *_ = (whole(value, 0) or 0 for value in asked)
+        parameters = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
+        gyro, _, barometer, _, accelerometer, *_ = (whole(value, 0) or 0 for value in parameters)
         if gyro == _GYRO:
             return self._if_healthy(self._commander.situation.health.gyro)
         if barometer == _BAROMETER:
@@ -150,7 +150,7 @@ class ArdupilotCalibration(Microservice):
         self._send(position)
 
     def _send(self, position: int) -> None:
-        self._asked_us = self._commander.time_us
+        self._requested_us = self._commander.time_us
         send_to_all(
             self._parts.broadcast,
             mavlink.MAVLink_command_long_message(

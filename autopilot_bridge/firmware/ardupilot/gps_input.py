@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from autopilot_bridge.firmware.gps_source import GpsSource, ardupilot_gps_source
+from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
@@ -90,23 +90,23 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
     """The values of a GPS_INPUT; None: not a fix."""
     ignored = int(message.ignore_flags)
 
-    def said(flag: int, value: float) -> float:
+    def unless(flag: int, value: float) -> float:
         return math.nan if ignored & flag else float(value)
 
     unmoved = bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
     no_climb = unmoved or bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT)
-    told = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
-    if not all(abs(part) < _MAX_SPEED_M_S for part in told):
+    reported = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
+    if not all(abs(part) < _MAX_SPEED_M_S for part in reported):
         return None
     return _fix(
         message,
         alt_m=0.0 if ignored & mavlink.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
-        velocity=(*told, math.nan, math.nan, math.nan)[:3],
-        hdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
-        vdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
-        eph_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
-        epv_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
-        speed_accuracy_m_s=said(mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
+        velocity=(*reported, math.nan, math.nan, math.nan)[:3],
+        hdop=unless(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
+        vdop=unless(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
+        eph_m=unless(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
+        epv_m=unless(mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
+        speed_accuracy_m_s=unless(mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
     )
 
 
@@ -153,9 +153,9 @@ def _fix(
     return values
 
 
-def _least(said: float, otherwise: float) -> float:
+def _least(reported: float, otherwise: float) -> float:
     """The received value if it is valid, else the other one."""
-    return said if said > 0.0 else otherwise
+    return reported if reported > 0.0 else otherwise
 
 
 _Reader = Callable[[MavlinkMessage], list[float] | None]

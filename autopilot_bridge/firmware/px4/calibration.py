@@ -76,8 +76,8 @@ class Px4Calibration(Microservice):
             self._end()
 
     def _calibrate(self, command: Command, source: Source) -> Result:
-        asked = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
-        values = [whole(value, 0) or 0 for value in asked]
+        parameters = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
+        values = [whole(value, 0) or 0 for value in parameters]
         if self._running is not None:
             if any(values):
                 return Result.TEMPORARILY_REJECTED

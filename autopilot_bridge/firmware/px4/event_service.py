@@ -59,7 +59,7 @@ class EventService(Microservice):
         self._time_us = 0
         self._next_report_us = 0
         self._reported: tuple[Occurrence, ...] = ()
-        self._station_heard = False
+        self._station_connected = False
 
     @property
     def commands(self) -> Mapping[int, Handler]:
@@ -98,9 +98,9 @@ class EventService(Microservice):
 
     def _station_comes(self) -> bool:
         """Before a flight, a ground station is connected that was not connected at the last tick."""
-        situation, before = self._commander.situation, self._station_heard
-        self._station_heard = situation.gcs_age_s < self._commander.parameters.gcs_loss_s
-        return self._station_heard and not before and not self._commander.armed
+        situation, before = self._commander.situation, self._station_connected
+        self._station_connected = situation.gcs_age_s < self._commander.parameters.gcs_loss_s
+        return self._station_connected and not before and not self._commander.armed
 
     def _run_checks(self, command: Command, source: Source) -> Result:
         """RUN_PREARM_CHECKS; failed checks are sent as texts too, which brings the report."""

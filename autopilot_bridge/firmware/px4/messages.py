@@ -100,7 +100,7 @@ class Px4Messages(CommonMessages):
     servo_unused_us = 900
     servo_disarmed_us = 900
     gps_timeout_us = 1_000_000
-    gps_told_before_first = False
+    gps_sent_before_first = False
 
     def __init__(self, sources: TelemetrySources) -> None:
         super().__init__(sources)
@@ -174,8 +174,8 @@ class Px4Messages(CommonMessages):
         else:  # PX4 shows the output of its position controller
             computed = self.sources.controller.velocity_setpoint_ned_m_s.tolist()
             target[3:6] = [
-                made if math.isnan(asked) else asked
-                for asked, made in zip(target[3:6], computed, strict=True)
+                made if math.isnan(commanded) else commanded
+                for commanded, made in zip(target[3:6], computed, strict=True)
             ]
         mask = sum(bit for bit, value in zip(_TARGET_BITS, target, strict=True) if math.isnan(value))
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)

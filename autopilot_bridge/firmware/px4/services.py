@@ -13,14 +13,13 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.px4 import messages
 from autopilot_bridge.firmware.px4.calibration import Px4Calibration
-from autopilot_bridge.firmware.px4.commands import Px4Commands
+from autopilot_bridge.firmware.px4.commands import Px4Commands, Px4PlaneCommands
 from autopilot_bridge.firmware.px4.component_metadata import MOUNT, ComponentMetadataService
 from autopilot_bridge.firmware.px4.copter import modes as copter_modes
 from autopilot_bridge.firmware.px4.event_service import EventService
 from autopilot_bridge.firmware.px4.mission_rules import PX4_MISSION_POLICY, PX4_PLANE_MISSION_POLICY
 from autopilot_bridge.firmware.px4.plane import messages as plane_messages
 from autopilot_bridge.firmware.px4.plane import modes as plane_modes
-from autopilot_bridge.firmware.px4.plane.commands import Px4PlaneCommands
 from autopilot_bridge.firmware.px4.setpoints import Px4Setpoints
 from autopilot_bridge.firmware.px4.texts import copter_notices, plane_notices
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices

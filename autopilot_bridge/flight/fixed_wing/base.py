@@ -18,8 +18,6 @@ class AircraftTask(ABC):
     A task that rested on the ground begins afresh when the aircraft is in the air.
     """
 
-    __slots__ = ("_active", "_command", "_rested", "_state")
-
     works_on_ground: ClassVar[bool] = False
 
     def __init__(self) -> None:
@@ -77,8 +75,6 @@ class LandingTask(Protocol):
 
 class GuidedPath:
     """Path guidance for one task, made when it first flies (the parameters are the context's)."""
-
-    __slots__ = ("_guidance", "_parameters")
 
     def __init__(self) -> None:
         self._guidance: PathGuidance | None = None

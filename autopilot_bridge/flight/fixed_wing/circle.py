@@ -28,21 +28,6 @@ class Circle:
         turns: flown since then.
     """
 
-    __slots__ = (
-        "_line_east_m",
-        "_line_north_m",
-        "_on_tangent",
-        "_phase_rad",
-        "_tangent_east",
-        "_tangent_north",
-        "circling",
-        "direction",
-        "east_m",
-        "north_m",
-        "radius_m",
-        "turns",
-    )
-
     def __init__(self, north_m: float, east_m: float, radius_m: float) -> None:
         self.north_m = north_m
         self.east_m = east_m

@@ -1,4 +1,4 @@
-"""A circle of a plan (NAV_LOITER_*): what it asks for, and when and where it is left."""
+"""A circle of a plan (NAV_LOITER_*): what it requires, and when and where it is left."""
 
 import math
 from typing import Final
@@ -29,8 +29,6 @@ class CircleItem:
     Attributes:
         task: flies it.
     """
-
-    __slots__ = ("_aligned", "_done_at_turns", "_seconds", "_to_height", "_turns", "task")
 
     def __init__(
         self,

@@ -20,8 +20,6 @@ class PowerCheck:
     Height and speed over ground count: a gust changes the airspeed at once, and these only by its force.
     """
 
-    __slots__ = ("_left_s", "_start_m")
-
     def __init__(self) -> None:
         self._left_s = 0.0
         self._start_m = 0.0
@@ -62,8 +60,6 @@ class LaunchDetector:
         launched: the launch was felt.
         since_launch_s: since then; kept by the task.
     """
-
-    __slots__ = ("_felt_s", "launched", "since_launch_s")
 
     def __init__(self) -> None:
         self.reset()

@@ -1,4 +1,4 @@
-"""What a flight task asks of the control laws: the fixed-wing setpoint as plain numbers, written at once."""
+"""The fixed-wing setpoint of a flight task as plain numbers, written to the control laws at once."""
 
 import math
 from typing import Final
@@ -11,26 +11,6 @@ _NAN: Final = math.nan
 
 class FlightCommand:
     """One setpoint of level FLY; NaN means not given. Fields as in `control.fixed_wing.setpoint`."""
-
-    __slots__ = (
-        "airspeed_m_s",
-        "brake",
-        "course_rad",
-        "down_m",
-        "flaps",
-        "heading_rad",
-        "height_rate_m_s",
-        "lateral_acceleration_m_s2",
-        "pitch_max_rad",
-        "pitch_min_rad",
-        "pitch_rad",
-        "roll_limit_rad",
-        "roll_rad",
-        "steering_heading_rad",
-        "throttle",
-        "throttle_max",
-        "yaw_stick",
-    )
 
     def __init__(self) -> None:
         self.clear()

@@ -15,8 +15,6 @@ class PositionLost:
         time_s: since the position was lost.
     """
 
-    __slots__ = ("time_s",)
-
     def __init__(self) -> None:
         self.time_s = 0.0
 
@@ -46,8 +44,6 @@ class DescendTask(AircraftTask):
 
     DONE on the ground.
     """
-
-    __slots__ = ("_lost", "_was_in_air")
 
     def __init__(self) -> None:
         super().__init__()

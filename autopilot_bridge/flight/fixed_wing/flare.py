@@ -62,8 +62,6 @@ class Flare:
         aligning: low enough to point the nose along the runway.
     """
 
-    __slots__ = ("_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "_touching_s", "aligning")
-
     def __init__(self) -> None:
         self.reset()
 

@@ -26,27 +26,6 @@ class GuidedTask(AircraftTask):
         kind: what is being flown: HOLD (circling here), POSITION, HEADING or ATTITUDE.
     """
 
-    __slots__ = (
-        "_airspeed_acceleration_m_s2",
-        "_airspeed_m_s",
-        "_airspeed_target_m_s",
-        "_altitude_rate_m_s",
-        "_altitude_target_down_m",
-        "_bank_limit_rad",
-        "_course",
-        "_heading_rad",
-        "_loiter",
-        "_loiter_started",
-        "_pitch_age_s",
-        "_pitch_rad",
-        "_place_given",
-        "_roll_age_s",
-        "_roll_rad",
-        "_throttle",
-        "_throttle_age_s",
-        "kind",
-    )
-
     def __init__(self) -> None:
         super().__init__()
         self.kind = GuidedKind.HOLD

@@ -71,8 +71,6 @@ class LandDetector:
         state: newest judgement.
     """
 
-    __slots__ = ("_contact_s", "_parameters", "_slow_s", "_smoothed", "state")
-
     def __init__(self, parameters: LandDetectorParameters | None = None, *, on_ground: bool = True) -> None:
         self._parameters = LandDetectorParameters() if parameters is None else parameters
         self._slow_s = self._contact_s = math.inf if on_ground else 0.0

@@ -37,7 +37,7 @@ class LandTask(AircraftTask):
     """Land at a place. DONE on the ground, with the propeller stopped and a `TouchedDown` event.
 
     With an approach leg it is flown at once, its slope the glide slope. Without one the aircraft circles down
-    beside the place and lands against the wind. Once the ground is believed, nothing turns again.
+    beside the place and lands against the wind. Once the ground is detected, nothing turns again.
 
     Args:
         place_ned_m: where to touch down, (3,); NaN components: of the place where the task starts, on the
@@ -48,24 +48,6 @@ class LandTask(AircraftTask):
         phase: see `LandPhase`.
         approach: the approach flown; None before `activate`.
     """
-
-    __slots__ = (
-        "_abort_climb_m",
-        "_blind",
-        "_circle",
-        "_flare",
-        "_go_arounds",
-        "_line",
-        "_path",
-        "_power",
-        "_rolled_s",
-        "_start",
-        "_touch_pitch_rad",
-        "_wanted",
-        "_wind",
-        "approach",
-        "phase",
-    )
 
     works_on_ground: ClassVar[bool] = True
 

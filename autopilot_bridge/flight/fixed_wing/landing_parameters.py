@@ -17,7 +17,7 @@ class ClimbOutParameters:
     Attributes:
         reached_m: the take-off is done this far below its height.
         capture_s: time of climb before the height in which climb-rate control becomes height control.
-        climb_share: share of the greatest climb rate that is asked for, so that throttle remains for control.
+        climb_share: share of the greatest climb rate that is commanded, so that throttle remains for control.
         fast_share: above this multiple of the climb-out's airspeed there is more power than the climb takes.
         low_m: height over the ground below which the wing tips have no room (half a wing span, of small
             aircraft).
@@ -179,7 +179,7 @@ class SurfaceWindParameters:
         known_at_m: the filter's wind is the wind from this height over the ground up.
         lowest_known_m: smallest height at which an approach can know the wind.
         ahead_s: an engine's spin-up, and the time that the airspeed needs to follow.
-        lowest_m: power that is asked for at a lower height acts after the touch.
+        lowest_m: power that is commanded at a lower height acts after the touch.
         corrected_s: time constant of the correction by the measured airspeed: longer than gusts close to the
             ground, shorter than the last part of the slope.
     """

@@ -31,20 +31,6 @@ class Leg:
         to_the_end: no turn begins before the waypoint is passed.
     """
 
-    __slots__ = (
-        "_direct",
-        "_line",
-        "_ramps",
-        "_start_down_m",
-        "_to_the_end",
-        "_turn_rad",
-        "_turn_side",
-        "course_rad",
-        "length_m",
-        "radius_m",
-        "target",
-    )
-
     def __init__(
         self,
         start: Place,

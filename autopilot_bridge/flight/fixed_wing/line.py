@@ -18,8 +18,6 @@ class Line:
         heading_rad: its direction.
     """
 
-    __slots__ = ("_cos", "_east_m", "_north_m", "_sin", "heading_rad")
-
     def __init__(self) -> None:
         self.set(0.0, 0.0, 0.0)
 

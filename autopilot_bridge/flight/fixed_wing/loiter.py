@@ -30,21 +30,6 @@ class LoiterTask(AircraftTask):
         radius_m: with its sign; NaN before `activate` where none was given.
     """
 
-    __slots__ = (
-        "_airspeed_m_s",
-        "_circle",
-        "_finished",
-        "_glides",
-        "_lost",
-        "_path",
-        "_placeless",
-        "_start",
-        "_turns",
-        "_wanted",
-        "centre_ned_m",
-        "radius_m",
-    )
-
     def __init__(
         self,
         centre_ned_m: Array | None = None,

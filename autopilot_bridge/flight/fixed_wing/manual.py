@@ -65,8 +65,6 @@ class ManualTask(AircraftTask):
         kind: what the sticks mean.
     """
 
-    __slots__ = ("_down_m", "_held_s", "_line", "_locked", "_path", "kind")
-
     works_on_ground: ClassVar[bool] = True
 
     def __init__(self, kind: ManualMode) -> None:
@@ -100,7 +98,7 @@ class ManualTask(AircraftTask):
         return TaskStatus.RUNNING
 
     def _fly_level(self, ctx: FlightContext) -> None:
-        """Nobody holds the sticks: nothing on the ground, straight and level in the air."""
+        """No stick input: no thrust on the ground, straight and level in the air."""
         if ctx.on_ground:
             clear_setpoint(ctx.setpoint, sp.IDLE)
             self._down_m = math.nan

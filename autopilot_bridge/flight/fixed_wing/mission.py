@@ -57,20 +57,6 @@ class MissionTask(PlanTask):
         rules: how the firmware goes through a plan.
     """
 
-    __slots__ = (
-        "_airspeed_m_s",
-        "_circle",
-        "_command",
-        "_hold_s",
-        "_leg",
-        "_lost",
-        "_path",
-        "_state",
-        "_throttle",
-        "_track",
-        "_track_down_m",
-    )
-
     def __init__(self, store: MissionStore, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
         super().__init__(store, first_item=first_item, rules=rules)
         self._state = AircraftState()

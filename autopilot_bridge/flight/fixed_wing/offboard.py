@@ -31,20 +31,6 @@ class OffboardTask(AircraftTask):
         kind: what the latest setpoint controls.
     """
 
-    __slots__ = (
-        "_acceleration",
-        "_attitude",
-        "_circle",
-        "_hold",
-        "_kept",
-        "_path",
-        "_position",
-        "_rates",
-        "_throttle",
-        "_velocity",
-        "kind",
-    )
-
     works_on_ground: ClassVar[bool] = True
 
     def __init__(self) -> None:

@@ -148,7 +148,7 @@ class FixedWingFlightParameters:
     )  # wing tips free near the ground: FW_WING_* | LEVEL_ROLL_LIMIT
     rangefinder_landing: bool = True  # FW_LND_USETER | RNGFND_LANDING
     pitch_time_constant_s: float = 0.25  # FW_P_TC | PTCH2SRV_TCONST: of the flare's haste
-    standing_height_m: float = 0.3  # what the rangefinder tells on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
+    standing_height_m: float = 0.3  # measured by the rangefinder on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
     landing_abort_climb_m: float = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
     flaps_takeoff: float = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
     flaps_landing: float = 0.0  # FW_FLAPS_LND_SCL | LAND_FLAP_PERCNT
@@ -195,7 +195,7 @@ class FixedWingFlightParameters:
         # a circle flown at two thirds of the bank limit's turn rate leaves room for wind
         radius = e.airspeed_trim_m_s**2 / (GRAVITY_M_S2 * math.tan(0.6 * bank))
         climb = max(0.3, 0.6 * e.climb_max_m_s)
-        # the guidance asks for no turn faster than the aircraft can roll into and fly: else it swings to and
+        # the guidance commands no turn faster than the aircraft can roll into and fly: else it swings to and
         # fro between its bank limits
         turn_s = e.airspeed_trim_m_s / (GRAVITY_M_S2 * math.tan(bank))
         reversal_s = 2.0 * bank / float(gains["roll_slew_rad_s"])

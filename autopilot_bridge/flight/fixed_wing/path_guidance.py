@@ -49,19 +49,6 @@ class PathGuidance:
         period_s: the period in use.
     """
 
-    __slots__ = (
-        "_found",
-        "_guide",
-        "_law",
-        "_switch_multiplier",
-        "course_rad",
-        "feasibility",
-        "lateral_acceleration_m_s2",
-        "period_s",
-        "track_error_bound_m",
-        "track_error_m",
-    )
-
     def __init__(self, parameters: FixedWingFlightParameters) -> None:
         self._law: Array = np.zeros(_LAW_SIZE)
         self._found: Array = np.zeros(6)
@@ -231,7 +218,7 @@ def _adapted_period(
     on_track: float,
 ) -> float:
     """The nominal period, not below what the roll response allows, not above what the curve in the wind
-    asks for.
+    commands.
     """
     period, damping, roll_time = law[_PERIOD], law[_DAMPING], law[_ROLL_TIME]
     if law[_LOWER_BOUND] == 0.0:

@@ -1,4 +1,4 @@
-"""Return: PX4's fixed-wing Return and ArduPlane's RTL, told apart by parameters only."""
+"""Return: PX4's fixed-wing Return and ArduPlane's RTL, which differ in parameters only."""
 
 import math
 from dataclasses import replace
@@ -32,7 +32,7 @@ def return_height(distance_m: float, height_m: float, parameters: FixedWingFligh
     """Height over home to fly home at.
 
     PX4: never lower than now; otherwise the return altitude, within RTL_MIN_DIST only as high as the cone
-    around home asks for. ArduPilot: the return altitude.
+    around home requires. ArduPilot: the return altitude.
     """
     p = parameters
     wanted = p.return_altitude_m
@@ -60,8 +60,6 @@ class ReturnTask(AircraftTask):
         place: where the return leads; None: nowhere.
     """
 
-    __slots__ = ("_first_item", "_home", "_rules", "_store", "_sub", "_wait_s", "phase", "place")
-
     def __init__(
         self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
     ) -> None:
@@ -85,7 +83,7 @@ class ReturnTask(AircraftTask):
         task.activate(ctx)
 
     def _landing_start(self, destination: ReturnDestination) -> int | None:
-        """Where the plan's landing begins; ArduPlane asks for a DO_LAND_START."""
+        """Where the plan's landing begins; ArduPlane requires a DO_LAND_START."""
         if self._store is None:
             return None
         marked = destination in (
@@ -138,7 +136,7 @@ class ReturnTask(AircraftTask):
         return True
 
     def _land_after_home(self, ctx: FlightContext) -> bool:
-        """Over home the landing sequence begins, where that is asked for and there is one."""
+        """Over home the landing sequence begins, where that is configured and there is one."""
         destination, place = ctx.fixed_wing.return_destination, self.place
         start = self._landing_start(destination)
         if destination is not ReturnDestination.HOME_THEN_LANDING_SEQUENCE or place is None or start is None:

@@ -34,8 +34,6 @@ class SurfaceWind:
         head_wind_m_s: from ahead just before the touch; negative: from behind; 0 while no wind is known.
     """
 
-    __slots__ = ("_correction_m_s", "_known_at_m", "_p", "airspeed_m_s", "head_wind_m_s")
-
     def __init__(self) -> None:
         self.reset(math.inf, SurfaceWindParameters())
 

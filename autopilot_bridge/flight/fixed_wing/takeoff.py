@@ -41,22 +41,6 @@ class TakeoffTask(AircraftTask):
         phase: see `TakeoffPhase`.
     """
 
-    __slots__ = (
-        "_altitude_m",
-        "_down_m",
-        "_fast",
-        "_launch",
-        "_loiter",
-        "_path",
-        "_place",
-        "_rotated_s",
-        "_runway",
-        "_start_down_m",
-        "_throttle",
-        "_way_m",
-        "phase",
-    )
-
     works_on_ground: ClassVar[bool] = True
 
     def __init__(self, altitude_above_home_m: float | None = None, place_ned_m: Array | None = None) -> None:
@@ -257,7 +241,7 @@ class TakeoffTask(AircraftTask):
     def _climb_to_height(self, p: FixedWingFlightParameters, remaining_m: float) -> None:
         """Full power, the pitch holds the airspeed; near the height the energy control takes over.
 
-        What is still slow gathers speed on its way up: low over the ground nobody dives for it.
+        What is still slow gathers speed on its way up: low over the ground the aircraft does not dive for it.
         """
         state, command = self._state, self._command
         command.airspeed_m_s = p.takeoff_airspeed_m_s

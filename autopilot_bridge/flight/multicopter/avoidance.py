@@ -60,8 +60,8 @@ def _slid(
     b, t = _stopping(ctx)
     for _ in range(_SLIDES):
         for sector in range(SECTORS):
-            told, distance_m = int(obstacles.told_us[sector]), float(obstacles.distances_m[sector])
-            if told < 0 or ctx.time_us - told > timeout_us or not math.isfinite(distance_m):
+            measured_us, distance_m = int(obstacles.measured_us[sector]), float(obstacles.distances_m[sector])
+            if measured_us < 0 or ctx.time_us - measured_us > timeout_us or not math.isfinite(distance_m):
                 continue
             angle = heading_rad + sector * SECTOR_RAD
             c, s = math.cos(angle), math.sin(angle)

@@ -22,8 +22,6 @@ class FollowTask(CruiseTask):
         following: the vehicle is following the target.
     """
 
-    __slots__ = ("_direction_rad", "following")
-
     def __init__(self) -> None:
         super().__init__()
         self._direction_rad = math.nan

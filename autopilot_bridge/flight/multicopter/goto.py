@@ -28,20 +28,6 @@ class GotoTask:
         acceptance_m: distance at which the position counts as reached; None: the parameter.
     """
 
-    __slots__ = (
-        "_acceptance_m",
-        "_motion",
-        "_place",
-        "_ramp",
-        "_reached",
-        "_speed_m_s",
-        "_turn",
-        "_wanted",
-        "_yaw_age_s",
-        "_yaw_rad",
-        "_yaw_rate_rad_s",
-    )
-
     def __init__(
         self,
         position_ned_m: Array,
@@ -148,8 +134,6 @@ class GotoTask:
 
 class RepositionTask(GotoTask):
     """DO_REPOSITION: a `GotoTask` that keeps holding the position and is never DONE."""
-
-    __slots__ = ()
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         super().update(ctx)

@@ -35,8 +35,6 @@ class TakeoffRamp:
         ramping: the thrust is rising (landed state TAKEOFF).
     """
 
-    __slots__ = ("_left_ground", "_since_s", "_start_down_m", "state")
-
     def __init__(self, ctx: FlightContext) -> None:
         self.state = GroundState.RESTING if ctx.on_ground else GroundState.FLYING
         self._since_s = 0.0

@@ -29,26 +29,6 @@ class GuidedTask:
         kind: the kind of the present target.
     """
 
-    __slots__ = (
-        "_acceleration",
-        "_age_s",
-        "_attitude",
-        "_climb_m_s",
-        "_goto",
-        "_goto_started",
-        "_hold",
-        "_hover_down_m",
-        "_motion",
-        "_position",
-        "_ramp",
-        "_rates",
-        "_turn",
-        "_velocity",
-        "_yaw_rad",
-        "_yaw_rate_rad_s",
-        "kind",
-    )
-
     def __init__(self) -> None:
         self.kind = GuidedKind.HOLD
         self._position: Array = np.full(3, np.nan)
@@ -84,7 +64,7 @@ class GuidedTask:
         speed_m_s: float | None = None,
     ) -> None:
         """Fly to a position and stay; NaN components: keep the present ones. A yaw rate expires."""
-        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
+        _note_commanded_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         target = np.array(position_ned_m, dtype=np.float64)
         if self.kind is GuidedKind.POSITION and self._goto is not None and self._goto_started:
             # a repeated target is not a new leg
@@ -118,7 +98,7 @@ class GuidedTask:
             self._motion = SmoothMotion(ctx, speed_m_s=ctx.multicopter.max_speed_m_s)
         self._velocity[:] = np.nan_to_num(np.array(velocity_ned_m_s, dtype=np.float64), nan=0.0)
         self._acceleration[:] = acceleration_ned_m_s2
-        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
+        _note_commanded_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         self._set_streamed(GuidedKind.VELOCITY, yaw_rad, yaw_rate_rad_s)
 
     def set_acceleration(
@@ -133,7 +113,7 @@ class GuidedTask:
         if self.kind is not GuidedKind.ACCELERATION or self._motion is None:
             self._motion = SmoothMotion(ctx)
         self._acceleration[:] = np.nan_to_num(np.array(acceleration_ned_m_s2, dtype=np.float64), nan=0.0)
-        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
+        _note_commanded_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         self._set_streamed(GuidedKind.ACCELERATION, yaw_rad, yaw_rate_rad_s)
 
     def set_trajectory(
@@ -152,7 +132,7 @@ class GuidedTask:
         self._acceleration[:] = acceleration_ned_m_s2
         if self.kind is not GuidedKind.TRAJECTORY or self._motion is None:
             self._motion = SmoothMotion(ctx)
-        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
+        _note_commanded_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         self._set_streamed(GuidedKind.TRAJECTORY, yaw_rad, yaw_rate_rad_s)
 
     def set_attitude(
@@ -268,7 +248,7 @@ class GuidedTask:
         motion.trajectory.track_velocity(float(velocity[0]), float(velocity[1]), down, ctx.dt_s)
 
 
-def _asked_for_yaw(ctx: FlightContext, *values: float) -> None:
+def _note_commanded_yaw(ctx: FlightContext, *values: float) -> None:
     """A target with a yaw or a yaw rate ends the region of interest."""
     if ctx.nose_on_roi and any(math.isfinite(value) for value in values):
         ctx.look_at(None)

@@ -14,8 +14,6 @@ from autopilot_bridge.flight.task import TaskStatus
 class CruiseTask(ABC):
     """A flight task that never takes off by itself: on the ground it keeps the motors at idle."""
 
-    __slots__ = ("_motion", "_ramp")
-
     def __init__(self) -> None:
         self._motion: SmoothMotion | None = None
         self._ramp: TakeoffRamp | None = None
@@ -57,8 +55,6 @@ class HoldTask(CruiseTask):
         yaw_rad: heading to hold; None: the present one.
     """
 
-    __slots__ = ("_target", "_yaw_rad")
-
     def __init__(self, position_ned_m: Array | None = None, yaw_rad: float | None = None) -> None:
         super().__init__()
         self._target = None if position_ned_m is None else np.array(position_ned_m, dtype=np.float64)
@@ -79,8 +75,6 @@ class HoldTask(CruiseTask):
 
 class BrakeTask(CruiseTask):
     """Stop as fast as the limits allow and hold (ArduPilot BRAKE); DONE when stopped."""
-
-    __slots__ = ("_done",)
 
     def __init__(self) -> None:
         super().__init__()

@@ -40,8 +40,6 @@ class LandTask:
         yaw_rad: heading; None: the present one.
     """
 
-    __slots__ = ("_contact_s", "_down", "_landed", "_motion", "_target", "_yaw_rad")
-
     def __init__(self, position_ned_m: Array | None = None, yaw_rad: float | None = None) -> None:
         self._target = None if position_ned_m is None else np.array(position_ned_m, dtype=np.float64)
         self._yaw_rad = math.nan if yaw_rad is None else yaw_rad

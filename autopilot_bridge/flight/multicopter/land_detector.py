@@ -40,8 +40,6 @@ class LandDetector:
         state: newest result.
     """
 
-    __slots__ = ("_contact_s", "_landed_s", "_maybe_s", "_parameters", "state")
-
     def __init__(self, parameters: LandDetectorParameters | None = None, *, on_ground: bool = True) -> None:
         self._parameters = LandDetectorParameters() if parameters is None else parameters
         self._contact_s = self._maybe_s = self._landed_s = math.inf if on_ground else 0.0

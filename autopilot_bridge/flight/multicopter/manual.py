@@ -55,8 +55,6 @@ class ManualTask:
         kind: the meaning of the sticks.
     """
 
-    __slots__ = ("_hold_down_m", "_motion", "_ramp", "_yaw_rad", "kind")
-
     def __init__(self, kind: ManualMode) -> None:
         self.kind = kind
         self._motion: SmoothMotion | None = None
@@ -191,8 +189,6 @@ class LoiterTask:
     A simulated radio with untouched sticks does not count as a pilot: its throttle is down, and the vehicle
     would descend to the ground.
     """
-
-    __slots__ = ("_hold", "_pilot", "_task")
 
     def __init__(self) -> None:
         self._hold: FlightTask = HoldTask()

@@ -76,8 +76,6 @@ class MissionTask(PlanTask):
         rules: how the firmware flies a plan.
     """
 
-    __slots__ = ("_leg", "_motion", "_nose", "_ramp", "_speed_m_s", "_turning")
-
     def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
         super().__init__(store, first_item=first_item, rules=rules)
         self._leg: _Leg | None = None
@@ -128,9 +126,9 @@ class MissionTask(PlanTask):
             self._set_sub(ctx, TakeoffTask(base - float(target[2])))
             return True
         if command in (Command.NAV_LAND, Command.NAV_VTOL_LAND):
-            asked = int(item.param2) if item.param2 in tuple(Precision) else Precision.NONE
+            precision = int(item.param2) if item.param2 in tuple(Precision) else Precision.NONE
             yaw_rad = self._item_yaw(ctx, item)
-            self._set_sub(ctx, landing_task(ctx, target, yaw_rad, precision=Precision(asked)))
+            self._set_sub(ctx, landing_task(ctx, target, yaw_rad, precision=Precision(precision)))
             return True
         if command == Command.NAV_LOITER_TURNS:
             turns = item.param1 if math.isfinite(item.param1) and item.param1 > 0.0 else 1.0

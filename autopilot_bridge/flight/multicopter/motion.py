@@ -38,16 +38,6 @@ class SmoothMotion:
         heading: the moving heading.
     """
 
-    __slots__ = (
-        "_height_resets",
-        "_leg_start",
-        "_position_resets",
-        "_synchronised",
-        "_yaw_resets",
-        "heading",
-        "trajectory",
-    )
-
     def __init__(self, ctx: FlightContext, *, speed_m_s: float | None = None) -> None:
         self.trajectory = TrajectoryGenerator(ctx.multicopter, speed_m_s=speed_m_s)
         self.heading = YawSteering()

@@ -26,8 +26,6 @@ class OffboardTask:
         kind: the quantity that the latest setpoint controls.
     """
 
-    __slots__ = ("_active", "_hold", "_latest", "_ramp", "kind")
-
     def __init__(self) -> None:
         self.kind = OffboardKind.NONE
         self._latest: Array = np.full(sp.SETPOINT_SIZE, np.nan)

@@ -57,21 +57,6 @@ class OrbitTask(CruiseTask):
         turns_done: turns flown so far.
     """
 
-    __slots__ = (
-        "_ahead",
-        "_finished",
-        "_initial_yaw",
-        "_phase_rad",
-        "_speed_m_s",
-        "_turns",
-        "_yaw_behaviour",
-        "centre_ned_m",
-        "circling",
-        "radius_m",
-        "turns_done",
-        "velocity_m_s",
-    )
-
     def __init__(
         self,
         centre_ned_m: Array | None = None,

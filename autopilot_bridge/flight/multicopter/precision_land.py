@@ -51,18 +51,6 @@ class PrecisionLandTask:
         phase: see `PrecisionPhase`.
     """
 
-    __slots__ = (
-        "_land",
-        "_lost_down_m",
-        "_motion",
-        "_place",
-        "_required",
-        "_searches",
-        "_since_s",
-        "_yaw_rad",
-        "phase",
-    )
-
     def __init__(
         self, position_ned_m: Array | None = None, yaw_rad: float | None = None, *, required: bool = True
     ) -> None:

@@ -62,20 +62,6 @@ class ReturnTask:
         place: the target of the return; None: there is none.
     """
 
-    __slots__ = (
-        "_first_item",
-        "_land",
-        "_motion",
-        "_plan",
-        "_ramp",
-        "_rules",
-        "_store",
-        "_target",
-        "_wait_s",
-        "phase",
-        "place",
-    )
-
     def __init__(
         self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
     ) -> None:

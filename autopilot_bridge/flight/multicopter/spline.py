@@ -34,8 +34,6 @@ class SplineCurve:
         length_m: of the curve.
     """
 
-    __slots__ = ("_along_m", "_end", "_speeds", "_start", "_tangents", "_u", "length_m")
-
     def __init__(
         self,
         start_ned_m: Array,
@@ -127,8 +125,6 @@ class SplineFlight:
         along_m: distance along the curve.
         speed_m_s: along it.
     """
-
-    __slots__ = ("_acceleration", "along_m", "curve", "speed_m_s")
 
     def __init__(self, curve: SplineCurve, speed_m_s: float, parameters: FlightParameters) -> None:
         self.curve = curve

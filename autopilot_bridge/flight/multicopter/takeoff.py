@@ -27,8 +27,6 @@ class TakeoffTask:
         yaw_rad: heading during the climb; None: the present one.
     """
 
-    __slots__ = ("_altitude_m", "_arrived", "_climb_m_s", "_motion", "_place", "_ramp", "_yaw_rad")
-
     def __init__(
         self,
         altitude_above_home_m: float | None = None,

@@ -232,15 +232,6 @@ class TrajectoryGenerator:
         limits: float64 (9,), see the indices of this module; writable.
     """
 
-    __slots__ = (
-        "_state",
-        "acceleration_ned_m_s2",
-        "limits",
-        "position_ned_m",
-        "stretch",
-        "velocity_ned_m_s",
-    )
-
     def __init__(self, parameters: FlightParameters, *, speed_m_s: float | None = None) -> None:
         self._state: Array = np.zeros(_SIZE)
         self.position_ned_m: Array = self._state[0:3]

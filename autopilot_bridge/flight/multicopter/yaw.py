@@ -19,8 +19,6 @@ class YawSteering:
         rate_rad_s: its rate.
     """
 
-    __slots__ = ("rate_rad_s", "yaw_rad")
-
     def __init__(self) -> None:
         self.yaw_rad = 0.0
         self.rate_rad_s = 0.0
@@ -74,8 +72,6 @@ def _rate(error_rad: float, rate_max_rad_s: float, parameters: FlightParameters)
 
 class Nose:
     """Replaces the heading of a setpoint that a task has written."""
-
-    __slots__ = ("_heading",)
 
     def __init__(self) -> None:
         self._heading = YawSteering()

@@ -73,10 +73,10 @@ class PowerService(Microservice):
             self._act(action)
 
     def _command(self, command: Command, source: Source) -> Result:
-        policy, asked = self._policy, whole(command.p1, 0)
-        action = policy.actions.get(asked or 0)
+        policy, requested = self._policy, whole(command.p1, 0)
+        action = policy.actions.get(requested or 0)
         if action is None:
-            return policy.nothing if not asked else policy.unknown
+            return policy.nothing if not requested else policy.unknown
         forced = policy.force is not None and whole(command.y) == policy.force
         if self._act is None or (self._commander.armed and not forced):
             return policy.armed

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.services.channel import NOBODY, AddressRule, MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import NO_CLIENT, AddressRule, MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.commands.handlers import (
     Command,
     CommandHandlers,
@@ -51,9 +51,9 @@ class CommandService:
 
     def carry_out(self, command: Command, source: Source | None = None) -> Result | None:
         """Execute a command without an acknowledgement; without a source, replies are dropped."""
-        asker = NOBODY if source is None else source
+        sender = NO_CLIENT if source is None else source
         handler = self._more.get(command.id)
-        return self._handlers.execute(command, asker) if handler is None else handler(command, asker)
+        return self._handlers.execute(command, sender) if handler is None else handler(command, sender)
 
     def _on_command(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if not self._address.accepts(message):

@@ -65,7 +65,7 @@ class Px4Actuators(Microservice):
         """DO_GRIPPER: p2 GRIPPER_ACTIONS; acknowledged when it is done, after PD_GRIPPER_TO seconds."""
         if self._parameters.get("PD_GRIPPER_TYPE") < 0 or whole(command.p2) not in _GRIPPER_ACTIONS:
             return Result.FAILED
-        if all(asker != source for _, asker in self._moving):  # else: a repeated request
+        if all(requester != source for _, requester in self._moving):  # else: a repeated request
             seconds = min(10.0, max(0.0, self._parameters.get("PD_GRIPPER_TO")))
             self._moving.append((self._commander.time_us + round(seconds * 1e6), source))
             self._moving.sort(key=lambda entry: entry[0])

@@ -154,13 +154,13 @@ class PayloadCommands(Microservice):
 
     def _configured(self, command: Command, source: Source) -> Command:
         """Values -2 and -3 refer to the client itself, not to the autopilot that forwards its command."""
-        asker = (source.system_id, source.component_id)
+        sender = (source.system_id, source.component_id)
         pairs = [(command.p1, command.p2), (command.p3, command.p4)]
         for index, pair in enumerate(pairs):
             if _TAKE in pair:
-                pairs[index] = (float(asker[0]), float(asker[1]))
+                pairs[index] = (float(sender[0]), float(sender[1]))
             elif _GIVE_UP in pair:
-                pairs[index] = (0.0, 0.0) if asker in self._in_control else (-1.0, -1.0)
+                pairs[index] = (0.0, 0.0) if sender in self._in_control else (-1.0, -1.0)
         (p1, p2), (p3, p4) = pairs
         return command._replace(p1=p1, p2=p2, p3=p3, p4=p4)
 

@@ -61,8 +61,6 @@ _Reply = tuple[bytes, int | None]
 class _Checksum:
     """A running checksum computation of a long file."""
 
-    __slots__ = ("client", "crc", "file", "offset", "request")
-
     def __init__(self, client: Client, request: Request, file: OpenFile) -> None:
         self.client = client
         self.request = request

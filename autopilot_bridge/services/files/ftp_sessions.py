@@ -81,8 +81,8 @@ class Client:
 
     def repeated(self, request: bytes, time_us: int) -> bytes | None:
         """The reply to a request that was answered a short time ago; None for a new request."""
-        told = self.replies.get(request)
-        return told[1] if told is not None and time_us - told[0] <= REPEAT_US else None
+        answered = self.replies.get(request)
+        return answered[1] if answered is not None and time_us - answered[0] <= REPEAT_US else None
 
     def remember(self, request: bytes, reply: bytes, time_us: int) -> None:
         """Keep a reply for a repeated request."""

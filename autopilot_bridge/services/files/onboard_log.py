@@ -35,12 +35,12 @@ class LogChannel:
 
     Attributes:
         motion: set by the autopilot that the channel is added to.
-        hears_all: it gets all texts, even before a client has sent a heartbeat.
+        receives_all: it gets all texts, even before a client has sent a heartbeat.
         line: its capacity: unlimited.
     """
 
     name = "onboard log"
-    hears_all = True
+    receives_all = True
     line = None
 
     def __init__(self, system_id: int, unix_us: Callable[[], int]) -> None:

@@ -27,7 +27,7 @@ from autopilot_bridge.navigation.external import (
 )
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
-from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
+from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, conjugate, from_euler, product

@@ -106,9 +106,9 @@ def _of_follow(message: MavlinkMessage) -> tuple[float, tuple[float, float, floa
     """(altitude over mean sea level, velocity, 1-sigma) of a FOLLOW_TARGET."""
     capabilities = int(message.est_capabilities)
     north, east, down = (float(part) for part in message.vel)
-    told = capabilities & _HAS_VELOCITY and max(abs(north), abs(east), abs(down)) < _MAX_SPEED_M_S
-    velocity = (north, east, down) if told and not math.isnan(north + east + down) else None
-    said = float(message.position_cov[0])
-    sigma_m = min(30.0, max(_SIGMA_M, said)) if said > 0.0 else _SIGMA_M
+    has_velocity = capabilities & _HAS_VELOCITY and max(abs(north), abs(east), abs(down)) < _MAX_SPEED_M_S
+    velocity = (north, east, down) if has_velocity and not math.isnan(north + east + down) else None
+    reported = float(message.position_cov[0])
+    sigma_m = min(30.0, max(_SIGMA_M, reported)) if reported > 0.0 else _SIGMA_M
     alt_m = float(message.alt) if capabilities & _HAS_POSITION else math.nan
     return alt_m, velocity, sigma_m

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
+from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from flightsim.airframe import AirframeKind
 from flightsim.foundation.vectors import from_euler, rotate, yaw_of
@@ -86,13 +86,13 @@ class LandingTargetService(Microservice):
             return None
         position, q = pose
         if message.position_valid:
-            told = np.array((message.x, message.y, message.z), dtype=np.float64)
-            if not float(np.abs(told).max()) < 1e5:
+            place = np.array((message.x, message.y, message.z), dtype=np.float64)
+            if not float(np.abs(place).max()) < 1e5:
                 return None
             if message.frame == mavlink.MAV_FRAME_LOCAL_NED:
-                return measured_us, told, _LEAST_SIGMA_M
+                return measured_us, place, _LEAST_SIGMA_M
             if message.frame in (mavlink.MAV_FRAME_BODY_FRD, mavlink.MAV_FRAME_LOCAL_FRD):
-                offset = rotated(q if message.frame == mavlink.MAV_FRAME_BODY_FRD else _heading(q), told)
+                offset = rotated(q if message.frame == mavlink.MAV_FRAME_BODY_FRD else _heading(q), place)
                 return measured_us, position + offset, _LEAST_SIGMA_M
             return None
         angle_x, angle_y = float(message.angle_x), float(message.angle_y)

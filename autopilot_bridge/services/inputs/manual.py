@@ -110,7 +110,7 @@ class ManualService(Microservice):
     def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
         if gcs:
-            self._commander.pilot.hear_gcs(time_us)
+            self._commander.pilot.on_gcs(time_us)
 
     def _may_steer(self, source: Source) -> bool:
         only = self._rules.gcs_only
@@ -188,7 +188,7 @@ class ManualService(Microservice):
     def _rc_channels(self) -> Values | None:
         """RC_CHANNELS (65); None without a radio."""
         pulses_us = self._radio.pulses_us
-        heard = [channel for channel, pulse_us in enumerate(pulses_us) if pulse_us]
-        if not heard:
+        driven = [channel for channel, pulse_us in enumerate(pulses_us) if pulse_us]
+        if not driven:
             return None
-        return (self._commander.time_us // 1000, heard[-1] + 1, *pulses_us, _RSSI_UNKNOWN)
+        return (self._commander.time_us // 1000, driven[-1] + 1, *pulses_us, _RSSI_UNKNOWN)

@@ -76,14 +76,14 @@ class ObstacleService(Microservice):
         if frame != mavlink.MAV_FRAME_BODY_FRD:
             first_rad -= float(self._context.nav[nav.EULER_RAD][2])
         values = np.array(message.distances, dtype=np.float64)[:SECTORS]
-        told = values != _UNKNOWN_CM
+        known = values != _UNKNOWN_CM
         values *= 0.01
         if self._simulation is not None and not self._simulation.apply_failure(_AVOIDANCE, values):
             return True
         nearest_m, reach_m = message.min_distance * 0.01, message.max_distance * 0.01
         obstacles = self._context.surroundings.obstacles
         count = min(SECTORS, math.ceil(math.tau / abs(step_rad) - 1e-6))
-        for k in np.flatnonzero(told[:count]).tolist():
+        for k in np.flatnonzero(known[:count]).tolist():
             distance_m = max(nearest_m, float(values[k]))
             if reach_m > 0.0 and distance_m > reach_m:
                 distance_m = math.inf

@@ -29,5 +29,5 @@ class RadioService:
     def _on_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         throttle = self._throttle(source.channel)
         if throttle is not None:
-            throttle.radio.heard(message.txbuf, time_us)
+            throttle.radio.on_radio_status(message.txbuf, time_us)
             throttle.fit()

@@ -1,4 +1,4 @@
-"""TIMESYNC and PING: the autopilot's side of time synchronisation and of round-trip measurements.
+"""TIMESYNC, PING and time stamps: the autopilot's side of time synchronisation and round-trip measurements.
 
 Sources: MAVLink time synchronisation protocol (tc1 = 0 is a request; the answer carries the own clock in tc1
 and the requester's ts1, both in nanoseconds) and ping protocol (target 0/0 is a request; the answer is
@@ -14,6 +14,20 @@ from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 
 _NS_PER_US: Final = 1000
 _INT64_MAX: Final = 2**63 - 1
+
+_OLDEST_US: Final = 500_000
+_NEWEST_US: Final = 20_000
+
+
+def in_vehicle_time(stamp_us: int, time_us: int) -> int:
+    """The time of a measurement, microseconds of vehicle time.
+
+    Args:
+        stamp_us: time stamp in the message.
+        time_us: time of arrival, returned for a stamp of another clock (TIMESYNC provides the vehicle's
+            clock).
+    """
+    return stamp_us if -_NEWEST_US <= time_us - stamp_us <= _OLDEST_US else time_us
 
 
 class TimeSyncService:

@@ -29,7 +29,7 @@ _NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
 
 @dataclass(slots=True)
 class _Aircraft:
-    heard_us: int
+    received_us: int
     warned_us: int | None = None
 
 
@@ -61,12 +61,12 @@ class TrafficService(Microservice):
         self._parts = parts
         self._commander = parts.commander
         self._rules = rules
-        self._heard: dict[int, _Aircraft] = {}
+        self._aircraft: dict[int, _Aircraft] = {}
 
     @property
     def aircraft(self) -> tuple[int, ...]:
         """ICAO addresses of the aircraft received recently."""
-        return tuple(self._heard)
+        return tuple(self._aircraft)
 
     @property
     def builders(self) -> Mapping[int, Builder]:
@@ -86,16 +86,18 @@ class TrafficService(Microservice):
 
     def _take(self, message: MavlinkMessage, time_us: int) -> None:
         address = message.ICAO_address
-        for old in [icao for icao, seen in self._heard.items() if time_us - seen.heard_us > _LIFETIME_US]:
-            del self._heard[old]
-        known = self._heard.get(address)
+        for old in [
+            icao for icao, seen in self._aircraft.items() if seen.received_us < time_us - _LIFETIME_US
+        ]:
+            del self._aircraft[old]
+        known = self._aircraft.get(address)
         if known is None:
-            if len(self._heard) >= _MOST:
+            if len(self._aircraft) >= _MOST:
                 return
-            known = self._heard[address] = _Aircraft(time_us)
-        elif time_us - known.heard_us < _LEAST_INTERVAL_US:
+            known = self._aircraft[address] = _Aircraft(time_us)
+        elif time_us - known.received_us < _LEAST_INTERVAL_US:
             return
-        known.heard_us = time_us
+        known.received_us = time_us
         send_to_all(self._parts.broadcast, message)
         if self._rules.conflicts:
             self._warn(message, known, time_us)

@@ -21,8 +21,6 @@ class Radio:
         at_rest: pulses of a built-in transmitter with untouched sticks; empty: there is none.
     """
 
-    __slots__ = ("_at_rest", "_overrides", "_times_us")
-
     def __init__(self, at_rest: tuple[int, ...] = ()) -> None:
         self._at_rest = at_rest + (0,) * (CHANNELS - len(at_rest))
         self._overrides = [0] * CHANNELS

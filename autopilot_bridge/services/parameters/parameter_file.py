@@ -13,8 +13,8 @@ from autopilot_bridge.parameter_files import (
 from autopilot_bridge.parameters import ParameterError, ParameterStore
 from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.storage import FileStore
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import exists, make_directories, read_whole, replace_whole
+from autopilot_bridge.storage.memory import MemoryCard
 
 
 class StoredParameters:

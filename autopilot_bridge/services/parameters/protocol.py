@@ -81,8 +81,6 @@ def fix_identity(store: ParameterStore, policy: ParameterPolicy, system_id: int)
 class _Listing:
     """Progress of one PARAM_REQUEST_LIST on one channel."""
 
-    __slots__ = ("channel", "next_index")
-
     def __init__(self, channel: Channel, next_index: int) -> None:
         self.channel = channel
         self.next_index = next_index  # -1: the hash comes first

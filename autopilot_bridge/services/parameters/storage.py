@@ -75,7 +75,7 @@ class ParameterStorageService(Microservice):
         self._time_us = 0
         self._due_us: int | None = None
         self._loading = False
-        self._told = False
+        self._reported = False
         store.subscribe(self._changed)
 
     @property
@@ -105,11 +105,11 @@ class ParameterStorageService(Microservice):
         try:
             self._stored.save()
         except OSError as failure:
-            if not self._told:
+            if not self._reported:
                 self._announce(mavlink.MAV_SEVERITY_ERROR, f"Storing parameters failed: {failure.strerror}")
-            self._told = True
+            self._reported = True
             return Result.FAILED
-        self._told = False
+        self._reported = False
         return Result.ACCEPTED
 
     def _command(self, command: Command, source: Source) -> Result | None:

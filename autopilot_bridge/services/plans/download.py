@@ -72,7 +72,7 @@ class MissionDownloads:
     def tick(self, time_us: int) -> None:
         for session in self._sessions.all():
             download = session.download
-            if download is not None and time_us - download.heard_us > self._policy.timeout_us:
+            if download is not None and time_us - download.received_us > self._policy.timeout_us:
                 session.download = None
                 self._say(self._policy.texts.timeout)
 
@@ -121,7 +121,7 @@ class MissionDownloads:
             return
         if message.mission_type != download.mission_type:
             return
-        download.heard_us = time_us
+        download.received_us = time_us
         if message.seq == download.next_seq < len(download.items):
             download.next_seq += 1
         elif message.seq != download.next_seq - 1:

@@ -78,17 +78,17 @@ class MissionEquipment(Microservice):
                 self._carry_out(index, self._missions.items[index])
             case ModeChanged(previous=FlightMode.MISSION) if self._in_control:
                 self._in_control = False
-                self._tell_gimbal(_CONFIGURE, _GIVE_UP, _GIVE_UP, _KEEP, _KEEP)
+                self._command_gimbal(_CONFIGURE, _GIVE_UP, _GIVE_UP, _KEEP, _KEEP)
 
     def _carry_out(self, index: int, item: MissionItem) -> None:
         if item.command in CAMERA_COMMANDS:
-            self._tell(_CAMERA, item.command, *_parameters(item))
+            self._command(_CAMERA, item.command, *_parameters(item))
         elif item.command in GIMBAL_COMMANDS:
             self._take_control()
             if item.command in MOUNT_COMMANDS:
                 self._point_mount(item)
             else:
-                self._tell_gimbal(item.command, *_parameters(item))
+                self._command_gimbal(item.command, *_parameters(item))
         elif item.command in ROI_COMMANDS:
             self._take_control()
             self._look(index, item)
@@ -101,7 +101,7 @@ class MissionEquipment(Microservice):
         """The mission takes control of the gimbal from any client (PX4's acquire_gimbal_control)."""
         if not self._in_control:
             self._in_control = True
-            self._tell_gimbal(_CONFIGURE, float(self._parts.system_id), float(_AUTOPILOT), _KEEP, _KEEP)
+            self._command_gimbal(_CONFIGURE, float(self._parts.system_id), float(_AUTOPILOT), _KEEP, _KEEP)
 
     def _point_mount(self, item: MissionItem) -> None:
         """Convert DO_MOUNT_CONTROL, DO_MOUNT_CONFIGURE of gimbal protocol v1 to v2."""
@@ -110,16 +110,16 @@ class MissionEquipment(Microservice):
         mode = round(value) if math.isfinite(value) else -1
         flags = _MODE_FLAGS.get(mode)
         if flags is not None:
-            self._tell_gimbal(_POINT, math.nan, math.nan, math.nan, math.nan, float(flags), 0.0, 0.0)
+            self._command_gimbal(_POINT, math.nan, math.nan, math.nan, math.nan, float(flags), 0.0, 0.0)
         elif mode == mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING and not configures:
             pitch, yaw = item.param1, item.param3
-            self._tell_gimbal(_POINT, pitch, yaw, math.nan, math.nan, float(_LEVEL), 0.0, 0.0)
+            self._command_gimbal(_POINT, pitch, yaw, math.nan, math.nan, float(_LEVEL), 0.0, 0.0)
 
     def _look(self, index: int, item: MissionItem) -> None:
         """Set a region of interest (a position on Earth), or end it."""
         place = self._place_of(index, item)
         if place is None:
-            self._tell_gimbal(mavlink.MAV_CMD_DO_SET_ROI_NONE)
+            self._command_gimbal(mavlink.MAV_CMD_DO_SET_ROI_NONE)
             return
         frame = place.frame
         if frame in TERRAIN_FRAMES:  # the ground is assumed level with home
@@ -158,10 +158,10 @@ class MissionEquipment(Microservice):
 
     # sending
 
-    def _tell_gimbal(self, command: int, *parameters: float) -> None:
-        self._tell(_GIMBAL, command, *parameters)
+    def _command_gimbal(self, command: int, *parameters: float) -> None:
+        self._command(_GIMBAL, command, *parameters)
 
-    def _tell(self, component: int, command: int, *parameters: float) -> None:
+    def _command(self, component: int, command: int, *parameters: float) -> None:
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
         message: MavlinkMessage = mavlink.MAVLink_command_long_message(
             self._parts.system_id, component, command, 0, *values

@@ -52,7 +52,7 @@ class FenceJudge(Protocol):
 
 HomeOf = Callable[[], GeodeticPosition | None]
 _GUIDED_ITEM = 2  # MISSION_ITEM.current of a guided-mode target
-_PROBLEMS_TOLD = 3  # a mission at a wrong place has one problem for each item
+_PROBLEMS_REPORTED = 3  # a mission at a wrong place has one problem for each item
 
 
 def new_stores() -> dict[MissionType, MissionStore]:
@@ -293,7 +293,7 @@ class MissionService:
             self._say(self._policy.texts.home_outside_fence)
         if mission_type is not MissionType.RALLY:
             # The firmware has events for these only, which few clients show.
-            for problem in self.problems(landed=self._landed())[:_PROBLEMS_TOLD]:
+            for problem in self.problems(landed=self._landed())[:_PROBLEMS_REPORTED]:
                 self._announce(CRITICAL, problem)
 
     def _store_ardupilot_plan(

@@ -23,7 +23,7 @@ class Download:
     partner: Source
     mission_type: MissionType
     items: tuple[MissionItem, ...]
-    heard_us: int
+    received_us: int
     next_seq: int = 0
 
 
@@ -49,8 +49,6 @@ class ChannelSession:
 
 class Sessions:
     """The sessions of all channels on which messages were received."""
-
-    __slots__ = ("_sessions",)
 
     def __init__(self) -> None:
         self._sessions: dict[int, ChannelSession] = {}

@@ -36,7 +36,7 @@ class Upload:
     first: int
     end: int
     kept: tuple[MissionItem, ...]
-    heard_us: int
+    received_us: int
     sent_us: int
     items: list[MissionItem] = field(default_factory=list)
     checksum: int = 0
@@ -86,7 +86,7 @@ class MissionUploads:
                 self._ack(source, self._policy.foreign_count_result, message.mission_type)
                 return
             if upload.items and not self._policy.restart_on_count:
-                upload.heard_us = time_us
+                upload.received_us = time_us
                 self._say(texts.upload_busy)
                 self._ack(source, mavlink.MAV_MISSION_ERROR, upload.mission_type)
                 return
@@ -147,7 +147,7 @@ class MissionUploads:
             return
         if message.seq != upload.next_seq:
             if self._policy.wrong_sequence_result is None:
-                upload.heard_us = time_us
+                upload.received_us = time_us
             else:
                 self._ack(source, self._policy.wrong_sequence_result, upload.mission_type)
             return
@@ -169,7 +169,7 @@ class MissionUploads:
         upload = self._upload
         if upload is None:
             return
-        if time_us - upload.heard_us > self._policy.timeout_us:
+        if time_us - upload.received_us > self._policy.timeout_us:
             self._upload = None
             self._say(self._policy.texts.timeout)
             if self._policy.timeout_result is not None:
@@ -178,7 +178,7 @@ class MissionUploads:
             self._request(upload, time_us)
 
     def _take(self, upload: Upload, message: MavlinkMessage, time_us: int) -> None:
-        upload.heard_us = time_us
+        upload.received_us = time_us
         item = item_from_message(message)
         rules = self._policy.rules
         result = rules.check(item, upload.mission_type, message.seq, upload.plan_size)

@@ -42,12 +42,12 @@ class Law:
 
     @staticmethod
     def load_factor(airspeed_m_s: float, angle_of_attack_rad: float) -> float:
-        """Of the wing as it is believed, in still air."""
+        """Of the wing as modelled, in still air."""
         lifting_rad = angle_of_attack_rad - PARAMETERS.trim_pitch_rad + PARAMETERS.lift_angle_rad
         return lifting_rad / PARAMETERS.lift_angle_rad * (airspeed_m_s / PARAMETERS.airspeed_trim_m_s) ** 2
 
     def feel(self, load_factor: float) -> None:
-        """What the accelerometers tell from now on."""
+        """What the accelerometers measure from now on."""
         self.nav[FORCE_DOWN] = -load_factor * G_M_S2
 
     def pitch(self, climb_m_s: float, lowest: float = LOWEST, highest: float = HIGHEST) -> float:

@@ -280,7 +280,7 @@ def test_airspeed_of_the_hud_becomes_true_airspeed():
     assert speed == pytest.approx(20.0 / math.sqrt(0.8637), rel=1e-3)
 
 
-def test_airspeed_by_pressure_where_nobody_tells_it():
+def test_airspeed_by_pressure_where_no_message_has_it():
     message = made("SCALED_PRESSURE", press_abs=1013.25, press_diff=0.5 * 1.225 * 20.0**2 / 100.0)
     assert airspeed_after(wing(), (10, message)) == pytest.approx(20.0, rel=1e-6)
     assert airspeed_after(wing(), (5, made("VFR_HUD", airspeed=15.0)), (10, message)) == pytest.approx(15.0)
@@ -308,7 +308,7 @@ def test_old_airspeed_is_not_used():
     assert math.isnan(newest(found).airspeed_m_s)
 
 
-def test_angle_of_attack_is_told_in_flight():
+def test_angle_of_attack_is_reported_in_flight():
     found = wing()
     for k in range(1, 500):
         if k % 5 == 0:

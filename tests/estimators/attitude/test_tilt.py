@@ -100,7 +100,7 @@ def test_bias_at_rest_is_found_within_seconds_all_three():
     assert found.bias == pytest.approx(bias, abs=6e-4)
 
 
-def test_a_takeoff_run_before_arming_is_told_is_no_bias():
+def test_a_takeoff_run_before_arming_is_reported_is_no_bias():
     """HEARTBEAT comes once a second: 5 m/s^2 of acceleration while still thought to be at rest."""
     found = Filter(at.WING, settled=False)
     found.disarmed = True

@@ -131,8 +131,8 @@ def test_a_file_is_whole_or_not_there(tmp_path):
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(LogError, match="exists"), new_file(path) as part:
         part.write_text("ours")
-        path.write_text("somebody was faster")
-    assert path.read_text() == "somebody was faster" and len(list(tmp_path.iterdir())) == 1
+        path.write_text("another process was faster")
+    assert path.read_text() == "another process was faster" and len(list(tmp_path.iterdir())) == 1
 
 
 def test_files_without_hard_links(tmp_path, monkeypatch):
@@ -148,8 +148,8 @@ def test_files_without_hard_links(tmp_path, monkeypatch):
     assert path.read_text() == "whole" and len(list(tmp_path.iterdir())) == 1
     with pytest.raises(LogError, match="exists"), new_file(tmp_path / "other") as part:
         part.write_text("ours")
-        (tmp_path / "other").write_text("somebody was faster")
-    assert (tmp_path / "other").read_text() == "somebody was faster"
+        (tmp_path / "other").write_text("another process was faster")
+    assert (tmp_path / "other").read_text() == "another process was faster"
 
 
 def test_mcap_takes_any_time_stamp(tmp_path):

@@ -255,7 +255,7 @@ def test_the_rate_of_two_imus_is_that_of_one(tmp_path):
     assert report_of(log).streams[0].rate_hz == pytest.approx(25.0, rel=0.01)
 
 
-def test_times_are_told_on_the_first_vehicles_clock_and_boot(tmp_path):
+def test_times_are_reported_on_the_first_vehicles_clock_and_boot(tmp_path):
     """Vehicle 2 booted 100 s before vehicle 1, which boots anew."""
     path, frames = tmp_path / "a.tlog", []
     for boot in range(2):

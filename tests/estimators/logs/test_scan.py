@@ -201,7 +201,7 @@ def test_time_stamp_that_looks_like_a_frame_hides_none():
 
 @pytest.mark.parametrize("flags", [2, 3, 4, 0x81])
 @pytest.mark.parametrize("tail", [b"", bytes(13)])
-def test_flags_that_nobody_may_ignore(flags, tail):
+def test_flags_that_no_reader_may_ignore(flags, tail):
     """The checksum is right, but what the frame means isn't known."""
     items = mixed_frames(2)
     foreign = build(ATTITUDE, b"\x01\x02\x03", flags=flags) + tail
@@ -222,7 +222,7 @@ def test_capture_without_time_stamps():
 
 
 @pytest.mark.parametrize("stamped", [True, False])
-def test_time_stamps_are_told_where_most_messages_are_unknown(stamped):
+def test_time_stamps_are_reported_where_most_messages_are_unknown(stamped):
     items = []
     for index in range(40):
         unknown = build(UNKNOWN_V2, bytes([1 + index % 200] * (index % 50 + 1)))

@@ -67,7 +67,7 @@ def feed(detector: AnomalyDetector, values_nt, map_nt=50_000.0, rate_hz=10.0):
     return found
 
 
-def test_anomaly_is_told_at_its_peak_when_it_ends():
+def test_anomaly_is_reported_at_its_peak_when_it_ends():
     values = [0.1] * 50 + [2.0, 6.0, 9.0, 5.0, 1.5] + [0.0] * 20
     (anomaly,) = feed(AnomalyDetector(threshold_nt=1.0), values)
     assert anomaly.peak_nt == pytest.approx(8.9, abs=0.1)

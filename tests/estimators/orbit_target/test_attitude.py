@@ -22,7 +22,7 @@ G = 9.80665
 
 
 class Sender:
-    """Frames of an autopilot, or of somebody else."""
+    """Frames of an autopilot, or of another component."""
 
     def __init__(self, system=1, component=1):
         self._encoder = FrameEncoder(system, component)

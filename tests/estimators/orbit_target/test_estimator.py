@@ -188,7 +188,7 @@ def as_read(message):
 
 
 @pytest.mark.parametrize(
-    ("values", "told"),
+    ("values", "reported"),
     [
         ({"target_north_m": 1.0}, "give both, or neither"),
         ({"ground_pa": 5.0}, "ground_pa 5"),
@@ -197,6 +197,6 @@ def as_read(message):
         ({"angle_rad": 0.0}, "angle_rad = 0"),
     ],
 )
-def test_parameters_are_checked(values, told):
-    with pytest.raises(ValueError, match=told):
+def test_parameters_are_checked(values, reported):
+    with pytest.raises(ValueError, match=reported):
         OrbitTargetParameters(**values)

@@ -85,7 +85,7 @@ def test_one_detection_at_the_limit_of_the_camera_is_no_acquisition_and_silence_
 
 
 def test_a_target_is_seen_while_its_expected_place_is_still_renewed():
-    """As with GPS: the place somebody tells is taken anew every step, and images come later than that."""
+    """As with GPS: the given place is taken anew every step, and images come later than that."""
     rig = Rig()
     accepted = 0
     for _ in range(100):
@@ -135,7 +135,7 @@ def test_nothing_is_made_of_images_without_attitude_height_or_gimbal():
     assert tracker.status is TargetStatus.EXPECTED
 
 
-def test_a_gimbal_that_fell_silent_is_not_believed():
+def test_a_gimbal_that_fell_silent_is_not_accepted():
     rig = Rig()
     rig.run(3.0)
     used = rig.tracker.target.accepted

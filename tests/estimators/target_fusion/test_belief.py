@@ -67,7 +67,7 @@ def test_a_target_that_was_lost_is_found_elsewhere() -> None:
     assert b.values[:2] == pytest.approx([60.0, 5.0])
 
 
-def test_nothing_is_told_before_it_is_confirmed() -> None:
+def test_nothing_is_reported_before_it_is_confirmed() -> None:
     b = belief(confirmations=2)
     assert b.take(0, seen(10.0, 0.0)) is Outcome.USED and not b.confirmed
     assert b.take(0, seen(90.0, 0.0)) is Outcome.USED and not b.confirmed

@@ -213,7 +213,7 @@ def test_who_is_too_slow_to_have_a_course_places_nothing() -> None:
 
 
 def test_nothing_is_placed_long_after_the_last_fix() -> None:
-    """A receiver without a fix goes on telling so; the pattern is not believed in for ever."""
+    """A receiver without a fix goes on reporting so; the pattern is not used for ever."""
     messages = [
         (t, m._replace(fix_type=0, lat=0, lon=0) if m.name == "GPS_RAW_INT" and t > 25_000_000 else m)
         for t, m in Flight(noise=0.0).messages(20.0)

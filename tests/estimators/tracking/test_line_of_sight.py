@@ -30,7 +30,7 @@ def printed_39(azimuth, elevation):
     return np.array([[ce * ca, -sa, se * ca], [ce * sa, ca, se * sa], [-se, 0.0, ce]])
 
 
-def told(azimuth, elevation, q_ned_from_frd):
+def reported(azimuth, elevation, q_ned_from_frd):
     """What a gimbal at these angles against the body tells: its attitude, from north."""
     r = Rotation.from_matrix(matrix(q_ned_from_frd) @ printed_39(azimuth, elevation))
     x, y, z, w = r.as_quat()
@@ -67,7 +67,7 @@ def test_a_gimbal_that_points_sees_the_target_in_the_middle(offset, height, roll
     """Pointing angles (section V-C), then equations 36 to 40, lead back to the target."""
     q = from_euler(roll, pitch, yaw)
     azimuth, elevation = pointing_angles((*offset, height), q)
-    line = line_of_sight_of_gimbal(0.0, 0.0, told(azimuth, elevation, q), q)
+    line = line_of_sight_of_gimbal(0.0, 0.0, reported(azimuth, elevation, q), q)
     assert meets_ground(line, height) == pytest.approx(offset, rel=1e-6, abs=1e-6)
 
 
@@ -76,7 +76,7 @@ def test_a_gimbal_that_points_beside_it_sees_it_off_the_middle(offset, roll, yaw
     height = 100.0
     q = from_euler(roll, 0.05, yaw)
     azimuth, elevation = pointing_angles((*offset, height), q)
-    gimbal = told(azimuth + error, elevation - 0.5 * error, q)
+    gimbal = reported(azimuth + error, elevation - 0.5 * error, q)
     forward, right, down = rotate(conjugate(gimbal.q), (*offset, height))
     line = line_of_sight_of_gimbal(right / forward, down / forward, gimbal, q)
     assert meets_ground(line, height) == pytest.approx(offset, rel=1e-6, abs=1e-6)

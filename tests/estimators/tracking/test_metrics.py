@@ -87,10 +87,10 @@ def test_assignment_is_that_of_scipy(rows, more, seed):
 
 
 @pytest.mark.parametrize(
-    ("cost", "told"), [(np.zeros((3, 2)), "as many columns"), (np.full((1, 1), np.inf), "finite")]
+    ("cost", "reported"), [(np.zeros((3, 2)), "as many columns"), (np.full((1, 1), np.inf), "finite")]
 )
-def test_an_impossible_assignment_is_refused(cost, told):
-    with pytest.raises(ValueError, match=told):
+def test_an_impossible_assignment_is_refused(cost, reported):
+    with pytest.raises(ValueError, match=reported):
         assign(cost)
 
 

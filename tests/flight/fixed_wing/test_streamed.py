@@ -159,7 +159,7 @@ def guided(mass: PointMass) -> GuidedTask:
     return task
 
 
-def test_guided_circles_here_until_told_otherwise() -> None:
+def test_guided_circles_here_until_commanded_otherwise() -> None:
     mass = PointMass()
     task = guided(mass)
     mass.run(50.0)

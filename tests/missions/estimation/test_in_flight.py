@@ -76,14 +76,14 @@ def test_what_a_pattern_says_of_an_estimators_parameters_is_set(estimator, chose
     assert find_mission("lissajous").estimator_settings(FlightOptions()) == {}
 
 
-def test_estimates_are_told_on_the_link_and_logged_as_a_component_of_the_vehicle(scripted, tmp_path):
+def test_estimates_are_reported_on_the_link_and_logged_as_a_component_of_the_vehicle(scripted, tmp_path):
     result = flight(tmp_path, estimator=LEVEL)
     log = open_log(result.folder / "flight.tlog")
-    told = log.table("ATTITUDE", system_id=1, component_id=191)
-    times = told.time_us
+    reported = log.table("ATTITUDE", system_id=1, component_id=191)
+    times = reported.time_us
     assert 8.0 < 1e6 / np.median(np.diff(times)) <= 10.1
     assert log.rate_hz("HEARTBEAT", system_id=1, component_id=191) == pytest.approx(1.0, abs=0.02)
-    assert scripted[0].autopilots[0].heartbeats_heard > len(
+    assert scripted[0].autopilots[0].heartbeats_received > len(
         log.table("HEARTBEAT", system_id=255, component_id=190)
     )
     # one component on one link has one sequence

@@ -75,7 +75,7 @@ class ScriptedVehicle(threading.Thread):
     """Says HEARTBEAT and ATTITUDE to a UDP port, up to ten times as fast as real time, and hears the answers.
 
     Args:
-        period_ms: between messages, until somebody asks for more.
+        period_ms: between messages, until a client asks for more.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class ScriptedVehicle(threading.Thread):
         period_ms=500,
     ):
         super().__init__(daemon=True)
-        self.heard = []
+        self.received = []
         self.done = threading.Event()
         self._port, self._seconds, self._system = port, seconds, system
         self._willing, self._garbage, self._repeat, self._says = willing, garbage, repeat, says
@@ -122,7 +122,7 @@ class ScriptedVehicle(threading.Thread):
                 self.done.wait(0.001)
 
     def _hear(self, message):
-        self.heard.append(message)
+        self.received.append(message)
         if (
             message.get_type() == "COMMAND_LONG"
             and message.param1 == type(self._says(0)).id
@@ -194,7 +194,7 @@ def test_it_asks_hears_tells_and_its_log_gives_the_same_estimates(tmp_path, port
     assert summary["link"]["published"] > 20
     estimates = assert_replay_is_the_same(tmp_path)
     assert len(estimates["time_us"]) == summary["samples"] > 50
-    said = {(m.get_type(), m.get_srcSystem(), m.get_srcComponent()) for m in there.heard}
+    said = {(m.get_type(), m.get_srcSystem(), m.get_srcComponent()) for m in there.received}
     assert ("ATTITUDE", system, 191) in said and ("HEARTBEAT", system, 191) in said
     log = open_log(tmp_path / "run" / "flight.tlog")
     assert not any(loss.lost for loss in log.source.losses)
@@ -207,7 +207,7 @@ def connected(port):
         with contextlib.suppress(OSError):
             return socket.create_connection(("127.0.0.1", port))
         waited.wait(0.05)
-    raise AssertionError(f"nobody listens at {port}")
+    raise AssertionError(f"no listener at {port}")
 
 
 def test_a_base_station_hears_a_team_on_one_link(tmp_path):
@@ -237,8 +237,10 @@ def test_a_base_station_hears_a_team_on_one_link(tmp_path):
     ours = np.load(tmp_path / "run" / "estimates.npz")
     assert np.abs(ours["east_m"] - 30.0).max() < 2.0 and np.abs(ours["north_m"]).max() < 2.0
     assert set(ours["vehicle"].tolist()) == {1.0, 2.0} and set(ours["target"].tolist()) == {7.0}
-    told = open_log(tmp_path / "run" / "flight.tlog").table("FOLLOW_TARGET", system_id=255, component_id=191)
-    assert len(told) > 20
+    reported = open_log(tmp_path / "run" / "flight.tlog").table(
+        "FOLLOW_TARGET", system_id=255, component_id=191
+    )
+    assert len(reported) > 20
     arguments = ["--estimator", "target-fusion", *settings, "--no-picture", "--out", str(tmp_path / "again")]
     assert run_command_line(["replay", str(tmp_path / "run" / "flight.tlog"), *arguments]) == 0
     theirs = np.load(tmp_path / "again" / "estimates.npz")
@@ -248,7 +250,7 @@ def test_a_base_station_hears_a_team_on_one_link(tmp_path):
 def test_it_can_be_silent(tmp_path, port, vehicle):
     there = vehicle(willing=False)
     assert estimate(tmp_path, port, "--duration", "6", "--no-request", "--no-publish") == 1
-    assert {m.get_type() for m in there.heard} == {"HEARTBEAT"}
+    assert {m.get_type() for m in there.received} == {"HEARTBEAT"}
 
 
 class FullAtTheEnd(TlogWriter):
@@ -260,7 +262,7 @@ class FullAtTheEnd(TlogWriter):
         raise TlogError(f"can't write {self.path}: No space left on device; check the disk")
 
 
-def test_a_log_whose_last_part_is_refused_is_told(tmp_path, port, vehicle, capfd, monkeypatch):
+def test_a_log_whose_last_part_is_refused_is_reported(tmp_path, port, vehicle, capfd, monkeypatch):
     monkeypatch.setattr("missions.estimation.live.TlogWriter", FullAtTheEnd)
     vehicle()
     assert estimate(tmp_path, port, "--duration", "3", "--no-picture") == 1
@@ -269,15 +271,15 @@ def test_a_log_whose_last_part_is_refused_is_told(tmp_path, port, vehicle, capfd
     assert summary["outcome"] == "failed" and "No space left on device" in summary["reason"]
 
 
-def test_what_the_link_lacks_is_told_and_nothing_is_published(tmp_path, port, vehicle, capfd):
+def test_what_the_link_lacks_is_reported_and_nothing_is_published(tmp_path, port, vehicle, capfd):
     there = vehicle(willing=False)
     assert estimate(tmp_path, port, "--duration", LONG) == 1
     error = capfd.readouterr().err
     assert re.search(r"ATTITUDE at \d\.?\d* Hz; needs 10 Hz or more for attitude", error)
     assert "are partial" in error
     assert summary_of(tmp_path)["partial"]
-    assert [m for m in there.heard if m.get_type() == "COMMAND_LONG"]
-    assert not [m for m in there.heard if m.get_type() == "ATTITUDE"]
+    assert [m for m in there.received if m.get_type() == "COMMAND_LONG"]
+    assert not [m for m in there.received if m.get_type() == "ATTITUDE"]
 
 
 @pytest.mark.parametrize(("says", "seconds", "period_ms"), [(imu, LONG, 500), (untimed, "1.5", 10)])
@@ -323,7 +325,7 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (
             ["level", "--connect", "udpin:127.0.0.1:1"],
@@ -336,10 +338,10 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
         ([LEVEL], "Missing option '--connect'"),
     ],
 )
-def test_wrong_use(tmp_path, monkeypatch, capfd, arguments, told):
+def test_wrong_use(tmp_path, monkeypatch, capfd, arguments, reported):
     monkeypatch.chdir(tmp_path)
     assert run_command_line(["estimate", *arguments]) == 2
-    assert told in capfd.readouterr().err
+    assert reported in capfd.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
@@ -386,7 +388,7 @@ def test_a_killed_process_leaves_a_log_that_can_be_replayed(tmp_path, port, vehi
     assert open_log(log).source.bytes_by_kind  # and not a byte of it is torn
 
 
-def test_a_process_that_stood_still_counts_that_as_nobodys_silence(tmp_path, port, capfd, monkeypatch):
+def test_a_process_that_stood_still_counts_that_as_no_silence(tmp_path, port, capfd, monkeypatch):
     now_s, waits = 100.0, []
 
     async def wait_for(awaited, timeout):

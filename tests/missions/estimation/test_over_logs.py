@@ -61,10 +61,10 @@ def test_one_log_one_folder(tmp_path, capfd):
     lines = (out / "estimates.csv").read_text().splitlines()
     assert lines[0] == "time_s,boot,subject,roll_rad,pitch_rad"
     assert len(lines) == 201
-    told = capfd.readouterr()
-    assert "mean squared" in told.out
-    assert "flight.tlog  vehicle 1  truth" in told.out
-    assert told.err == ""
+    reported = capfd.readouterr()
+    assert "mean squared" in reported.out
+    assert "flight.tlog  vehicle 1  truth" in reported.out
+    assert reported.err == ""
 
 
 @pytest.mark.parametrize("against", ["autopilot", "truth"])
@@ -143,13 +143,13 @@ def test_no_truth_and_never_in_the_air(tmp_path, against, armed, says):
     assert (tmp_path / "out" / "errors.png").exists()
 
 
-def test_what_is_lacking_is_told_and_the_rest_goes_on(tmp_path, capfd):
+def test_what_is_lacking_is_reported_and_the_rest_goes_on(tmp_path, capfd):
     slow, good = write_log(tmp_path / "slow.tlog", rate_hz=2), write_log(tmp_path / "good.tlog")
     out = tmp_path / "out"
     assert replay(slow, good, "--estimator", LEVEL, "--out", out) == 1
-    told = capfd.readouterr()
-    assert "slow.tlog: ATTITUDE at 2 Hz; needs 10 Hz or more for attitude" in told.err
-    assert "good.tlog: completed" in told.out
+    reported = capfd.readouterr()
+    assert "slow.tlog: ATTITUDE at 2 Hz; needs 10 Hz or more for attitude" in reported.err
+    assert "good.tlog: completed" in reported.out
     summary = summary_of(out / "slow")
     assert summary["partial"] and summary["outcome"] == "failed"
     assert summary["samples"] == 0
@@ -162,13 +162,13 @@ def test_files_that_are_no_logs(tmp_path, capfd, content):
     path = tmp_path / "bad.tlog"
     path.write_bytes(content)
     assert replay(path, "--estimator", LEVEL, "--out", tmp_path / "out") == 1
-    told = capfd.readouterr()
-    assert "bad.tlog" in told.err
-    assert "Traceback" not in told.err
+    reported = capfd.readouterr()
+    assert "bad.tlog" in reported.err
+    assert "Traceback" not in reported.err
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (["{folder}"], "is a directory; give the path of a log"),
         (["{folder}/none.tlog"], "does not exist; give the path of a log"),
@@ -184,12 +184,12 @@ def test_files_that_are_no_logs(tmp_path, capfd, content):
         ([], "Missing argument 'LOG...'"),
     ],
 )
-def test_wrong_use_names_value_and_what_is_accepted(tmp_path, capfd, arguments, told):
+def test_wrong_use_names_value_and_what_is_accepted(tmp_path, capfd, arguments, reported):
     log = write_log(tmp_path / "flight.tlog")
     filled = [text.format(folder=tmp_path, log=log) for text in arguments]
     assert replay(*filled, "--estimator", LEVEL) == 2
     error = capfd.readouterr().err
-    assert told in error
+    assert reported in error
     assert error.count("\n") == 1
     assert {path.name for path in tmp_path.iterdir()} == {"flight.tlog"}
 
@@ -236,7 +236,7 @@ def test_attitude_on_a_real_flight(tmp_path, monkeypatch, capfd):
     assert summary["counters"]["updated"] == summary["samples"]
 
 
-def test_a_full_disk_is_told_and_leaves_no_half_files(tmp_path, monkeypatch, capfd):
+def test_a_full_disk_is_reported_and_leaves_no_half_files(tmp_path, monkeypatch, capfd):
     def full(*_args, **_columns):
         raise OSError(errno.ENOSPC, "No space left on device")
 

@@ -13,11 +13,11 @@ NEED = Need(messages=("ATTITUDE",), rate_hz=20.0, purpose="roll")
 
 def watched(rates_hz: list[float]) -> RateWatch:
     """A watch that looked every two seconds at a stream with these rates."""
-    heard: Counter[tuple[int, int]] = Counter()
-    watch = RateWatch([NEED], heard)
+    received: Counter[tuple[int, int]] = Counter()
+    watch = RateWatch([NEED], received)
     watch.look(0, [1])
     for k, rate_hz in enumerate(rates_hz):
-        heard[1, definition("ATTITUDE").message_id] += round(2.0 * rate_hz)
+        received[1, definition("ATTITUDE").message_id] += round(2.0 * rate_hz)
         watch.look(2_000_000 * (k + 1), [1])
     return watch
 

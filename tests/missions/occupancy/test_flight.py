@@ -174,7 +174,7 @@ def test_a_map_without_data_in_the_area_is_refused_before_anything_starts(found,
         )
 
 
-def test_without_a_magnetometer_nobody_takes_off(found, tmp_path):
+def test_without_a_magnetometer_no_vehicle_takes_off(found, tmp_path):
     options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
     bare = replace(request(tmp_path / "run", options), world=WorldSpec.of_team(options.vehicles))
     result = fly(OccupancyMission(), bare)

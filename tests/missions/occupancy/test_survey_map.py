@@ -83,7 +83,7 @@ def test_missing_file_is_refused_by_name(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         ({"total_field_nt": None}, "has no total_field_nt"),
         ({"format": "other"}, "format other"),
@@ -94,10 +94,10 @@ def test_missing_file_is_refused_by_name(tmp_path):
         ({"height_m": "high"}, "height_m holds"),
     ],
 )
-def test_damaged_contents_are_refused_by_name(tmp_path, change, told):
+def test_damaged_contents_are_refused_by_name(tmp_path, change, reported):
     path = saved(tmp_path)
     with np.load(path) as archive:
         contents = {name: archive[name] for name in archive.files} | change
     np.savez(path, **{name: value for name, value in contents.items() if value is not None})
-    with pytest.raises(PlanError, match=told):
+    with pytest.raises(PlanError, match=reported):
         load_survey_map(path)

@@ -7,7 +7,7 @@ import pytest
 from missions.occupancy.traffic import Traffic
 
 
-def test_nobody_rises_before_all_were_checked():
+def test_no_vehicle_rises_before_all_were_checked():
     traffic = Traffic([80.0, 95.0, 110.0])
     traffic.checked(2)
     assert not traffic.may_rise(2)

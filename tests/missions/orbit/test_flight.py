@@ -43,7 +43,7 @@ def orbit(tmp_path, autopilot="px4", picture=False, name="run", seed=1, target=T
 
 
 def gps_times(folder, start_s, end_s):
-    """Times of the receiver's data that the autopilot has told between two vehicle times."""
+    """Times of the receiver's data that the autopilot has reported between two vehicle times."""
     found = set()
     for stamp_us, frame in TlogReader(folder / "flight.tlog"):
         time_s = (stamp_us - EPOCH_UNIX_US) * 1e-6

@@ -6,9 +6,9 @@ from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError
 from missions.notes import FlightNotes
 from missions.orbit.gps_switch import GpsSwitch
+from missions.orbit.mission import orbit_verdict
 from missions.orbit.options import GpsOff, OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.orbit.verdict import orbit_verdict
 
 INJECT = dialect.MAV_CMD_INJECT_FAILURE
 REAL = 9  # MAV_PARAM_TYPE
@@ -100,7 +100,7 @@ def test_where_there_is_no_way_the_ground_says_what_to_ask_for(flown, flavour, a
         find(flown, flavour, GpsOff.AUTO, answer=answer)
 
 
-def test_a_parameter_that_is_not_restored_is_told(flown) -> None:
+def test_a_parameter_that_is_not_restored_is_reported(flown) -> None:
     async def act(switch, autopilot):
         await switch.off()
         autopilot.on_param_set = lambda message: None

@@ -1,4 +1,4 @@
-"""What an orbit's flight is told with: by truth where there is any, as the mission believed where not."""
+"""The figures of an orbit's flight: by truth where there is any, else as the mission estimated."""
 
 import pytest
 
@@ -32,14 +32,14 @@ def debriefing(*phases, marks=MARKS):
     )
 
 
-def test_a_vehicle_elsewhere_is_told_as_the_mission_believed():
+def test_a_vehicle_elsewhere_is_reported_with_the_position_that_the_mission_assumed():
     mission = OrbitMission()
     figures = mission.figures(debriefing((ORBIT, 100_000_000, 700_000_000)))
     assert figures["orbit_s"] == pytest.approx(600.0)
     assert figures["radius_mean_error_percent"] is None
     assert (figures["detections_used"], figures["detections_rejected"]) == (5900, 12)
-    circle, unknown = mission.said(figures)
-    assert circle.startswith("orbit of 150 m for 600 s, as the mission believes: mean radius 150.4 m")
+    circle, unknown = mission.report_lines(figures)
+    assert circle.startswith("orbit of 150 m for 600 s, as the mission estimates: mean radius 150.4 m")
     for words in ("standard deviation 1.9 m", "within 3.2 m", "target lost 1 times", "5900 detections"):
         assert words in circle
     assert "does not report" in unknown
@@ -49,4 +49,4 @@ def test_of_an_orbit_that_was_never_reached_nothing_is_said():
     mission = OrbitMission()
     figures = mission.figures(debriefing(("entry", 100_000_000, 300_000_000), marks={}))
     assert figures["orbit_s"] is None
-    assert mission.said(figures) == ()
+    assert mission.report_lines(figures) == ()

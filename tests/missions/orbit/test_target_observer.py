@@ -4,7 +4,7 @@ from missions.orbit.options import OrbitOptions
 from missions.orbit.target_observer import TargetObserver
 
 
-def test_what_was_told_before_a_silence_is_no_news(flown):
+def test_what_was_reported_before_a_silence_is_no_news(flown):
     """Where the aircraft was when its line was pulled out says nothing of the target against it now."""
 
     async def script(vehicle, autopilot):

@@ -68,7 +68,7 @@ def test_what_is_wrong_is_named(text: str, words: str, tmp_path: Path) -> None:
     assert words in str(refused.value)
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_reported(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match=r"none\.waypoints can't be read: No such file"):
         read_wpl(tmp_path / "none.waypoints")
 

@@ -11,7 +11,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.kind import VehicleKind
-from missions.preflight.fence_geometry import first_outside
+from missions.preflight.before_flight import first_outside
 from missions.preflight.finding import Finding, Level
 from missions.preflight.health import health_findings, not_ready_because, reasons_against_arming, sensors
 from missions.preflight.lost_link import lost_link_words
@@ -38,7 +38,7 @@ READY: dict[str, dict[str, Any]] = {
 
 
 def found(changes: dict[str, dict[str, Any] | None], texts: tuple[str, ...] = ()) -> dict[str, Finding]:
-    """Findings by subject, of a ready vehicle with some fields changed (None: message not heard)."""
+    """Findings by subject, of a ready vehicle with some fields changed (None: message not received)."""
     messages = copy.deepcopy(READY)
     for name, fields in changes.items():
         if fields is None:
@@ -282,7 +282,7 @@ def test_ways_and_fences(fences: list, way: list, outside: tuple[float, float] |
     ],
 )
 def test_two_areas_to_stay_in(flavour: str, parameters: dict[str, float], inside: bool) -> None:
-    """PX4 asks for one of them, ArduPilot for all unless it is told otherwise."""
+    """PX4 asks for one of them, ArduPilot for all unless a parameter says otherwise."""
     plan = [*items(5001, 4, *SQUARE), *items(5003, 50.0, (130.0, 0.0))]
     shapes = fence_shapes(plan, LocalFrame(HOME))
     place = first_outside(shapes, [(0.0, 0.0), (160.0, 0.0)], join=shapes_join(flavour, parameters))

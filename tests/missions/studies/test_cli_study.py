@@ -51,7 +51,7 @@ def test_wrong_options_are_usage_errors(
     assert words in capsys.readouterr().err
 
 
-def test_an_unknown_study_is_told_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_study_is_reported_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["study", "magic"]) == 2
     assert "no study 'magic'; there are lissajous-localization" in capsys.readouterr().err
 

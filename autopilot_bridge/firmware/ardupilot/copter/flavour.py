@@ -14,8 +14,8 @@ from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
 from autopilot_bridge.firmware.ardupilot.services import SERVICES, address_rule
 from autopilot_bridge.firmware.ardupilot.texts import copter_notices
+from autopilot_bridge.firmware.external_mapping import ardupilot_gps_source
 from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
-from autopilot_bridge.firmware.gps_source import ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector

@@ -14,8 +14,7 @@ from autopilot_bridge.commander.geofence_parameters import (
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
-from autopilot_bridge.firmware.external_mapping import ardupilot_external
-from autopilot_bridge.firmware.gps_source import GpsSource, ardupilot_gps_source
+from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_external, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import FieldMap, RatioMap, build, clamp, integer, scaled_values
 from autopilot_bridge.firmware.navigation_noise import ardupilot_noise
 from autopilot_bridge.firmware.surroundings_mapping import (

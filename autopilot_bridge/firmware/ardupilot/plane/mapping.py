@@ -16,7 +16,7 @@ from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.firmware import mapping
 from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
-from autopilot_bridge.firmware.gps_source import GpsSource, ardupilot_gps_source
+from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import (
     FieldMap,
     RatioMap,

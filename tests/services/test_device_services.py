@@ -37,7 +37,7 @@ class Vehicle:
     def long(self, command: int, *parameters: float) -> list[int]:
         return self.rig.long(command, *parameters)
 
-    def hear(self, message: Any, component: int = 190) -> None:
+    def receive(self, message: Any, component: int = 190) -> None:
         source = self.rig.source._replace(component_id=component)
         assert deliver(message, source, self.rig.time_us, *self.services)
 
@@ -108,11 +108,11 @@ def test_nothing_is_calibrated_while_armed(flavour: str) -> None:
 def test_px4_radio_calibration_mutes_the_sticks() -> None:
     vehicle = Vehicle("px4")
     assert vehicle.long(CALIBRATE, 0, 0, 0, 1) == [ACCEPTED]
-    vehicle.hear(mavlink.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0))
+    vehicle.receive(mavlink.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0))
     vehicle.run(0.1)
     assert not vehicle.rig.context.sticks.valid
     assert vehicle.long(CALIBRATE) == [ACCEPTED]
-    vehicle.hear(mavlink.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0))
+    vehicle.receive(mavlink.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0))
     vehicle.run(0.1)
     assert vehicle.rig.context.sticks.valid
 
@@ -232,7 +232,7 @@ def report(
 def test_px4_passes_traffic_on_and_warns_once() -> None:
     vehicle = Vehicle("px4")
     for _ in range(20):
-        vehicle.hear(report(vehicle))
+        vehicle.receive(report(vehicle))
         vehicle.run(0.2)
     assert len(vehicle.sent(mavlink.MAVLink_adsb_vehicle_message)) == 20
     alerts = [text for text in vehicle.texts() if text.startswith("Traffic alert")]
@@ -242,7 +242,7 @@ def test_px4_passes_traffic_on_and_warns_once() -> None:
 @pytest.mark.parametrize("change", [{"heading_cdeg": 0}, {"speed_cm_s": 1000}])
 def test_traffic_that_goes_away_or_is_slow_is_no_conflict(change: dict[str, int]) -> None:
     vehicle = Vehicle("px4")
-    vehicle.hear(report(vehicle, **change))
+    vehicle.receive(report(vehicle, **change))
     assert not any(text.startswith("Traffic") for text in vehicle.texts())
 
 
@@ -259,34 +259,34 @@ def test_traffic_from_any_direction_is_a_conflict_when_its_path_leads_here(
     place_ne_m: tuple[float, float], heading_deg: int, conflict: bool
 ) -> None:
     vehicle = Vehicle("px4")
-    vehicle.hear(report(vehicle, heading_cdeg=100 * heading_deg, place_ne_m=place_ne_m))
+    vehicle.receive(report(vehicle, heading_cdeg=100 * heading_deg, place_ne_m=place_ne_m))
     alert = "".join(vehicle.texts())
     assert alert.startswith("Traffic alert") == conflict
     assert (f"Heading {heading_deg}" in alert) == conflict
 
 
-def test_px4_returns_from_traffic_when_told_so() -> None:
+def test_px4_returns_from_traffic_when_configured() -> None:
     vehicle = Vehicle("px4", NAV_TRAFF_AVOID=2)
     vehicle.rig.fly()
-    vehicle.hear(report(vehicle))
+    vehicle.receive(report(vehicle))
     assert vehicle.rig.commander.mode is FlightMode.RETURN
 
 
 def test_floods_of_traffic_and_other_autopilots_words_are_not_passed_on() -> None:
     vehicle = Vehicle("px4")
     for address in range(500):
-        vehicle.hear(report(vehicle, address=address))
-        vehicle.hear(report(vehicle, address=address))
+        vehicle.receive(report(vehicle, address=address))
+        vehicle.receive(report(vehicle, address=address))
     assert len(vehicle.sent(mavlink.MAVLink_adsb_vehicle_message)) == 50
     other = Vehicle("px4")
-    other.hear(report(other), component=1)
+    other.receive(report(other), component=1)
     assert not other.sent(mavlink.MAVLink_adsb_vehicle_message)
 
 
 def test_ardupilot_hears_traffic_only_with_a_receiver() -> None:
     for receiver, passed_on in ((0, 0), (2, 1)):
         vehicle = Vehicle("ardupilot", ADSB_TYPE=receiver)
-        vehicle.hear(report(vehicle))
+        vehicle.receive(report(vehicle))
         assert len(vehicle.sent(mavlink.MAVLink_adsb_vehicle_message)) == passed_on
 
 
@@ -306,9 +306,9 @@ def pulses(vehicle: Vehicle) -> tuple[int, ...] | None:
 def test_overrides_are_shown_released_and_forgotten() -> None:
     vehicle = Vehicle("ardupilot")
     assert pulses(vehicle)[:8] == (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
-    vehicle.hear(override(1600, 65535, 1300, more=(1111, *(0,) * 9)))
+    vehicle.receive(override(1600, 65535, 1300, more=(1111, *(0,) * 9)))
     assert pulses(vehicle)[:4] == (1600, 1500, 1300, 1500) and pulses(vehicle)[8] == 1111
-    vehicle.hear(override(0, 65535, 65535, more=(65534, *(0,) * 9)))
+    vehicle.receive(override(0, 65535, 65535, more=(65534, *(0,) * 9)))
     assert pulses(vehicle)[0] == 1500 and pulses(vehicle)[2] == 1300 and pulses(vehicle)[8] == 0
     vehicle.run(3.1)  # RC_OVERRIDE_TIME
     assert pulses(vehicle)[2] == 1000
@@ -317,27 +317,27 @@ def test_overrides_are_shown_released_and_forgotten() -> None:
 
 def test_ardupilot_listens_to_its_ground_station_alone() -> None:
     vehicle = Vehicle("ardupilot", SYSID_MYGCS=254)
-    vehicle.hear(override(1900, 1900, 1900, 1900))
+    vehicle.receive(override(1900, 1900, 1900, 1900))
     assert pulses(vehicle)[0] == 1500
 
 
 def test_ardupilot_manual_control_is_an_override() -> None:
     vehicle = Vehicle("ardupilot")
-    vehicle.hear(mavlink.MAVLink_manual_control_message(1, 500, 32767, 600, -200, 0))
+    vehicle.receive(mavlink.MAVLink_manual_control_message(1, 500, 32767, 600, -200, 0))
     assert pulses(vehicle)[:4] == (1500, 1250, 1600, 1400)
 
 
 def test_px4_shows_a_radio_that_does_not_steer() -> None:
     vehicle = Vehicle("px4")
     assert pulses(vehicle) is None
-    vehicle.hear(override(1600, 1500, 1300, 1500))
+    vehicle.receive(override(1600, 1500, 1300, 1500))
     vehicle.run(0.1)
     assert pulses(vehicle)[:4] == (1600, 1500, 1300, 1500)
     assert not vehicle.rig.context.sticks.valid  # COM_RC_IN_MODE 1
     vehicle.run(1.2)
     assert pulses(vehicle) is None
     other = Vehicle("px4", COM_RC_IN_MODE=3)
-    other.hear(override(1750, 1500, 1500, 1500))
+    other.receive(override(1750, 1500, 1500, 1500))
     other.run(0.1)
     assert other.rig.context.sticks.roll == pytest.approx(0.5)
 
@@ -347,7 +347,7 @@ def test_mode_switch() -> None:
     vehicle.rig.commander.set_mode(FlightMode.GUIDED)
 
     def each() -> None:
-        vehicle.hear(override(65535, 65535, 65535, 65535, 1425))  # position 3: FLTMODE3, RTL
+        vehicle.receive(override(65535, 65535, 65535, 65535, 1425))  # position 3: FLTMODE3, RTL
 
     vehicle.run(0.1, each)
     assert vehicle.rig.commander.commanded_mode is FlightMode.GUIDED
@@ -359,12 +359,12 @@ def test_mode_switch() -> None:
 def test_sticks_arm_and_disarm(flavour: str, held_s: float) -> None:
     vehicle = Vehicle(flavour)
     if flavour == "px4":
-        vehicle.hear(mavlink.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0))
+        vehicle.receive(mavlink.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0))
         vehicle.run(0.1)
         vehicle.rig.commander.set_mode(FlightMode.STABILIZED)
 
     def sticks(yaw: int) -> Any:
-        return lambda: vehicle.hear(mavlink.MAVLink_manual_control_message(1, 0, 0, 0, yaw, 0))
+        return lambda: vehicle.receive(mavlink.MAVLink_manual_control_message(1, 0, 0, 0, yaw, 0))
 
     vehicle.run(held_s - 0.3, sticks(1000))
     assert not vehicle.rig.commander.armed

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Final
 
+from estimators.errors import LogError
 from estimators.logs.dialect import load_dialect
-from estimators.logs.errors import LogError
 from estimators.logs.log import Log
 from estimators.logs.source import LogSource
 from estimators.logs.tlog import open_tlog

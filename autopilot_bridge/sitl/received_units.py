@@ -12,7 +12,7 @@ OBSTACLE_SECTORS: Final = 72
 _NAN4: Final = (math.nan,) * 4
 
 
-class EntryUnit(NamedTuple):
+class ReceivedUnit(NamedTuple):
     """A unit, the size of its samples and their approximate rate per second."""
 
     target: FaultTarget
@@ -20,8 +20,8 @@ class EntryUnit(NamedTuple):
     rate_hz: float
 
 
-ENTRY_UNITS: Final = (
-    EntryUnit(
+RECEIVED_UNITS: Final = (
+    ReceivedUnit(
         FaultTarget(
             unit=SensorUnit.VIO,
             channels=slice(0, SAMPLE_SIZE),
@@ -33,7 +33,7 @@ ENTRY_UNITS: Final = (
         SAMPLE_SIZE,
         30.0,
     ),
-    EntryUnit(
+    ReceivedUnit(
         FaultTarget(
             unit=SensorUnit.AVOIDANCE,
             channels=slice(0, OBSTACLE_SECTORS),

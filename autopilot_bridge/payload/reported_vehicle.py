@@ -13,7 +13,7 @@ _LAT_MAX: Final = 900_000_000
 _LON_MAX: Final = 1_800_000_000
 
 
-class VehicleHeard:
+class ReportedVehicle:
     """The newest position, attitude and time of one vehicle.
 
     Attributes:

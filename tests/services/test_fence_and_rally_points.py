@@ -28,7 +28,7 @@ class Vehicle:
         self.service = OldPoints(self.parameters, self.stores, lambda _, text: self.texts.append(text))
         self.channel = Recorder("one")
 
-    def tell(self, message: Any) -> list[Any]:
+    def deliver(self, message: Any) -> list[Any]:
         assert deliver(message, Source(self.channel, 255, 190), 0, self.service)
         self.service.tick(0)
         return self.channel.take()
@@ -56,7 +56,7 @@ def rally_point(index: int, count: int, lat: float = 47.0, lon: float = 8.0, alt
 def send_fence(vehicle: Vehicle, points: list[tuple[float, float]]) -> None:
     vehicle.total("FENCE", len(points))
     for index, point in enumerate(points):
-        vehicle.tell(fence_point(index, len(points), point))
+        vehicle.deliver(fence_point(index, len(points), point))
 
 
 def test_a_fence_is_sent_and_read_back() -> None:
@@ -66,7 +66,7 @@ def test_a_fence_is_sent_and_read_back() -> None:
     assert [item.command for item in vehicle.fence()] == [5000, 5001, 5001, 5001, 5001]
     assert {item.param1 for item in vehicle.fence()[1:]} == {4.0}
     assert vehicle.parameters.get("FENCE_TOTAL") == 6
-    read = [vehicle.tell(mavlink.MAVLink_fence_fetch_point_message(1, 1, k))[0] for k in range(6)]
+    read = [vehicle.deliver(mavlink.MAVLink_fence_fetch_point_message(1, 1, k))[0] for k in range(6)]
     assert [(m.lat, m.lng) for m in read] == points
     assert {m.count for m in read} == {6}
     assert vehicle.texts == [f"Received message (FENCE_{x}) is deprecated" for x in ("POINT", "FETCH_POINT")]
@@ -88,7 +88,7 @@ def test_a_fence_is_sent_and_read_back() -> None:
 def test_bad_fence_points_change_nothing(total: int, message: Any, text: str) -> None:
     vehicle = Vehicle()
     vehicle.total("FENCE", total)
-    vehicle.tell(message)
+    vehicle.deliver(message)
     assert vehicle.texts[-1] == text
     assert vehicle.fence() == ()
 
@@ -99,7 +99,7 @@ def test_an_open_or_incomplete_fence_is_not_stored() -> None:
     assert vehicle.fence() == ()
     vehicle.total("FENCE", 6)
     for index in (0, 1, 2):
-        vehicle.tell(fence_point(index, 6, BACK))
+        vehicle.deliver(fence_point(index, 6, BACK))
     assert vehicle.fence() == ()
 
 
@@ -110,7 +110,7 @@ def test_a_fence_that_the_messages_can_not_carry() -> None:
     )
     vehicle.stores[MissionType.FENCE].replace((circle,), 1)
     assert old_fence((circle,)) is None
-    assert vehicle.tell(mavlink.MAVLink_fence_fetch_point_message(1, 1, 0)) == []
+    assert vehicle.deliver(mavlink.MAVLink_fence_fetch_point_message(1, 1, 0)) == []
     assert vehicle.texts[-1] == "Vehicle contains advanced fences"
     assert vehicle.parameters.get("FENCE_TOTAL") == 1
 
@@ -118,22 +118,22 @@ def test_a_fence_that_the_messages_can_not_carry() -> None:
 def test_rally_points() -> None:
     vehicle = Vehicle()
     vehicle.total("RALLY", 2)
-    vehicle.tell(rally_point(1, 2, 47.5))
+    vehicle.deliver(rally_point(1, 2, 47.5))
     assert vehicle.rally() == ()
-    vehicle.tell(rally_point(0, 2, alt=-20))
+    vehicle.deliver(rally_point(0, 2, alt=-20))
     assert [item.x for item in vehicle.rally()] == pytest.approx([47.0, 47.5])
     assert [item.z for item in vehicle.rally()] == [-20.0, 80.0]
-    (back,) = vehicle.tell(mavlink.MAVLink_rally_fetch_point_message(1, 1, 1))
+    (back,) = vehicle.deliver(mavlink.MAVLink_rally_fetch_point_message(1, 1, 1))
     assert (back.idx, back.count, back.lat, back.alt) == (1, 2, 475000000, 80)
     assert (back.break_alt, back.land_dir, back.flags) == (0, 0, 0)
-    assert vehicle.tell(mavlink.MAVLink_rally_fetch_point_message(1, 1, 2)) == []
+    assert vehicle.deliver(mavlink.MAVLink_rally_fetch_point_message(1, 1, 2)) == []
     assert vehicle.texts[-1] == "Bad rally point ID"
     for message, text in (
         (rally_point(2, 2), "Bad rally point message ID"),
         (rally_point(0, 3), "Bad rally point message count"),
         (rally_point(0, 2, 95.0), "Bad rally point message lat or lng"),
     ):
-        vehicle.tell(message)
+        vehicle.deliver(message)
         assert vehicle.texts[-1] == text
     vehicle.total("RALLY", 1)
     assert len(vehicle.rally()) == 1
