@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Final
 
 from autopilot_bridge.links.link import LinkCounters, PeerId
+from autopilot_bridge.mavlink.frame import Frame
 
 MAX_INBOX: Final = 100_000
 
@@ -18,11 +19,13 @@ class MemoryLink:
     Attributes:
         on_receive: when set, is called with the bytes at the moment the other end sends them; `receive` then
             returns nothing.
+        on_frames: when set, is called instead with frames, if the other end has frames and not bytes.
     """
 
     def __init__(self, name: str, on_receive: Callable[[bytes], None] | None = None) -> None:
         self.name = name
         self.on_receive = on_receive
+        self.on_frames: Callable[[list[Frame]], None] | None = None
         self._writes = self._bytes_out = self._dropped = self._bytes_dropped = 0
         self.closed = False
         self._inbox: deque[bytes] = deque()
@@ -71,6 +74,19 @@ class MemoryLink:
             on_receive(data)
         else:
             other._inbox.append(data)
+
+    @property
+    def takes_frames(self) -> bool:
+        """Whether the other end receives frames as they are, so that they need not be parsed."""
+        other = self._other
+        return not self.closed and other is not None and not other.closed and other.on_frames is not None
+
+    def send_frames(self, frames: list[Frame]) -> None:
+        """Pass valid frames to the other end, which must be one that `takes_frames`."""
+        assert self._other is not None and self._other.on_frames is not None
+        self._writes += 1
+        self._bytes_out += sum([len(frame.raw) for frame in frames])
+        self._other.on_frames(frames)
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
         """The data that the other end has sent since the last call."""

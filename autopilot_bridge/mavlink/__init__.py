@@ -5,7 +5,7 @@ Messages are pymavlink's own objects of the dialect `all` (`dialect`), made by i
 
 from pymavlink.dialects.v20 import all as dialect
 
-from autopilot_bridge.mavlink.decoder import decode
+from autopilot_bridge.mavlink.decoder import decode, field_reader
 from autopilot_bridge.mavlink.definitions import (
     DEFINITIONS,
     MAVLinkMessage,
@@ -41,4 +41,5 @@ __all__ = [
     "definition",
     "dialect",
     "enum_name",
+    "field_reader",
 ]

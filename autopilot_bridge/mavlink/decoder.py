@@ -1,5 +1,6 @@
 """Conversion of frames to pymavlink's message objects."""
 
+import struct
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -34,6 +35,24 @@ def decode(frame: Frame) -> MAVLinkMessage:
     message._payload = raw[start:end]
     message._crc = int.from_bytes(raw[end : end + CHECKSUM_SIZE], "little")
     return message
+
+
+@cache
+def field_reader(name: str, *fields: str) -> Callable[[Frame], tuple[Any, ...]]:
+    """A function that reads some scalar fields of the frames of one message, without its other fields.
+
+    Args:
+        name: of the message.
+        fields: names, in the order on the wire.
+    """
+    found = definition(name)
+    codes, at = "<", 0
+    for field in found.wire_fields:
+        if field.name in fields:
+            codes += f"{field.offset - at}x{field.code}"
+            at = field.offset + field.size
+    unpack_from = struct.Struct(codes).unpack_from
+    return lambda frame: unpack_from(frame.payload)
 
 
 @cache

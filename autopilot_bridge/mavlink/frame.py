@@ -1,6 +1,8 @@
 """One verified MAVLink frame, as it was on the wire."""
 
-from typing import Final, NamedTuple
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, NamedTuple
 
 from autopilot_bridge.mavlink.definitions import DEFINITIONS, MessageDefinition
 
@@ -80,3 +82,7 @@ class Frame(NamedTuple):
         if offset is None or offset >= raw[1]:  # a truncated target is zero
             return 0
         return raw[(HEADER_SIZE_V2 if self.version == 2 else HEADER_SIZE_V1) + offset]
+
+
+new_frame: Final[Callable[[tuple[Any, ...]], Frame]] = partial(tuple.__new__, Frame)
+"""A frame from the tuple of all its attributes, in half the time of the constructor."""

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Final
 
-from autopilot_bridge.links import Link, PeerId
+from autopilot_bridge.links import Link, MemoryLink, PeerId
 from autopilot_bridge.mavlink import Frame, FrameEncoder, Intake, LinkSigning, ParserCounters
-from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE
+from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE, new_frame
 from autopilot_bridge.mavlink.signing import is_unsigned_v2
 from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.services.channel import MavlinkMessage
@@ -34,6 +34,7 @@ class LinkChannel:
         "_encoder",
         "_forward",
         "_intake",
+        "_memory",
         "_peers",
         "_signs",
         "line",
@@ -62,6 +63,7 @@ class LinkChannel:
         self._encoder = FrameEncoder(system_id, component_id)
         self._intake: Intake[PeerId] = Intake(None if signing is None else signing.admit)
         self._peers = PeerExchange(link)
+        self._memory = link if isinstance(link, MemoryLink) else None
         self._forward = getattr(link, "forward", None)  # of a link shared by several vehicles
 
     @property
@@ -94,7 +96,11 @@ class LinkChannel:
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Send the payloads that are due together, in packets of at most one datagram."""
-        packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
+        memory = self._frame_link
+        if memory is not None:
+            self._hand_over(memory, motion, payloads)
+            return
+        packet = self.motion.packet(motion, self._encoder) if motion and self.motion is not None else b""
         if payloads:
             most = _MAX_PACKET
             if self._signs is not None and self._signs.signs:
@@ -106,6 +112,26 @@ class LinkChannel:
                 packet += frame
         if packet:
             self._send(packet)
+
+    @property
+    def _frame_link(self) -> MemoryLink | None:
+        """The link, if its other end is in this process and receives frames that need not be parsed."""
+        memory = self._memory
+        if memory is None or not memory.takes_frames or (self._signs is not None and self._signs.signs):
+            return None
+        return memory
+
+    def _hand_over(self, memory: MemoryLink, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Send the payloads that are due together, as frames."""
+        encoder = self._encoder
+        frames = self.motion.frames(motion, encoder) if motion and self.motion is not None else []
+        system_id, component_id = encoder.system_id, encoder.component_id
+        for (message_id, _), raw in zip(payloads, encoder.encode_payloads(payloads), strict=True):
+            frames.append(new_frame((raw, message_id, system_id, component_id, raw[4], 2, False)))
+        if frames:
+            if self.line is not None:
+                self.line.add(sum(len(frame.raw) for frame in frames))
+            memory.send_frames(frames)
 
     def send_frame(self, raw: bytes) -> None:
         """Forward a frame of another system unchanged: with its own signature, or without one."""
@@ -127,12 +153,19 @@ class LinkChannel:
             data = signs.sign(data)
         if self.line is not None:
             self.line.add(len(data))
-        self.link.send(data)
+        self._put(data)
 
     def _pass_on(self, data: bytes) -> None:
         if self.line is not None:
             self.line.forward(len(data))
-        self.link.send(data)
+        self._put(data)
+
+    def _put(self, data: bytes) -> None:
+        memory = self._frame_link
+        if memory is None:
+            self.link.send(data)
+        else:
+            memory.send_frames([Frame.of(data)])
 
     def receive(self) -> list[tuple[PeerId, list[Frame]]]:
         """Valid frames that have arrived, by peer, as many as the time budget allows."""

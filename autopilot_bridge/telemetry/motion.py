@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.mavlink import Frame, FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
-from autopilot_bridge.mavlink.frame import OVERHEAD_V2
+from autopilot_bridge.mavlink.frame import OVERHEAD_V2, new_frame
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.navigation import layout as n
 from autopilot_bridge.navigation.states import ATT, POS, VEL
@@ -147,13 +147,22 @@ _PARTS: Final = _parts()
 
 
 @kernel
-def _frames(record: NDArray[np.uint8], out: NDArray[np.uint8], due: int, sender: int, sequence: int) -> int:
+def _frames(
+    record: NDArray[np.uint8],
+    out: NDArray[np.uint8],
+    ends: NDArray[np.int64],
+    due: int,
+    sender: int,
+    sequence: int,
+) -> int:
     """MAVLink 2 frames of the parts whose bit is set in `due`, in sequence; returns their length.
 
     Args:
+        ends: (parts,), end of each frame in `out`.
         sender: system id x 256 + component id.
     """
     end = 0
+    count = 0
     for part in range(_PARTS.shape[0]):
         if not due >> part & 1:
             continue
@@ -180,6 +189,8 @@ def _frames(record: NDArray[np.uint8], out: NDArray[np.uint8], due: int, sender:
         out[end] = crc & 0xFF
         out[end + 1] = crc >> 8
         end += 2
+        ends[count] = end
+        count += 1
         sequence += 1
     return end
 
@@ -225,7 +236,10 @@ class MotionMessages:
         }
         self._packet = np.zeros(self._record.nbytes + len(MESSAGES) * OVERHEAD_V2, np.uint8)
         self._packet_bytes = self._packet.data
-        self._make_frames = bound(_frames, self._record.view(np.uint8), self._packet, then=(0, 0, 0))
+        self._ends = np.zeros(len(MESSAGES), np.int64)
+        self._make_frames = bound(
+            _frames, self._record.view(np.uint8), self._packet, self._ends, then=(0, 0, 0)
+        )
         self._fill = bound(
             _fill,
             navigation.state,
@@ -241,28 +255,54 @@ class MotionMessages:
         self.bits: Mapping[int, int] = {
             message_id: 1 << index for index, (_, _, message_id, _) in enumerate(_PARTS.tolist())
         }
+        self._ids = [
+            tuple(message_id for message_id, bit in self.bits.items() if due & bit)
+            for due in range(1 << len(self.bits))
+        ]
 
-    def frames(self, due: int, encoder: FrameEncoder) -> bytes:
-        """Frames of the messages whose `bits` are set and whose values are available.
+    def packet(self, due: int, encoder: FrameEncoder) -> bytes:
+        """Frames of the messages whose `bits` are set and whose values are available, in one piece.
 
         Args:
             due: sum of `bits`.
             encoder: the channel's; provides sender and sequence numbers.
         """
+        due = self._available(due)
+        return self._packet_bytes[: self._make(due, encoder)].tobytes() if due else b""
+
+    def frames(self, due: int, encoder: FrameEncoder) -> list[Frame]:
+        """The frames of `packet`, one by one."""
+        due = self._available(due)
+        if not due:
+            return []
+        system_id, component_id, sequence = encoder.system_id, encoder.component_id, encoder.sequence
+        packet = self._packet_bytes[: self._make(due, encoder)].tobytes()
+        frames, start = [], 0
+        for message_id, end in zip(self._ids[due], self._ends.tolist(), strict=False):
+            raw = packet[start:end]
+            frames.append(new_frame((raw, message_id, system_id, component_id, sequence, 2, False)))
+            sequence = (sequence + 1) & 0xFF
+            start = end
+        return frames
+
+    def _available(self, due: int) -> int:
+        """The bits whose values are available."""
         if not self._navigation.health.attitude:
             due &= ~_NEED_ATTITUDE
         if self._context.frame is None:
             due &= ~_NEED_FRAME
         if self._readings.barometer.time_us < 0 or self._readings.imu.time_us < 0:
             due &= ~_NEED_SENSORS
-        if not due:
-            return b""
+        return due
+
+    def _make(self, due: int, encoder: FrameEncoder) -> int:
+        """Make the frames; returns their length."""
         self._fresh()
         sequence = encoder.sequence
         encoder.sequence = (sequence + due.bit_count()) & 0xFF
         sender = encoder.system_id << 8 | encoder.component_id
-        end = self._make_frames(due, sender, sequence)
-        return self._packet_bytes[:end].tobytes()
+        size: int = self._make_frames(due, sender, sequence)
+        return size
 
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its payload."""

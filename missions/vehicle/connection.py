@@ -1,12 +1,14 @@
 """A link as a mission sees it: the newest message of each kind, streams of messages, and waiting for one.
 
 Several hundred messages a second arrive, and a mission uses few of them. A frame that no task waits for costs
-two dictionary operations; it is decoded only when it is requested.
+two dictionary operations; it is decoded only when it is requested. An autopilot in this process hands over
+its frames with their ids, instead of bytes that would have to be parsed.
 """
 
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Protocol, Self
 
@@ -66,7 +68,8 @@ class Connection:
         signing: signs sent frames, and drops received frames that it does not accept. None: no signing.
 
     Attributes:
-        parsers: one for each of the newest peers; their counters account for every byte ever received.
+        parsers: one for each of the newest peers; their counters account for every byte ever received. Frames
+            from a channel in this process are not parsed, and not in them.
         signing: as passed to the constructor.
     """
 
@@ -113,7 +116,9 @@ class Connection:
             loop.add_reader(fileno, self._drain)
         self._drain()
         if hasattr(self._link, "on_receive"):
-            self._link.on_receive = lambda data: self._on_bytes(None, data)
+            self._link.on_receive = partial(self._on_bytes, None)
+            if hasattr(self._link, "on_frames") and self.signing is None:
+                self._link.on_frames = self._on_frames
         else:
             self._tasks.append(loop.create_task(self._keep_looking_after_link()))
         self._tasks.append(loop.create_task(self._keep_sending_heartbeats()))
@@ -149,25 +154,25 @@ class Connection:
             self._on_frames(frames)
 
     def _on_frames(self, frames: list[Frame]) -> None:
-        if self._observed is None:
-            self._record(frames)
-        put, listeners = self._newest.put, self._listeners
+        if self._observed is not None:
+            if len(frames) > 1:  # each may set the clock
+                for frame in frames:
+                    self._on_frames([frame])
+                return
+            if frames[0].message_id in _TIMESTAMPED:
+                self._observe(frames[0])
+        self._newest.put(frames)
+        self._record(frames)
+        listeners = self._listeners
         for frame in frames:
-            message_id = frame.message_id
-            put(frame)
-            if self._observed is not None:
-                if message_id in _TIMESTAMPED:
-                    self._observe(frame)
-                self._record([frame])
-            if message_id in listeners:
-                for listener in tuple(listeners[message_id]):
+            if frame.message_id in listeners:
+                for listener in tuple(listeners[frame.message_id]):
                     listener(frame)
 
     def _record(self, frames: list[Frame]) -> None:
         if self._recorder is not None:
-            logged = [
-                frame for frame in frames if frame.message_id != SETUP_SIGNING
-            ]  # a log contains no keys
+            # a log contains no keys
+            logged = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
             self._recorder.record(logged, self.clock.time_us)
 
     def _observe(self, frame: Frame) -> None:

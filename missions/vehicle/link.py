@@ -342,10 +342,10 @@ class VehicleLink:
         """Whether no heartbeat was received for three seconds of vehicle time."""
         return self.heartbeat_us is not None and self.clock.time_us - self.heartbeat_us > _SILENT_AFTER_US
 
-    async def follow(self, handle: Callable[[MAVLinkMessage], bool], *, on: Sequence[str]) -> None:
-        """Pass each message of the autopilot that is named in `on` to `handle`, until it returns true.
+    async def follow(self, handle: Callable[[Frame], bool], *, on: Sequence[str]) -> None:
+        """Pass each frame of the autopilot with a message named in `on` to `handle`, until it returns true.
 
-        Each message is handled when it is received, and the task that waits continues only at the end: for
+        Each frame is handled when it is received, and the task that waits continues only at the end: for
         waits that look at many messages.
 
         Args:
@@ -358,7 +358,7 @@ class VehicleLink:
             if (frame.system_id, frame.component_id) != (self._system_id, AUTOPILOT_COMPONENT) or over.done():
                 return
             try:
-                if handle(decode(frame)):
+                if handle(frame):
                     over.set_result(None)
             except MissionError as error:
                 over.set_exception(error)

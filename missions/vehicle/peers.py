@@ -3,7 +3,7 @@
 Components come and go, and any sender can use any ids, so only a limited number of components is kept.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode
@@ -43,13 +43,16 @@ class NewestFrames:
         """Never remove this component."""
         self._kept.add(component)
 
-    def put(self, frame: Frame) -> None:
-        """Store a frame as the newest of its message."""
-        component = (frame.system_id, frame.component_id)
-        frames = self._frames.get(component)
-        if frames is None:
-            frames = self._add(component)
-        frames[frame.message_id] = frame
+    def put(self, frames: Iterable[Frame]) -> None:
+        """Store frames, each as the newest of its message."""
+        system_id = component_id = -1
+        newest: dict[int, Frame] = {}
+        for frame in frames:
+            if frame.component_id != component_id or frame.system_id != system_id:
+                system_id, component_id = component = frame.system_id, frame.component_id
+                known = self._frames.get(component)
+                newest = self._add(component) if known is None else known
+            newest[frame.message_id] = frame
 
     def _add(self, component: ComponentId) -> dict[int, Frame]:
         if len(self._frames) >= MAX_COMPONENTS:

@@ -1,9 +1,9 @@
 """The plans that a vehicle stores (mission, geofence, rally points), and the progress of its mission."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import Frame, decode, definition, dialect, field_reader
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
@@ -21,6 +21,8 @@ from missions.vehicle.mission_transfer import clear, download, renumbered, uploa
 _REWINDS: Final = 4
 _REWIND_S: Final = 1.5
 _ACCEPTANCE_M: Final = 2.0
+_POSITION: Final = definition("GLOBAL_POSITION_INT").message_id
+_read_position: Final = field_reader("GLOBAL_POSITION_INT", "lat", "lon", "alt")
 """Distance at which a position shows that a waypoint was passed, if the waypoint specifies none."""
 
 
@@ -119,7 +121,12 @@ class VehiclePlans:
             reported = len(tracker.reached)
             return tracker.behind > wanted
 
-        def handle(message: Any) -> bool:
+        def handle(frame: Frame) -> bool:
+            if frame.message_id == _POSITION:
+                lat, lon, alt = _read_position(frame)
+                tracker.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self._link.clock.stamp_us)
+                return there()
+            message = decode(frame)
             if message.get_type() != "HEARTBEAT":
                 tracker.on_message(message, self._link.clock.stamp_us)
             elif mode.left(message.custom_mode) and not tracker.at_the_last_place:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as pymavlink_dialect
 
 from autopilot_bridge.errors import MessageError
-from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, decode, definition
+from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, decode, definition, field_reader
 
 _INTEGERS = {
     "uint8_t": (0, 2**8 - 1),
@@ -98,6 +98,19 @@ def test_every_message_is_decoded_as_pymavlink_decodes_it():
         again = FrameEncoder(3, 1)
         again.sequence = theirs.get_seq()
         assert again.encode(ours) == raw
+
+
+def test_single_fields_are_read_as_the_whole_message_is_decoded():
+    chance = random.Random(5)
+    encoder, parser = FrameEncoder(3, 1), FrameParser()
+    for found in DEFINITIONS.values():
+        scalars = [field.name for field in found.wire_fields if not field.length and field.code != "s"]
+        names = [name for name in scalars if chance.random() < 0.5]
+        (frame,) = parser.feed(encoder.encode(random_message(chance, found, zero_tail=chance.random() < 0.5)))
+        message = decode(frame)
+        assert repr(field_reader(found.name, *names)(frame)) == repr(
+            tuple(getattr(message, n) for n in names)
+        )
 
 
 GOLDEN = [
