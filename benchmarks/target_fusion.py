@@ -15,6 +15,7 @@ import argparse
 import math
 import statistics
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
-from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.mavlink import Frame, FrameParser, definition
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
@@ -50,7 +50,9 @@ from missions.pattern_search.flight import fly_pattern
 from missions.patterns.curve import Lap
 from missions.patterns.lissajous import Lissajous
 from missions.runs.run_folder import EPOCH_UNIX_US
-from missions.studies.pool import processors, work_through
+from missions.studies import Pool, Study, run_study
+from missions.studies.pool import processors
+from missions.studies.study import run_of
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
@@ -300,20 +302,31 @@ def score(recorded: Recorded, estimator: Estimator[Any]) -> Score:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
-    """One seed's flight, and how it is looked at."""
+class Errors:
+    """RMSE of each form, and the number of detections, of one seed's flight."""
 
-    seed: int
+    measurement: float
+    kalman: float
+    proposed: float
+    frequency: float
+    detections: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """A trial: one seed's flight by a setting, looked at by every form."""
+
     setting: Setting
     heading: str
+    first: int
 
-
-def flown(task: Task) -> tuple[dict[str, Score], float]:
-    """Every form's score on one flight, and the seconds that it took."""
-    started_s = wall_time_s()
-    recorded = fly(task.seed, task.setting)
-    scores = {form: score(recorded, base_station(form, task.setting, heading=task.heading)) for form in FORMS}
-    return scores, wall_time_s() - started_s
+    def __call__(self, _parameters: object, seed: int) -> Errors:
+        recorded = fly(self.first + run_of(seed)[1], self.setting)
+        scores = {
+            form: score(recorded, base_station(form, self.setting, heading=self.heading)) for form in FORMS
+        }
+        errors = {form: found.rmse_m for form, found in scores.items()}
+        return Errors(**errors, detections=scores["proposed"].detections)
 
 
 def main() -> int:
@@ -331,19 +344,24 @@ def main() -> int:
     if not 0.0 <= arguments.epsilon <= 0.01:
         parser.error("--epsilon from 0 to 0.01")
     setting = Setting(epsilon_rad_s=arguments.epsilon)
-    found: dict[str, list[float]] = {form: [] for form in FORMS}
+    study = Study(
+        name="target-fusion",
+        trial=Flown(setting=setting, heading=arguments.heading, first=arguments.first),
+        row=Errors,
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        results = run_study(
+            study, runs=arguments.seeds, engine=Pool(arguments.workers), out=f"{folder}/study", picture=False
+        ).results
+    for failed in results.without_row():
+        say(f"trial {failed['trial']}: {failed['error']}")
+        return 1
+    found = {form: results.values(form)[0].tolist() for form in FORMS}
+    detections, took_s = results.values("detections")[0], results.timing["wall_time_s"].to_pylist()
     say(f"{'seed':>5}" + "".join(f"{form:>13}" for form in FORMS) + f"{'detections':>12}{'wall s':>8}")
-    seeds = range(arguments.first, arguments.first + arguments.seeds)
-    tasks = [Task(seed=seed, setting=setting, heading=arguments.heading) for seed in seeds]
-    done: dict[int, tuple[dict[str, Score], float]] = {}
-    for task, result in work_through(flown, tasks, arguments.workers):
-        done[task.seed] = result
-        while (seed := arguments.first + len(found["proposed"])) in done:  # in order, as far as they are
-            scores, took_s = done[seed]
-            for form, value in scores.items():
-                found[form].append(value.rmse_m)
-            line = "".join(f"{scores[form].rmse_m:13.3f}" for form in FORMS)
-            say(f"{seed:5d}{line}{scores['proposed'].detections:12d}{took_s:8.1f}")
+    for k in range(arguments.seeds):
+        line = "".join(f"{found[form][k]:13.3f}" for form in FORMS)
+        say(f"{arguments.first + k:5d}{line}{detections[k]:12.0f}{took_s[k]:8.1f}")
     means = {form: statistics.fmean(values) for form, values in found.items()}
     say(f"{'mean':>5}" + "".join(f"{means[form]:13.3f}" for form in FORMS))
     for order in (("proposed", "kalman", "measurement"), ("proposed", "kalman"), ("kalman", "measurement")):

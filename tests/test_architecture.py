@@ -127,7 +127,7 @@ def complaints(name, imports):
     elif is_embedding(name):
         allowed, forbidden = PACKAGES, set()
     else:
-        world = WORLD if is_in(name, ("missions.runs",)) else ()
+        world = WORLD if is_in(name, ("missions.runs", "missions.studies")) else ()
         allowed, forbidden = ("missions", "estimators", *FOUNDATION, *GROUND_FLOOR, *world), set()
         # The command line stands above the missions, not below them.
         if name != "missions.__main__":

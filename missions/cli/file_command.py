@@ -9,7 +9,12 @@ import click
 from missions.cli.mission_command import Given, MissionCommand, option
 
 
-def _arguments(pairs: tuple[str, ...]) -> dict[str, str]:
+def arguments_of(pairs: tuple[str, ...]) -> dict[str, str]:
+    """Values by name of repeated `--arg NAME=VALUE`.
+
+    Raises:
+        PlanError: one is not of this form.
+    """
     from missions.errors import PlanError
 
     values = {}
@@ -26,7 +31,7 @@ def _own_options(given: Given, common: Mapping[str, Any]) -> Any:
 
     return FlightOptions(
         **common,
-        arguments=_arguments(given["arg"]),
+        arguments=arguments_of(given["arg"]),
         altitude_m=given["altitude"],
         speed_m_s=given["speed"],
         rate_hz=given["rate"],

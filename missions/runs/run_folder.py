@@ -166,7 +166,7 @@ def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
     """Write `summary.json`; after an error no file remains. Numbers that are not finite become null."""
-    text = json.dumps(_finite(summary), indent=2, allow_nan=False) + "\n"
+    text = json.dumps(finite(summary), indent=2, allow_nan=False) + "\n"
     path = folder / SUMMARY_NAME
     with whole(path), path.open("x", encoding="utf-8") as file:
         file.write(text)
@@ -193,13 +193,13 @@ def whole(path: Path) -> Iterator[None]:
         raise
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: finite(entry) for key, entry in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_finite(entry) for entry in value]
+        return [finite(entry) for entry in value]
     return value
 
 

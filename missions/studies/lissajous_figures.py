@@ -8,8 +8,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimators.reports.picture import tidy
-from missions.studies.lissajous_localization import SampleRun
 from missions.studies.lissajous_setting import DT, SAMPLE_CELL, START, STEPS
+from missions.studies.lissajous_trial import SampleRun
 
 _INK: Final = "#1f2937"
 _TARGET: Final = "#7c3aed"

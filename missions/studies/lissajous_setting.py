@@ -86,6 +86,16 @@ class Equations(StrEnum):
     """17 and 25a as printed, also 17 in the truth. 28 and 29 are still corrected."""
 
 
+READINGS: Final[Mapping[str, tuple[Equations, ...]]] = MappingProxyType(
+    {
+        "both": tuple(Equations),
+        "corrected": (Equations.CORRECTED,),
+        "printed": (Equations.SIGN_AS_PRINTED, Equations.AS_PRINTED),
+    }
+)
+"""The readings of the equations by the name of the choice."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
     """One estimator of a table.

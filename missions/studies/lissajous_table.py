@@ -9,8 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from missions.studies.lissajous_localization import Array, StudyResult
-from missions.studies.lissajous_setting import CELLS, PAPER, Equations, block_of
+from missions.studies.lissajous_setting import CELLS, PAPER, READINGS, Equations, block_of
+from missions.studies.lissajous_trial import Array, errors_of
+from missions.studies.results import Results
 
 _KEYS: Final = {
     Equations.CORRECTED: "",
@@ -24,20 +25,20 @@ _TITLES: Final = {
 }
 
 
-def cells_of(result: StudyResult) -> list[dict[str, float]]:
+def cells_of(results: Results) -> list[dict[str, float]]:
     """One entry for each cell: `n_rmse`, `k_rmse`, `p_rmse` (medians over the runs), `wins` (per cent of runs
     in which P was best), the paper's values, and standard errors.
 
     Keys without a prefix belong to the corrected equations or, if these were not requested, to the first
     requested ones. `f_rmse` belongs to the filter with the frequencies as states.
     """
-    first = result.request.equations[0]
-    plain = Equations.CORRECTED if Equations.CORRECTED in result.errors else first
+    by_equations = errors_of(results)
+    plain = _plain(tuple(by_equations))
     cells = []
     for index, (epsilon, delta) in enumerate(CELLS):
         paper = PAPER[epsilon, delta]
         cell: dict[str, float] = {"epsilon": epsilon, "delta": delta}
-        for equations, errors in result.errors.items():
+        for equations, errors in by_equations.items():
             done = errors[index][~np.isnan(errors[index, :, 0])]
             figures = _figures(done, [column.name for column in block_of(equations).columns])
             prefix = "" if equations is plain else _KEYS[equations]
@@ -82,26 +83,25 @@ def _median_error(values: Array) -> float:
     return 0.5 * float(high - low)
 
 
-def summary_of(result: StudyResult, wall_time_s: float) -> dict[str, Any]:
-    """Contents of `summary.json` besides versions and command."""
-    request = result.request
-    return {
-        "study": "lissajous-localization",
-        "outcome": "failed" if result.failure else "completed" if result.complete else "interrupted",
-        "reason": result.failure,
-        "partial": not result.complete,
-        "runs": request.runs,
-        "seed": request.seed,
-        "workers": request.workers,
-        "equations": [str(equations) for equations in request.equations],
-        "wall_time_s": round(wall_time_s, 3),
-        "cells": cells_of(result),
-    }
+def summarise(results: Results) -> dict[str, Any]:
+    """The study's own entries of `summary.json`."""
+    readings = READINGS[str(results.options["equations"])]
+    return {"equations": [str(equations) for equations in readings], "cells": cells_of(results)}
+
+
+def lines_of(results: Results) -> list[str]:
+    """Lines of the table: our values next to the paper's."""
+    return table_of(cells_of(results), READINGS[str(results.options["equations"])])
+
+
+def _plain(equations: Sequence[Equations]) -> Equations:
+    """The reading whose figures have no prefix."""
+    return Equations.CORRECTED if Equations.CORRECTED in equations else equations[0]
 
 
 def table_of(cells: Sequence[Mapping[str, float]], equations: Sequence[Equations]) -> list[str]:
     """Lines of the table: our values next to the paper's."""
-    plain = Equations.CORRECTED if Equations.CORRECTED in equations else equations[0]
+    plain = _plain(equations)
     others = [e for e in equations if e is not plain]
     head = f"{'':13}{'paper':^31}  {_TITLES[plain]:^40}"
     names = (

@@ -1,17 +1,18 @@
 """The localisation study: an independent reproduction of Table IV; the same for any number of workers."""
 
 import math
-from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
 
 from estimators.lissajous.model import AXIS, Discretisation, axis, correct, course, course_variance, predict
 from estimators.target_fusion.transform import INFORMATION, add_information, belief_of, ground_target
+from missions.studies import Inline, Pool, Results, read_results, run_study
 from missions.studies import lissajous_setting as setting
-from missions.studies.lissajous_localization import StudyRequest, run_study, sample_run, simulate
+from missions.studies.lissajous_localization import study
 from missions.studies.lissajous_setting import CELLS, PAPER, Equations, block_of
-from missions.studies.lissajous_table import cells_of, summary_of, table_of
+from missions.studies.lissajous_table import cells_of, lines_of
+from missions.studies.lissajous_trial import errors_of, sample_run, simulate
 
 RUNS = 100
 
@@ -49,14 +50,19 @@ AS_PRINTED = {
 """The same with equation 17 as printed, in truth and filter."""
 
 
-@pytest.fixture(scope="module")
-def study():
-    return run_study(StudyRequest(runs=RUNS))
+def localized(folder, *, runs, equations="both", engine=None, seed=0, **options) -> Results:
+    given = {"runs": runs, "seed": seed, "engine": engine or Inline(), "picture": False}
+    return run_study(study(equations), out=folder / "study", **given, **options).results
 
 
 @pytest.fixture(scope="module")
-def cells(study):
-    return {(cell["epsilon"], cell["delta"]): cell for cell in cells_of(study)}
+def localization(tmp_path_factory):
+    return localized(tmp_path_factory.mktemp("localization"), runs=RUNS)
+
+
+@pytest.fixture(scope="module")
+def cells(localization):
+    return {(cell["epsilon"], cell["delta"]): cell for cell in cells_of(localization)}
 
 
 @pytest.mark.slow
@@ -110,32 +116,36 @@ def test_without_uncertainty_k_p_and_f_are_one_filter(cells) -> None:
         assert cell["k_wins"] == cell["wins"]
 
 
-def test_workers_and_runs_change_no_run() -> None:
-    alone = run_study(StudyRequest(runs=3, equations=(Equations.CORRECTED,)))
-    shared = run_study(StudyRequest(runs=52, workers=2, equations=(Equations.CORRECTED,)))
-    assert np.array_equal(alone.errors[Equations.CORRECTED], shared.errors[Equations.CORRECTED][:, :3])
-    other = run_study(StudyRequest(runs=3, seed=1, equations=(Equations.CORRECTED,)))
-    assert not np.any(other.errors[Equations.CORRECTED] == alone.errors[Equations.CORRECTED])
+def test_workers_and_runs_change_no_run(tmp_path) -> None:
+    corrected = Equations.CORRECTED
+    alone = errors_of(localized(tmp_path / "alone", runs=3, equations="corrected"))[corrected]
+    shared = errors_of(localized(tmp_path / "shared", runs=52, equations="corrected", engine=Pool(2)))[
+        corrected
+    ]
+    assert np.array_equal(alone, shared[:, :3])
+    other = errors_of(localized(tmp_path / "other", runs=3, equations="corrected", seed=1))[corrected]
+    assert not np.any(other == alone)
 
 
-def test_equations_that_are_not_asked_for_change_no_run(study) -> None:
-    alone = run_study(StudyRequest(runs=2, equations=(Equations.AS_PRINTED,)))
-    assert np.array_equal(alone.errors[Equations.AS_PRINTED], study.errors[Equations.AS_PRINTED][:, :2])
+def test_equations_that_are_not_asked_for_change_no_run(localization, tmp_path) -> None:
+    alone = localized(tmp_path, runs=2, equations="printed")
+    for equations, errors in errors_of(alone).items():
+        assert np.array_equal(errors, errors_of(localization)[equations][:, :2])
     (cell, *_) = cells_of(alone)
     assert "p_rmse" in cell and "f_rmse" not in cell
 
 
-def test_an_interruption_keeps_what_is_there() -> None:
-    def interrupt(share: float) -> None:
-        if share >= 0.5:
+def test_an_interruption_keeps_what_is_there(tmp_path) -> None:
+    def interrupt(progress) -> None:
+        if progress.done >= progress.trials // 2:
             raise KeyboardInterrupt
 
-    result = run_study(StudyRequest(runs=2, equations=(Equations.CORRECTED,)), interrupt)
-    assert not result.complete
-    cells = cells_of(result)
-    done = [cell for cell in cells if cell["runs"] == 2.0]
-    assert len(done) == 10 and len(cells) == 20
-    assert len(table_of(cells, result.request.equations)) == 2 + 10 + 2
+    results = localized(tmp_path, runs=2, equations="corrected", on_progress=interrupt)
+    assert not results.complete and results.table.num_rows == 20
+    cells = cells_of(results)
+    assert [cell["runs"] for cell in cells] == [1.0] * 20
+    assert len(lines_of(results)) == 2 + 20 + 2
+    assert read_results(tmp_path / "study").table.equals(results.table)
 
 
 def test_a_run_is_the_equations_one_after_the_other() -> None:
@@ -192,31 +202,3 @@ def test_the_sample_run_has_what_the_figures_show() -> None:
     assert off == pytest.approx(sample.errors)
     assert sample.errors[3] < sample.errors[2] < sample.errors[0] < sample.errors[1]
     assert np.abs(sample.first_drone[:, 2] - sample.drones[:, 0, [0, 2]]).mean() < 1.0
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"runs": 0}, "0 runs"),
-        ({"seed": -1}, "seed -1"),
-        ({"workers": 0}, "0 workers"),
-        ({"equations": ()}, "no equations"),
-    ],
-)
-def test_wrong_requests_are_named(wrong, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        StudyRequest(**wrong)
-
-
-def test_a_killed_worker_keeps_what_is_there(monkeypatch) -> None:
-    def two_then_none(work, tasks, _workers):
-        for task in tasks[:2]:
-            yield task, work(task)
-        raise BrokenProcessPool
-
-    monkeypatch.setattr("missions.studies.lissajous_localization.work_through", two_then_none)
-    result = run_study(StudyRequest(runs=2, workers=2, equations=(Equations.CORRECTED,)))
-    assert not result.complete and "`workers`" in result.failure
-    assert sum(cell["runs"] == 2.0 for cell in cells_of(result)) == 2
-    summary = summary_of(result, 1.0)
-    assert summary["outcome"] == "failed" and summary["partial"] and summary["reason"] == result.failure

@@ -1,0 +1,330 @@
+"""The command of one study: its own options and those of every study, and what it prints."""
+
+import hashlib
+import json
+import shlex
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from missions.cli.mission_command import Given
+from missions.cli.options import FiniteRange, StatusLine, in_options, report
+
+if TYPE_CHECKING:
+    from missions.studies.engine import Engine, Progress
+    from missions.studies.running import StudyResult
+    from missions.studies.study import Study, Trial
+
+_FAILED: Final = 1
+_KILLED: Final = 128
+_LIMIT: Final = FiniteRange(min=0.0, min_open=True, max=1e7)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyCommand:
+    """A study on the command line.
+
+    Attributes:
+        help: text of `flightstack study NAME --help`.
+        build: makes the study from the values of its own options.
+        options: its own options, besides those of every study.
+        repeat: the command that repeats a trial; None: this command with `--trial`.
+    """
+
+    help: str
+    build: Callable[[Given], "Study[Any, Any]"]
+    options: tuple[click.Parameter, ...] = ()
+
+    def command(self, name: str) -> click.Command:
+        """The command.
+
+        Args:
+            name: name of the study, or path of the file that has it.
+        """
+
+        def run(**given: Any) -> int:
+            return _run(self, name, given)
+
+        return click.Command(
+            name,
+            callback=run,
+            params=[*self.options, *engine_options()],
+            help=self.help,
+            context_settings={"show_default": True},
+        )
+
+
+def engine_options() -> list[click.Parameter]:
+    """The options of every study."""
+    return [
+        click.Option(["--runs"], type=click.IntRange(1, 1_000_000), help="Per cell. [default: the study's]"),
+        click.Option(["--seed"], type=click.IntRange(min=0), default=0, help="One seed makes one table."),
+        click.Option(
+            ["--workers"], type=click.IntRange(1, 4096),
+            help="Processes; 1: this process. With --ray: workers at most. [default: one per processor]",
+        ),
+        click.Option(
+            ["--ray"], metavar="ADDRESS",
+            help="On a Ray cluster: HOST:PORT of its head, ray://HOST:PORT, auto, or local for one of this "
+            "machine. Needs the extra `ray`.",
+        ),
+        click.Option(
+            ["--out"], metavar="DIR|URI",
+            help="Folder, also s3://, gs:// and others of pyarrow.fs. [default: runs/STUDY-N]",
+        ),
+        click.Option(["--resume"], metavar="DIR|URI", help="Continue the study in this folder."),
+        click.Option(
+            ["--keep-logs"], type=click.Choice(["none", "failed", "all"]), default="none",
+            help="Trials whose files are kept, in logs/ of the folder.",
+        ),
+        click.Option(
+            ["--time-limit"], type=_LIMIT, metavar="S",
+            help="Terminate a trial after so many seconds of wall time. [default: no limit]",
+        ),
+        click.Option(["--no-picture"], is_flag=True, help="Draw no pictures."),
+        click.Option(
+            ["--trial"], type=click.IntRange(min=0), metavar="N",
+            help="Run this trial only, in this process, and print its row.",
+        ),
+    ]  # fmt: skip
+
+
+def _run(declared: StudyCommand, name: str, given: dict[str, Any]) -> int:
+    from missions.errors import MissionError, PlanError
+
+    try:
+        return run_declared(declared, name, given)
+    except PlanError as error:
+        raise click.UsageError(in_options(error)) from error
+    except MissionError as error:
+        raise click.ClickException(in_options(error)) from error
+
+
+def run_declared(declared: StudyCommand, name: str, given: dict[str, Any]) -> int:
+    """Run the study of a command, and print its table; returns the exit code.
+
+    Raises:
+        PlanError, MissionError: see `run_study`.
+    """
+    from missions.studies.folder import StudyFolder
+
+    if given["resume"] is not None:
+        _take_up(declared, given, StudyFolder.opened(given["resume"]).identity())
+    study = declared.build(given)
+    runs = study.runs if given["runs"] is None else given["runs"]
+    if given["trial"] is not None:
+        return _one_trial(study, runs, given["seed"], given["trial"])
+    own = words_of(declared.options, given)
+    words = ["flightstack", "study", name, *own, "--runs", str(runs), "--seed", str(given["seed"])]
+
+    def repeat(trial: "Trial") -> str:
+        return shlex.join([*words, "--trial", str(trial.index)])
+
+    arguments = {option.name: given[option.name] for option in declared.options if option.name is not None}
+    return run_and_tell(study, given, repeat=repeat, arguments=arguments)
+
+
+def _take_up(declared: StudyCommand, given: dict[str, Any], identity: Mapping[str, Any]) -> None:
+    """Give options that the user did not specify the values that a study was begun with."""
+    context = click.get_current_context()
+    before = {**identity["arguments"], "runs": identity["runs"], "seed": identity["seed"]}
+    for name, value in before.items():
+        source = context.get_parameter_source(name)
+        if name in given and source is not click.core.ParameterSource.COMMANDLINE:
+            given[name] = tuple(value) if isinstance(value, list) else value
+
+
+def _one_trial(study: "Study[Any, Any]", runs: int, seed: int, index: int) -> int:
+    """Run one trial in this process and print its row; its error, if it raises one, has the whole
+    traceback.
+    """
+    from missions.studies.running import run_trial
+
+    try:
+        row = run_trial(study, index, runs=runs, seed=seed)
+    except IndexError as error:
+        raise click.UsageError(str(error)) from error
+    except Exception:  # noqa: BLE001 - whatever the trial raises is shown
+        click.echo(traceback.format_exc(), nl=False, err=True)
+        report(f"trial {index} failed")
+        return _FAILED
+    click.echo(json.dumps(row, indent=2))
+    return 0
+
+
+def run_and_tell(
+    study: "Study[Any, Any]",
+    given: Given,
+    *,
+    repeat: "Callable[[Trial], str]",
+    arguments: Mapping[str, Any],
+) -> int:
+    """Run a study with the options of every study, and print its table; returns the exit code.
+
+    Args:
+        study: the study.
+        given: values of the options.
+        repeat: the command that repeats a trial.
+        arguments: what `--resume` needs to build the study again.
+    """
+    from missions.runs.ending import EndedBySignal, EndSignalHandler
+    from missions.studies.running import run_study
+
+    class Ending(EndSignalHandler):
+        def _on_signal(self, number: int, frame: FrameType | None) -> None:
+            raise EndedBySignal(number)
+
+    line = _ProgressLine()
+    line.start(study.name)
+    try:
+        with Ending():
+            result = run_study(
+                study,
+                runs=given["runs"],
+                seed=given["seed"],
+                engine=engine_of(given),
+                out=given["out"],
+                resume=given["resume"],
+                keep_logs=given["keep_logs"],
+                time_limit_s=given["time_limit"],
+                picture=not given["no_picture"],
+                command=shlex.join(["flightstack", *sys.argv[1:]]),
+                repeat=repeat,
+                arguments=arguments,
+                on_progress=line,
+            )
+    finally:
+        line.end()
+    return _tell(result)
+
+
+def engine_of(given: Given) -> "Engine":
+    """The engine that the options select."""
+    from missions.studies.inline import Inline
+    from missions.studies.pool import Pool
+
+    if given["ray"] is not None:
+        from missions.studies.ray_cluster import RayCluster
+
+        return RayCluster(given["ray"], workers=given["workers"])
+    if given["workers"] == 1 and given["time_limit"] is None:
+        return Inline()
+    return Pool(given["workers"])  # with a time limit, also one worker is a process, which can be terminated
+
+
+def _tell(result: "StudyResult") -> int:
+    """Print the result; returns the exit code."""
+    for line in result.table:
+        click.echo(line)
+    click.echo(f"run: {result.folder}")
+    if result.outcome != "completed":
+        done, trials = result.results.table.num_rows, result.results.runs * len(result.results.cells)
+        report(
+            f"{result.reason}; {done} of {trials} trials are in {result.folder}, and --resume "
+            f"{result.folder} "
+            "continues"
+        )
+        return _KILLED + result.signal if result.outcome == "interrupted" else _FAILED
+    without_row = result.results.without_row()
+    if without_row:
+        first = without_row[0]
+        count = "1 trial has" if len(without_row) == 1 else f"{len(without_row)} trials have"
+        report(f"{count} no row; trial {first['trial']}: {first['error']}; repeat it: {first['command']}")
+        return _FAILED
+    return 0
+
+
+def words_of(options: tuple[click.Parameter, ...], given: Given) -> list[str]:
+    """The words of a command line that give options these values; those with their default are left out."""
+    words: list[str] = []
+    for option in options:
+        value = None if option.name is None else given[option.name]
+        if value is None or value == option.default or value == ():
+            continue
+        if isinstance(option, click.Argument):
+            words += [str(v) for v in value] if isinstance(value, tuple) else [str(value)]
+        elif isinstance(option, click.Option) and option.is_flag:
+            words += [option.opts[0]] if value else []
+        else:
+            for each in value if isinstance(value, tuple) else (value,):
+                words += [option.opts[0], str(each)]
+    return words
+
+
+class _ProgressLine:
+    """The progress on a terminal; nothing in a pipe."""
+
+    def __init__(self) -> None:
+        self._line = StatusLine()
+
+    def start(self, name: str) -> None:
+        if self._line.terminal:
+            self._line.show(f"{name}: starting (the first start compiles the flight code)")
+
+    def __call__(self, progress: "Progress") -> None:
+        left = "" if progress.left_s is None else f", {_clock(progress.left_s)} left"
+        rate = "" if progress.rate_hz == 0.0 else f", {progress.rate_hz:.3g}/s"
+        self._line.show(f"{progress.done}/{progress.trials} done, {progress.failed} failed{rate}{left}")
+
+    def end(self) -> None:
+        self._line.end()
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def file_command() -> StudyCommand:
+    """The command of a user's study file."""
+    return StudyCommand(
+        help=(
+            "Run a study of your own: a Python file with `STUDY = Study(...)`, or with `def "
+            "study(arguments)` that "
+            "returns one.\n\n--arg NAME=VALUE gives the function its arguments, a mapping of texts."
+        ),
+        options=(
+            click.Option(
+                ["--arg"], multiple=True, metavar="NAME=VALUE", help="An argument of your own; repeat."
+            ),
+        ),
+        build=lambda given: _study_in(Path(click.get_current_context().info_name or ""), given["arg"]),
+    )
+
+
+def _study_in(path: Path, pairs: tuple[str, ...]) -> "Study[Any, Any]":
+    from missions.cli.file_command import arguments_of
+    from missions.errors import PlanError
+    from missions.studies.job import load_study_module
+    from missions.studies.study import Study
+    from missions.studies.trial_runner import error_text
+
+    arguments = arguments_of(pairs)
+    module = load_study_module(path)
+    found = getattr(module, "STUDY", None)
+    if callable(getattr(module, "study", None)):
+        try:
+            found = module.study(arguments)
+        except PlanError:
+            raise
+        except Exception as error:
+            raise PlanError(f"study file {path}: {error_text(error)}") from error
+    elif arguments:
+        raise PlanError(f"study file {path} takes no arguments; they are for `def study(arguments)`")
+    if not isinstance(found, Study):
+        raise PlanError(
+            f"study file {path} has neither `STUDY = Study(...)` nor `def study(arguments)`; add one"
+        )
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return replace(
+        found,
+        files=(*found.files, path.resolve()),
+        options={**found.options, **arguments, "file": path.name, "sha256": digest[:16]},
+    )
