@@ -161,8 +161,8 @@ def observation(case: Case, *, gate: float = WIDE_GATE) -> Array:
     """Measurements of everything, each off by its own amount, with variances of their own."""
     obs = np.zeros(fusion.OBS_SIZE)
     gps_error = case.core[s.X_GPS_ERROR : s.X_GPS_ERROR + 3]
-    obs[fusion.GPS_POS : fusion.GPS_POS + 3] = case.past_pos + gps_error + [0.4, -0.3, 0.6]
-    obs[fusion.GPS_VEL : fusion.GPS_VEL + 3] = case.past_vel + [0.2, -0.1, 0.15]
+    obs[fusion.GPS_POS : fusion.GPS_POS + 3] = case.past_pos + gps_error + np.array([0.4, -0.3, 0.6])
+    obs[fusion.GPS_VEL : fusion.GPS_VEL + 3] = case.past_vel + np.array([0.2, -0.1, 0.15])
     obs[fusion.GPS_POS_VAR : fusion.GPS_POS_VAR + 3] = 0.8, 0.9, 1.7
     obs[fusion.GPS_VEL_VAR : fusion.GPS_VEL_VAR + 3] = 0.05, 0.07, 0.11
     obs[fusion.GPS_DELAY_S] = obs[fusion.BARO_DELAY_S] = DELAY_S
@@ -173,7 +173,7 @@ def observation(case: Case, *, gate: float = WIDE_GATE) -> Array:
     obs[fusion.MAG : fusion.MAG + 3] = case.r_past.T @ field_ned + bias + [0.01, -0.02, 0.015]
     obs[fusion.MAG_VAR] = 0.002
     obs[fusion.MAG_NED : fusion.MAG_NED + 3] = field_ned
-    obs[fusion.HOLD : fusion.HOLD + 3] = case.core[s.X_POS : s.X_POS + 3] + [0.05, -0.06, 0.07]
+    obs[fusion.HOLD : fusion.HOLD + 3] = case.core[s.X_POS : s.X_POS + 3] + np.array([0.05, -0.06, 0.07])
     obs[fusion.HOLD_VAR], obs[fusion.HOLD_HEIGHT_VAR] = 0.4, 0.6
     obs[fusion.REST_VEL_VAR], obs[fusion.REST_RATE_VAR] = 0.02, 1e-4
     obs[fusion.GATE_GPS : fusion.GATE_MAG + 1] = gate
@@ -419,8 +419,8 @@ def test_gate_is_in_standard_deviations_of_the_innovation(
 def external_sample(case: Case) -> Array:
     obs = np.zeros(external_fusion.EXT_SIZE)
     nose = case.r_past[:, 0]
-    obs[external_fusion.EXT_POS : external_fusion.EXT_POS + 3] = case.past_pos + [0.2, -0.3, 0.25]
-    obs[external_fusion.EXT_VEL : external_fusion.EXT_VEL + 3] = case.past_vel + [0.1, 0.2, -0.15]
+    obs[external_fusion.EXT_POS : external_fusion.EXT_POS + 3] = case.past_pos + np.array([0.2, -0.3, 0.25])
+    obs[external_fusion.EXT_VEL : external_fusion.EXT_VEL + 3] = case.past_vel + np.array([0.1, 0.2, -0.15])
     obs[external_fusion.EXT_YAW] = math.atan2(nose[1], nose[0]) + 0.05
     obs[external_fusion.EXT_POS_VAR : external_fusion.EXT_POS_VAR + 3] = 0.1, 0.2, 0.3
     obs[external_fusion.EXT_VEL_VAR : external_fusion.EXT_VEL_VAR + 3] = 0.02, 0.03, 0.04
