@@ -23,7 +23,7 @@ def requested(index: float) -> list[tuple[int, int, int, int, int, str]]:
             sent.standard_mode,
             sent.custom_mode,
             sent.properties,
-            sent.mode_name.decode(),
+            sent.mode_name,
         )
         for sent in channel.sent
     ]
