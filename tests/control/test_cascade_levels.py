@@ -225,6 +225,9 @@ def test_without_attitude_or_rates_the_motors_idle(place: int, level: float) -> 
     rig.step()
     rig.nav[place] = math.nan
     assert rig.step()[:4].tolist() == [rig.controller.parameters.motor_idle] * 4
+    assert np.isfinite(rig.state[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3]).all()
+    assert np.isfinite(rig.state[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3]).all()
+    assert np.isfinite(rig.controller.attitude_setpoint).all()
 
 
 def test_integrators_wait_on_the_ground_until_the_thrust_lifts() -> None:

@@ -213,6 +213,16 @@ def test_feed_forward_gives_way_at_the_speed_limit(
     np.testing.assert_allclose(s[c.VEL_SETPOINT : c.VEL_SETPOINT + 2], expected, atol=1e-6)
 
 
+@pytest.mark.parametrize(("axis", "other"), [(0, 1), (1, 0)])
+def test_an_axis_without_a_velocity_takes_nothing_of_the_speed_limit(axis: int, other: int) -> None:
+    nav, setpoint, s = flying()
+    setpoint[sp.VEL_NED_M_S] = 0.0
+    setpoint[sp.VEL + axis], setpoint[sp.VEL + other], setpoint[sp.ACC + other] = 6.0, math.nan, 0.5
+    trajectory_control(nav, setpoint, packed(speed_xy_max_m_s=6.0), s, DT_S, False)
+    assert s[c.VEL_SETPOINT + axis] == pytest.approx(6.0)
+    assert math.isnan(s[c.VEL_SETPOINT + other])
+
+
 @pytest.mark.parametrize(("error_m", "velocity"), [(-50.0, -3.0), (50.0, 1.5), (-0.5, -0.5), (0.5, 0.5)])
 def test_climb_and_descent_have_limits_of_their_own(error_m: float, velocity: float) -> None:
     nav, setpoint, s = flying()

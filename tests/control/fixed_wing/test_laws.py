@@ -182,7 +182,7 @@ def rate_state() -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize(
-    ("airspeed", "scaled_with"), [(12.0, 12.0), (15.0, 15.0), (2.0, 7.0), (60.0, 30.0), (math.nan, None)]
+    ("airspeed", "scaled_with"), [(12.0, 12.0), (15.0, 15.0), (2.0, 7.0), (60.0, 30.0), (10.0, None)]
 )
 def test_rate_law(airspeed: float, scaled_with: float | None) -> None:
     """A moment grows with the square of the airspeed, and the steady rate of a surface with the airspeed:
@@ -193,7 +193,7 @@ def test_rate_law(airspeed: float, scaled_with: float | None) -> None:
         p, scale = parameters(**RATE_GAINS, airspeed_scaling=False), 1.0
     else:
         p, scale = parameters(**RATE_GAINS), 15.0 / scaled_with
-        s[c.EAS] = airspeed
+    s[c.EAS] = airspeed
     before, surfaces = s.copy(), np.zeros(3)
     rate_control(nav, p, s, surfaces, False)
     rates, wanted = nav[n.RATES_FRD_RAD_S], before[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
@@ -520,6 +520,14 @@ def test_bank_given_past_the_guidance(roll: float, flown: float) -> None:
     assert math.isnan(s[c.HEADING_SETPOINT])
 
 
+def test_a_course_can_be_flown_from_rest() -> None:
+    """Without any motion through the air the course is the heading: the start of a catapult or a roll."""
+    nav, setpoint, s = flying(yaw=0.4, airspeed=0.0)
+    setpoint[sp.COURSE_RAD] = 1.2
+    lateral_control(nav, setpoint, parameters(), s, GUIDANCE_S)
+    assert s[c.HEADING_SETPOINT] == pytest.approx(1.2)
+
+
 # -- heights
 
 
@@ -676,12 +684,13 @@ def test_trim_throttle_lies_between_the_three_that_are_known(airspeed: float, th
     unknown = parameters(**(ENERGY | {"trim_throttle_min_speed": 0.0, "trim_throttle_max_speed": 0.0}))
     energy_control(nav, setpoint, unknown, s, GUIDANCE_S, False)
     assert s[c.THROTTLE] == pytest.approx(0.5)
-    # the ends at the same airspeed as the trim give no slope
-    flat = parameters(**(ENERGY | {"airspeed_min_m_s": 15.0, "airspeed_max_m_s": 15.0005}))
-    setpoint[sp.AIRSPEED_M_S] = 15.0
-    nav, _, s = flying(airspeed=15.0)
-    energy_control(nav, setpoint, flat, s, GUIDANCE_S, False)
-    assert s[c.THROTTLE] == pytest.approx(0.5, abs=1e-3)
+    # ends at the same airspeed as the trim give no slope
+    flat = parameters(**(ENERGY | {"airspeed_min_m_s": 14.9995, "airspeed_max_m_s": 15.0005}))
+    for wanted in (14.0, 16.0):
+        setpoint[sp.AIRSPEED_M_S] = wanted
+        nav, _, s = flying(airspeed=15.0)
+        energy_control(nav, setpoint, flat, s, GUIDANCE_S, False)
+        assert s[c.THROTTLE] == pytest.approx(0.5, abs=2e-3)
 
 
 @pytest.mark.parametrize("bank", [0.7, -0.7])
@@ -968,3 +977,15 @@ def test_a_climb_out_gives_way_before_the_stall() -> None:
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.PITCH_MIN_RAD] = -3.0, 0.2
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
     assert s[c.PITCH_SETPOINT] == pytest.approx(0.2)
+
+
+def test_unknown_climb_rate_counts_as_level() -> None:
+    states = []
+    for down_m_s in (math.nan, 0.0):
+        nav, setpoint, s = flying(airspeed=16.0)
+        nav[n.VEL + 2] = down_m_s
+        nav[n.ACC_NED_M_S2] = 0.0
+        setpoint[sp.HEIGHT_RATE_M_S] = 1.0
+        energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
+        states.append(s)
+    np.testing.assert_array_equal(states[0], states[1])
