@@ -192,6 +192,7 @@ def test_position_error_alone_is_flown_at_the_speed_limit(direction: float) -> N
         ((0.0, 0.0), (5.0, 8.0)),
         ((-1.0, 3.0), (0.0, 9.0)),
         ((0.3, -0.2), (7.0, 0.5)),
+        ((5.9, 0.0), (0.5, 0.0)),
     ],
 )
 def test_feed_forward_gives_way_at_the_speed_limit(
