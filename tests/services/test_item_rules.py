@@ -71,7 +71,7 @@ def test_a_position_that_is_not_set_means_here_for_some_commands(command: int, h
     assert rules.check_position(item(command, x=10.0, y=NAN)) == Y  # half of a position is none
 
 
-@pytest.mark.parametrize(("place", "result"), enumerate((PARAM1, PARAM2, PARAM3, PARAM4), start=1))
+@pytest.mark.parametrize(("place", "result"), list(enumerate((PARAM1, PARAM2, PARAM3, PARAM4), start=1)))
 @pytest.mark.parametrize("value", [INF, -INF, NAN])
 def test_parameters_are_finite_or_not_set_where_that_is_allowed(
     place: int, result: int, value: float

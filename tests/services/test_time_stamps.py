@@ -2,7 +2,7 @@
 
 import pytest
 
-from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
+from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 
 NOW_US = 60_000_000
 

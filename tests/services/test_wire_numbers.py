@@ -4,7 +4,7 @@ import pytest
 from pymavlink import mavftp
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import NOBODY
+from autopilot_bridge.services.channel import NO_CLIENT
 from autopilot_bridge.services.files.ftp_protocol import FtpError, Opcode
 from autopilot_bridge.services.inputs import setpoint_frames as frames
 from autopilot_bridge.services.inputs.transmitter import CHANNELS, Radio
@@ -65,8 +65,8 @@ def test_an_override_ends_by_its_timeout(timeout_s: float) -> None:
     assert radio.overridden is (timeout_s < 0.0)  # negative: never
 
 
-def test_nobody_has_no_address() -> None:
-    assert (NOBODY.system_id, NOBODY.component_id) == (0, 0)
+def test_no_client_has_no_address() -> None:
+    assert (NO_CLIENT.system_id, NO_CLIENT.component_id) == (0, 0)
 
 
 def test_bits_of_setpoints_are_mavlinks() -> None:
