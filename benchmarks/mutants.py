@@ -1,6 +1,7 @@
 """Mutants: small, deliberate faults in the flight code, made with cosmic-ray's operators."""
 
 import random
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import unified_diff
@@ -108,12 +109,16 @@ def modules() -> list[str]:
 
 
 def is_plain(path: str) -> bool:
-    """Whether a module is tested without Numba: kernels, and the constants beside them that they are made of.
-    Numba would compile a mutant of these for longer than the tests take."""
+    """Whether a module is tested without Numba: kernels, and the modules of constants beside them that they
+    are made of. Numba would compile a mutant of these for longer than the tests take."""
     module = ROOT / path
-    if "def " in module.read_text(encoding="utf-8"):
+    if _PUBLIC.search(module.read_text(encoding="utf-8")):
         return _has_kernels(module)
     return any(map(_has_kernels, module.parent.glob("*.py")))
+
+
+_PUBLIC: Final = re.compile(r"^(class|def (?!_))", re.MULTILINE)
+"""A module without public classes and functions consists of constants."""
 
 
 def _has_kernels(module: Path) -> bool:

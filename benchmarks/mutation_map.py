@@ -4,6 +4,7 @@ import json
 import time
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,11 +36,14 @@ PLAIN_TESTS: Final = (
     "tests/navigation/test_jacobians.py",
     "tests/navigation/test_mechanisation.py",
     "tests/navigation/test_pitot.py",
+    "tests/navigation/test_updates.py",
 )
 """What modules with kernels are tested with, as plain Python: without minutes of flight."""
 
 TEST_LIMIT_S: Final = 30.0
-"""A test that takes longer is left out of the map."""
+"""A test that takes more processor time is left out of the map."""
+WAITING_LIMIT_S: Final = 600.0
+"""By the wall clock, of which a busy machine takes much more."""
 
 
 PYTEST_OPTIONS: Final = (
@@ -74,7 +78,11 @@ class Recorder:
             self._failed.add(report.nodeid)
 
     def passed_s(self) -> dict[str, float]:
-        return {test: spent for test, spent in self.times_s.items() if test not in self._failed}
+        return {
+            test: spent
+            for test, spent in self.times_s.items()
+            if test not in self._failed and spent <= TEST_LIMIT_S
+        }
 
 
 def record(test_folder: str, folder: Path, *, plain: bool) -> None:
@@ -88,7 +96,7 @@ def record(test_folder: str, folder: Path, *, plain: bool) -> None:
     recorder = Recorder(coverage)
     coverage.start()
     code = pytest.main(
-        [*PYTEST_OPTIONS, f"--timeout={TEST_LIMIT_S}", str(ROOT / test_folder)], plugins=[recorder]
+        [*PYTEST_OPTIONS, f"--timeout={WAITING_LIMIT_S}", str(ROOT / test_folder)], plugins=[recorder]
     )
     coverage.stop()
     if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
@@ -126,18 +134,17 @@ class TestMap:
                     self._lines[path][int(line)].update(tests)
 
     def tests_of(self, mutant: Mutant, budget_s: float) -> dict[str, float]:
-        """Those that execute the line: first those of the module's package, then the others, the quickest
-        first in both. For what is executed at import, and in the middle of long statements, those that
-        execute anything of the statement, the function or the module; where a module executes nothing but
-        definitions, those of the package."""
-        lines = self._lines[mutant.path]
-        for first, last in self._places(mutant):
-            found = set().union(*(lines[line] for line in range(first, last + 1) if line in lines))
-            if found:
-                break
-        else:
-            found = set() if mutant.in_function() else self._tests_of_package(mutant)
+        """The tests of a mutant and how long each takes: first those of the module's package, then the
+        others, the quickest first in both, as long as their times fit into the budget.
+
+        Inside a function these are the tests that execute the line; in the middle of a long statement, those
+        that execute anything of the statement or of the function. A constant, a field and its default are
+        executed at import: the tests are those that execute a line of any module that names it, then those
+        that execute a function of the module, and where there are none, those of the package."""
+        places = self._in_function(mutant) if mutant.in_function() else self._at_import(mutant)
+        found = next(filter(None, places), set())
         times_s = self._times_s[is_plain(mutant.path)]
+        found &= times_s.keys()
         chosen: dict[str, float] = {}
         own_folder = self._folder_of_package(mutant)
         for test in sorted(found, key=lambda test: (not test.startswith(own_folder), times_s[test], test)):
@@ -146,26 +153,92 @@ class TestMap:
             chosen[test] = times_s[test]
         return chosen
 
-    def _tests_of_package(self, mutant: Mutant) -> set[str]:
-        """For modules that execute nothing but definitions."""
+    def _in_function(self, mutant: Mutant) -> Iterator[set[str]]:
+        yield self._that_execute(mutant.path, mutant.line, mutant.line)
+        node = _leaf(mutant)
+        while node.parent is not None:
+            if node.type in ("simple_stmt", "expr_stmt", "return_stmt"):
+                yield self._that_execute(mutant.path, node.start_pos[0], node.end_pos[0])
+            if node.type == "funcdef":
+                yield self._that_execute(mutant.path, node.start_pos[0] + 1, node.end_pos[0])
+                return  # in a function that no test calls
+            node = node.parent
+
+    def _at_import(self, mutant: Mutant) -> Iterator[set[str]]:
+        if names := _defined_names(mutant):
+            yield self._that_name(names, mutant)
+        yield set().union(
+            *(self._that_execute(mutant.path, first, last) for first, last in _functions(mutant.path))
+        )
         folder = self._folder_of_package(mutant)
-        return {test for test in self._times_s[is_plain(mutant.path)] if test.startswith(folder)}
+        yield {test for test in self._times_s[is_plain(mutant.path)] if test.startswith(folder)}
+
+    def _that_name(self, names: set[str], mutant: Mutant) -> set[str]:
+        """Tests that execute, in a function of any module, a line that names one of these."""
+        found: set[str] = set()
+        plain = is_plain(mutant.path)
+        for path, lines in self._lines.items():
+            if is_plain(path) is not plain:
+                continue
+            named = _lines_that_name(path, names)
+            if path == mutant.path:
+                named.discard(mutant.line)
+            for first, last in _functions(path):
+                found.update(*(lines[line] for line in named if first <= line <= last and line in lines))
+        return found
+
+    def _that_execute(self, path: str, first: int, last: int) -> set[str]:
+        lines = self._lines[path]
+        return set().union(*(lines[line] for line in range(first, last + 1) if line in lines))
 
     @staticmethod
     def _folder_of_package(mutant: Mutant) -> str:
         package, part = mutant.path.split("/")[:2]
         return "tests/estimators/" if package == "estimators" else f"tests/{part}/"
 
-    @staticmethod
-    def _places(mutant: Mutant) -> Iterator[tuple[int, int]]:
-        yield mutant.line, mutant.line
-        tree = parso.parse((ROOT / mutant.path).read_text(encoding="utf-8"))
-        node = tree.get_leaf_for_position((mutant.line, mutant.column))
-        while node.parent is not None:
-            if node.type in ("simple_stmt", "expr_stmt", "return_stmt"):
-                yield node.start_pos[0], node.end_pos[0]
-            if node.type == "funcdef":
-                yield node.start_pos[0] + 1, node.end_pos[0]
-                return  # in a function that no test calls
-            node = node.parent
-        yield 1, node.end_pos[0]
+
+@cache
+def _tree(path: str) -> Any:
+    return parso.parse((ROOT / path).read_text(encoding="utf-8"))
+
+
+def _leaf(mutant: Mutant) -> Any:
+    return _tree(mutant.path).get_leaf_for_position((mutant.line, mutant.column))
+
+
+@cache
+def _functions(path: str) -> tuple[tuple[int, int], ...]:
+    """First and last line of the body of each function of a module."""
+
+    def walk(node: Any) -> Iterator[tuple[int, int]]:
+        if node.type in ("funcdef", "lambdef"):
+            yield node.children[-1].start_pos[0], node.end_pos[0]
+            return
+        for child in getattr(node, "children", ()):
+            yield from walk(child)
+
+    return tuple(walk(_tree(path)))
+
+
+def _defined_names(mutant: Mutant) -> set[str]:
+    """What the statement around the mutant assigns: a constant, a class attribute, a field."""
+    node = _leaf(mutant)
+    while node.parent is not None and node.type != "expr_stmt":
+        node = node.parent
+    return {name.value for name in node.get_defined_names()} if node.type == "expr_stmt" else set()
+
+
+def _lines_that_name(path: str, names: set[str]) -> set[int]:
+    return {line for name in names for line in _words(path).get(name, ())}
+
+
+@cache
+def _words(path: str) -> dict[str, set[int]]:
+    """The lines on which each name of a module is."""
+    found: dict[str, set[int]] = defaultdict(set)
+    leaf = _tree(path).get_first_leaf()
+    while leaf is not None:
+        if leaf.type == "name":
+            found[leaf.value].add(leaf.start_pos[0])
+        leaf = leaf.get_next_leaf()
+    return found

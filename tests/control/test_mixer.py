@@ -77,3 +77,46 @@ def test_thrust_curve_clips() -> None:
     assert command_from_thrust(1.7, 0.5) == 1.0
     assert command_from_thrust(-0.2, 0.5) == 0.0
     assert math.isfinite(command_from_thrust(0.5, 1e-9))
+
+
+def px4_desaturated(
+    motors: np.ndarray, direction: np.ndarray, upper: float, *, down_only: bool
+) -> np.ndarray:
+    """One step of PX4's `ControlAllocationSequentialDesaturation::desaturateActuators`: along `direction` as
+    far as the motors beyond their limits ask for, then half of what is still missing."""
+
+    def gain(motors: np.ndarray) -> float:
+        needed = np.where(motors < 0.0, -motors, np.where(motors > upper, upper - motors, 0.0)) / direction
+        return min(0.0, needed.min()) + max(0.0, needed.max())
+
+    first = gain(motors)
+    if down_only and first > 0.0:
+        return motors
+    motors = motors + first * direction
+    return motors + 0.5 * gain(motors) * direction
+
+
+@settings(max_examples=300, deadline=None)
+@given(*[st.floats(-1.5, 1.5)] * 3, st.floats(0.0, 1.0))
+def test_at_its_limits_it_mixes_as_px4_without_airmode(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    """`mixAirmodeDisabled`: thrust down, roll, pitch; then `mixYaw` with 15 % more room, and thrust down."""
+    half = math.sqrt(0.5)
+    x, y = np.array([-half, half, half, -half]), np.array([half, -half, half, -half])
+    turn, up = np.array([1.0, 1.0, -1.0, -1.0]), np.ones(4)
+    motors = roll * x + pitch * y + thrust * up
+    motors = px4_desaturated(motors, up, 1.0, down_only=True)
+    motors = px4_desaturated(motors, x, 1.0, down_only=False)
+    motors = px4_desaturated(motors, y, 1.0, down_only=False)
+    motors = px4_desaturated(motors + yaw * turn, turn, 1.15, down_only=False)
+    motors = np.clip(px4_desaturated(motors, up, 1.0, down_only=True), 0.0, 1.0)
+    mixed, unallocated = mix(roll, pitch, yaw, thrust)
+    np.testing.assert_allclose(mixed, motors, atol=1e-12)
+    # the torques that these motors give: least squares over the four columns
+    given_roll, given_pitch, given_yaw, _ = np.linalg.lstsq(
+        np.column_stack([x, y, turn, up]), motors, rcond=None
+    )[0]
+    np.testing.assert_allclose(
+        unallocated, [roll - given_roll, pitch - given_pitch, yaw - given_yaw], atol=1e-12
+    )

@@ -13,7 +13,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav_layout
-from autopilot_bridge.services.commands.handlers import whole
+from autopilot_bridge.services.commands.handlers import Command, command_from_message, flags, on_earth, whole
 from tests.services.command_rig import NAN, ServiceRig
 
 ARM, MODE, TAKEOFF, LAND, RTL = 400, 176, 22, 21, 20
@@ -503,3 +503,77 @@ def test_no_command_ever_raises(place: tuple[str, str], calls: list[tuple]) -> N
 )
 def test_whole_numbers_are_rounded_half_away_from_zero(value: float, number: int) -> None:
     assert whole(value, 7) == number
+
+
+@pytest.mark.parametrize(
+    ("value", "mask"),
+    [
+        (0.0, 0),
+        (1.0, 1),
+        (5.0, 5),
+        (4294967295.0, 4294967295),
+        (4294967296.0, 0),
+        (-1.0, 0),
+        (math.nan, 0),
+        (math.inf, 0),
+    ],
+)
+def test_bit_masks(value: float, mask: int) -> None:
+    assert flags(value) == mask
+
+
+@pytest.mark.parametrize(
+    ("frame", "scale"),
+    [
+        (mavlink.MAV_FRAME_GLOBAL, 1e-7),
+        (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, 1e-7),
+        (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT, 1e-7),
+        (mavlink.MAV_FRAME_MISSION, 1e-7),
+        (mavlink.MAV_FRAME_LOCAL_NED, 1e-4),
+        (mavlink.MAV_FRAME_LOCAL_ENU, 1e-4),
+        (mavlink.MAV_FRAME_LOCAL_OFFSET_NED, 1e-4),
+        (mavlink.MAV_FRAME_BODY_NED, 1e-4),
+        (mavlink.MAV_FRAME_BODY_OFFSET_NED, 1e-4),
+        (mavlink.MAV_FRAME_BODY_FRD, 1e-4),
+        (mavlink.MAV_FRAME_LOCAL_FRD, 1e-4),
+        (mavlink.MAV_FRAME_LOCAL_FLU, 1e-4),
+    ],
+)
+def test_integer_positions_are_scaled_by_their_frame(frame: int, scale: float) -> None:
+    """COMMAND_INT (MAVLink): degrees times 1e7, or metres times 1e4 in local frames; 2^31 - 1: not set."""
+    message = mavlink.MAVLink_command_int_message(
+        1, 1, frame, 192, 0, 0, 1.0, 2.0, 3.0, 4.0, 300_000_000, -450_000_000, 12.5
+    )
+    command = command_from_message(message)
+    assert (command.id, command.frame, command.is_int) == (192, frame, True)
+    assert (command.p1, command.p2, command.p3, command.p4) == (1.0, 2.0, 3.0, 4.0)
+    assert (command.x, command.y) == pytest.approx((3e8 * scale, -4.5e8 * scale))
+    assert command.z == 12.5
+    message.x = message.y = 0x7FFFFFFF
+    unset = command_from_message(message)
+    assert math.isnan(unset.x) and math.isnan(unset.y)
+
+
+def test_long_commands_carry_their_values_as_they_are() -> None:
+    message = mavlink.MAVLink_command_long_message(1, 1, 192, 0, 1.0, 2.0, 3.0, 4.0, 5.5, 6.5, 7.5)
+    command = command_from_message(message)
+    assert tuple(command) == (192, 1.0, 2.0, 3.0, 4.0, 5.5, 6.5, 7.5, None)
+    assert not command.is_int
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "valid"),
+    [
+        (0.0, 0.0, True),
+        (90.0, 180.0, True),
+        (-90.0, -180.0, True),
+        (90.01, 0.0, False),
+        (-90.01, 0.0, False),
+        (0.0, 180.01, False),
+        (0.0, -180.01, False),
+        (math.nan, 500.0, True),
+        (500.0, math.nan, True),
+    ],
+)
+def test_positions_of_commands_are_on_earth_or_not_set(x: float, y: float, valid: bool) -> None:
+    assert on_earth(Command(192, 0.0, 0.0, 0.0, 0.0, x, y, 0.0, None)) is valid

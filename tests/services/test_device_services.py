@@ -9,6 +9,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.services.commands.protocol import CommandService
+from autopilot_bridge.services.inputs.traffic import TrafficService
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver
 from tests.services.parts_rig import parts_of
@@ -207,24 +209,28 @@ def report(
     heading_cdeg: int = 18000,
     speed_cm_s: int = 10_000,
     place_ne_m: tuple[float, float] = (1000.0, 0.0),
+    down_m: float = 0.0,
+    climb_cm_s: int = 0,
+    flags: int = FLYING_FLAGS,
+    **place: int,
 ) -> Any:
     """ADSB_VEHICLE of an aircraft at the vehicle's height, by default 1 km north of it."""
     frame = vehicle.rig.context.frame
     assert frame is not None
-    lat, lon, alt_m = frame.geodetic_from_ned(*place_ne_m, 0.0)
+    lat, lon, alt_m = frame.geodetic_from_ned(*place_ne_m, down_m)
     return mavlink.MAVLink_adsb_vehicle_message(
         address,
-        round(lat * 1e7),
-        round(lon * 1e7),
+        place.get("lat", round(lat * 1e7)),
+        place.get("lon", round(lon * 1e7)),
         1,
         round(alt_m * 1000.0),
         heading_cdeg,
         speed_cm_s,
-        0,
+        climb_cm_s,
         b"TEST",
         1,
         1,
-        FLYING_FLAGS,
+        flags,
         7000,
     )
 
@@ -263,6 +269,119 @@ def test_traffic_from_any_direction_is_a_conflict_when_its_path_leads_here(
     alert = "".join(vehicle.texts())
     assert alert.startswith("Traffic alert") == conflict
     assert (f"Heading {heading_deg}" in alert) == conflict
+
+
+def alerted(vehicle: Vehicle) -> str:
+    """The text of the alert, all of its chunks."""
+    return "".join(text for text in vehicle.texts() if text)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "changed", "conflict"),
+    [
+        ({"NAV_TRAFF_A_VER": 100}, {"down_m": 99.0}, True),
+        ({"NAV_TRAFF_A_VER": 100}, {"down_m": -99.0}, True),
+        ({"NAV_TRAFF_A_VER": 100}, {"down_m": 101.0}, False),
+        ({"NAV_TRAFF_A_VER": 100}, {"down_m": -101.0}, False),
+        ({"NAV_TRAFF_A_HOR": 500}, {"place_ne_m": (1000.0, 495.0)}, True),
+        ({"NAV_TRAFF_A_HOR": 500}, {"place_ne_m": (1000.0, -495.0)}, True),
+        ({"NAV_TRAFF_A_HOR": 500}, {"place_ne_m": (1000.0, 505.0)}, False),
+        ({"NAV_TRAFF_COLL_T": 11}, {}, True),  # 1 km at 100 m/s
+        ({"NAV_TRAFF_COLL_T": 9}, {}, False),
+        ({"NAV_TRAFF_COLL_T": 9}, {"climb_cm_s": 10_000}, True),  # 141 m/s in space
+        ({}, {"flags": 3}, True),
+        ({}, {"flags": 1}, False),  # no altitude
+        ({}, {"flags": 2}, False),  # no position
+        ({}, {"flags": 0}, False),
+        ({}, {"lat": 900_000_001}, False),
+        ({}, {"lon": 1_800_000_001}, False),
+        ({}, {"speed_cm_s": 0}, False),
+        ({"NAV_TRAFF_AVOID": 0}, {}, False),
+    ],
+)
+def test_conflict_is_by_distance_height_and_time(
+    parameters: dict[str, float], changed: dict[str, Any], conflict: bool
+) -> None:
+    vehicle = Vehicle("px4", **parameters)
+    vehicle.receive(report(vehicle, **changed))
+    assert bool(alerted(vehicle)) is conflict
+
+
+def test_alert_names_the_distance_at_which_it_passes() -> None:
+    vehicle = Vehicle("px4")
+    vehicle.receive(report(vehicle, place_ne_m=(1000.0, 120.0), heading_cdeg=18000))
+    assert "Separation Distance 120, Heading 180" in alerted(vehicle)
+
+
+def test_positions_at_the_edge_of_the_map_are_on_earth() -> None:
+    """An aircraft on the 180th meridian, or near it, is one like any other."""
+    vehicle = Vehicle("px4")
+    vehicle.rig.context.frame = LocalFrame(GeodeticPosition(lat_deg=10.0, lon_deg=179.995, alt_m=0.0))
+    vehicle.receive(report(vehicle))
+    assert alerted(vehicle)
+
+
+@pytest.mark.parametrize(("later_s", "alerts"), [(59.0, 1), (61.0, 2)])
+def test_alert_is_repeated_after_a_minute(later_s: float, alerts: int) -> None:
+    vehicle = Vehicle("px4")
+    vehicle.receive(report(vehicle))
+    for _ in range(round(later_s)):  # reports keep the aircraft known
+        vehicle.run(1.0)
+        vehicle.receive(report(vehicle))
+    assert sum(text.startswith("Traffic alert") for text in vehicle.texts()) == alerts
+
+
+def test_alert_comes_again_after_the_conflict_has_ended() -> None:
+    vehicle = Vehicle("px4")
+    for heading in (18000, 0, 18000):
+        vehicle.receive(report(vehicle, heading_cdeg=heading))
+        vehicle.run(1.0)
+    assert sum(text.startswith("Traffic alert") for text in vehicle.texts()) == 2
+
+
+@pytest.mark.parametrize(("after_s", "passed_on"), [(0.08, 1), (0.1, 2)])
+def test_reports_of_one_aircraft_keep_an_interval(after_s: float, passed_on: int) -> None:
+    vehicle = Vehicle("px4")
+    vehicle.receive(report(vehicle))
+    vehicle.run(after_s)
+    vehicle.receive(report(vehicle))
+    assert len(vehicle.sent(mavlink.MAVLink_adsb_vehicle_message)) == passed_on
+
+
+@pytest.mark.parametrize(("after_s", "known"), [(29.0, 2), (31.0, 1)])
+def test_an_aircraft_is_forgotten_after_half_a_minute(after_s: float, known: int) -> None:
+    vehicle = Vehicle("px4")
+    vehicle.receive(report(vehicle, address=1))
+    vehicle.run(after_s)
+    vehicle.receive(report(vehicle, address=2))
+    traffic = next(service for service in vehicle.services if isinstance(service, TrafficService))
+    assert len(traffic.aircraft) == known
+
+
+@pytest.mark.parametrize(
+    ("avoid", "mode", "words"),
+    [
+        (1, None, ""),
+        (2, FlightMode.RETURN, "returning home"),
+        (3, FlightMode.LAND, "landing"),
+        (4, FlightMode.HOLD, "holding position"),
+    ],
+)
+def test_px4_avoids_traffic_as_its_parameter_says(avoid: int, mode: FlightMode | None, words: str) -> None:
+    vehicle = Vehicle("px4", NAV_TRAFF_AVOID=avoid)
+    vehicle.rig.fly()
+    before = vehicle.rig.commander.mode
+    vehicle.receive(report(vehicle))
+    assert vehicle.rig.commander.mode is (before if mode is None else mode)
+    assert words in alerted(vehicle)
+
+
+def test_on_the_ground_traffic_changes_no_mode() -> None:
+    vehicle = Vehicle("px4", NAV_TRAFF_AVOID=2)
+    before = vehicle.rig.commander.mode
+    vehicle.receive(report(vehicle))
+    assert vehicle.rig.commander.mode is before
+    assert alerted(vehicle)
 
 
 def test_px4_returns_from_traffic_when_configured() -> None:

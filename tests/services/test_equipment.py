@@ -77,6 +77,21 @@ def test_px4s_gripper_takes_its_time(parameter_s: float, takes_s: float) -> None
     assert vehicle.long(GRIPPER, 1, 1) == []  # done: the next one begins
 
 
+def test_px4_acknowledges_grippers_of_two_clients_in_the_order_in_which_they_end() -> None:
+    """The one with the shorter time ends first, though it was asked last."""
+    vehicle = Vehicle("px4", PD_GRIPPER_TYPE=0, PD_GRIPPER_TO=5.0)
+    assert vehicle.long(GRIPPER, 1, 0) == []
+    vehicle.rig.store.set("PD_GRIPPER_TO", 1.0)
+    again = m.MAVLink_command_long_message(1, 1, GRIPPER, 0, 1, 1, 0, 0, 0, 0, 0)
+    other = vehicle.rig.source._replace(component_id=25)
+    assert deliver(again, other, vehicle.rig.time_us, vehicle.rig.commands)
+    vehicle.run(1.1)
+    (ack,) = vehicle.sent(m.MAVLink_command_ack_message)
+    assert ack.target_component == 25
+    vehicle.run(4.0)
+    assert [ack.target_component for ack in vehicle.sent(m.MAVLink_command_ack_message)][-1] == 190
+
+
 @pytest.mark.parametrize(("kind", "action"), [(-1, 0), (0, 2), (0, -1), (0, NAN)])
 def test_px4_fails_without_a_gripper_or_an_action(kind: int, action: float) -> None:
     assert Vehicle("px4", PD_GRIPPER_TYPE=kind).long(GRIPPER, 1, action) == [FAILED]

@@ -93,6 +93,87 @@ def test_rates_are_answered_by_their_surfaces() -> None:
     assert made.rate_setpoint_frd_rad_s == pytest.approx([0.5, 0.2, 0.1])
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rates_sticks_and_throttle_are_limited_and_zero_where_they_are_not_given(sign: float) -> None:
+    made = controller(
+        level=sp.RATES, throttle=sign * 3.0, yaw_stick=sign * 2.0, flaps=sign * 2.0, brake=sign * 2.0
+    )
+    made.setpoint[sp.RATES_FRD_RAD_S] = sign * 30.0
+    made.step()
+    on = max(0.0, sign)
+    assert made.rate_setpoint_frd_rad_s.tolist() == [sign * 20.0] * 3
+    assert made.actuators[[THROTTLE, FLAPS, BRAKE]].tolist() == [on, on, on]
+    assert made.actuators[STEERING] == sign
+    write(made, level=sp.RATES)
+    made.step()
+    assert made.rate_setpoint_frd_rad_s.tolist() == [0.0] * 3
+    assert made.actuators[[THROTTLE, FLAPS, BRAKE, STEERING]].tolist() == [0.0] * 4
+    write(made, level=sp.SURFACES_DIRECT, throttle=sign * 3.0)
+    made.setpoint[sp.SURFACES] = sign * 2.0
+    made.step()
+    assert made.actuators[[AILERON, ELEVATOR, RUDDER, STEERING]].tolist() == [sign] * 4
+    assert made.actuators[THROTTLE] == on
+
+
+def test_at_rest_no_attitude_is_wanted() -> None:
+    made = controller(level=sp.OFF)
+    assert made.attitude_setpoint.tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert math.isnan(made.heading_setpoint_rad)
+    assert math.isnan(made.course_setpoint_rad)
+    assert np.isnan(made.velocity_setpoint_ned_m_s).all()
+    assert math.isnan(made.down_reference_m)
+    write(made, level=sp.FLY, heading_rad=0.5, down_m=-120.0)
+    run(made, 50)
+    assert made.attitude_setpoint.tolist() != [1.0, 0.0, 0.0, 0.0]
+    made.nav[n.RATES_FRD_RAD_S] = 0.2, math.nan, -0.1
+    write(made, level=sp.OFF)
+    made.step()
+    assert made.attitude_setpoint.tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert np.isnan(made.velocity_setpoint_ned_m_s).all()
+
+
+@pytest.mark.parametrize(
+    "place", [n.Q, n.Q + 1, n.Q + 2, n.Q + 3, n.RATES, n.RATES + 1, n.RATES + 2, n.ROLL, n.PITCH, n.YAW]
+)
+def test_any_unknown_part_of_the_attitude_stops_the_propeller(place: int) -> None:
+    made = controller(down_m=-120.0)
+    run(made, 20)
+    assert made.actuators[THROTTLE] > 0.0
+    made.nav[place] = math.nan
+    made.step()
+    assert not made.actuators.any()
+    level_flight(made.nav)
+    run(made, 20)
+    assert made.actuators[THROTTLE] > 0.0
+
+
+@pytest.mark.parametrize("level", [sp.RATES, sp.SURFACES_DIRECT])
+def test_past_the_guidance_nothing_of_it_is_reported(level: float) -> None:
+    made = controller(heading_rad=1.0, down_m=-150.0)
+    run(made, 100)
+    level_flight(made.nav, roll=0.3, pitch=-0.1)
+    write(made, level=level, throttle=0.6)
+    made.step()
+    assert made.roll_setpoint_rad == 0.3
+    assert made.pitch_setpoint_rad == -0.1
+    assert math.isnan(made.heading_setpoint_rad)
+    assert math.isnan(made.course_setpoint_rad)
+    assert math.isnan(made.velocity_setpoint_ned_m_s[2])
+    assert math.isnan(made.down_reference_m)
+    assert made.thrust == 0.6
+    assert made.underspeed == 0.0
+
+
+def test_guidance_runs_at_fifty_hertz() -> None:
+    made = controller(heading_rad=0.5, down_m=-100.0)
+    run(made, 5)
+    rolls = []
+    for _ in range(12):
+        made.step()
+        rolls.append(made.roll_setpoint_rad)
+    assert np.flatnonzero(np.diff(rolls)).tolist() in ([0, 5, 10], [1, 6], [2, 7], [3, 8], [4, 9])
+
+
 @pytest.mark.parametrize("airspeed", [8.0, 15.0, 20.0])
 def test_surfaces_scale_with_airspeed(airspeed: float) -> None:
     made = controller(level=sp.RATES, throttle=0.4)
