@@ -1,5 +1,6 @@
 """SITL: the runner that steps worlds and autopilots together, embedded or for clients on real links."""
 
+from autopilot_bridge.firmware.simulator import Port, default_ports
 from autopilot_bridge.sitl.backend import (
     AutopilotBackend,
     BackendLinks,
@@ -9,7 +10,6 @@ from autopilot_bridge.sitl.backend import (
     emulated,
 )
 from autopilot_bridge.sitl.packet_log import PacketLog
-from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
 from autopilot_bridge.sitl.sitl import Sitl
