@@ -22,9 +22,9 @@ from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import load_fdm
-from flightsim.trim import trim_hover
 from flightsim.trim_flight import trim_flight
 from flightsim.vehicle import Vehicle
+from tests.flightsim.hover_trim import trim_hover
 
 
 def microseconds_per_call(call: Callable[[], object], calls: int) -> float:

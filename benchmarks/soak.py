@@ -66,8 +66,8 @@ def kind_of(index: int) -> tuple[str, str]:
 
 def serve(vehicles: int, port: int) -> None:
     """Run the vehicles until a signal stops them; a line of JSON each second reports pace and memory."""
+    from autopilot_bridge.firmware.simulator import Port
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
-    from autopilot_bridge.sitl.ports import Port
     from flightsim.world_spec import VehicleSpec, WorldSpec
 
     specifications = tuple(

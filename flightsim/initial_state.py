@@ -10,11 +10,11 @@ import jsbsim
 from flightsim import truth as t
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, LaunchKind, LaunchParameters
 from flightsim.environment import Environment
+from flightsim.foundation.imperial import M_PER_FT
 from flightsim.home import Home
 
-_FT: Final = 0.3048
 _INCH: Final = 0.0254
-_UNITS_M: Final = {"IN": _INCH, "FT": _FT, "M": 1.0}
+_UNITS_M: Final = {"IN": _INCH, "FT": M_PER_FT, "M": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,14 +103,14 @@ def initialise(
     values = (  # the order matters: JSBSim derives each from those before
         ("ic/lat-geod-deg", lat_deg),
         ("ic/long-gc-deg", lon_deg),
-        ("ic/terrain-elevation-ft", home.alt_m / _FT),
-        ("ic/h-agl-ft", height_m / _FT),
+        ("ic/terrain-elevation-ft", home.alt_m / M_PER_FT),
+        ("ic/h-agl-ft", height_m / M_PER_FT),
         ("ic/phi-rad", start.roll_rad),
         ("ic/theta-rad", start.pitch_rad),
         ("ic/psi-true-rad", yaw_rad % (2.0 * math.pi)),
-        ("ic/vn-fps", start.vel_ned_m_s[0] / _FT),
-        ("ic/ve-fps", start.vel_ned_m_s[1] / _FT),
-        ("ic/vd-fps", start.vel_ned_m_s[2] / _FT),
+        ("ic/vn-fps", start.vel_ned_m_s[0] / M_PER_FT),
+        ("ic/ve-fps", start.vel_ned_m_s[1] / M_PER_FT),
+        ("ic/vd-fps", start.vel_ned_m_s[2] / M_PER_FT),
         ("ic/p-rad_sec", start.rates_frd_rad_s[0]),
         ("ic/q-rad_sec", start.rates_frd_rad_s[1]),
         ("ic/r-rad_sec", start.rates_frd_rad_s[2]),
@@ -128,7 +128,7 @@ def initialise(
                 f"the JSBSim model has no property '{name}', which [start] of '{airframe.name}' sets"
             )
     for axis, speed in zip(("north", "east", "down"), environment.wind_ned_m_s_at(height_m), strict=True):
-        fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / _FT)
+        fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / M_PER_FT)
     rotors = [item for item in airframe.truth if t.ROTOR_RAD_S.start <= item[0] < t.ROTOR_RAD_S.stop]
     speeds = start.rotor_rad_s if isinstance(start.rotor_rad_s, tuple) else (start.rotor_rad_s,) * len(rotors)
     if len(speeds) != len(rotors):

@@ -14,18 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.airframe import AirframeError, LaunchKind, LaunchParameters
+from flightsim.foundation.imperial import KG_M2_PER_SLUG_FT2, KG_PER_SLUG, M_PER_FT, N_PER_LBF, NM_PER_LBF_FT
 from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.jsbsim_model import LAUNCHER_FORCE, LAUNCHER_MOMENT, find_property
+from flightsim.truth_reading import MOTION
 
 __all__ = ["Launcher"]
 
 Array = NDArray[np.float64]
 
-_FT: Final = 0.3048
-_N_PER_LBF: Final = 4.4482216152605
-_NM_PER_LBF_FT: Final = 1.3558179483314004
-_KG_PER_SLUG: Final = 14.593902937206364
-_KG_M2_PER_SLUG_FT2: Final = 1.3558179483314004
 _SPRING_RAD_S: Final = 20.0  # natural frequency of the carriage's spring, a twelfth of 1/dt at 250 Hz
 _RISE_S: Final = 0.05  # in which the acceleration builds up
 _FORCE_PARTS: Final = ("aero", "prop", "gear", "buoyancy", "weight")
@@ -72,15 +69,7 @@ class Launcher:
         self._motion = tuple(
             node(name).get_double_value
             for name in (
-                "position/lat-geod-rad",
-                "position/long-gc-rad",
-                "position/geod-alt-ft",
-                "velocities/v-north-fps",
-                "velocities/v-east-fps",
-                "velocities/v-down-fps",
-                "attitude/phi-rad",
-                "attitude/theta-rad",
-                "attitude/psi-rad",
+                *MOTION,
                 "velocities/p-rad_sec",
                 "velocities/q-rad_sec",
                 "velocities/r-rad_sec",
@@ -89,8 +78,7 @@ class Launcher:
         )
         self._mass = node("inertia/mass-slugs").get_double_value
         self._inertia_kg_m2 = tuple(
-            node(f"inertia/i{axis}{axis}-slugs_ft2").get_double_value() * _KG_M2_PER_SLUG_FT2
-            for axis in "xyz"
+            node(f"inertia/i{axis}{axis}-slugs_ft2").get_double_value() * KG_M2_PER_SLUG_FT2 for axis in "xyz"
         )
         node(f"external_reactions/{LAUNCHER_FORCE}/magnitude").set_double_value(1.0)
         node(f"external_reactions/{LAUNCHER_MOMENT}/magnitude-lbsft").set_double_value(1.0)
@@ -147,16 +135,16 @@ class Launcher:
         return self.parameters.acceleration_m_s2 * rise
 
     def _push(self, motion: list[float], acceleration_m_s2: float) -> None:
-        radius_m = motion[12] * _FT
+        radius_m = motion[12] * M_PER_FT
         origin = self._origin
         place_ned = np.array(
             [
                 (motion[0] - origin[0]) * radius_m,
                 (motion[1] - origin[1]) * radius_m * math.cos(origin[0]),
-                (origin[2] - motion[2]) * _FT,
+                (origin[2] - motion[2]) * M_PER_FT,
             ]
         )
-        velocity_ned = np.array(motion[3:6]) * _FT
+        velocity_ned = np.array(motion[3:6]) * M_PER_FT
         direction = self._direction_ned
         wanted_ned = (
             direction * acceleration_m_s2
@@ -166,14 +154,14 @@ class Launcher:
         q, wanted_frd = np.empty(4), np.empty(3)
         quaternion_from_euler(motion[6], motion[7], motion[8], q)
         rotate_inverse(q, wanted_ned, wanted_frd)
-        mass_kg = self._mass() * _KG_PER_SLUG
+        mass_kg = self._mass() * KG_PER_SLUG
         for set_value, wanted, parts in zip(self._set_force, wanted_frd.tolist(), self._forces, strict=True):
             present_lbf = sum(get() for get in parts)
-            set_value(mass_kg * wanted / _N_PER_LBF - present_lbf)
+            set_value(mass_kg * wanted / N_PER_LBF - present_lbf)
 
     def _turn(self, motion: list[float]) -> None:
         for i, (set_value, parts) in enumerate(zip(self._set_moment, self._moments, strict=True)):
             error = math.remainder(self._attitude[i] - motion[6 + i], 2.0 * math.pi)
             wanted = _SPRING_RAD_S**2 * error - 2.0 * _SPRING_RAD_S * motion[9 + i]
             present_lbsft = sum(get() for get in parts)
-            set_value(self._inertia_kg_m2[i] * wanted / _NM_PER_LBF_FT - present_lbsft)
+            set_value(self._inertia_kg_m2[i] * wanted / NM_PER_LBF_FT - present_lbsft)

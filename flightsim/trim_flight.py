@@ -13,7 +13,6 @@ from flightsim.environment import Environment
 from flightsim.flight_trim import FlightTrim, flight_pitch_rad, flight_state
 from flightsim.home import Home
 from flightsim.interface import AILERON, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
-from flightsim.trim import TrimError
 from flightsim.wind_tunnel import WindTunnel
 
 __all__ = ["FlightTrim", "TrimError", "trim_flight", "trim_in_tunnel"]
@@ -27,6 +26,10 @@ _SLOW_CONVERGENCE: Final = 0.3  # a new Jacobian when an iteration leaves more t
 _STEP_LIMIT: Final = 0.15
 _ALPHA_MIN_RAD: Final = math.radians(-20.0)
 _ALPHA_MAX_RAD: Final = math.radians(40.0)
+
+
+class TrimError(ArithmeticError):
+    """The model cannot fly steadily under the given conditions."""
 
 
 def trim_flight(

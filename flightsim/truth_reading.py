@@ -23,6 +23,7 @@ from flightsim.crash import (
     Touches,
 )
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.imperial import KG_M3_PER_SLUG_FT3, M_PER_FT, PA_PER_PSF
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.jsbsim_model import find_property
@@ -33,12 +34,8 @@ _VEL: Final[int] = t.VEL_NED_M_S.start
 _RATES: Final[int] = t.RATES_FRD_RAD_S.start
 _FORCE: Final[int] = t.SPECIFIC_FORCE_FRD_M_S2.start
 _WIND: Final[int] = t.WIND_NED_M_S.start
-_FT: Final = 0.3048
-_PA_PER_PSF: Final = 47.88025898033584
-_KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
 
-# What is read from JSBSim every step, in this order; `write_truth` converts it.
-STATE: Final = (
+MOTION: Final = (
     "position/lat-geod-rad",
     "position/long-gc-rad",
     "position/geod-alt-ft",
@@ -48,6 +45,10 @@ STATE: Final = (
     "attitude/phi-rad",
     "attitude/theta-rad",
     "attitude/psi-rad",
+)
+# What is read from JSBSim every step, in this order; `write_truth` converts it.
+STATE: Final = (
+    *MOTION,
     "velocities/pi-rad_sec",
     "velocities/qi-rad_sec",
     "velocities/ri-rad_sec",
@@ -75,7 +76,7 @@ GEAR_FORCE_Z: Final = STATE.index("forces/fbz-gear-lbs")
 LOAD_FACTORS: Final = {
     f"accelerations/a-pilot-{axis}-ft_sec2": f"accelerations/N{axis}" for axis in ("x", "y", "z")
 }
-ACCEL_SCALE: Final = np.array([_FT, _FT, _FT])
+ACCEL_SCALE: Final = np.array([M_PER_FT, M_PER_FT, M_PER_FT])
 LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * GRAVITY_M_S2
 # Motion is read every step; the rest and the model's own properties may be slower.
 MOTION_SIZE: Final = STATE.index("atmosphere/P-psf")
@@ -120,34 +121,34 @@ def write_truth(
     total = 0.0
     for i in range(raw.shape[0]):
         total += raw[i]
-    speed = math.sqrt(raw[3] ** 2 + raw[4] ** 2 + raw[5] ** 2) * _FT
+    speed = math.sqrt(raw[3] ** 2 + raw[4] ** 2 + raw[5] ** 2) * M_PER_FT
     turn = math.sqrt(raw[9] ** 2 + raw[10] ** 2 + raw[11] ** 2)
     if not (math.isfinite(total) and speed <= FASTEST_M_S and turn <= FASTEST_RAD_S):
         return _IMPOSSIBLE
     force = 0.0
     for i in range(3):
         force += (raw[12 + i] * accel_scale[i]) ** 2
-    height_m = raw[2] * _FT - ground_alt_m
+    height_m = raw[2] * M_PER_FT - ground_alt_m
     blow = height_m < NEAR_M and speed > MOVING_M_S and math.sqrt(force) > breaks_at_m_s2
     if blow or height_m < -DEEPEST_M:
         return _BROKEN
     truth[t.LAT_RAD] = raw[0]
     truth[t.LON_RAD] = raw[1]
-    truth[t.ALT_M] = raw[2] * _FT
+    truth[t.ALT_M] = raw[2] * M_PER_FT
     quaternion_from_euler(raw[6], raw[7], raw[8], truth[t.Q_NED_FROM_FRD])
     for i in range(3):
-        truth[_VEL + i] = raw[3 + i] * _FT
+        truth[_VEL + i] = raw[3 + i] * M_PER_FT
         truth[_RATES + i] = raw[9 + i]
         truth[_FORCE + i] = raw[12 + i] * accel_scale[i]
-        truth[_WIND + i] = raw[18 + i] * _FT
-    truth[t.PRESSURE_PA] = raw[15] * _PA_PER_PSF
+        truth[_WIND + i] = raw[18 + i] * M_PER_FT
+    truth[t.PRESSURE_PA] = raw[15] * PA_PER_PSF
     truth[t.TEMPERATURE_K] = raw[16] / 1.8
-    truth[t.DENSITY_KG_M3] = raw[17] * _KG_M3_PER_SLUG_FT3
-    truth[t.HEIGHT_ABOVE_GROUND_M] = raw[21] * _FT
-    truth[t.AIRSPEED_TRUE_M_S] = raw[22] * _FT
+    truth[t.DENSITY_KG_M3] = raw[17] * KG_M3_PER_SLUG_FT3
+    truth[t.HEIGHT_ABOVE_GROUND_M] = raw[21] * M_PER_FT
+    truth[t.AIRSPEED_TRUE_M_S] = raw[22] * M_PER_FT
     truth[t.ANGLE_OF_ATTACK_RAD] = raw[26]
     truth[t.SIDESLIP_RAD] = raw[27]
-    truth[t.DYNAMIC_PRESSURE_PA] = raw[28] * _PA_PER_PSF
+    truth[t.DYNAMIC_PRESSURE_PA] = raw[28] * PA_PER_PSF
     truth[t.ON_GROUND] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
     for i in range(extra.shape[0]):
         truth[extra[i]] = raw[STATE_SIZE + i] * scale[i]

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.imperial import M_PER_FT
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -23,7 +24,6 @@ _BLOCK_STEPS: Final = 512
 _NORMALS_PER_STEP: Final = 5
 _STATE_SIZE: Final = 5
 _SQRT3: Final = math.sqrt(3.0)
-_FT: Final = 0.3048
 _LEAST_AIRSPEED_M_S: Final = 1.0
 _LEAST_HEIGHT_FT: Final = 10.0
 _GREATEST_HEIGHT_FT: Final = 1000.0
@@ -35,10 +35,10 @@ def low_altitude_scales(height_m: float, wind_at_20_ft_m_s: float, out: Array) -
 
     MIL-F-8785C, figures 10 and 11; height is held in 10..1000 ft, where they are defined.
     """
-    h = min(max(height_m / _FT, _LEAST_HEIGHT_FT), _GREATEST_HEIGHT_FT)
+    h = min(max(height_m / M_PER_FT, _LEAST_HEIGHT_FT), _GREATEST_HEIGHT_FT)
     base = 0.177 + 0.000823 * h
-    out[0] = h / base**1.2 * _FT
-    out[1] = h * _FT
+    out[0] = h / base**1.2 * M_PER_FT
+    out[1] = h * M_PER_FT
     out[3] = 0.1 * wind_at_20_ft_m_s
     out[2] = out[3] / base**0.4
 

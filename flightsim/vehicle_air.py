@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.environment import CosineGust, Environment
+from flightsim.foundation.imperial import M_PER_FT
 from flightsim.jsbsim_model import ROTARY_GUSTS, find_property
 from flightsim.rotary_gusts import RotaryGusts
 from flightsim.turbulence import DrydenTurbulence
@@ -16,7 +17,6 @@ from flightsim.wind_profile import WindLaw, WindProfile
 
 Array = NDArray[np.float64]
 
-_FT: Final = 0.3048
 _AXES: Final = ("north", "east", "down")
 
 
@@ -57,7 +57,7 @@ class VehicleAir:
         )
         nodes = [fdm.get_property_manager().get_node(name) for name in ROTARY_GUSTS]
         self._set_rotary = tuple(node.set_double_value for node in nodes if node is not None)
-        self._span_m = float(fdm.get_property_value("metrics/bw-ft")) * _FT
+        self._span_m = float(fdm.get_property_value("metrics/bw-ft")) * M_PER_FT
         self._gusts: list[CosineGust] = list(environment.gusts)
         self._wind_ned_m_s = environment.wind_ned_m_s
         self._profile = environment.profile
@@ -80,7 +80,7 @@ class VehicleAir:
             turbulence.step(truth[t.HEIGHT_ABOVE_GROUND_M], airspeed_m_s)
             gust_ned_m_s = turbulence.velocity_ned_m_s
             for set_gust, value in zip(self._set_gust, gust_ned_m_s.tolist(), strict=True):
-                set_gust(value / _FT)
+                set_gust(value / M_PER_FT)
             rotary = self._rotary
             if rotary is not None:
                 rotary.step(gust_ned_m_s, turbulence.scales, airspeed_m_s, truth[t.Q_NED_FROM_FRD])
@@ -115,11 +115,11 @@ class VehicleAir:
         self._stir(wind_at_20_ft_m_s)
 
     def _write_wind(self, height_m: float) -> None:
-        factor = self._profile.factor(height_m) / _FT
+        factor = self._profile.factor(height_m) / M_PER_FT
         north, east, down = self._set_wind
         north(factor * self._wind_ned_m_s[0])
         east(factor * self._wind_ned_m_s[1])
-        down(self._wind_ned_m_s[2] / _FT)
+        down(self._wind_ned_m_s[2] / M_PER_FT)
 
     def _stir(self, wind_at_20_ft_m_s: float) -> None:
         """Begin turbulence of this intensity; 0: none."""
@@ -153,7 +153,7 @@ class VehicleAir:
             "startup-duration-sec": gust.rise_s,
             "steady-duration-sec": gust.hold_s,
             "end-duration-sec": gust.fall_s,
-            "magnitude-ft_sec": speed / _FT,
+            "magnitude-ft_sec": speed / M_PER_FT,
             "frame": 3.0,  # local NED
             "X-velocity-ft_sec": gust.velocity_ned_m_s[0],  # JSBSim takes the direction from these
             "Y-velocity-ft_sec": gust.velocity_ned_m_s[1],

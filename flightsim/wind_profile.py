@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-_FT: Final = 0.3048
+from flightsim.foundation.imperial import M_PER_FT
+
 _REFERENCE_M: Final = 10.0  # height of the wind in weather reports (WMO No. 8, part I, chapter 5)
-_OPEN_ROUGHNESS_M: Final = 0.15 * _FT
-_TOP_M: Final = 1000.0 * _FT
+_OPEN_ROUGHNESS_M: Final = 0.15 * M_PER_FT
+_TOP_M: Final = 1000.0 * M_PER_FT
 
 
 class WindLaw(StrEnum):

@@ -18,6 +18,7 @@ from flightsim.actuation import FixedWingActuators
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, Role, load_airframe
 from flightsim.environment import Environment
 from flightsim.foundation.atmosphere import SEA_LEVEL_DENSITY_KG_M3
+from flightsim.foundation.imperial import KG_M3_PER_SLUG_FT3, KG_PER_SLUG, M_PER_FT, N_PER_LBF
 from flightsim.foundation.rotations import quaternion_from_euler, rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, height_on_wheels_m, initialise
@@ -28,10 +29,6 @@ __all__ = ["FlightState", "Reading", "WindTunnel"]
 
 Array = NDArray[np.float64]
 
-_FT: Final = 0.3048
-_N_PER_LBF: Final = 4.4482216152605
-_KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
-_KG_PER_SLUG: Final = 14.593902937206364
 _BLOCK_S: Final = 0.4  # servos have followed by then
 _SETTLED: Final = 2e-5  # m/s2 and rad/s2 from block to block
 _LONGEST_S: Final = 20.0  # a jet needs that to spool up
@@ -39,7 +36,7 @@ _ACCELERATIONS: Final = (
     *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
     *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),
 )
-_SCALES: Final = np.array([_FT, _FT, _FT, 1.0, 1.0, 1.0])
+_SCALES: Final = np.array([M_PER_FT, M_PER_FT, M_PER_FT, 1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,11 +131,11 @@ class WindTunnel:
         if fuel_freeze is not None:
             fuel_freeze.set_double_value(1.0)
         value = self._fdm.get_property_value
-        self.density_kg_m3 = float(value("atmosphere/rho-slugs_ft3")) * _KG_M3_PER_SLUG_FT3
-        self.mass_kg = float(value("inertia/mass-slugs")) * _KG_PER_SLUG
-        self.wing_span_m = float(value("metrics/bw-ft")) * _FT
-        self.wing_area_m2 = float(value("metrics/Sw-sqft")) * _FT**2
-        self.chord_m = float(value("metrics/cbarw-ft")) * _FT
+        self.density_kg_m3 = float(value("atmosphere/rho-slugs_ft3")) * KG_M3_PER_SLUG_FT3
+        self.mass_kg = float(value("inertia/mass-slugs")) * KG_PER_SLUG
+        self.wing_span_m = float(value("metrics/bw-ft")) * M_PER_FT
+        self.wing_area_m2 = float(value("metrics/Sw-sqft")) * M_PER_FT**2
+        self.chord_m = float(value("metrics/cbarw-ft")) * M_PER_FT
         self.standing_height_m = height_on_wheels_m(self._fdm, airframe)
 
     @property
@@ -175,7 +172,7 @@ class WindTunnel:
             if not engines or float(np.max(np.abs(accelerations - last))) < _SETTLED:
                 break
             last = accelerations
-        force = np.array([get() for get in self._forces]) * _N_PER_LBF
+        force = np.array([get() for get in self._forces]) * N_PER_LBF
         return Reading(accelerations=accelerations, force_frd_n=force)
 
     def value(self, name: str) -> float:

@@ -153,6 +153,35 @@ def test_firmwares_stand_above_what_they_configure(name):
     assert sorted(item for item in imports_of(name) if is_in(item, ("autopilot_bridge.firmware",))) == []
 
 
+def flavour_tests(source):
+    """Comparisons with the name of a firmware."""
+    return [
+        ast.unparse(node)
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Compare | ast.match_case)
+        for part in ast.walk(node.pattern if isinstance(node, ast.match_case) else node)
+        if isinstance(part, ast.Constant) and part.value in ("px4", "ardupilot")
+    ]
+
+
+@pytest.mark.parametrize(
+    "name",
+    sorted(
+        name
+        for name in MODULES
+        if is_in(name, ("autopilot_bridge",)) and not is_in(name, ("autopilot_bridge.firmware",))
+    ),
+)
+def test_only_firmware_tests_for_a_firmware(name):
+    """Elsewhere a firmware's difference is data of its `Flavour` or its `SimulatorDefaults`."""
+    assert flavour_tests(MODULES[name].read_text(encoding="utf-8")) == []
+
+
+def test_the_test_sees_flavours():
+    found = flavour_tests('x = {"px4": 1}\nif spec.autopilot == "ardupilot": pass\ny = z in ("px4",)')
+    assert found == ["spec.autopilot == 'ardupilot'", "z in ('px4',)"]
+
+
 def test_only_clock_and_shells_know_the_wall_clock():
     """`time` is imported by the clock alone; what reports wall time (runners, benchmarks) asks the clock."""
     users = [
@@ -204,11 +233,9 @@ def in_circles(needs):
         left = {name: others - free for name, others in left.items() if name not in free}
 
 
-@pytest.mark.parametrize("package", ["estimators", "flightsim", "missions"])
-def test_no_modules_import_each_other(package):
+def test_no_modules_import_each_other():
     """Imports in functions and for type checking count."""
-    names = {name for name in MODULES if is_in(name, (package,))}
-    assert in_circles({name: needed(name) & names for name in names}) == []
+    assert in_circles({name: needed(name) for name in MODULES}) == []
 
 
 def test_the_test_sees_circles():

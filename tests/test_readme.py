@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -112,3 +113,43 @@ def test_the_index_names_every_page() -> None:
     expected = [page for page in pages if page != "index.md" and not page.startswith("mavlink")]
     assert len(expected) > 10
     assert [page for page in expected if f"]({page})" not in index] == []
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Every module of the repository, by its full name."""
+    tops = ("flightsim", "autopilot_bridge", "estimators", "missions", "tests", "benchmarks", "examples")
+    names = {
+        path: path.relative_to(ROOT).with_suffix("") for top in tops for path in (ROOT / top).rglob("*.py")
+    }
+    return dict.fromkeys(tops, ROOT / "pyproject.toml") | {
+        ".".join(name.parts).removesuffix(".__init__"): path for path, name in names.items()
+    }
+
+
+def unknown_names(text: str, known: dict[str, Path]) -> list[str]:
+    """Modules, names in modules and source files that a page names and that do not exist."""
+    unknown = []
+    tops = "|".join(sorted({name.partition(".")[0] for name in known}))
+    for dotted in re.findall(rf"(?<![\w/.(])(?:{tops})(?:\.(?!md\b|py\b)[A-Za-z]\w*)+", text):
+        parts = dotted.split(".")
+        depth = max(k for k in range(1, len(parts) + 1) if ".".join(parts[:k]) in known)
+        source = known[".".join(parts[:depth])].read_text(encoding="utf-8")
+        known_start = any(name.startswith(dotted) for name in known)  # `missions.studies.lissajous_*`
+        if parts[depth:] and not known_start and not re.search(rf"\b{parts[depth]}\b", source):
+            unknown.append(dotted)
+    paths = [f"/{path.relative_to(ROOT).as_posix()}" for path in known.values()]
+    files = re.findall(r"`([\w/]+/\w+\.py)`", text)
+    return unknown + [file for file in files if not any(path.endswith(f"/{file}") for path in paths)]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_name_modules_that_exist(page: str) -> None:
+    """NAME stands for the reader's own."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    assert [name for name in unknown_names(text, modules()) if "NAME" not in name] == []
+
+
+def test_the_test_sees_names_that_do_not_exist() -> None:
+    text = "`estimators.runner.Runner`, `estimators.runer.Runner`, `missions/fly.py`, `missions/errors.py`"
+    assert unknown_names(text, modules()) == ["estimators.runer.Runner", "missions/fly.py"]

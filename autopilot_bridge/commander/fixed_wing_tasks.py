@@ -97,7 +97,10 @@ class FixedWingTasks:
                 return self.guided
             case FlightMode.RETURN:
                 return ReturnTask(
-                    self._missions, first_item=self._policy.mission_first_item, rules=self._policy.plans
+                    self._missions,
+                    first_item=self._policy.mission_first_item,
+                    rules=self._policy.plans,
+                    plan_task=MissionTask,
                 )
             case FlightMode.LAND:
                 return LandTask()

@@ -1,12 +1,11 @@
 """Requests for movement: take off, fly to a position, circle, return, fly the mission, pause."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from autopilot_bridge.commander.commanded_vehicle import CommandedVehicle
 from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
@@ -14,9 +13,6 @@ from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
 from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.streamed import Vector
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask
-
-if TYPE_CHECKING:
-    from autopilot_bridge.commander.commander import Commander
 
 _DO_REPOSITION: Final = 192
 _MAX_DISTANCE_M: Final = 1e6
@@ -28,7 +24,7 @@ _MIN_TAKEOFF_M: Final = 0.3
 class Guidance:
     """Executes requests for movement. Positions are local NED metres; NaN: unchanged."""
 
-    def __init__(self, commander: Commander) -> None:
+    def __init__(self, commander: CommandedVehicle) -> None:
         self._commander = commander
         self._vehicle = commander.vehicle
         self._parameters: Any = commander.context.parameters

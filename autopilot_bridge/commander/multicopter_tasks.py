@@ -90,7 +90,12 @@ class MulticopterTasks:
                 self.guided.set_hold(context)
                 return self.guided
             case FlightMode.RETURN | FlightMode.SMART_RETURN | FlightMode.AUTO_RETURN:
-                return ReturnTask(self._missions, first_item=policy.mission_first_item, rules=policy.plans)
+                return ReturnTask(
+                    self._missions,
+                    first_item=policy.mission_first_item,
+                    rules=policy.plans,
+                    plan_task=MissionTask,
+                )
             case FlightMode.LAND:
                 return landing_task(context)
             case FlightMode.PRECISION_LAND:

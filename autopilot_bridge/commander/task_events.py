@@ -1,22 +1,17 @@
 """Converts the events of the flight task into modes and events of the vehicle."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
+from autopilot_bridge.commander.commanded_vehicle import CommandedVehicle
 from autopilot_bridge.commander.events import ItemCommanded, MissionFinished, MissionItemReached
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight import context as flight
-
-if TYPE_CHECKING:
-    from autopilot_bridge.commander.commander import Commander
 
 
 class TaskFollower:
     """Reads the events of the active flight task for the commander."""
 
-    def __init__(self, commander: Commander) -> None:
+    def __init__(self, commander: CommandedVehicle) -> None:
         self._commander = commander
 
     def follow(self) -> None:

@@ -27,7 +27,6 @@ from flightsim.foundation.geodesy import LocalFrame
 
 if TYPE_CHECKING:
     from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-    from autopilot_bridge.flight.region_of_interest import RegionOfInterest
 
 Array = NDArray[np.float64]
 
@@ -70,6 +69,32 @@ class ManualInput:
             value = getattr(self, name)
             if not -1.0 <= value <= 1.0:
                 raise ValueError(f"manual input {name} = {value} is not in -1..1")
+
+
+class RoiMode(IntEnum):
+    """MAV_ROI."""
+
+    NONE = 0
+    NEXT_WAYPOINT = 1
+    WAYPOINT = 2
+    LOCATION = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionOfInterest:
+    """A region of interest.
+
+    Attributes:
+        mode: its kind.
+        place_ned_m: local NED, (3,), of a LOCATION.
+        index: item of a WAYPOINT.
+        yaw_offset_rad: added to the direction of the NEXT_WAYPOINT.
+    """
+
+    mode: RoiMode
+    place_ned_m: Array | None = None
+    index: int = -1
+    yaw_offset_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from autopilot_bridge.flight.context import (
     ItemCommanded,
     MissionFinished,
     MissionModeRequested,
+    RoiMode,
     TaskFinished,
     WaypointReached,
     WaypointStarted,
@@ -30,7 +31,7 @@ from autopilot_bridge.flight.plan_reading import (
     jump_target,
     target_of,
 )
-from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, RoiMode, roi_of
+from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, roi_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout

@@ -1,13 +1,11 @@
 """The region of interest set by a plan or a command (MAV_CMD_DO_SET_ROI and related commands)."""
 
 import math
-from dataclasses import dataclass
-from enum import IntEnum
 from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.context import Array, FlightContext, RegionOfInterest, RoiMode
 from autopilot_bridge.flight.plan_reading import Command, target_of
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav_layout
@@ -16,38 +14,12 @@ from flightsim.foundation.vectors import wrap_pi
 _NEAREST_M: Final = 0.5  # within this distance, right above or below it, the heading is not defined
 
 
-class RoiMode(IntEnum):
-    """MAV_ROI."""
-
-    NONE = 0
-    NEXT_WAYPOINT = 1
-    WAYPOINT = 2
-    LOCATION = 3
-
-
 _BY_COMMAND: Final = {
     Command.DO_SET_ROI_LOCATION: RoiMode.LOCATION,
     Command.DO_SET_ROI_WPNEXT_OFFSET: RoiMode.NEXT_WAYPOINT,
     Command.DO_SET_ROI_NONE: RoiMode.NONE,
 }
 ROI_COMMANDS: Final = frozenset({*_BY_COMMAND, Command.DO_SET_ROI, Command.NAV_ROI})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RegionOfInterest:
-    """A region of interest.
-
-    Attributes:
-        mode: its kind.
-        place_ned_m: local NED, (3,), of a LOCATION.
-        index: item of a WAYPOINT.
-        yaw_offset_rad: added to the direction of the NEXT_WAYPOINT.
-    """
-
-    mode: RoiMode
-    place_ned_m: Array | None = None
-    index: int = -1
-    yaw_offset_rad: float = 0.0
 
 
 def roi_of(item: MissionItem, ctx: FlightContext) -> RegionOfInterest | None:

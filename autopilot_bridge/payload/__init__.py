@@ -4,7 +4,8 @@ Each represents one device of `flightsim.payload`. They do no I/O: they take dec
 outputs, and produce frames.
 """
 
-from autopilot_bridge.payload.camera import CAMERA_COMPONENT, CameraComponent
+from autopilot_bridge.payload.camera import CameraComponent
+from autopilot_bridge.payload.camera_state import CAMERA_COMPONENT
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
 from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT

@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.camera_actions import CameraActions
+from autopilot_bridge.payload.camera_definition import CameraDefinition
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, STORAGE_ID
 from autopilot_bridge.payload.camera_video import STREAM_ID, VideoStream
 from autopilot_bridge.payload.component import Answer, CommandHandler, parameters, whole
-
-if TYPE_CHECKING:
-    from autopilot_bridge.payload.camera import CameraComponent
 
 Sender = tuple[int, int]
 
@@ -42,8 +41,9 @@ class CameraCommands:
         answers: messages whose request has parameters of its own, by message id.
     """
 
-    def __init__(self, camera: "CameraComponent") -> None:
+    def __init__(self, camera: CameraActions, definition: CameraDefinition) -> None:
         self._camera = camera
+        self._definition = definition
         self._newest_single: tuple[Sender, int, int] | None = None  # sender, sequence number, time
         m = mavlink
         self.handlers: dict[int, CommandHandler] = {
@@ -174,7 +174,7 @@ class CameraCommands:
             return _DENIED
         self._camera.mode = mode
         self._camera.send_settings()
-        self._camera.definition.report("CAM_MODE")
+        self._definition.report("CAM_MODE")
         return _ACCEPTED
 
     def _zoom(self, message: Any, sender: Sender) -> int | None:

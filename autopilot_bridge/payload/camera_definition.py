@@ -7,22 +7,17 @@ Source: MAVLink camera definition files (mavlink.io/en/services/camera_def.html)
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from xml.etree import ElementTree
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.camera_actions import CameraActions
+from autopilot_bridge.payload.camera_messages import DEFINITION_FILE, DEFINITION_VERSION
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.storage.generated import GeneratedStore
 
-if TYPE_CHECKING:
-    from autopilot_bridge.payload.camera import CameraComponent
-
-VERSION: Final = 1
-"""Clients cache the file by this number: increase it with every change of the content."""
-FILE: Final = "camera.xml"
-URI: Final = f"mftp:///{FILE}"
 _TICK_US: Final = 20_000
 _UINT8: Final = int(mavlink.MAV_PARAM_EXT_TYPE_UINT8)
 _ACCEPTED: Final = int(mavlink.PARAM_ACK_ACCEPTED)
@@ -52,11 +47,13 @@ class CameraSetting:
 class CameraDefinition:
     """Serves the definition and the settings of one camera component."""
 
-    def __init__(self, camera: "CameraComponent") -> None:
+    def __init__(self, camera: CameraActions) -> None:
         self._camera = camera
         self.name = "bus"
         self.settings = _settings(camera)
-        self._files = FileTransferService(GeneratedStore({FILE: lambda _: definition(self.settings)}))
+        self._files = FileTransferService(
+            GeneratedStore({DEFINITION_FILE: lambda _: definition(self.settings)})
+        )
         self._next_tick_us: int | None = None  # no file was requested yet
         self._list: list[int] = []
 
@@ -124,7 +121,7 @@ class CameraDefinition:
 def definition(settings: tuple[CameraSetting, ...]) -> bytes:
     """The camera definition file."""
     root = ElementTree.Element("mavlinkcamera")
-    head = ElementTree.SubElement(root, "definition", version=str(VERSION))
+    head = ElementTree.SubElement(root, "definition", version=str(DEFINITION_VERSION))
     ElementTree.SubElement(head, "model").text = "simulated camera"
     ElementTree.SubElement(head, "vendor").text = "flightstack"
     parameters = ElementTree.SubElement(root, "parameters")
@@ -142,7 +139,7 @@ def definition(settings: tuple[CameraSetting, ...]) -> bytes:
     return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
 
 
-def _settings(camera: "CameraComponent") -> tuple[CameraSetting, ...]:
+def _settings(camera: CameraActions) -> tuple[CameraSetting, ...]:
     def set_mode(mode: int) -> None:
         camera.mode = mode
         camera.send_settings()

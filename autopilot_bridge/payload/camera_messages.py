@@ -1,19 +1,19 @@
 """The messages of the camera component: each function makes one message of its present state."""
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.payload.camera_definition import URI, VERSION
+from autopilot_bridge.payload.camera_state import SENSOR_WIDTH_MM, CameraState
 from autopilot_bridge.payload.component import fixed_text
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import rotate
 from flightsim.payload import Detection
 
-if TYPE_CHECKING:
-    from autopilot_bridge.payload.camera import CameraComponent
-
-SENSOR_WIDTH_MM: Final = 6.0  # a 1/2.3-inch sensor; with the field of view it gives the focal length
+DEFINITION_VERSION: Final = 1
+"""Clients cache the camera definition file by this number: increase it with every change of the content."""
+DEFINITION_FILE: Final = "camera.xml"
+_DEFINITION_URI: Final = f"mftp:///{DEFINITION_FILE}"
 _FILM_WIDTH_MM: Final = 36.0
 _FORWARD: Final = (1.0, 0.0, 0.0)
 _NO_NUMBER: Final = 255
@@ -21,7 +21,7 @@ _UNKNOWN_DEGE7: Final = 2**31 - 1
 _FARTHEST_M: Final = 20_000.0  # at greater distances the ground is no plane
 
 
-def information(camera: "CameraComponent") -> Any:
+def information(camera: CameraState) -> Any:
     """CAMERA_INFORMATION."""
     model = camera.device.parameters.model
     flags = (
@@ -50,13 +50,13 @@ def information(camera: "CameraComponent") -> Any:
         model.height_px,
         0,
         flags,
-        VERSION,
-        fixed_text(URI, 140),
+        DEFINITION_VERSION,
+        fixed_text(_DEFINITION_URI, 140),
         gimbal_device_id=camera.gimbal_device_id,
     )
 
 
-def capture_status(camera: "CameraComponent", time_us: int) -> Any:
+def capture_status(camera: CameraState, time_us: int) -> Any:
     """CAMERA_CAPTURE_STATUS; between two photos of a series the camera is idle with an interval set."""
     since_us = camera.recording_since_us
     return mavlink.MAVLink_camera_capture_status_message(
@@ -70,7 +70,7 @@ def capture_status(camera: "CameraComponent", time_us: int) -> Any:
     )
 
 
-def image_captured(camera: "CameraComponent", time_us: int, index: int, name: str) -> Any:
+def image_captured(camera: CameraState, time_us: int, index: int, name: str) -> Any:
     """CAMERA_IMAGE_CAPTURED: position from the autopilot, orientation as known to the camera."""
     here = camera.vehicle.located(time_us)
     q = camera.orientation
@@ -90,7 +90,7 @@ def image_captured(camera: "CameraComponent", time_us: int, index: int, name: st
     )
 
 
-def photo_notes(camera: "CameraComponent") -> dict[str, float]:
+def photo_notes(camera: CameraState) -> dict[str, float]:
     """The data for a photo's file."""
     notes = {
         "focal_mm": camera.lens.focal_mm,
@@ -109,7 +109,7 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
     return notes
 
 
-def fov_status(camera: "CameraComponent", time_us: int) -> Any:
+def fov_status(camera: CameraState, time_us: int) -> Any:
     """CAMERA_FOV_STATUS: the camera's position, and the ground point at the centre of its picture."""
     here, q = camera.vehicle.located(time_us), camera.orientation
     ground = None if here is None or q is None else ground_point(camera, here, rotate(q, _FORWARD))
@@ -124,7 +124,7 @@ def fov_status(camera: "CameraComponent", time_us: int) -> Any:
     )
 
 
-def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
+def tracking_geo_status(camera: CameraState, time_us: int) -> Any:
     """CAMERA_TRACKING_GEO_STATUS: the ground position of the tracked target."""
     tracker, here, q = camera.tracker, camera.vehicle.located(time_us), camera.orientation
     place, distance_m, heading_rad = None, math.nan, math.nan
@@ -152,7 +152,7 @@ def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
 
 
 def ground_point(
-    camera: "CameraComponent", here: GeodeticPosition, ray_ned: tuple[float, float, float]
+    camera: CameraState, here: GeodeticPosition, ray_ned: tuple[float, float, float]
 ) -> GeodeticPosition | None:
     """The point where a ray meets level ground at home's height; None: no such point within range."""
     height_m = here.alt_m - camera.vehicle.home_alt_m

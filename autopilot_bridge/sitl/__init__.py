@@ -1,5 +1,6 @@
 """SITL: the runner that steps worlds and autopilots together, embedded or for clients on real links."""
 
+from autopilot_bridge.firmware.simulator import Port, default_ports
 from autopilot_bridge.sitl.backend import (
     AutopilotBackend,
     BackendLinks,
@@ -8,7 +9,6 @@ from autopilot_bridge.sitl.backend import (
     EmulatedBackend,
     emulated,
 )
-from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
 from autopilot_bridge.sitl.sitl import Sitl

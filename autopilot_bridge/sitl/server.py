@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.clock import RealTimeClock
+from autopilot_bridge.firmware.simulator import Port, default_ports
 from autopilot_bridge.links import Link, open_link, reach_of
-from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.sitl import Sitl
 from autopilot_bridge.sitl.vehicle import SitlVehicle
 

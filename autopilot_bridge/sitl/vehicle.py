@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.autopilot import Autopilot
+from autopilot_bridge.firmware.simulator import simulator_defaults
 from autopilot_bridge.links import Link, Reach, memory_pair
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.signing import signing_time
@@ -28,15 +29,7 @@ from flightsim.airframe import AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargets, MagneticField, Payload, PayloadParameters
-from flightsim.sensors import (
-    FIX_AFTER_10_S,
-    FIX_AT_BOOT,
-    RTK_FIX_AFTER_10_S,
-    GpsFixStage,
-    GpsParameters,
-    SensorSuite,
-    SensorSuiteParameters,
-)
+from flightsim.sensors import GpsParameters, SensorSuite, SensorSuiteParameters
 from flightsim.world import World
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
@@ -238,8 +231,6 @@ class SitlVehicle:
 
 def usual_sensors(specification: VehicleSpec, *, aircraft: bool) -> SensorSuiteParameters:
     """The sensors of a vehicle of this kind; its receiver starts as in the firmware's own SITL."""
-    timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
-    if specification.autopilot == "ardupilot":
-        timeline = RTK_FIX_AFTER_10_S if specification.gps == "differential" else FIX_AFTER_10_S
+    timeline = simulator_defaults(specification.autopilot).fix_timelines[specification.gps]
     fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
     return fitted(gps=GpsParameters.of(specification.gps, fix_timeline=timeline))

@@ -19,14 +19,14 @@ from typing import Any, Final, TypeVar
 
 import numba
 import numpy as np
-from numba.core import cgutils
-from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic, is_jitted
-from numba.np.arrayobj import populate_array
 
-try:
+try:  # Numba promises nothing of these; tests/flightsim/foundation/test_kernels.py notices when they move
+    from numba.core import cgutils
+    from numba.core.imputils import impl_ret_borrowed
     from numba.core.serialize import dumps
-except ImportError:  # Numba's internals have moved: its own cache serves then
+    from numba.np.arrayobj import populate_array
+except ImportError:  # then Numba's own cache serves, and kernels are called with all their arguments
     dumps = None
 
 __all__ = ["bound", "compiled_for", "kernel", "source_stamp"]

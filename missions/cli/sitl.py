@@ -92,13 +92,14 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     Raises:
         TlogError: the file exists or can't be made.
     """
+    from autopilot_bridge.firmware.simulator import simulator_defaults
     from autopilot_bridge.tlog import TlogWriter
 
     recorder = TlogWriter(path)
     for spec, listener in zip(
         simulated.spec.vehicles, simulated.record(recorder, losses.log_ended), strict=True
     ):
-        if spec.autopilot == "ardupilot":  # it sends only what was requested
+        if simulator_defaults(spec.autopilot).streams_on_request:
             listener.send(_request_streams())
     try:
         yield
@@ -236,6 +237,7 @@ def sitl(
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
+    from autopilot_bridge.firmware.simulator import simulator_defaults
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
     from flightsim.vehicle import VehicleDivergedError
     from missions.mission import WorldDefaults
@@ -293,7 +295,7 @@ def sitl(
         def report(pace: PaceReport) -> None:
             line.show(f"{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}")
 
-        if spec.vehicles[0].autopilot == "ardupilot" and not ports and not no_wait:
+        if simulator_defaults(spec.vehicles[0].autopilot).waits_for_client and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
             server.wait_for_client(lambda: ending.requested)
         try:

@@ -9,8 +9,9 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext, MissionFinished, TouchedDown, WaypointReached
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters
+from autopilot_bridge.flight.fixed_wing import MissionTask as AircraftMissionTask
 from autopilot_bridge.flight.fixed_wing import ReturnTask as AircraftReturnTask
-from autopilot_bridge.flight.multicopter import ReturnPhase, ReturnTask
+from autopilot_bridge.flight.multicopter import MissionTask, ReturnPhase, ReturnTask
 from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, ReturnDestination
 from autopilot_bridge.flight.plan_reading import Command
 from autopilot_bridge.flight.return_place import choose_return, plan_landing
@@ -195,7 +196,7 @@ def test_a_copter_lands_by_its_plan() -> None:
         place(15.0, 15.0, height=10.0),
         place(0.0, 15.0, Command.NAV_LAND, 0.0),
     )
-    track = fly_home(rig, ReturnTask(store))
+    track = fly_home(rig, ReturnTask(store, plan_task=MissionTask))
     assert rig.ctx.on_ground
     assert np.linalg.norm(track[-1][:2] - [0.0, 15.0]) < 0.6
     assert np.linalg.norm(track[:, :2] - [15.0, 15.0], axis=1).min() < 2.0
@@ -228,7 +229,7 @@ def test_a_return_along_the_plan(
     rig = Rig(height_m=12.0, parameters=px4_returns(return_destination=destination))
     store = long_plan(landing)
     store.current = current
-    track = fly_home(rig, ReturnTask(store))
+    track = fly_home(rig, ReturnTask(store, plan_task=MissionTask))
     assert rig.ctx.on_ground
     assert np.linalg.norm(track[-1][:2] - ends) < 0.7
     assert np.linalg.norm(track[:, :2] - passes, axis=1).min() < 2.1
@@ -276,7 +277,7 @@ def test_an_aircraft_goes_back_along_its_plan() -> None:
         place(300.0, 300.0, height=100.0), place(600.0, 300.0, height=100.0), place(1500.0, 0.0, height=100.0)
     )
     store.current = 2
-    mass.fly(AircraftReturnTask(store))
+    mass.fly(AircraftReturnTask(store, plan_task=AircraftMissionTask))
     log = mass.run(70.0)
     for north in (600.0, 300.0):
         assert np.hypot(log[:, 0] - north, log[:, 1] - 300.0).min() < 25.0

@@ -12,8 +12,8 @@ from flightsim.foundation.rotations import rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.trim import HoverTrim, trim_hover
 from flightsim.vehicle import Vehicle
+from tests.flightsim.hover_trim import HoverTrim, trim_hover
 
 MASS_KG = 1.5
 INERTIA_KG_M2 = (0.029125, 0.029125, 0.055225)

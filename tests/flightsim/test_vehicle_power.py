@@ -11,8 +11,9 @@ from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.trim import HoverTrim, TrimError, trim_hover
+from flightsim.trim_flight import TrimError
 from flightsim.vehicle import Vehicle
+from tests.flightsim.hover_trim import HoverTrim, trim_hover
 
 TORQUE_CONSTANT = 60.0 / (2.0 * math.pi * 850.0)
 RESISTANCE_OHM, FRICTION = 0.24, 7.6e-6

@@ -7,7 +7,7 @@ import pytest
 
 from autopilot_bridge.commander.events import ItemCommanded, ModeChanged
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.flight.region_of_interest import RoiMode
+from autopilot_bridge.flight.context import RoiMode
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Source

@@ -1,9 +1,8 @@
 """PX4's missions: the protocol, and rules for items (commands, frames, how an item is stored)."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -180,26 +179,15 @@ def _heading(degrees: float) -> float:
 
 
 def _multicopter_problems(
-    items: tuple[MissionItem, ...],
-    parameters: ParameterStore,
-    *,
-    home_alt_m: float | None,
-    landed: bool,
-    outside: Callable[[MissionItem], bool] | None,
+    items: tuple[MissionItem, ...], parameters: ParameterStore, **situation: Any
 ) -> tuple[str, ...]:
-    return mission_problems(items, home_alt_m=home_alt_m, landed=landed, outside=outside)
+    return mission_problems(items, **situation)
 
 
 def _aircraft_problems(
-    items: tuple[MissionItem, ...],
-    parameters: ParameterStore,
-    *,
-    home_alt_m: float | None,
-    landed: bool,
-    outside: Callable[[MissionItem], bool] | None,
+    items: tuple[MissionItem, ...], parameters: ParameterStore, **situation: Any
 ) -> tuple[str, ...]:
-    rules = AircraftRules.of(parameters)
-    return mission_problems(items, home_alt_m=home_alt_m, landed=landed, aircraft=rules, outside=outside)
+    return mission_problems(items, aircraft=AircraftRules.of(parameters), **situation)
 
 
 PX4_MISSION_POLICY: Final = MissionPolicy(

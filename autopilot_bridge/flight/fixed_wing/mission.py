@@ -97,7 +97,7 @@ class MissionTask(PlanTask):
         return LoiterTask(airspeed_m_s=self._airspeed_m_s)
 
     def _return_task(self) -> FlightTask:
-        return ReturnTask(self._store, first_item=self._first_item, rules=self._rules)
+        return ReturnTask(self._store, first_item=self._first_item, rules=self._rules, plan_task=MissionTask)
 
     def _finish(self, ctx: FlightContext) -> None:
         sub, leg = self._sub, self._leg

@@ -1,6 +1,7 @@
 """Return: PX4's fixed-wing Return and ArduPlane's RTL, which differ in parameters only."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from enum import IntEnum
 
@@ -13,6 +14,7 @@ from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.parameters import ALONG_PLAN, ReturnDestination
 from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules, landing_start
+from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.return_place import ReturnPlace, ReturnPlan, choose_return, plan_landing
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionStore
@@ -54,6 +56,7 @@ class ReturnTask(AircraftTask):
         store: the plan, whose landing sequence the parameters may send the return to; None: there is none.
         first_item: the first item that is flown, as the mission task has it.
         rules: how the firmware goes through a plan.
+        plan_task: makes the mission task that flies the plan; None: the return flies no plan.
 
     Attributes:
         phase: see `ReturnPhase`.
@@ -61,12 +64,18 @@ class ReturnTask(AircraftTask):
     """
 
     def __init__(
-        self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
+        self,
+        store: MissionStore | None = None,
+        *,
+        first_item: int = 0,
+        rules: PlanRules = PX4_PLANS,
+        plan_task: Callable[..., PlanTask] | None = None,
     ) -> None:
         super().__init__()
         self._store = store
         self._first_item = first_item
         self._rules = rules
+        self._plan_task = plan_task
         self.place: ReturnPlace | None = None
         self._sub: FlightTask | None = None
         self._home: Array = np.full(3, np.nan)
@@ -123,16 +132,13 @@ class ReturnTask(AircraftTask):
 
     def _land_by_plan(self, ctx: FlightContext, place: ReturnPlace) -> bool:
         """Go on along the plan, or with its landing sequence, if there is one."""
-        # a plan may send the vehicle home, and a return may fly the plan
-        from autopilot_bridge.flight.fixed_wing.mission import MissionTask
-
         store = self._store
-        if store is None or len(store.items) <= self._first_item:
+        if store is None or self._plan_task is None or len(store.items) <= self._first_item:
             return False
         destination = ctx.fixed_wing.return_destination
         plan = ReturnPlan.of(ctx, store, self._first_item, self._rules, destination, place)
         self.phase = ReturnPhase.LAND
-        self._set_sub(ctx, plan.task(MissionTask))
+        self._set_sub(ctx, plan.task(self._plan_task))
         return True
 
     def _land_after_home(self, ctx: FlightContext) -> bool:

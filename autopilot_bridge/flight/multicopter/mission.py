@@ -98,7 +98,7 @@ class MissionTask(PlanTask):
         return HoldTask()
 
     def _return_task(self) -> FlightTask:
-        return ReturnTask(self._store, first_item=self._first_item, rules=self._rules)
+        return ReturnTask(self._store, first_item=self._first_item, rules=self._rules, plan_task=MissionTask)
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Fly at this speed until an item or a command changes it, the present leg included."""

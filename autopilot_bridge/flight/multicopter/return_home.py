@@ -1,6 +1,7 @@
 """Return to home and land: PX4's Return and ArduPilot's RTL, which differ in parameters only."""
 
 import math
+from collections.abc import Callable
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +12,7 @@ from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
 from autopilot_bridge.flight.parameters import ALONG_PLAN, FlightParameters
 from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules
+from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.return_place import ReturnPlace, ReturnPlan, choose_return, plan_landing
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionStore
@@ -56,6 +58,7 @@ class ReturnTask:
         store: the plan whose landing the return may use, by the parameters; None: there is none.
         first_item: the first item that is flown, as in the mission task.
         rules: how the firmware flies a plan.
+        plan_task: makes the mission task that flies the plan; None: the return flies no plan.
 
     Attributes:
         phase: see `ReturnPhase`.
@@ -63,13 +66,19 @@ class ReturnTask:
     """
 
     def __init__(
-        self, store: MissionStore | None = None, *, first_item: int = 0, rules: PlanRules = PX4_PLANS
+        self,
+        store: MissionStore | None = None,
+        *,
+        first_item: int = 0,
+        rules: PlanRules = PX4_PLANS,
+        plan_task: Callable[..., PlanTask] | None = None,
     ) -> None:
         self.phase = ReturnPhase.CLIMB
         self.place: ReturnPlace | None = None
         self._store = store
         self._first_item = first_item
         self._rules = rules
+        self._plan_task = plan_task
         self._motion: SmoothMotion | None = None
         self._ramp: TakeoffRamp | None = None
         self._land: FlightTask | None = None
@@ -122,17 +131,14 @@ class ReturnTask:
 
     def _fly_plan(self, ctx: FlightContext) -> bool:
         """Continue along the plan, or with its landing; False if there is none."""
-        # a plan may send the vehicle home, and a return may fly the plan
-        from autopilot_bridge.flight.multicopter.mission import MissionTask
-
         store = self._store
-        if store is None or len(store.items) <= self._first_item:
+        if store is None or self._plan_task is None or len(store.items) <= self._first_item:
             return False
         plan = ReturnPlan.of(
             ctx, store, self._first_item, self._rules, ctx.multicopter.return_destination, self.place
         )
         self.phase = ReturnPhase.PLAN
-        self._plan = plan.task(MissionTask)
+        self._plan = plan.task(self._plan_task)
         self._plan.activate(ctx)
         return True
 

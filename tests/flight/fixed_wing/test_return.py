@@ -109,7 +109,7 @@ def test_the_landing_sequence_of_the_plan_is_flown(destination: ReturnDestinatio
     parameters = FixedWingFlightParameters(return_destination=destination, return_altitude_m=60.0)
     mass = PointMass((900.0, 400.0, -100.0), 3.0, parameters=parameters)
     store = landing_plan()
-    task = ReturnTask(store)
+    task = ReturnTask(store, plan_task=MissionTask)
     mass.fly(task)
     if destination is ReturnDestination.HOME_THEN_LANDING_SEQUENCE:
         assert task.phase is ReturnPhase.FLY
@@ -129,7 +129,7 @@ def test_the_landing_sequence_of_the_plan_is_flown(destination: ReturnDestinatio
 def test_without_a_sequence_home_is_the_destination() -> None:
     parameters = FixedWingFlightParameters(return_destination=ReturnDestination.LANDING_SEQUENCE)
     mass = PointMass((900.0, 400.0, -100.0), parameters=parameters)
-    task = ReturnTask(MissionStore())
+    task = ReturnTask(MissionStore(), plan_task=MissionTask)
     mass.fly(task)
     assert task.phase is ReturnPhase.FLY
     assert not task.go_around(mass.ctx)

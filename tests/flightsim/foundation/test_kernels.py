@@ -238,6 +238,22 @@ def test_a_bound_kernel_keeps_its_arrays_and_lets_go_of_the_callers() -> None:
     assert more[0] == 2000.0
 
 
+MOVED_PROGRAM = """
+import numba.core.imputils as internals
+import numpy as np
+moved = internals.__dict__.pop("impl_ret_borrowed")
+from flightsim.foundation import kernels
+internals.impl_ret_borrowed = moved  # Numba uses it too
+from tiny.outer import outer
+print(float(kernels.bound(outer, np.array([1.0, 2.0, 3.0]))()), kernels.dumps is None)
+"""
+
+
+def test_kernels_work_without_what_numba_promises_nothing_of(package: Package) -> None:
+    """A release of Numba that moves its internals costs some speed, and no function."""
+    assert package.say(MOVED_PROGRAM).split() == ["13.0", "True"]
+
+
 def test_a_function_that_is_no_kernel_is_bound_too() -> None:
     assert bound(max, 3, then=(0,))(5) == 5
 

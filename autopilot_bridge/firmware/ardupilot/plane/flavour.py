@@ -8,10 +8,10 @@ from typing import Final
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.fixed_wing_tasks import FixedWingTasks
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
-from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.control.fixed_wing import FixedWingController
 from autopilot_bridge.firmware.ardupilot.copter.flavour import ARDUPILOT
+from autopilot_bridge.firmware.ardupilot.copter.flavour import POLICY as MULTICOPTER_POLICY
 from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane_mapping
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
@@ -49,9 +49,9 @@ MODE_NEEDS_BY_DEAD_RECKONING: Final[Mapping[FlightMode, Need]] = MappingProxyTyp
 )
 """ArduPlane refuses no mode in flight without a position: it then continues by dead reckoning."""
 
-POLICY: Final = CommanderPolicy(
+POLICY: Final[CommanderPolicy] = replace(
+    MULTICOPTER_POLICY,
     boot_mode=FlightMode.MANUAL,
-    heartbeat_start_s=0.0,
     boot_s=1.7,
     armable_s=1.7,
     position_ready_s=20.4,
@@ -59,26 +59,10 @@ POLICY: Final = CommanderPolicy(
     armable_modes=_FLOWN - _NOT_ARMABLE,
     ground_modes=_FLOWN,
     flown_modes=_FLOWN,
-    kept_after_disarm=frozenset(),
-    takeoff_mode=None,
-    reposition_mode=FlightMode.GUIDED,
+    failsafe_disarms_landed=False,
     mission_return_is_mode=True,
     mission_waits_for_start=False,
-    mission_first_item=1,
-    manual_control_always=True,
-    recovers=False,
     fallback_land=None,
-    critical_on_warning=True,
-    active_when_landed=False,
-    standby_when_armable=False,
-    preflight_disarm_extra_s=0.0,
-    disarm_landed_everywhere=False,
-    prearm_report_s=30.0,
-    arming_denied=Result.FAILED,
-    mode_denied=Result.FAILED,
-    disarm_in_air_denied=Result.FAILED,
-    gcs_needed_to_arm=False,
-    force_arm_skips_checks=True,
     mode_needs=MODE_NEEDS_BY_DEAD_RECKONING,
     position_needed_to_arm=True,
     initialising_mode=FlightMode.INITIALISING,
@@ -90,8 +74,8 @@ POLICY: Final = CommanderPolicy(
     radio_restores_mode=True,
     ground_speed_apart=True,
     mission_end_mode=FlightMode.RETURN,
+    mission_restart=MissionRestart.NEVER,
     landing_blocks_arming=True,
-    fence_in_status=True,
     plans=ARDUPLANE_PLANS,
     fence_bounds_targets=False,
 )

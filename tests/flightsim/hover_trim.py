@@ -12,25 +12,19 @@ from flightsim import truth as t
 from flightsim.airframe import AirframeError, AirframeKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import EARTH_RATE_RAD_S
+from flightsim.foundation.imperial import KG_PER_SLUG, M_PER_FT, N_PER_LBF, NM_PER_LBF_FT
 from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.jsbsim_model import load_fdm
+from flightsim.trim_flight import TrimError
 
 Array = NDArray[np.float64]
 
-_N_PER_LBF: Final = 4.4482216152605
-_NM_PER_LBF_FT: Final = 1.3558179483314004
-_KG_PER_SLUG: Final = 14.593902937206364
-_FT: Final = 0.3048
 _SETTLE_STEPS: Final = 400
 _FORCES: Final = tuple(f"forces/fb{axis}-total-lbs" for axis in "xyz")
 _WEIGHTS: Final = tuple(f"forces/fb{axis}-weight-lbs" for axis in "xyz")
 _MOMENTS: Final = tuple(f"moments/{axis}-total-lbsft" for axis in "lmn")
-
-
-class TrimError(ArithmeticError):
-    """The model cannot hover under the given conditions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,10 +105,10 @@ def trim_hover(
             fdm.run()
         speeds = tuple(fdm.get_property_value(name) for name in rotors)
         forces = [
-            (fdm.get_property_value(force) + fdm.get_property_value(weight)) * _N_PER_LBF
+            (fdm.get_property_value(force) + fdm.get_property_value(weight)) * N_PER_LBF
             for force, weight in zip(_FORCES, _WEIGHTS, strict=True)
         ]
-        moments = [fdm.get_property_value(name) * _NM_PER_LBF_FT for name in _MOMENTS]
+        moments = [fdm.get_property_value(name) * NM_PER_LBF_FT for name in _MOMENTS]
         return np.array([*(np.array(forces) + _centrifugal_force_frd(fdm)), *moments])
 
     unknowns = np.zeros(motors + 2)
@@ -155,8 +149,8 @@ def trim_hover(
 def _centrifugal_force_frd(fdm: jsbsim.FGFDMExec) -> Array:
     """Force (3,) N of the Earth's rotation on a body at rest; JSBSim's weight is gravitation alone."""
     lat = fdm.get_property_value("position/lat-geod-rad")
-    x, y = (fdm.get_property_value(f"position/ecef-{axis}-ft") * _FT for axis in "xy")
-    mass_kg = fdm.get_property_value("inertia/mass-slugs") * _KG_PER_SLUG
+    x, y = (fdm.get_property_value(f"position/ecef-{axis}-ft") * M_PER_FT for axis in "xy")
+    mass_kg = fdm.get_property_value("inertia/mass-slugs") * KG_PER_SLUG
     outward_n = mass_kg * EARTH_RATE_RAD_S**2 * math.hypot(x, y)
     q = np.empty(4)
     roll, pitch, yaw = (fdm.get_property_value(f"attitude/{angle}-rad") for angle in ("phi", "theta", "psi"))
