@@ -1,4 +1,7 @@
-"""Return: PX4's fixed-wing Return and ArduPlane's RTL, which differ in parameters only."""
+"""Return: PX4's fixed-wing Return and ArduPlane's RTL, which differ in parameters only.
+
+The parameters are set by `flight_parameters` of `firmware/px4/plane/mapping.py` and of ArduPilot's.
+"""
 
 import math
 from collections.abc import Callable

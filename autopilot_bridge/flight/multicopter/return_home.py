@@ -1,4 +1,7 @@
-"""Return to home and land: PX4's Return and ArduPilot's RTL, which differ in parameters only."""
+"""Return to home and land: PX4's Return and ArduPilot's RTL, which differ in parameters only.
+
+The parameters are set by `flight_parameters` of `firmware/px4/copter/mapping.py` and of ArduPilot's.
+"""
 
 import math
 from collections.abc import Callable
