@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
+from estimators.occupancy.detection import MapError
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 Array = NDArray[np.float64]
@@ -41,6 +42,9 @@ _NEEDED: Final = (
     "home_alt_m",
 )
 _STATED: Final = ("error_nt", "line_spacing_m")
+_USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
+_USUAL_LINES_M: Final = 200.0
+_SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,6 +125,16 @@ class SurveyMap:
     def west_m(self) -> float:
         """Western edge."""
         return float(self.east_m[0])
+
+
+def map_error_of(survey_map: SurveyMap, given_nt: float | None = None) -> MapError:
+    """Error of a published map: as given, else as the map states it, else that of a careful survey."""
+    stated_nt = survey_map.error_nt if given_nt is None else given_nt
+    spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
+    return MapError(
+        sigma_nt=_USUAL_ERROR_NT if stated_nt is None else stated_nt,
+        correlation_m=_SHARE_OF_LINES * spacing_m,
+    )
 
 
 def load_survey_map(path: Path) -> SurveyMap:

@@ -54,6 +54,14 @@ class OccupancyMission(Mission[OccupancyOptions]):
     def with_map(self, options: OccupancyOptions, published: Path) -> OccupancyOptions:
         return options if options.map_file is not None else replace(options, map_file=str(published))
 
+    def estimator_settings(self, options: OccupancyOptions) -> Mapping[str, float | str]:
+        known: dict[str, float | str] = {"threshold_nt": options.threshold_nt, "noise_nt": options.noise_nt}
+        if options.map_error_nt is not None:
+            known["map_error_nt"] = options.map_error_nt
+        if options.map_file is not None:
+            known["map_file"] = options.map_file
+        return known
+
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions]) -> None:
         map_file = options[0].map_file
         if map_file is None:

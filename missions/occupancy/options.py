@@ -7,7 +7,7 @@ from typing import Final
 
 from estimators.errors import EstimatorError
 from estimators.occupancy.detection import DetectionModel, MapError
-from estimators.occupancy.survey_map import SurveyMap, load_survey_map
+from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.tracking.grid import GridLayout
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
@@ -20,9 +20,6 @@ LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0
 """Smallest ratio of threshold to noise; below it, noise alone exceeds the threshold."""
 
-_USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
-_USUAL_LINES_M: Final = 200.0
-_SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
 _PENALTY_OF_WINGS: Final = 0.2
 _PENALTY_OF_MULTICOPTERS: Final = 0.05
 _MULTICOPTER_M_S: Final = 10.0
@@ -132,12 +129,7 @@ class OccupancyOptions(MissionOptions):
         """Error of a published map: specified by the user, else stated by the map, else that of a careful
         survey.
         """
-        stated_nt = survey_map.error_nt if self.map_error_nt is None else self.map_error_nt
-        spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
-        return MapError(
-            sigma_nt=_USUAL_ERROR_NT if stated_nt is None else stated_nt,
-            correlation_m=_SHARE_OF_LINES * spacing_m,
-        )
+        return map_error_of(survey_map, self.map_error_nt)
 
     @property
     def decision_parameters(self) -> DecisionParameters:
