@@ -23,6 +23,7 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "attitude": "estimators.attitude",
         "lissajous": "estimators.lissajous",
+        "magnetic-identification": "estimators.magnetic_identification",
         "orbit-target": "estimators.orbit_target",
         "target-fusion": "estimators.target_fusion",
     }

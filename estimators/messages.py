@@ -16,8 +16,8 @@ from autopilot_bridge.mavlink import DEFINITIONS, Frame, MessageDefinition
 Message = Any
 """A named tuple made by `message_class`.
 
-It has the fields of the definition (with a trailing underscore if the name is a Python keyword) and, before
-them:
+It has the fields of the definition (with a trailing underscore if the name is a Python keyword, or `name`,
+which is the message's own) and, before them:
 
 Attributes:
     src_system, src_component: ids of the sender.
@@ -26,11 +26,12 @@ Its class has `name` ("ATTITUDE") and `message_id`. Arrays are tuples; strings e
 """
 
 SOURCE_FIELDS: Final = ("src_system", "src_component")
+_CLASS_ATTRIBUTES: Final = ("name", "message_id")
 
 
 def field_name(name: str) -> str:
     """Name of the attribute that holds a field."""
-    return f"{name}_" if keyword.iskeyword(name) else name
+    return f"{name}_" if keyword.iskeyword(name) or name in _CLASS_ATTRIBUTES else name
 
 
 def message_class(found: MessageDefinition) -> Any:

@@ -21,12 +21,12 @@ from flightsim.airframe import (
 )
 from flightsim.crash import hits_ground, lay_down
 from flightsim.environment import Environment
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
 from flightsim.launcher import Launcher
-from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.truth_reading import Motion, TruthReader
 from flightsim.vehicle_air import VehicleAir
 from flightsim.wind_profile import WindProfile

@@ -131,7 +131,7 @@ class Mission(Generic[AnyOptions]):
         """Fly all vehicles of a team, each ready to arm; called instead of `fly` if `flies_as_team`."""
         raise PlanError(f"mission {self.name} flies no team")
 
-    def estimator_settings(self, options: AnyOptions) -> Mapping[str, float]:
+    def estimator_settings(self, options: AnyOptions) -> Mapping[str, float | str]:
         """Parameter values of estimators that follow from the mission, by name.
 
         An estimator that runs during the flight receives the parameters that it has and that the user did not

@@ -12,7 +12,7 @@ from autopilot_bridge.navigation.alignment import magnetic_heading_rad
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.states import R
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.magnetics import magnetic_field_ned_gauss
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 
 _REFUSED_US: Final = 800_000
 _CONFIRMED_US: Final = 10_000_000

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.home import Home
-from flightsim.magnetics import magnetic_field_ned_gauss
 
 Array = NDArray[np.float64]
 

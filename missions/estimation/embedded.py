@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, dialect
 from estimators.fleet import Fleet
-from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import Runner
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
@@ -68,19 +67,11 @@ class FlightEstimators:
         settings: Sequence[str] = (),
         *,
         component_id: int = COMPONENT_ID,
-        known: Mapping[str, float] = MappingProxyType({}),
+        known: Mapping[str, float | str] = MappingProxyType({}),
     ) -> None:
-        found = estimator_class(name)
-        has = {field.name for field in fields(found.PARAMETERS)}
-        # a later setting replaces an earlier one
-        settings = [*(f"{name}={value!r}" for name, value in known.items() if name in has), *settings]
-        parameters = parameters_from(found, settings)
-
-        def make() -> Estimator[Any]:
-            return found(parameters)
-
-        self.fleet = Fleet(make)
-        self._settings = tuple(settings)
+        self._class = estimator_class(name)
+        self._given = tuple(settings)
+        self.know(known)
         self._component_id = component_id
         self._publisher = Publisher(self._say)
         self._encoders: dict[int, FrameEncoder] = {}
@@ -89,6 +80,18 @@ class FlightEstimators:
         self._vehicles: Sequence[_Vehicle] = ()
         self._links: Sequence[Link] = ()
         self._clock: Clock | None = None
+
+    def know(self, known: Mapping[str, float | str]) -> None:
+        """Parameters that follow from the mission, once they are known; before the first message.
+
+        Raises:
+            EstimatorError: a parameter does not accept its value.
+        """
+        has = {field.name for field in fields(self._class.PARAMETERS)}
+        # a later setting replaces an earlier one
+        self._settings = (*(f"{name}={value}" for name, value in known.items() if name in has), *self._given)
+        parameters = parameters_from(self._class, self._settings)
+        self.fleet = Fleet(lambda: self._class(parameters))
 
     def around(self, recorder: Recorder, log: Path) -> EstimatorTap:
         """A recorder that replaces this one for connections and truth, and also feeds the estimators.

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators
 
 
-def estimators_of(request: RunRequest, known: Mapping[str, float]) -> "FlightEstimators | None":
+def estimators_of(request: RunRequest, known: Mapping[str, float | str]) -> "FlightEstimators | None":
     """The estimators of a flight; None when none is requested.
 
     Args:

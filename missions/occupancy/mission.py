@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.mission import Debriefing, Mission, WorldDefaults
-from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle
-from missions.occupancy.survey_map import load_survey_map
+from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle, read_map
 from missions.occupancy.team import SearchTeam
 from missions.planning.limits import Limits
 
@@ -46,21 +45,22 @@ class OccupancyMission(Mission[OccupancyOptions]):
             raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
         check_vehicle(options, limits)
         if options.map_file is not None:
-            layout = options.layout
-            load_survey_map(Path(options.map_file)).require_data(
-                south_m=layout.south_m,
-                north_m=layout.north_m,
-                west_m=layout.west_m,
-                east_m=layout.east_m,
-                what=f"the searched area (`width_m, height_m` {options.width_m:g}x{options.height_m:g})",
-            )
+            check_map(options, read_map(options.map_file))
 
     def check_place(self, options: OccupancyOptions, limits: Limits, home: GeodeticPosition) -> None:
         if options.map_file is not None:  # a generated map is centred on home
-            check_reach(options, limits, load_survey_map(Path(options.map_file)).frame(), home)
+            check_reach(options, limits, read_map(options.map_file).frame(), home)
 
     def with_map(self, options: OccupancyOptions, published: Path) -> OccupancyOptions:
         return options if options.map_file is not None else replace(options, map_file=str(published))
+
+    def estimator_settings(self, options: OccupancyOptions) -> Mapping[str, float | str]:
+        known: dict[str, float | str] = {"threshold_nt": options.threshold_nt, "noise_nt": options.noise_nt}
+        if options.map_error_nt is not None:
+            known["map_error_nt"] = options.map_error_nt
+        if options.map_file is not None:
+            known["map_file"] = options.map_file
+        return known
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions]) -> None:
         map_file = options[0].map_file
@@ -68,7 +68,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
             raise PlanError(
                 "a search needs the published magnetic map of its place: give it with `map_file` FILE"
             )
-        team = SearchTeam(vehicles, options, load_survey_map(Path(map_file)))
+        team = SearchTeam(vehicles, options, read_map(map_file))
         self._flown = _Flown(first_notes=vehicles[0].notes, team=team)
         await team.fly()
 

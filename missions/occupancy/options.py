@@ -2,16 +2,17 @@
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 from estimators.errors import EstimatorError
 from estimators.occupancy.detection import DetectionModel, MapError
+from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.tracking.grid import GridLayout
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
 from missions.occupancy.search import SearchParameters
-from missions.occupancy.survey_map import SurveyMap
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
 
@@ -19,9 +20,6 @@ LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0
 """Smallest ratio of threshold to noise; below it, noise alone exceeds the threshold."""
 
-_USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
-_USUAL_LINES_M: Final = 200.0
-_SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
 _PENALTY_OF_WINGS: Final = 0.2
 _PENALTY_OF_MULTICOPTERS: Final = 0.05
 _MULTICOPTER_M_S: Final = 10.0
@@ -131,12 +129,7 @@ class OccupancyOptions(MissionOptions):
         """Error of a published map: specified by the user, else stated by the map, else that of a careful
         survey.
         """
-        stated_nt = survey_map.error_nt if self.map_error_nt is None else self.map_error_nt
-        spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
-        return MapError(
-            sigma_nt=_USUAL_ERROR_NT if stated_nt is None else stated_nt,
-            correlation_m=_SHARE_OF_LINES * spacing_m,
-        )
+        return map_error_of(survey_map, self.map_error_nt)
 
     @property
     def decision_parameters(self) -> DecisionParameters:
@@ -158,6 +151,37 @@ class OccupancyOptions(MissionOptions):
             heading_penalty=penalty if self.heading_penalty is None else self.heading_penalty,
             speed_m_s=speed_m_s if self.speed_m_s is None else self.speed_m_s,
         )
+
+
+def read_map(path: str) -> SurveyMap:
+    """The published map in a file.
+
+    Raises:
+        PlanError: the file does not exist or is not a map, or the map has no data.
+    """
+    try:
+        return load_survey_map(Path(path))
+    except EstimatorError as error:
+        raise PlanError(str(error)) from None
+
+
+def check_map(options: OccupancyOptions, survey_map: SurveyMap) -> None:
+    """Refuse a searched area that the map doesn't cover completely.
+
+    Raises:
+        PlanError: names the area that the map covers.
+    """
+    layout = options.layout
+    try:
+        survey_map.require_data(
+            south_m=layout.south_m,
+            north_m=layout.north_m,
+            west_m=layout.west_m,
+            east_m=layout.east_m,
+            what=f"the searched area (`width_m, height_m` {options.width_m:g}x{options.height_m:g})",
+        )
+    except EstimatorError as error:
+        raise PlanError(str(error)) from None
 
 
 def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:

@@ -6,15 +6,16 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
+from estimators.occupancy.placed_readings import PlacedReading
+from estimators.occupancy.survey_map import SurveyMap
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.occupancy.field_watch import FieldWatch, PlacedReading
+from missions.occupancy.field_watch import FieldWatch
 from missions.occupancy.noise_check import require_quiet
-from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle
+from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
-from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.firmware import Mode
@@ -77,15 +78,10 @@ class SearchTeam:
             PlanError: the map has no data somewhere in the area.
         """
         first = options[0]
-        layout = first.layout
-        survey_map.require_data(
-            south_m=layout.south_m,
-            north_m=layout.north_m,
-            west_m=layout.west_m,
-            east_m=layout.east_m,
-            what=f"the searched area (`width_m, height_m` {first.width_m:g}x{first.height_m:g})",
+        check_map(first, survey_map)
+        self.search = Search(
+            first.layout, first.search_parameters, [own.decision_parameters for own in options]
         )
-        self.search = Search(layout, first.search_parameters, [own.decision_parameters for own in options])
         self.searchers = [
             Searcher(pilot=Pilot(self.search, k, start_ne_m=start_place(own)))
             for k, own in enumerate(options)

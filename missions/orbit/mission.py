@@ -57,7 +57,7 @@ class OrbitMission(Mission[OrbitOptions]):
             raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
         options.check(limits)
 
-    def estimator_settings(self, options: OrbitOptions) -> Mapping[str, float]:
+    def estimator_settings(self, options: OrbitOptions) -> Mapping[str, float | str]:
         north_m, east_m = options.target_ne_m
         return {
             "target_north_m": north_m,

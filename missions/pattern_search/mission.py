@@ -60,7 +60,7 @@ class PatternMission(Mission[FlightOptions]):
     async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
         await fly_pattern(vehicle, options, self.curve(options))
 
-    def estimator_settings(self, options: FlightOptions) -> Mapping[str, float]:
+    def estimator_settings(self, options: FlightOptions) -> Mapping[str, float | str]:
         if options.period_s is None:
             return {}  # at constant speed the motion is not harmonic
         x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)

@@ -170,6 +170,8 @@ def _fly_interruptible(
         stage = opener.open_vehicles(request) if request.connect else opener.open_world(request, claimed)
         if stage.published_map is not None:
             request = replace(request, options=mission.with_map(request.options, stage.published_map))
+            if estimators is not None:
+                estimators.know(mission.estimator_settings(request.options))
         request.on_open()
         check_stage(mission, request, stage, opener)
     except BaseException:

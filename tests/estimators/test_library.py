@@ -32,7 +32,11 @@ def test_the_library_alone_imports_no_estimator():
 @pytest.mark.parametrize(
     ("name", "reported"),
     [
-        ("atitude", "'atitude' is not known; there are attitude, lissajous, orbit-target, target-fusion"),
+        (
+            "atitude",
+            "'atitude' is not known; there are attitude, lissajous, magnetic-identification, orbit-target, "
+            "target-fusion",
+        ),
         ("nowhere.py", "nowhere.py does not exist"),
     ],
 )

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.integrate import dblquad
 from scipy.interpolate import RegularGridInterpolator
 
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
-from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.payload import (
     DipoleSignature,
     GaussianSignature,

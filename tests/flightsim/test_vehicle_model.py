@@ -12,10 +12,10 @@ import flightsim
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, known_models, load_airframe
 from flightsim.environment import CosineGust, Environment, Turbulence
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.vehicle import Vehicle, VehicleDivergedError
 from flightsim.world import World, WorldParameters
 

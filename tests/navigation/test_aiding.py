@@ -12,8 +12,8 @@ from autopilot_bridge.navigation import layout
 from autopilot_bridge.navigation import states as s
 from flightsim import truth as t
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.interface import GPS_EPH_M
-from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.sensors.gps import FIX_AT_BOOT, RTK_FIX_AFTER_10_S, GpsParameters
 from flightsim.sensors.suite import SensorSuiteParameters

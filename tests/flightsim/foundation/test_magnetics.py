@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flightsim.magnetics import magnetic_field_ned_gauss
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 
 # decimal year, height km, latitude, longitude, X, Y, Z in nT
 OFFICIAL = [

@@ -1,36 +1,25 @@
 """Readings and the places they were taken at."""
 
-import math
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimators.occupancy.placed_readings import ReadingPlacer
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.occupancy.field_watch import ReadingPlacer
-from missions.occupancy.noise_check import white_noise_nt
-from missions.vehicle.telemetry import Position
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 FRAME = LocalFrame(HOME)
 
 
-def position(time_us: int, north_m: float, east_m: float, height_m: float = 100.0) -> Position:
+def position(time_us: int, north_m: float, east_m: float, height_m: float = 100.0):
     lat, lon, alt = FRAME.geodetic_from_ned(north_m, east_m, -height_m)
-    return Position(
-        time_us=time_us,
-        lat_deg=lat,
-        lon_deg=lon,
-        alt_m=alt,
-        height_m=height_m,
-        vel_ned_m_s=(0.0, 0.0, 0.0),
-    )
+    return time_us, lat, lon, alt
 
 
 @given(st.lists(st.integers(0, 10_000_000), min_size=1, max_size=50, unique=True))
 def test_on_a_straight_line_every_reading_gets_its_place(times_us):
     placer = ReadingPlacer(FRAME)
-    placer.add_position(position(0, 0.0, 0.0))
+    placer.add_position(*position(0, 0.0, 0.0))
     placed = []
     waiting = sorted(times_us)
     for tick in range(1, 52):
@@ -39,7 +28,7 @@ def test_on_a_straight_line_every_reading_gets_its_place(times_us):
             placer.add_reading(waiting[0], 48_000.0 + waiting[0])
             waiting.pop(0)
         placed += placer.add_position(
-            position(now_us, 25e-6 * now_us, -10e-6 * now_us, 100.0 + 1e-6 * now_us)
+            *position(now_us, 25e-6 * now_us, -10e-6 * now_us, 100.0 + 1e-6 * now_us)
         )
     assert [reading.time_us for reading in placed] == sorted(times_us)
     assert placer.dropped == 0
@@ -54,24 +43,24 @@ def test_on_a_straight_line_every_reading_gets_its_place(times_us):
 def test_a_reading_before_the_first_position_is_dropped():
     placer = ReadingPlacer(FRAME)
     placer.add_reading(50_000, 1.0)
-    assert placer.add_position(position(100_000, 0.0, 0.0)) == []
+    assert placer.add_position(*position(100_000, 0.0, 0.0)) == []
     assert placer.dropped == 1
 
 
 def test_nothing_is_interpolated_across_a_gap():
     placer = ReadingPlacer(FRAME)
-    placer.add_position(position(0, 0.0, 0.0))
+    placer.add_position(*position(0, 0.0, 0.0))
     placer.add_reading(1_000_000, 1.0)
-    assert placer.add_position(position(5_000_000, 100.0, 0.0)) == []
+    assert placer.add_position(*position(5_000_000, 100.0, 0.0)) == []
     assert placer.dropped == 1
 
 
 def test_late_and_repeated_positions_change_nothing():
     placer = ReadingPlacer(FRAME)
-    placer.add_position(position(1_000_000, 0.0, 0.0))
+    placer.add_position(*position(1_000_000, 0.0, 0.0))
     placer.add_reading(1_100_000, 1.0)
-    assert placer.add_position(position(900_000, -500.0, 0.0)) == []
-    (reading,) = placer.add_position(position(1_200_000, 20.0, 0.0))
+    assert placer.add_position(*position(900_000, -500.0, 0.0)) == []
+    (reading,) = placer.add_position(*position(1_200_000, 20.0, 0.0))
     assert reading.north_m == pytest.approx(10.0, abs=1e-6)
 
 
@@ -80,12 +69,3 @@ def test_without_positions_readings_do_not_pile_up():
     for k in range(500):
         placer.add_reading(k * 100_000, 1.0)
     assert placer.dropped == 400
-
-
-def test_white_noise_knows_nothing_of_drift():
-    import numpy as np
-
-    rng = np.random.default_rng(1)
-    readings = 48_000.0 + 0.05 * np.arange(2000) + rng.normal(0.0, 0.3, 2000)
-    assert white_noise_nt(readings.tolist()) == pytest.approx(0.3, rel=0.1)
-    assert math.isnan(white_noise_nt([1.0]))

@@ -1,4 +1,4 @@
-"""The published magnetic map, as a mission reads it; written by the simulator's own class."""
+"""The published magnetic map, as estimators and missions read it; written by the simulator's own class."""
 
 import math
 from pathlib import Path
@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimators.errors import EstimatorError
+from estimators.occupancy.survey_map import load_survey_map
 from flightsim.home import Home
 from flightsim.payload import MagneticMap
-from missions.errors import PlanError
-from missions.occupancy.survey_map import load_survey_map
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 
@@ -63,9 +63,9 @@ def test_area_without_data_is_refused_with_what_there_is(tmp_path):
     read = load_survey_map(saved(tmp_path, hole=True))
     area = {"what": "the search area"}
     read.require_data(south_m=-500.0, north_m=0.0, west_m=-300.0, east_m=300.0, **area)
-    with pytest.raises(PlanError, match=r"does not cover it; it reaches from north -500 to 700 m"):
+    with pytest.raises(EstimatorError, match=r"does not cover it; it reaches from north -500 to 700 m"):
         read.require_data(south_m=-600.0, north_m=0.0, west_m=-300.0, east_m=300.0, **area)
-    with pytest.raises(PlanError, match="no data in part of it"):
+    with pytest.raises(EstimatorError, match="no data in part of it"):
         read.require_data(south_m=-100.0, north_m=200.0, west_m=-300.0, east_m=300.0, **area)
 
 
@@ -73,12 +73,12 @@ def test_area_without_data_is_refused_with_what_there_is(tmp_path):
 def test_garbage_is_refused_by_name(tmp_path, content):
     path = tmp_path / "bad.npz"
     path.write_bytes(content)
-    with pytest.raises(PlanError, match=r"`map_file` .*bad\.npz"):
+    with pytest.raises(EstimatorError, match=r"`map_file` .*bad\.npz"):
         load_survey_map(path)
 
 
 def test_missing_file_is_refused_by_name(tmp_path):
-    with pytest.raises(PlanError, match=r"`map_file` .*nowhere\.npz"):
+    with pytest.raises(EstimatorError, match=r"`map_file` .*nowhere\.npz"):
         load_survey_map(tmp_path / "nowhere.npz")
 
 
@@ -99,5 +99,5 @@ def test_damaged_contents_are_refused_by_name(tmp_path, change, reported):
     with np.load(path) as archive:
         contents = {name: archive[name] for name in archive.files} | change
     np.savez(path, **{name: value for name, value in contents.items() if value is not None})
-    with pytest.raises(PlanError, match=reported):
+    with pytest.raises(EstimatorError, match=reported):
         load_survey_map(path)

@@ -1,4 +1,4 @@
-"""The published magnetic map of a survey, which a mission reads from a file.
+"""The published magnetic map of a survey, read from a file.
 
 The file is a numpy `.npz` archive, in the format "flightstack-magnetic-map-1": grid lines `north_m` (rows,)
 and `east_m` (columns,) from the map's home, `total_field_nt` (rows, columns) with NaN where there is no data,
@@ -19,8 +19,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.errors import EstimatorError
+from estimators.occupancy.detection import MapError
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.errors import PlanError
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,9 @@ _NEEDED: Final = (
     "home_alt_m",
 )
 _STATED: Final = ("error_nt", "line_spacing_m")
+_USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
+_USUAL_LINES_M: Final = 200.0
+_SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,7 +94,7 @@ class SurveyMap:
         """Refuse an area that the map doesn't cover completely.
 
         Raises:
-            PlanError: names the area that the map covers.
+            EstimatorError: names the area that the map covers.
         """
         inside = (
             self.north_m[0] <= south_m
@@ -110,7 +114,7 @@ class SurveyMap:
             if np.all(np.isfinite(self.total_field_nt[rows, columns])):
                 return
         why = "has no data in part of it" if inside else "does not cover it"
-        raise PlanError(
+        raise EstimatorError(
             f"{what}, north {south_m:.0f} to {north_m:.0f} m and east {west_m:.0f} to {east_m:.0f} m: the "
             f"magnetic map {why}; it reaches from north {self.north_m[0]:.0f} to {self.north_m[-1]:.0f} m, "
             f"east {self.east_m[0]:.0f} to {self.east_m[-1]:.0f} m. Give a smaller `width_m, height_m` or "
@@ -123,11 +127,21 @@ class SurveyMap:
         return float(self.east_m[0])
 
 
+def map_error_of(survey_map: SurveyMap, given_nt: float | None = None) -> MapError:
+    """Error of a published map: as given, else as the map states it, else that of a careful survey."""
+    stated_nt = survey_map.error_nt if given_nt is None else given_nt
+    spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
+    return MapError(
+        sigma_nt=_USUAL_ERROR_NT if stated_nt is None else stated_nt,
+        correlation_m=_SHARE_OF_LINES * spacing_m,
+    )
+
+
 def load_survey_map(path: Path) -> SurveyMap:
     """Read a published map.
 
     Raises:
-        PlanError: the file does not exist or is not a map, or the map has no data.
+        EstimatorError: the file does not exist or is not a map, or the map has no data.
     """
     try:
         # not np.load, which treats a file that is not an archive as a pickle, and advises to trust it
@@ -137,15 +151,17 @@ def load_survey_map(path: Path) -> SurveyMap:
                 with archive.open(name) as file:
                     found[name.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
     except OSError as error:
-        raise PlanError(f"`map_file` {path} can't be read: {error.strerror or error}") from None
+        raise EstimatorError(f"`map_file` {path} can't be read: {error.strerror or error}") from None
     except _UNREADABLE as error:
         why = str(error) or type(error).__name__
-        raise PlanError(f"`map_file` {path} is not a magnetic map (a numpy .npz archive): {why}") from None
+        raise EstimatorError(
+            f"`map_file` {path} is not a magnetic map (a numpy .npz archive): {why}"
+        ) from None
     missing = [name for name in _NEEDED if name not in found]
     if missing:
-        raise PlanError(f"`map_file` {path} is not a magnetic map: it has no {', '.join(missing)}")
+        raise EstimatorError(f"`map_file` {path} is not a magnetic map: it has no {', '.join(missing)}")
     if str(found["format"]) != FORMAT:
-        raise PlanError(f"`map_file` {path} has the format {found['format']}; accepted is {FORMAT}")
+        raise EstimatorError(f"`map_file` {path} has the format {found['format']}; accepted is {FORMAT}")
     north_m, east_m, total_nt = (
         _numbers(path, name, found[name]) for name in ("north_m", "east_m", "total_field_nt")
     )
@@ -156,28 +172,28 @@ def load_survey_map(path: Path) -> SurveyMap:
     stated = {name: _number(path, name, found[name]) for name in _STATED if name in found}
     for name, value in stated.items():
         if not (math.isfinite(value) and value > 0.0):
-            raise PlanError(f"`map_file` {path}: {name} {value:g} is not accepted; more than 0 is")
+            raise EstimatorError(f"`map_file` {path}: {name} {value:g} is not accepted; more than 0 is")
     shape = (north_m.size, east_m.size)
     rising = all(
         lines.ndim == 1 and lines.size >= 2 and bool(np.all(np.diff(lines) > 0.0))
         for lines in (north_m, east_m)
     )
     if not rising or total_nt.shape != shape or gradient.shape != shape:
-        raise PlanError(
+        raise EstimatorError(
             f"`map_file` {path}: its grid of {total_nt.shape} does not fit {north_m.size} rising lines "
             "north and "
             f"{east_m.size} east"
         )
     if not np.any(np.isfinite(total_nt)) or np.any(np.isinf(total_nt)):
-        raise PlanError(f"`map_file` {path} has no data: total_field_nt needs finite numbers")
+        raise EstimatorError(f"`map_file` {path} has no data: total_field_nt needs finite numbers")
     if not np.all(np.isfinite(gradient[np.isfinite(total_nt)])):
-        raise PlanError(
+        raise EstimatorError(
             f"`map_file` {path}: vertical_gradient_nt_m has no number at places where total_field_nt has "
             "one; "
             "leave it out, or fill it"
         )
     if not (math.isfinite(height_m + alt_m) and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
-        raise PlanError(
+        raise EstimatorError(
             f"`map_file` {path}: height {height_m}, home {lat_deg}, {lon_deg}, {alt_m} are not a place"
         )
     return SurveyMap(
@@ -194,12 +210,14 @@ def load_survey_map(path: Path) -> SurveyMap:
 def _numbers(path: Path, name: str, values: Array) -> Array:
     """Read an array of the file as real numbers."""
     if values.dtype.kind not in "iuf":
-        raise PlanError(f"`map_file` {path}: {name} holds {values.dtype} and no real numbers")
+        raise EstimatorError(f"`map_file` {path}: {name} holds {values.dtype} and no real numbers")
     return values.astype(np.float64)
 
 
 def _number(path: Path, name: str, values: Array) -> float:
     """Read a single number of the file."""
     if values.size != 1:
-        raise PlanError(f"`map_file` {path}: {name} has the shape {values.shape}; it is to be one number")
+        raise EstimatorError(
+            f"`map_file` {path}: {name} has the shape {values.shape}; it is to be one number"
+        )
     return float(_numbers(path, name, values).reshape(()))

@@ -1,0 +1,119 @@
+"""Time of one measurement of the particle filter of `magnetic-identification`, beside plain NumPy.
+
+    python -m benchmarks.magnetic_identification [--particles 10000] [--repeats 200]
+
+Both do the same: draw the noise of the control, move, weigh with the Kalman filter of each particle,
+normalize, and resample when the effective number is low. They alternate in one process; the figures are the
+medians and their ratio.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.clock.pacing import wall_time_s
+from estimators.magnetic_identification import particles as p
+from estimators.magnetic_identification.classes import GaussianClass
+from estimators.magnetic_identification.hypotheses import Control, GaussianHypothesis, Measurement
+
+Array = NDArray[np.float64]
+
+STEP_M = 25.0
+DECAY = math.exp(-STEP_M / 100.0)
+CONTROL = Control(
+    forward_m=STEP_M, right_m=0.0, turn_rad=0.0, forward_sigma_m=0.5, turn_sigma_rad=0.02,
+    decay=DECAY, drive_nt2=1.0 - DECAY**2,
+)  # fmt: skip
+WHITE_NT2 = 0.05
+
+
+class PlainFilter:
+    """The same filter in NumPy."""
+
+    def __init__(self, of: GaussianClass, particles: Array, weights: Array, rng: np.random.Generator) -> None:
+        self.rows, self.weights, self.rng, self.of = particles.T.copy(), weights.copy(), rng, of
+
+    def step(self, residual_nt: float) -> None:
+        """One measurement."""
+        of, count = self.of, self.weights.size
+        if 1.0 / np.sum(self.weights**2) < 0.5 * count:
+            chosen = np.searchsorted(np.cumsum(self.weights), (np.arange(count) + self.rng.random()) / count)
+            self.rows = self.rows[:, np.minimum(chosen, count - 1)]
+            self.weights = np.full(count, 1.0 / count)
+        rows, noise = self.rows, self.rng.standard_normal((2, count))
+        cosine, sine = rows[p.COS], rows[p.SIN]
+        forward = CONTROL.forward_m + CONTROL.forward_sigma_m * noise[0]
+        turn = CONTROL.turn_sigma_rad * noise[1]
+        rows[p.X] += cosine * forward
+        rows[p.Y] += sine * forward
+        rows[p.COS], rows[p.SIN] = (
+            cosine * np.cos(turn) - sine * np.sin(turn),
+            sine * np.cos(turn) + cosine * np.sin(turn),
+        )
+        size = rows[p.SIZE]
+        square = (rows[p.X] / (of.sigma_along_m * size)) ** 2 + (rows[p.Y] / (of.sigma_across_m * size)) ** 2
+        term = of.amplitude_nt * np.exp(-0.5 * square)
+        map_nt = DECAY * rows[p.MAP]
+        aa, ab = rows[p.AMPLITUDE_VAR], DECAY * rows[p.AMPLITUDE_MAP]
+        bb = DECAY**2 * rows[p.MAP_VAR] + CONTROL.drive_nt2
+        residual = residual_nt - term * rows[p.AMPLITUDE] - map_nt
+        gain_a, gain_b = term * aa + ab, term * ab + bb
+        total = term * gain_a + gain_b + WHITE_NT2
+        share = residual / total
+        rows[p.AMPLITUDE] += gain_a * share
+        rows[p.MAP] = map_nt + gain_b * share
+        rows[p.AMPLITUDE_VAR] = aa - gain_a**2 / total
+        rows[p.AMPLITUDE_MAP] = ab - gain_a * gain_b / total
+        rows[p.MAP_VAR] = bb - gain_b**2 / total
+        likelihood = np.exp(-0.5 * residual * share) / np.sqrt(total)
+        self.weights = self.weights * likelihood
+        self.weights /= self.weights.sum()
+
+
+def times_ms(steps: list[Callable[[float], object]], values: Array) -> Array:
+    """(steps, values) times of each step for each measurement, alternating."""
+    found = np.empty((len(steps), len(values)))
+    for k, value in enumerate(values.tolist()):
+        for n, step in enumerate(steps):
+            began_s = wall_time_s()
+            step(value)
+            found[n, k] = 1e3 * (wall_time_s() - began_s)
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--particles", type=int, default=10_000)
+    parser.add_argument("--repeats", type=int, default=200)
+    given = parser.parse_args()
+    of = GaussianClass(name="target")
+    compiled = GaussianHypothesis(of, given.particles, np.random.Generator(np.random.SFC64(1)))
+    compiled.start(
+        Measurement(residual_nt=4.0, white_nt2=WHITE_NT2, height_m=80.0, course_rad=0.0), map_nt2=1.0
+    )
+    plain = PlainFilter(of, compiled.particles, compiled.weights, np.random.Generator(np.random.PCG64(1)))
+
+    def kernel_step(value: float) -> object:
+        return compiled.step(
+            CONTROL, Measurement(residual_nt=value, white_nt2=WHITE_NT2, height_m=80.0, course_rad=0.0)
+        )
+
+    # a pass over the target, again and again, so that resampling has its usual share
+    along_m = STEP_M * (np.arange(given.repeats + 20) % 20 - 10)
+    values = 25.0 * np.exp(-0.5 * (along_m / 70.0) ** 2)
+    found = np.median(times_ms([kernel_step, plain.step], values)[:, 20:], axis=1)
+    sys.stdout.write(
+        f"{given.particles} particles, per measurement: kernels {found[0]:.2f} ms, NumPy {found[1]:.2f} ms, "
+        f"ratio {found[1] / found[0]:.1f}\n"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

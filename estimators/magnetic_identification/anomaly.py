@@ -1,0 +1,311 @@
+"""One anomaly under investigation: its hypotheses, the evidence of each, and the trace of the confidence.
+
+Source: Lum, Rysdyk and Pongpunwattana 2005, section III. The paper has one hypothesis, the target, and reads
+its confidence; here every class has a filter, and the probabilities of the classes follow from their
+evidences (Bayes). The paper's filter, with white noise and a fixed signature, runs beside them.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.magnetic_identification.classes import AnomalyClass, GaussianClass
+from estimators.magnetic_identification.hypotheses import (
+    Control,
+    DipoleHypothesis,
+    GaussianHypothesis,
+    Hypothesis,
+    Measurement,
+    ParticleHypothesis,
+    ShapelessHypothesis,
+)
+from estimators.magnetic_identification.parameters import IdentificationParameters
+from estimators.occupancy.detection import MapError
+from estimators.tracking.modes import Mode, find_modes
+
+__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly", "Sample", "TracePoint"]
+
+Array = NDArray[np.float64]
+
+UNKNOWN: Final = "unknown"
+"""Name of the hypothesis that an anomaly has another shape."""
+BACKGROUND: Final = "background"
+"""Name of the hypothesis that there is only the error of the map."""
+_BACKGROUND_PRIOR: Final = 0.3  # of what is no target
+_UNKNOWN_PRIOR: Final = 0.1
+_LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
+_TRACE_SIGMAS: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """Averaged readings of one vehicle.
+
+    Attributes:
+        time_us: vehicle time of the middle.
+        vehicle: number of the vehicle.
+        north_m, east_m, height_m: mean place from the map's home.
+        course_rad: course of the vehicle over ground.
+        residual_nt: mean of reading less map, less level.
+        readings: number of readings.
+    """
+
+    time_us: int
+    vehicle: int
+    north_m: float
+    east_m: float
+    height_m: float
+    course_rad: float
+    residual_nt: float
+    readings: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TracePoint:
+    """The state after one measurement.
+
+    Attributes:
+        time_us: vehicle time.
+        number: number of the pass, from 0.
+        residual_nt: the measurement.
+        confidence: the paper's C_t, per particle and over its greatest value; NaN: no class has it.
+        probability: that the anomaly is one of the targets.
+        evidence: logarithm of the evidence of the most probable target, less that of the most probable other
+            explanation.
+    """
+
+    time_us: int
+    number: int
+    residual_nt: float
+    confidence: float
+    probability: float
+    evidence: float
+
+
+class Anomaly:
+    """One anomaly.
+
+    Attributes:
+        number: from 0, in the order of time.
+        names: of the hypotheses: the classes, `UNKNOWN` and `BACKGROUND`.
+        log_evidence: (hypotheses,) logarithms.
+        trace: after each measurement.
+        passes: number of passes over it.
+        under_way: whether a pass is in progress.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        first: Sample,
+        parameters: IdentificationParameters,
+        classes: Sequence[AnomalyClass],
+        map_error: MapError,
+        *,
+        threshold_nt: float,
+        field_ned: Array,
+        rng: np.random.Generator,
+    ) -> None:
+        """Start every hypothesis with the first measurement beyond the threshold.
+
+        Args:
+            number: of the anomaly.
+            first: the measurement.
+            parameters, classes: of the filters.
+            map_error: error of the published map.
+            threshold_nt: threshold that the measurement exceeds.
+            field_ned: (3,) direction of the Earth's field.
+            rng: random numbers of the filters.
+        """
+        q = parameters
+        self.number = number
+        self.passes = 1
+        self.under_way = True
+        self.trace: list[TracePoint] = []
+        self._parameters = q
+        self._map_error = map_error
+        self._last = first
+        self._loudest = first
+        self._sought = [k for k, of in enumerate(classes) if of.sought]
+        hypotheses: list[Hypothesis] = []
+        for of in classes:
+            if isinstance(of, GaussianClass):
+                hypotheses.append(GaussianHypothesis(of, q.particles, rng, by_roulette=q.roulette))
+            else:
+                hypotheses.append(
+                    DipoleHypothesis(of, q.particles, rng, field_ned=field_ned, by_roulette=q.roulette)
+                )
+        hypotheses += [
+            ShapelessHypothesis(math.hypot(q.unknown_nt, map_error.sigma_nt), q.unknown_m),
+            ShapelessHypothesis(map_error.sigma_nt),
+        ]
+        self.names = (*(of.name for of in classes), UNKNOWN, BACKGROUND)
+        self._hypotheses = hypotheses
+        self._log_prior = np.log(_priors(classes, q.target_prior))
+        self.log_evidence: Array = np.zeros(len(hypotheses))
+        gaussian = next((of for of in classes if of.sought and isinstance(of, GaussianClass)), None)
+        self._paper: GaussianHypothesis | None = None
+        if gaussian is not None:
+            exact = replace(gaussian, amplitude_spread=0.0, size_spread=0.0)
+            self._paper = GaussianHypothesis(exact, q.particles, rng, by_roulette=q.roulette)
+        seen = self._measurement(first)
+        for k, hypothesis in enumerate(hypotheses):
+            self.log_evidence[k] = hypothesis.start(seen, map_error.sigma_nt**2, threshold_nt)
+        if self._paper is not None:
+            self._paper.start(self._white(seen), 0.0)
+        self._place_ne_m: tuple[float, float] | None = None
+        self._note(first, math.nan)
+
+    def take(self, sample: Sample) -> None:
+        """One more measurement of any vehicle."""
+        last, q, map_error = self._last, self._parameters, self._map_error
+        north_m, east_m = sample.north_m - last.north_m, sample.east_m - last.east_m
+        cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
+        forward_m, right_m = cosine * north_m + sine * east_m, cosine * east_m - sine * north_m
+        turn_rad = math.remainder(sample.course_rad - last.course_rad, math.tau)
+        distance_m = math.hypot(north_m, east_m)
+        elapsed_s = abs(sample.time_us - last.time_us) * 1e-6
+        decay = math.exp(-distance_m / map_error.correlation_m)
+        walked_m = q.target_speed_m_s * min(elapsed_s, 60.0)
+        control = Control(
+            forward_m=forward_m,
+            right_m=right_m,
+            turn_rad=turn_rad,
+            forward_sigma_m=math.hypot(q.forward_noise * min(distance_m, _LONGEST_STEP_M), walked_m),
+            turn_sigma_rad=math.hypot(q.turn_noise * turn_rad, q.course_noise_rad),
+            decay=decay,
+            drive_nt2=(1.0 - decay * decay) * map_error.sigma_nt**2,
+        )
+        seen = self._measurement(sample)
+        for k, hypothesis in enumerate(self._hypotheses):
+            self.log_evidence[k] += hypothesis.step(control, seen)[0]
+        confidence = math.nan
+        if self._paper is not None:
+            exact = replace(control, decay=0.0, drive_nt2=0.0)
+            confidence = self._paper.step(exact, self._white(seen))[1]
+        self._last = sample
+        if abs(sample.residual_nt) > abs(self._loudest.residual_nt):
+            self._loudest = sample
+        self._note(sample, confidence)
+
+    def _measurement(self, sample: Sample) -> Measurement:
+        q = self._parameters
+        return Measurement(
+            residual_nt=sample.residual_nt,
+            white_nt2=q.noise_nt**2 / sample.readings + (q.shape_error * sample.residual_nt) ** 2,
+            height_m=sample.height_m,
+            course_rad=sample.course_rad,
+        )
+
+    def _white(self, seen: Measurement) -> Measurement:
+        """As the paper's filter sees it: the error of the map is white."""
+        return replace(seen, white_nt2=seen.white_nt2 + (_TRACE_SIGMAS * self._map_error.sigma_nt) ** 2)
+
+    def _note(self, sample: Sample, confidence: float) -> None:
+        self._place_ne_m = None
+        posterior = self._log_prior + self.log_evidence
+        sought = np.isin(np.arange(len(posterior)), self._sought)
+        self.trace.append(
+            TracePoint(
+                time_us=sample.time_us,
+                number=self.passes - 1,
+                residual_nt=sample.residual_nt,
+                confidence=confidence,
+                probability=self.probability,
+                evidence=float(self.log_evidence[sought].max() - self.log_evidence[~sought].max()),
+            )
+        )
+
+    @property
+    def probabilities(self) -> Array:
+        """(hypotheses,) probability of each."""
+        logs = self._log_prior + self.log_evidence
+        shares: Array = np.exp(logs - logs.max())
+        return shares / shares.sum()
+
+    @property
+    def probability(self) -> float:
+        """Probability that the anomaly is one of the targets."""
+        return float(self.probabilities[self._sought].sum())
+
+    @property
+    def place_ne_m(self) -> tuple[float, float]:
+        """Mean place under the most probable class, from the map's home."""
+        if self._place_ne_m is None:
+            best = int(np.argmax(self.probabilities[:-2]))
+            hypothesis = self._hypotheses[best]
+            self._place_ne_m = self._loudest.north_m, self._loudest.east_m
+            if isinstance(hypothesis, ParticleHypothesis):
+                forward_m, right_m = hypothesis.weights @ hypothesis.sources()[:, :2]
+                self._place_ne_m = self._in_map(float(forward_m), float(right_m))
+        return self._place_ne_m
+
+    def modes(self) -> list[Mode]:
+        """The modes under the most probable target: north and east from the map's home, axis from north."""
+        best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
+        hypothesis = self._hypotheses[best]
+        if not isinstance(hypothesis, ParticleHypothesis):
+            return []
+        found = find_modes(hypothesis.sources(), hypothesis.weights)
+        return [self._mode_in_map(mode) for mode in found]
+
+    def predictions(self, north_m: Array, east_m: Array, height_m: float, count: int) -> list[Array | None]:
+        """What a pass over places (n,) would measure, nT, by each hypothesis: (count, n) for as many equally
+        probable particles; None: an unknown shape predicts nothing.
+        """
+        found: list[Array | None] = []
+        for hypothesis in self._hypotheses[:-2]:
+            if not isinstance(hypothesis, ParticleHypothesis):
+                found.append(None)
+                continue
+            last = self._last
+            cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
+            off_n, off_e = north_m - last.north_m, east_m - last.east_m
+            found.append(
+                hypothesis.predicted_nt(
+                    cosine * off_n + sine * off_e, cosine * off_e - sine * off_n, height_m, count
+                )
+            )
+        return [*found, None, np.zeros((1, len(north_m)))]
+
+    def _mode_in_map(self, mode: Mode) -> Mode:
+        north_m, east_m = self._in_map(mode.mean[0], mode.mean[1])
+        axis_rad = math.remainder(mode.mean[2] + self._last.course_rad, math.tau)
+        course = self._last.course_rad
+        cosine2, sine2 = math.cos(course) ** 2, math.sin(course) ** 2
+        forward2, right2 = mode.sigmas[0] ** 2, mode.sigmas[1] ** 2
+        return Mode(
+            weight=mode.weight,
+            mean=(north_m, east_m, axis_rad),
+            sigmas=(
+                math.sqrt(cosine2 * forward2 + sine2 * right2),
+                math.sqrt(sine2 * forward2 + cosine2 * right2),
+                mode.sigmas[2],
+            ),
+        )
+
+    def _in_map(self, forward_m: float, right_m: float) -> tuple[float, float]:
+        last = self._last
+        cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
+        return (
+            last.north_m + cosine * forward_m - sine * right_m,
+            last.east_m + sine * forward_m + cosine * right_m,
+        )
+
+
+def _priors(classes: Sequence[AnomalyClass], target_prior: float) -> Array:
+    """Probabilities of the hypotheses before any measurement."""
+    sought = sum(of.sought for of in classes)
+    others = len(classes) - sought
+    rest = 1.0 - target_prior
+    unknown, background = _UNKNOWN_PRIOR * rest, _BACKGROUND_PRIOR * rest
+    known = rest - unknown - background
+    if not others:
+        unknown, known = unknown + known, 0.0
+    return np.array(
+        [target_prior / sought if of.sought else known / others for of in classes] + [unknown, background]
+    )

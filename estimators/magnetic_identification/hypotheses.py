@@ -1,0 +1,349 @@
+"""The hypotheses about one anomaly, each with its evidence: a particle filter for each class of anomaly, and
+the map's error or a body of unknown shape without a signature.
+
+The evidence of a hypothesis is the probability density of all measurements under it: the product of the
+means of the particles' likelihoods. The paper's confidence (7) is the same mean without memory, each weight
+over its greatest possible value.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.magnetic_identification import particles as p
+from estimators.magnetic_identification.classes import DipoleClass, GaussianClass
+from estimators.tracking.resampling import effective_count, roulette, systematic
+
+__all__ = [
+    "Control",
+    "DipoleHypothesis",
+    "GaussianHypothesis",
+    "Hypothesis",
+    "Measurement",
+    "ParticleHypothesis",
+    "ShapelessHypothesis",
+]
+
+Array = NDArray[np.float64]
+
+_FARTHEST: Final = 3.5  # standard deviations at which an anomaly of a Gaussian class can begin
+_RESAMPLED_BELOW: Final = 0.5  # of the particles: effective number
+_LEAST_INSIDE: Final = 0.01  # share of that ellipse beyond the threshold, for a class that hardly exceeds it
+_SPREAD_EVERY: Final = 4  # one particle of so many starts anywhere in that ellipse
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """A differential measurement.
+
+    Attributes:
+        residual_nt: reading less map, less level.
+        white_nt2: variance of its white noise.
+        height_m: height of the sensor above the map's home.
+        course_rad: course of the vehicle.
+    """
+
+    residual_nt: float
+    white_nt2: float
+    height_m: float
+    course_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """The motion between two measurements, and what it does to the error of the map.
+
+    Attributes:
+        forward_m, right_m: displacement along and across the course at the earlier measurement.
+        turn_rad: change of the course.
+        forward_sigma_m, turn_sigma_rad: standard deviations of displacement and turn.
+        decay, drive_nt2: factor of the error of the map, and the variance that is added.
+    """
+
+    forward_m: float
+    right_m: float
+    turn_rad: float
+    forward_sigma_m: float
+    turn_sigma_rad: float
+    decay: float
+    drive_nt2: float
+
+
+class Hypothesis(Protocol):
+    """One explanation of an anomaly."""
+
+    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+        """Begin with the first measurement beyond a threshold.
+
+        Args:
+            seen: the measurement.
+            map_nt2: variance of the error of the map.
+            threshold_nt: there is an anomaly because the measurement is beyond it.
+
+        Returns:
+            Logarithm of the density of the measurement, given that it is beyond the threshold.
+        """
+
+    def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
+        """One more measurement.
+
+        Returns:
+            Logarithm of the measurement's density given those before it, and the confidence (7), 0..1.
+        """
+
+
+class ShapelessHypothesis:
+    """An anomaly without a signature: a Gauss-Markov process along the track, whose evidence is exact.
+
+    Args:
+        sigma_nt: standard deviation of the process.
+        correlation_m: its correlation distance; None: that of the map's error, whose process this is.
+    """
+
+    def __init__(self, sigma_nt: float, correlation_m: float | None = None) -> None:
+        self._sigma_nt2 = sigma_nt * sigma_nt
+        self._correlation_m = correlation_m
+        self._mean_nt = 0.0
+        self._variance_nt2 = 0.0
+
+    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+        self._mean_nt, self._variance_nt2 = 0.0, map_nt2 if self._correlation_m is None else self._sigma_nt2
+        beyond = _beyond(threshold_nt, np.array([math.sqrt(self._variance_nt2 + seen.white_nt2)]))
+        return self._update(seen)[0] - beyond
+
+    def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
+        decay, drive_nt2 = control.decay, control.drive_nt2
+        if self._correlation_m is not None:
+            decay = math.exp(-math.hypot(control.forward_m, control.right_m) / self._correlation_m)
+            drive_nt2 = (1.0 - decay * decay) * self._sigma_nt2
+        self._mean_nt *= decay
+        self._variance_nt2 = decay * decay * self._variance_nt2 + drive_nt2
+        return self._update(seen)
+
+    def _update(self, seen: Measurement) -> tuple[float, float]:
+        total_nt2 = self._variance_nt2 + seen.white_nt2
+        residual_nt = seen.residual_nt - self._mean_nt
+        fit = residual_nt * residual_nt / total_nt2
+        gain = self._variance_nt2 / total_nt2
+        self._mean_nt += gain * residual_nt
+        self._variance_nt2 *= 1.0 - gain
+        return -0.5 * (fit + math.log(math.tau * total_nt2)), math.exp(-0.5 * fit)
+
+
+class ParticleHypothesis:
+    """What the filters of both forms share: motion and resampling.
+
+    Attributes:
+        particles: (n, width), see `particles`.
+        weights: (n,), sum one.
+    """
+
+    def __init__(self, width: int, count: int, rng: np.random.Generator, *, by_roulette: bool) -> None:
+        self.particles: Array = np.zeros((count, width))
+        self.weights: Array = np.full(count, 1.0 / count)
+        self._other = np.empty_like(self.particles)
+        self._noise = np.empty((2, count))
+        self._fits = np.empty((count, 2))
+        self._chosen = np.empty(count, dtype=np.int64)
+        self._rng = rng
+        self._by_roulette = by_roulette
+
+    def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
+        raise NotImplementedError
+
+    def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
+        if effective_count(self.weights) < _RESAMPLED_BELOW * self.weights.size:
+            self._resample()
+        self._rng.standard_normal(out=self._noise)
+        p.move(
+            self.particles,
+            control.forward_m,
+            control.right_m,
+            control.turn_rad,
+            self._noise,
+            control.forward_sigma_m,
+            control.turn_sigma_rad,
+        )
+        return self._weigh(seen, control.decay, control.drive_nt2)
+
+    def _resample(self) -> None:
+        if self._by_roulette:
+            marks = np.sort(self._rng.random(self.weights.size))
+            roulette(self.weights, marks, self._chosen)
+        else:
+            systematic(self.weights, float(self._rng.random()), self._chosen)
+        p.copy_chosen(self._chosen, self.particles, self._other)
+        self.particles, self._other = self._other, self.particles
+        self.weights[:] = 1.0 / self.weights.size
+
+    def predicted_nt(self, forward_m: Array, right_m: Array, height_m: float, count: int) -> Array:
+        """Anomaly at places in the frame of the vehicle, (count, places), for as many equally probable
+        particles.
+        """
+        chosen = np.empty(count, dtype=np.int64)
+        systematic(self.weights, 0.5, chosen)
+        rows = self.particles[chosen]
+        cosine, sine = rows[:, p.COS, None], rows[:, p.SIN, None]
+        x = rows[:, p.X, None] + cosine * forward_m - sine * right_m
+        y = rows[:, p.Y, None] + sine * forward_m + cosine * right_m
+        return self._signals(rows, x, y, height_m)
+
+    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
+        raise NotImplementedError
+
+    def sources(self) -> Array:
+        """(n, 3) forward and right of the vehicle, and axis relative to its course (8)."""
+        out = np.empty((self.weights.size, 3))
+        p.relative_sources(self.particles, out)
+        return out
+
+
+class GaussianHypothesis(ParticleHypothesis):
+    """The anomaly is of a class with a Gaussian signature."""
+
+    def __init__(
+        self, of: GaussianClass, count: int, rng: np.random.Generator, *, by_roulette: bool = False
+    ) -> None:
+        super().__init__(p.GAUSSIAN, count, rng, by_roulette=by_roulette)
+        self._class = of
+        self._signature = np.array([of.amplitude_nt, of.sigma_along_m, of.sigma_across_m])
+
+    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+        """Put the particles on the level curves of the first measurement (section III-C).
+
+        Before the measurement every place is as probable within the ellipse of 3.5 standard deviations. The
+        level of a particle is drawn around the measurement, some are drawn from the whole ellipse, and the
+        weight is the ratio of both densities (importance sampling).
+        """
+        of, rng, count = self._class, self._rng, self.weights.size
+        amplitude_nt, level_nt = abs(of.amplitude_nt), math.copysign(1.0, of.amplitude_nt) * seen.residual_nt
+        sigma_nt = math.sqrt(seen.white_nt2 + map_nt2 + (of.amplitude_spread * level_nt) ** 2)
+        lowest_nt = amplitude_nt * math.exp(-0.5 * _FARTHEST**2)
+        # the square of the distance in standard deviations is uniform over the area of an ellipse
+        square = _FARTHEST**2 * rng.random(count)
+        drawn_nt = level_nt + sigma_nt * rng.standard_normal(count)
+        on_level = (np.arange(count) % _SPREAD_EVERY > 0) & (drawn_nt > lowest_nt) & (drawn_nt < amplitude_nt)
+        square[on_level] = -2.0 * np.log(drawn_nt[on_level] / amplitude_nt)
+        there_nt = amplitude_nt * np.exp(-0.5 * square)
+        density = np.exp(-0.5 * ((there_nt - level_nt) / sigma_nt) ** 2) / (sigma_nt * math.sqrt(math.tau))
+        share = float(np.mean(on_level))
+        ratio = (
+            share
+            * 0.5
+            * _FARTHEST**2
+            * density
+            * there_nt
+            / max(
+                _normal_share((lowest_nt - level_nt) / sigma_nt, (amplitude_nt - level_nt) / sigma_nt), 1e-12
+            )
+            + 1.0
+            - share
+        )
+        self.weights[:] = 1.0 / (count * ratio)
+        particles = self.particles
+        particles[:] = 0.0
+        angle, axis = rng.uniform(-math.pi, math.pi, (2, count))
+        size = np.exp(of.size_spread * rng.standard_normal(count))
+        particles[:, p.X] = np.sqrt(square) * np.cos(angle) * of.sigma_along_m * size
+        particles[:, p.Y] = np.sqrt(square) * np.sin(angle) * of.sigma_across_m * size
+        particles[:, p.COS], particles[:, p.SIN] = np.cos(axis), np.sin(axis)
+        particles[:, p.SIZE] = size
+        particles[:, p.AMPLITUDE] = 1.0
+        particles[:, p.AMPLITUDE_VAR] = of.amplitude_spread**2
+        particles[:, p.MAP_VAR] = map_nt2
+        inside = -2.0 * math.log(min(1.0, max(threshold_nt, lowest_nt) / amplitude_nt)) / _FARTHEST**2
+        return self._weigh(seen, 1.0, 0.0)[0] - math.log(max(inside, _LEAST_INSIDE))
+
+    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
+        amplitude_nt, along_m, across_m = self._signature
+        size = rows[:, p.SIZE, None]
+        square = (x / (along_m * size)) ** 2 + (y / (across_m * size)) ** 2
+        signals: Array = amplitude_nt * rows[:, p.AMPLITUDE, None] * np.exp(-0.5 * square)
+        return signals
+
+    def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
+        return p.weigh_gaussian(
+            self.particles,
+            self.weights,
+            self._signature,
+            seen.residual_nt,
+            seen.white_nt2,
+            decay,
+            drive_nt2,
+            self._fits,
+        )
+
+
+class DipoleHypothesis(ParticleHypothesis):
+    """The anomaly is of a class of dipoles."""
+
+    def __init__(
+        self,
+        of: DipoleClass,
+        count: int,
+        rng: np.random.Generator,
+        *,
+        field_ned: Array,
+        by_roulette: bool = False,
+    ) -> None:
+        super().__init__(p.DIPOLE, count, rng, by_roulette=by_roulette)
+        self._class = of
+        self._field_ned = field_ned
+
+    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+        """Spread the particles over the places from which an anomaly of the class can begin."""
+        of, rng, count = self._class, self._rng, self.weights.size
+        depth_m = of.least_m * (of.most_m / of.least_m) ** rng.random(count)
+        distance_m = 2.0 * depth_m * np.sqrt(rng.random(count))
+        angle = rng.uniform(-math.pi, math.pi, count)
+        particles = self.particles
+        particles[:] = 0.0
+        particles[:, p.X], particles[:, p.Y] = distance_m * np.cos(angle), distance_m * np.sin(angle)
+        particles[:, p.COS], particles[:, p.SIN] = math.cos(seen.course_rad), math.sin(seen.course_rad)
+        particles[:, p.HEIGHT] = seen.height_m - depth_m
+        particles[:, p.RANGE] = depth_m
+        for k in range(p.TERMS - 1):
+            particles[:, p.COVARIANCE + (p.TERMS + 1) * k] = of.strength_nt**2
+        particles[:, p.COVARIANCE + p.TERMS * p.TERMS - 1] = map_nt2
+        self.weights[:] = 1.0 / count
+        density = self._weigh(seen, 1.0, 0.0)[0]
+        return density - _beyond(threshold_nt, np.sqrt(self._fits[:, 1]))
+
+    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
+        up = np.maximum(1.0, height_m - rows[:, p.HEIGHT, None])
+        distance = np.sqrt(x * x + y * y + up * up)
+        offset = (x / distance, y / distance, -up / distance)
+        along = sum(self._field_ned[k] * offset[k] for k in range(3))
+        total = sum(
+            rows[:, p.MEANS + k, None] * (3.0 * along * offset[k] - self._field_ned[k]) for k in range(3)
+        )
+        signals: Array = (rows[:, p.RANGE, None] / distance) ** 3 * total
+        return signals
+
+    def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
+        return p.weigh_dipole(
+            self.particles,
+            self.weights,
+            self._field_ned,
+            seen.height_m,
+            seen.residual_nt,
+            seen.white_nt2,
+            decay,
+            drive_nt2,
+            self._fits,
+        )
+
+
+def _normal_share(low: float, high: float) -> float:
+    """Probability of a standard normal number between two bounds."""
+    return 0.5 * (math.erf(high / math.sqrt(2.0)) - math.erf(low / math.sqrt(2.0)))
+
+
+def _beyond(threshold_nt: float, sigmas_nt: Array) -> float:
+    """Logarithm of the mean probability that normal numbers without a mean are beyond a threshold."""
+    scaled = threshold_nt / math.sqrt(2.0) / sigmas_nt
+    shares = [math.erfc(value) for value in scaled.tolist()]
+    return math.log(max(sum(shares) / len(shares), 1e-300))

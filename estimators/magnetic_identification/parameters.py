@@ -1,0 +1,102 @@
+"""Parameters of the identification of magnetic targets."""
+
+import math
+from dataclasses import dataclass
+
+from estimators.magnetic_identification.classes import AnomalyClass, DipoleClass, classes_from
+
+__all__ = ["IdentificationParameters"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentificationParameters:
+    """Parameters of `Identifier`.
+
+    Attributes:
+        targets: classes that are sought, as `NAME:gaussian:AMPLITUDE:ALONG:ACROSS` (nT, m, m) or
+            `NAME:dipole:STRENGTH:LEAST:MOST` (nT, m, m).
+        false_anomalies: known classes that are not sought, likewise.
+        target_prior: probability, before any measurement, that an anomaly is one of the targets.
+        particles: number of particles of each class.
+        roulette: resample by the paper's roulette wheel instead of systematically.
+        interval_s: time over which readings are averaged for one measurement (paper: 1 s).
+        threshold_nt: an anomaly begins beyond it, or beyond 3 standard deviations of map and noise if that is
+            larger (paper: 1 nT).
+        noise_nt: standard deviation of one reading.
+        map_error_nt: standard deviation of the map; None: as the map states it, else 1 nT.
+        shape_error: error of a measurement relative to itself, as no signature is exact.
+        forward_noise: standard deviation of a displacement, relative to it.
+        turn_noise: standard deviation of a turn, relative to it.
+        course_noise_rad: standard deviation of the course at each measurement.
+        target_speed_m_s: largest speed of a moving target, as a random walk.
+        unknown_nt, unknown_m: standard deviation and correlation distance of anomalies of unknown shape.
+        most_anomalies: number of anomalies that are kept; the least probable target is dropped first.
+        report_s: interval of estimates during a pass; there is one after each pass too.
+        seed: of the random numbers.
+
+    Raises:
+        ValueError: a value is out of its range.
+    """
+
+    targets: tuple[str, ...] = ("target:gaussian:30:80:60",)
+    false_anomalies: tuple[str, ...] = ("boat:dipole:15:30:300",)
+    target_prior: float = 0.5
+    particles: int = 4000
+    roulette: bool = False
+    interval_s: float = 1.0
+    threshold_nt: float = 3.0
+    noise_nt: float = 0.5
+    map_error_nt: float | None = None
+    shape_error: float = 0.04
+    forward_noise: float = 0.02
+    turn_noise: float = 0.02
+    course_noise_rad: float = 0.02
+    target_speed_m_s: float = 0.0
+    unknown_nt: float = 12.0
+    unknown_m: float = 120.0
+    most_anomalies: int = 12
+    report_s: float = 5.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _ = self.classes
+        if not self.targets:
+            raise ValueError(
+                "targets names no class: there is nothing to identify; give one or more, such as "
+                "target:gaussian:30:80:60"
+            )
+        for name in ("interval_s", "threshold_nt", "noise_nt", "unknown_nt", "unknown_m", "report_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} {value:g} is not accepted; more than 0 is")
+        for name in ("shape_error", "forward_noise", "turn_noise", "course_noise_rad", "target_speed_m_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} {value:g} is not accepted; 0 or more is")
+        if self.map_error_nt is not None and not (
+            math.isfinite(self.map_error_nt) and self.map_error_nt >= 0.0
+        ):
+            raise ValueError(f"map_error_nt {self.map_error_nt:g} is not accepted; 0 or more is, or none")
+        if not 0.0 < self.target_prior < 1.0:
+            raise ValueError(f"target_prior {self.target_prior:g} is not between 0 and 1")
+        if not 100 <= self.particles <= 1_000_000:
+            raise ValueError(f"particles {self.particles} is not in 100..1000000")
+        if self.most_anomalies < 1:
+            raise ValueError(f"most_anomalies {self.most_anomalies} is not accepted; 1 or more is")
+
+    @property
+    def classes(self) -> tuple[AnomalyClass, ...]:
+        """The classes, those sought first."""
+        found = (
+            *classes_from(self.targets, sought=True),
+            *classes_from(self.false_anomalies, sought=False),
+        )
+        names = [of.name for of in found]
+        if len(set(names)) != len(names):
+            raise ValueError(f"the classes {', '.join(names)} do not all have a name of their own")
+        return found
+
+    @property
+    def reach_m(self) -> float:
+        """Distance from an anomaly within which measurements are about it."""
+        return max(2.0 * of.least_m if isinstance(of, DipoleClass) else of.reach_m for of in self.classes)

@@ -1,0 +1,166 @@
+"""Filters of one hypothesis: evidence against the density of all measurements, and figures 4 and 5."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from estimators.magnetic_identification import particles as p
+from estimators.magnetic_identification.classes import DipoleClass, GaussianClass
+from estimators.magnetic_identification.hypotheses import (
+    Control,
+    DipoleHypothesis,
+    GaussianHypothesis,
+    ShapelessHypothesis,
+)
+from estimators.tracking.modes import find_modes
+from flightsim.payload import DipoleSignature
+from tests.estimators.magnetic_identification.encounters import (
+    CORRELATION_M,
+    DIRECTION,
+    HEIGHT_M,
+    MAP_NT,
+    NOISE_NT,
+    measurement,
+    straight,
+)
+
+STEP_M = 20.0
+COUNT = 15
+ALONG_M = -140.0 + STEP_M * np.arange(COUNT)
+
+
+def map_covariance():
+    apart = np.abs(ALONG_M[:, None] - ALONG_M)
+    return MAP_NT**2 * np.exp(-apart / CORRELATION_M) + NOISE_NT**2 * np.eye(COUNT)
+
+
+def put(hypothesis, *, y_m, **places):
+    """All particles at one pose, on a straight track along x."""
+    hypothesis.particles[:, p.X], hypothesis.particles[:, p.Y] = ALONG_M[0], y_m
+    hypothesis.particles[:, p.COS], hypothesis.particles[:, p.SIN] = 1.0, 0.0
+    for place, value in places.items():
+        hypothesis.particles[:, getattr(p, place)] = value
+    hypothesis.weights[:] = 1.0 / len(hypothesis.weights)
+
+
+def density_of(hypothesis, values):
+    """Logarithm of the density of all measurements, by the filter's steps."""
+    total = hypothesis.step(straight(0.0), measurement(values[0]))[0]
+    return total + sum(hypothesis.step(straight(STEP_M), measurement(v))[0] for v in values[1:])
+
+
+def test_the_evidence_of_a_gaussian_is_the_density_of_all_measurements_together():
+    of = GaussianClass(name="target", amplitude_spread=0.2, size_spread=0.0)
+    hypothesis = GaussianHypothesis(of, 10, np.random.default_rng(1))
+    hypothesis.start(measurement(3.0), MAP_NT**2)
+    put(
+        hypothesis,
+        y_m=25.0,
+        SIZE=1.0,
+        AMPLITUDE=1.0,
+        MAP=0.0,
+        AMPLITUDE_VAR=0.04,
+        AMPLITUDE_MAP=0.0,
+        MAP_VAR=MAP_NT**2,
+    )
+    shape = 30.0 * np.exp(-0.5 * ((ALONG_M / 80.0) ** 2 + (25.0 / 60.0) ** 2))
+    values = 1.1 * shape + np.random.default_rng(2).standard_normal(COUNT)
+    together = multivariate_normal(shape, map_covariance() + 0.04 * np.outer(shape, shape))
+    assert density_of(hypothesis, values) == pytest.approx(together.logpdf(values), abs=1e-6)
+
+
+def test_the_evidence_of_a_dipole_is_the_density_of_all_measurements_together():
+    of = DipoleClass(name="boat", strength_nt=10.0)
+    hypothesis = DipoleHypothesis(of, 10, np.random.default_rng(1), field_ned=DIRECTION)
+    hypothesis.start(measurement(3.0), MAP_NT**2)
+    hypothesis.particles[:, p.MEANS : p.DIPOLE] = 0.0
+    put(hypothesis, y_m=-30.0, HEIGHT=0.0, RANGE=HEIGHT_M)
+    for k, variance in enumerate((100.0, 100.0, 100.0, MAP_NT**2)):
+        hypothesis.particles[:, p.COVARIANCE + 5 * k] = variance
+    # the simulator's dipole; in a field this strong only its part along the field changes the magnitude
+    moment = HEIGHT_M**3 / 100.0
+    terms = np.array(
+        [
+            DipoleSignature(north_m=0.0, east_m=0.0, height_m=0.0, moment_ned_a_m2=axis).anomaly_nt(
+                ALONG_M, np.full(COUNT, -30.0), HEIGHT_M, 1e9 * DIRECTION
+            )
+            for axis in ((moment, 0.0, 0.0), (0.0, moment, 0.0), (0.0, 0.0, moment))
+        ]
+    )
+    values = 12.0 * terms[2] + np.random.default_rng(2).standard_normal(COUNT)
+    together = multivariate_normal(np.zeros(COUNT), map_covariance() + 100.0 * terms.T @ terms)
+    assert density_of(hypothesis, values) == pytest.approx(together.logpdf(values), abs=1e-4)
+
+
+def test_the_evidence_without_a_signature_is_that_of_the_process():
+    values = np.random.default_rng(4).standard_normal(COUNT)
+    hypothesis = ShapelessHypothesis(MAP_NT)
+    total = hypothesis.start(measurement(values[0]), MAP_NT**2)
+    total += sum(hypothesis.step(straight(STEP_M), measurement(v))[0] for v in values[1:])
+    assert total == pytest.approx(multivariate_normal(np.zeros(COUNT), map_covariance()).logpdf(values))
+
+
+def test_the_first_evidence_is_the_mean_density_over_the_ellipse():
+    """Importance sampling on the level curve, against plain sampling of the ellipse."""
+    of = GaussianClass(name="target", amplitude_spread=0.15, size_spread=0.0)
+    found = [
+        GaussianHypothesis(of, 20_000, np.random.default_rng(seed)).start(measurement(4.0), MAP_NT**2)
+        for seed in range(4)
+    ]
+    square = 3.5**2 * np.random.default_rng(9).random(2_000_000)
+    level = 30.0 * np.exp(-0.5 * square)
+    variance = NOISE_NT**2 + MAP_NT**2 + (0.15 * level) ** 2
+    plain = np.mean(np.exp(-0.5 * (4.0 - level) ** 2 / variance) / np.sqrt(2.0 * math.pi * variance))
+    assert found == pytest.approx([math.log(plain)] * 4, abs=0.03)
+
+
+def test_equation_8_puts_the_source_where_it_is_seen_from_the_vehicle():
+    """Vehicle 100 m along and 50 m right of the axis, flying across it to the right."""
+    row = np.zeros((1, p.GAUSSIAN))
+    row[0, : p.POSE] = (100.0, 50.0, 0.0, 1.0)
+    out = np.empty((1, 3))
+    p.relative_sources(row, out)
+    assert out[0] == pytest.approx((-50.0, 100.0, -0.5 * math.pi))
+
+
+def diagonal_pass(seed: int, count: int, *, by_roulette: bool = False) -> GaussianHypothesis:
+    """Figure 4: from where the anomaly begins, over the centre with slope 1:5, to 2250 m beyond it."""
+    of = GaussianClass(
+        name="target",
+        amplitude_nt=100.0,
+        sigma_along_m=1000.0,
+        sigma_across_m=500.0,
+        amplitude_spread=0.0,
+        size_spread=0.0,
+    )
+    hypothesis = GaussianHypothesis(
+        of, count, np.random.Generator(np.random.SFC64(seed)), by_roulette=by_roulette
+    )
+    psi = math.atan(0.2)
+    along_m = 25.0 * np.arange(-200, 91)
+    square = (along_m * math.cos(psi) / 1000.0) ** 2 + (along_m * math.sin(psi) / 500.0) ** 2
+    values = 100.0 * np.exp(-0.5 * square) + 0.5 * np.random.default_rng(seed).standard_normal(len(along_m))
+    first = int(np.flatnonzero(values > 3.0)[0])
+    hypothesis.start(measurement(values[first], white_nt2=1.0), 0.0)
+    control = Control(
+        forward_m=25.0, right_m=0.0, turn_rad=0.0, forward_sigma_m=0.5, turn_sigma_rad=0.015, decay=0.0,
+        drive_nt2=0.0,
+    )  # fmt: skip
+    for value in values[first + 1 :]:
+        hypothesis.step(control, measurement(value, white_nt2=1.0))
+    return hypothesis
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_diagonal_pass_leaves_four_modes(seed):
+    """Figures 4 and 5 with 200,000 particles: the modes that the paper's pair merged are separate."""
+    hypothesis = diagonal_pass(seed, 200_000)
+    modes = find_modes(hypothesis.sources(), hypothesis.weights, least_cell=25.0)
+    angles = sorted(math.degrees(mode.mean[2]) for mode in modes)
+    assert angles == pytest.approx([-168.7, -11.3, 11.3, 168.7], abs=3.0)
+    forward = sum(mode.weight * mode.mean[0] for mode in modes)
+    right = sum(mode.weight * mode.mean[1] for mode in modes)
+    assert forward == pytest.approx(-2250.0, rel=0.05)
+    assert abs(right) < 0.05 * 2250.0

@@ -1,0 +1,133 @@
+"""Identification of anomalies from readings of passes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from estimators.magnetic_identification.identifier import Identifier
+from estimators.magnetic_identification.parameters import IdentificationParameters
+from estimators.occupancy.detection import MapError
+from tests.estimators.magnetic_identification.encounters import (
+    CORRELATION_M,
+    DIRECTION,
+    MAP_NT,
+    boat,
+    readings,
+    target,
+    track,
+)
+
+PARAMETERS = IdentificationParameters(particles=1500, noise_nt=0.2)
+
+
+def identifier(parameters=PARAMETERS):
+    return Identifier(
+        parameters,
+        map_error=MapError(sigma_nt=MAP_NT, correlation_m=CORRELATION_M),
+        field_ned=DIRECTION,
+    )
+
+
+def fly(found, rng, signatures, *, passes=1, vehicle=1, start_us=0, offset_m=30.0, first_rad=0.3):
+    """Straight passes, each across the last one; returns the ended passes."""
+    ended = []
+    for k in range(passes):
+        places = track(rng, offset_m=offset_m * (-1) ** k, course_rad=first_rad + 0.5 * math.pi * k)
+        for reading in readings(rng, places, signatures, start_us=start_us + k * 120_000_000):
+            progress = found.take(vehicle, reading, 0.0)
+            if progress is not None and progress.pass_ended is not None:
+                ended.append(progress.pass_ended)
+    return ended
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_target_is_identified_in_two_passes_and_localized(seed):
+    rng, found = np.random.default_rng(seed), identifier()
+    ended = fly(found, rng, [target(rng)], passes=2)
+    anomaly = found.anomalies[0]
+    assert ended.count(anomaly) == anomaly.passes == 2
+    assert all(other.probability < 0.1 for other in found.anomalies[1:])
+    assert anomaly.probability > 0.9
+    assert math.hypot(*anomaly.place_ne_m) < 20.0
+    assert anomaly.modes()[0].weight > 0.2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_boat_is_not_a_target(seed):
+    rng, found = np.random.default_rng(seed), identifier()
+    fly(found, rng, [boat(rng)], passes=2)
+    assert all(anomaly.probability < 0.1 for anomaly in found.anomalies)
+
+
+def test_the_second_pass_may_be_another_vehicle_s():
+    rng, found = np.random.default_rng(1), identifier()
+    of = target(rng)
+    fly(found, rng, [of], vehicle=1)
+    after_one = found.anomalies[0].probability
+    fly(found, rng, [of], vehicle=2, start_us=60_000_000, first_rad=1.9)
+    (anomaly,) = found.anomalies
+    assert anomaly.passes == 2
+    assert anomaly.probability > max(0.9, after_one)
+
+
+def test_two_sources_apart_are_two_anomalies():
+    rng, found = np.random.default_rng(2), identifier()
+    sources = [target(rng, (-600.0, 0.0)), boat(rng, (600.0, 0.0))]
+    places = track(rng, offset_m=20.0, course_rad=0.0, half_m=1400.0)
+    for reading in readings(rng, places, sources):
+        found.take(1, reading, 0.0)
+    first, second = found.anomalies
+    assert first.probability > 0.5 > second.probability
+
+
+def test_the_map_s_error_alone_is_no_target():
+    """Where it exceeds the threshold, the background explains it."""
+    rng, found = np.random.default_rng(3), identifier()
+    for k in range(12):
+        places = track(rng, offset_m=300.0 * k, course_rad=0.0, half_m=2000.0)
+        for reading in readings(rng, places, [], start_us=k * 200_000_000):
+            found.take(1, reading, 0.0)
+    assert all(anomaly.probability < 0.5 for anomaly in found.anomalies)
+
+
+def test_the_number_of_kept_anomalies_is_bounded():
+    rng = np.random.default_rng(4)
+    found = identifier(IdentificationParameters(particles=100, noise_nt=0.2, most_anomalies=3))
+    sources = [boat(rng, (800.0 * k, 0.0)) for k in range(-3, 4)]
+    for reading in readings(rng, track(rng, offset_m=10.0, course_rad=0.0, half_m=3200.0), sources):
+        found.take(1, reading, 0.0)
+    assert found.started > 3
+    assert len(found.anomalies) == 3
+
+
+def test_the_confidence_of_the_paper_stays_for_a_target_and_drops_for_a_boat():
+    """Figure 6."""
+    means = []
+    for source in (target, boat):
+        values = []
+        for seed in range(6):
+            rng, found = np.random.default_rng(seed), identifier()
+            fly(found, rng, [source(rng)])
+            trace = [point.confidence for anomaly in found.anomalies for point in anomaly.trace[1:]]
+            values += trace
+        means.append(np.mean(values))
+    assert means[0] > means[1] + 0.1
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"targets": ()}, "targets names no class: there is nothing to identify"),
+        ({"targets": ("ship:cube:1:2:3",)}, "class 'ship:cube:1:2:3' is not accepted; give NAME:gaussian"),
+        ({"targets": ("ship:gaussian:1:2",)}, "is not accepted; give NAME:gaussian"),
+        ({"targets": ("ship:gaussian:30:-1:60",)}, "sigma_along_m -1 of class ship is not accepted"),
+        ({"targets": ("a:gaussian:1:2:3",), "false_anomalies": ("a:dipole:1:2:3",)}, "a name of their own"),
+        ({"target_prior": 1.0}, "target_prior 1 is not between 0 and 1"),
+        ({"particles": 10}, "particles 10 is not in 100..1000000"),
+        ({"interval_s": math.nan}, "interval_s nan is not accepted"),
+    ],
+)
+def test_impossible_parameters_are_refused(values, said):
+    with pytest.raises(ValueError, match=said):
+        IdentificationParameters(**values)
