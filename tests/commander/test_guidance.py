@@ -1,6 +1,7 @@
 """What clients command in flight: circles, places, and what is reported of a mission's items."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,3 +109,116 @@ def test_the_distance_of_a_reached_waypoint_is_reported(flavour: str) -> None:
     assert reached[first] == pytest.approx(5.0, abs=0.05)
     if first + 1 in reached:
         assert math.isnan(reached[first + 1])
+
+
+def captured(rig: Rig, monkeypatch: pytest.MonkeyPatch, name: str) -> list[Any]:
+    """What is handed to the vehicle's tasks from now on."""
+    found: list[Any] = []
+    make = getattr(type(rig.commander.vehicle), name)
+
+    def note(vehicle: Any, what: Any) -> Any:
+        found.append(what)
+        return make(vehicle, what)
+
+    monkeypatch.setattr(type(rig.commander.vehicle), name, note)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"yaw_rad": 1.2}, {"yaw_rad": 1.2}),
+        ({"yaw_rad": 2.0 * math.pi}, {"yaw_rad": 2.0 * math.pi}),
+        ({"yaw_rad": -2.0 * math.pi}, {"yaw_rad": -2.0 * math.pi}),
+        ({"yaw_rad": 7.0}, {"yaw_rad": math.nan}),
+        ({"yaw_rad": -7.0}, {"yaw_rad": math.nan}),
+        ({"speed_m_s": 0.5}, {"speed_m_s": 0.5}),
+        ({"speed_m_s": 100.0}, {"speed_m_s": 100.0}),
+        ({"speed_m_s": 100.1}, {"speed_m_s": None}),
+        ({"speed_m_s": 0.0}, {"speed_m_s": None}),
+        ({"speed_m_s": -1.0}, {"speed_m_s": None}),
+        ({"speed_m_s": math.nan}, {"speed_m_s": None}),
+        ({"radius_m": 80.0}, {"radius_m": 80.0}),
+        ({"radius_m": -80.0}, {"radius_m": -80.0}),
+        ({"radius_m": 0.5}, {"radius_m": 0.5}),
+        ({"radius_m": 1e4}, {"radius_m": 1e4}),
+        ({"radius_m": 1.1e4}, {"radius_m": None}),
+        ({"radius_m": -1.1e4}, {"radius_m": None}),
+        ({"radius_m": 0.0}, {"radius_m": None}),
+        ({"radius_m": math.nan}, {"radius_m": None}),
+    ],
+)
+def test_unusable_figures_of_a_reposition_are_left_to_the_parameters(
+    given: dict[str, float], expected: dict[str, float | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = hovering("px4")
+    found = captured(rig, monkeypatch, "reposition")
+    verdict = rig.commander.guidance.reposition(north_m=50.0, east_m=-20.0, down_m=-30.0, **given)
+    assert verdict.accepted
+    (place,) = found
+    assert place.ned_m.tolist() == [50.0, -20.0, -30.0]
+    for name, value in expected.items():
+        assert getattr(place, name) == (value if value is None else pytest.approx(value, nan_ok=True))
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "speed_m_s", "radius", "speed", "clockwise"),
+    [
+        (30.0, 5.0, 30.0, 5.0, True),
+        (-30.0, -5.0, 30.0, 5.0, False),
+        (0.5, 0.5, 0.5, 0.5, True),
+        (1e4, 100.0, 1e4, 100.0, True),
+        (-1e4, -100.0, 1e4, 100.0, False),
+        (1.1e4, 101.0, None, None, True),
+        (-1.1e4, -101.0, None, None, True),
+        (0.0, 0.0, None, None, True),
+        (math.nan, math.nan, None, None, True),
+    ],
+)
+def test_figures_of_an_orbit(
+    radius_m: float,
+    speed_m_s: float,
+    radius: float | None,
+    speed: float | None,
+    clockwise: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = hovering("px4")
+    found = captured(rig, monkeypatch, "orbit")
+    rig.commander.guidance.orbit(
+        radius_m=radius_m, speed_m_s=speed_m_s, yaw_behaviour=2, north_m=1.0, east_m=2.0, down_m=-30.0
+    )
+    circle = found[-1]
+    assert circle.centre_ned_m.tolist() == [1.0, 2.0, -30.0]
+    assert (circle.radius_m, circle.speed_m_s, circle.clockwise) == (radius, speed, clockwise)
+    assert circle.yaw_behaviour == 2
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "known"), [(9.9e5, True), (-9.9e5, True), (1.1e6, False), (-1.1e6, False)]
+)
+def test_places_farther_than_a_thousand_kilometres_are_not_flown_to(
+    distance_m: float, known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for axis in range(3):
+        rig = hovering("px4")
+        found = captured(rig, monkeypatch, "reposition")
+        place = [10.0, 20.0, -30.0]
+        place[axis] = distance_m
+        rig.commander.guidance.reposition(north_m=place[0], east_m=place[1], down_m=place[2])
+        assert math.isfinite(found[-1].ned_m[axis]) is known
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("speed_m_s", [0.0, -1.0, math.nan])
+def test_no_speed_is_the_parameters_speed(flavour: str, speed_m_s: float) -> None:
+    rig = hovering(flavour)
+    usual = rig.context.parameters.cruise_speed_m_s
+    rig.commander.guidance.change_speed(0.5 * usual, kind=1)
+    assert rig.context.parameters.cruise_speed_m_s == pytest.approx(0.5 * usual)
+    rig.commander.guidance.change_speed(speed_m_s, kind=1)
+    expected = 0.5 * usual if math.isnan(speed_m_s) else usual
+    assert rig.context.parameters.cruise_speed_m_s == pytest.approx(expected)
+    rig.commander.guidance.change_speed(0.5 * usual, kind=1)
+    rig.commander.guidance.forget_speed()
+    assert rig.context.parameters.cruise_speed_m_s == pytest.approx(usual)

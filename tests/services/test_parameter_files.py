@@ -13,6 +13,10 @@ from autopilot_bridge.parameter_files import (
     read_untyped_parameter_file,
 )
 from autopilot_bridge.parameters import ParameterDefinition, ParameterError, ParameterStore
+from autopilot_bridge.services.parameters.parameter_file import StoredParameters
+from autopilot_bridge.storage.files import read_whole
+from autopilot_bridge.storage.memory import MemoryCard
+from tests.services.command_rig import ServiceRig
 
 QGC = """# Onboard parameters for Vehicle 1
 #
@@ -74,3 +78,30 @@ def test_unreadable_files(tmp_path: Path) -> None:
     (tmp_path / "binary.parm").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ParameterError, match="not UTF-8"):
         read_untyped_parameter_file(tmp_path / "binary.parm")
+
+
+@pytest.mark.parametrize(
+    ("flavour", "name", "value", "line"),
+    [
+        ("px4", "COM_OF_LOSS_T", 2.5, "7\t1\tCOM_OF_LOSS_T\t2.5\t9"),
+        ("ardupilot", "WPNAV_SPEED", 700.0, "WPNAV_SPEED      700.0"),
+    ],
+)
+def test_each_firmware_stores_what_was_changed_in_its_own_format(
+    flavour: str, name: str, value: float, line: str
+) -> None:
+    """PX4 in QGroundControl's, ArduPilot in MAVProxy's; values as at the start are not stored."""
+    rig, card = ServiceRig(flavour), MemoryCard(logs=False)
+    layout = rig.flavour.services.card
+    stored = StoredParameters(rig.store, card.files, layout, system_id=7)
+    rig.store.set(name, value)
+    stored.save()
+    text = read_whole(card.files, layout.parameters).decode()
+    assert line in text.splitlines()
+    assert parse_untyped_parameters(text) == {name: value}
+    rig.store.set(name, rig.store.find(name).default)  # type: ignore[union-attr]
+    stored.load()
+    assert rig.store.get(name) == value
+    stored.erase()
+    stored.save()
+    assert parse_untyped_parameters(read_whole(card.files, layout.parameters).decode()) == {}

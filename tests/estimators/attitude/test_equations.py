@@ -439,11 +439,11 @@ def test_without_a_model_of_motion_the_force_points_up(form, disarmed):
     assert math.isnan(x[at.SPEED])
 
 
-def reference_error(x, p):
+def reference_error(x, p, rate=RATE):
     """The error of the reference that the step used, from the covariance's last place."""
     fade = math.exp(-DT_S / p[par.REFERENCE_TIME])
     before = x[at.ROLL_COVARIANCE + 5]
-    feed(x, p, RATE, FORCE)
+    feed(x, p, rate, FORCE)
     return math.sqrt((x[at.ROLL_COVARIANCE + 5] - fade**2 * before) / (1.0 - fade**2))
 
 
@@ -455,8 +455,8 @@ def test_error_of_the_reference():
     x, p = filter_state()
     feed(x, p, RATE, FORCE)
     x[at.FORM] = at.WING  # without airspeed: a turn of 20 m/s may be hidden in the force
-    blind = min(0.5, np.linalg.norm(RATE) * 20.0 / G)
-    assert reference_error(x, p) == pytest.approx(math.hypot(p[par.FLIGHT_ERROR], blind))
+    for rate, blind in ((0.4 * RATE, np.linalg.norm(0.4 * RATE) * 20.0 / G), (RATE, 0.5)):
+        assert reference_error(x, p, rate) == pytest.approx(math.hypot(p[par.FLIGHT_ERROR], blind))
     x, p = wing_state()
     feed(x, p, RATE, FORCE)
     x[at.FORM] = at.WING
