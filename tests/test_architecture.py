@@ -182,6 +182,19 @@ def test_the_test_sees_flavours():
     assert found == ["spec.autopilot == 'ardupilot'", "z in ('px4',)"]
 
 
+def test_only_the_emulated_backend_reaches_into_the_emulated_autopilot():
+    """Another backend has none; what all have is in `AutopilotBackend` and the protocols beside it."""
+    users = {
+        name
+        for name, path in MODULES.items()
+        if is_in(name, ("autopilot_bridge.sitl", "autopilot_bridge.video", "missions", "estimators"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and node.attr == "commander"
+    }
+    # the warm-up flies an emulated vehicle to compile what it uses
+    assert users == {"autopilot_bridge.sitl.backend", "autopilot_bridge.sitl.warm_up"}
+
+
 def test_only_clock_and_shells_know_the_wall_clock():
     """`time` is imported by the clock alone; what reports wall time (runners, benchmarks) asks the clock."""
     users = [

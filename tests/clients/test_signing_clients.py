@@ -192,7 +192,7 @@ def test_mavproxy_brings_the_key(tmp_path: Path) -> None:
     ):  # the key outlives a restart
         stranger = Station(f"tcp:127.0.0.1:{port}", bytes(range(32)))
         stranger.link.mav.signing.allow_unsigned_callback = lambda mav, message_id: True
-        stranger.link.mav.command_long_send(1, 1, 512, 0, 148, *[0.0] * 6)
+        stranger.link.mav.command_long_send(1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, *[0.0] * 6)
         beats = 0
         deadline_s = time.monotonic() + WALL_DEADLINE_S
         while beats < 10:

@@ -32,7 +32,9 @@ HOME = (0.0, 0.0, 0.0)
 
 def vertex(north: float, east: float, count: int, *, inside: bool = True) -> MissionItem:
     lat, lon, _ = FRAME.geodetic_from_ned(north, east, 0.0)
-    return MissionItem(command=5001 if inside else 5002, frame=5, param1=float(count), x=lat, y=lon)
+    kept = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+    avoided = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+    return MissionItem(command=kept if inside else avoided, frame=5, param1=float(count), x=lat, y=lon)
 
 
 def square(north: float, east: float, half: float, *, inside: bool = True) -> tuple[MissionItem, ...]:
@@ -42,7 +44,8 @@ def square(north: float, east: float, half: float, *, inside: bool = True) -> tu
 
 def circle(north: float, east: float, radius: float, *, inside: bool = True) -> MissionItem:
     lat, lon, _ = FRAME.geodetic_from_ned(north, east, 0.0)
-    return MissionItem(command=5003 if inside else 5004, frame=5, param1=radius, x=lat, y=lon)
+    kept, avoided = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+    return MissionItem(command=kept if inside else avoided, frame=5, param1=radius, x=lat, y=lon)
 
 
 def store_of(*items: MissionItem) -> MissionStore:

@@ -4,6 +4,7 @@ import itertools
 import math
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
 from autopilot_bridge.firmware.ardupilot import mission_rules as mission_rules_ardupilot
@@ -99,11 +100,11 @@ def test_what_is_not_flown_is_refused(flavour: str, command: int) -> None:
 @pytest.mark.parametrize(
     ("command", "params", "result"),
     [
-        (93, (-1.0, 12.0, 0.0), 6),  # a time of day is not waited for
-        (112, (-1.0,), 6),
-        (601, (1.0, -2.0), 7),
-        (177, (99.0, 1.0), 6),
-        (1000, (math.nan, math.nan, math.nan, math.nan), 0),
+        (mavlink.MAV_CMD_NAV_DELAY, (-1.0, 12.0, 0.0), 6),  # a time of day is not waited for
+        (mavlink.MAV_CMD_CONDITION_DELAY, (-1.0,), 6),
+        (mavlink.MAV_CMD_DO_JUMP_TAG, (1.0, -2.0), 7),
+        (mavlink.MAV_CMD_DO_JUMP, (99.0, 1.0), 6),
+        (mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, (math.nan, math.nan, math.nan, math.nan), 0),
     ],
 )
 def test_values_that_can_not_be_flown(command: int, params: tuple[float, ...], result: int) -> None:
