@@ -32,7 +32,7 @@ TAKEOFF_M_PER_M_S2 = 0.45  # way to roll and climb, over the square of the trim 
 TAKEOFF_M = 250.0
 LEVEL_S = 18.0  # from there to the slope
 LIMIT_S = 900.0
-WITHIN_M = 20.0  # what is asked for
+WITHIN_M = 20.0  # what is requested
 SOFT_M_S = 2.0
 SEA_LEVEL_DENSITY_KG_M3 = 1.225
 

@@ -4,7 +4,7 @@
 
 Every flavour x plan (rectangle, sharp corners) x launch (runway, catapult, hand) x direction of 6 m/s of
 wind (0, 60, 120, 240, 300 degrees from the runway's) x seed, in moderate turbulence, from the take-off to the
-touch. What is asked of each: across the legs less than 5 m RMS, height 2 m, airspeed (the true one, gusts
+touch. What is required of each: across the legs less than 5 m RMS, height 2 m, airspeed (the true one, gusts
 included) 1 m/s, no airspeed below 14 m/s. Exit code 1: some mission missed one of these.
 """
 

@@ -3,7 +3,7 @@ of every service, with absurd fields.
 
     python -m benchmarks.fuzz_services [--messages 1000000] [--seed 0] [--flavour px4|ardupilot] [--jobs 2]
 
-The messages are shared out to both flavours and both classes of vehicle. What is asked
+The messages are shared out to both flavours and both classes of vehicle. What is required
 (`tests.fuzz.campaign`): no exception, no batch of messages that takes more than 50 ms, a vehicle that keeps
 its mode and place whenever no command was sent, and memory that does not grow. Exit code 1: something else
 was seen; what, is printed with the seed and the round that shows it again.

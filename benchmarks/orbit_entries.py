@@ -5,7 +5,7 @@
 
 Every flight is `flightstack fly orbit` in an embedded world: GPS lost at the entry, 4 m/s of wind and light
 turbulence. Without options: ten entries, both directions, both autopilots, a target that stands and one that
-moves at 2 m/s, 600 s each: 80 flights. The figures are of truth; asked for are a mean radius error below 5 %,
+moves at 2 m/s, 600 s each: 80 flights. The figures are of truth; requested are a mean radius error below 5 %,
 a standard deviation below 8 m and an altitude within 10 m, and the exit code is 1 when a flight misses one.
 """
 
@@ -137,7 +137,7 @@ def say(line: str) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Fly what is asked for; 1 when a flight fails or misses a bound."""
+    """Fly what is requested; 1 when a flight fails or misses a bound."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -172,7 +172,7 @@ def _line(text: str) -> None:
 
 
 def main() -> int:
-    """Measure the flavours asked for."""
+    """Measure the flavours requested."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0, help="wall seconds measured per flavour")
     parser.add_argument("--flavour", choices=("px4", "ardupilot"), action="append")

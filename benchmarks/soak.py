@@ -4,7 +4,7 @@
 
 The vehicles (of both flavours, every fourth an aircraft) run in a process of their own, as `flightstack sitl`
 runs them; the clients, in this one, are an onboard computer that flies its vehicle by setpoints, a ground
-station on UDP and one on TCP, which asks for its own rates. What is asked: memory of the vehicles' process
+station on UDP and one on TCP, which asks for its own rates. What is required: memory of the vehicles' process
 grows by no more than 5 % after the warm-up, no heartbeat is missed (at most 1.5 s between two), no stream
 comes at less than 95 % of its rate, and vehicle time keeps up with the wall clock within 1 %. Exit code 1:
 something of this was missed.

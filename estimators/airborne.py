@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from estimators.logs import Log
 
-__all__ = ["ALWAYS", "Spans", "airborne_spans", "duration_s", "within"]
-
 Spans = list[tuple[int, int]]
 """Spans of vehicle time in microseconds, (from, to), `to` exclusive, ascending."""
 

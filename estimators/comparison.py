@@ -29,8 +29,6 @@ from flightsim.foundation.geodesy import GeodeticPosition
 if TYPE_CHECKING:
     from estimators.logs import Log
 
-__all__ = ["AGAINST", "OSPA_CUTOFF_M", "Comparison", "comparisons"]
-
 AGAINST: Final[Mapping[str, Sequence[str]]] = {
     "autopilot": (AUTOPILOT,),
     "truth": (TRUTH,),

@@ -4,8 +4,6 @@ import traceback
 
 from autopilot_bridge.errors import TlogError
 
-__all__ = ["EstimatorError", "EstimatorFailure", "LogError", "NothingThere", "described"]
-
 
 class LogError(TlogError):
     """A log can't be opened or lacks the requested data; the message names it and the next step."""

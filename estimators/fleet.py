@@ -11,8 +11,6 @@ from estimators.observations import Observation
 from estimators.runner import Runner
 from estimators.vehicle_time import VehicleTime, stamp_field
 
-__all__ = ["AUTOPILOT_COMPONENT", "GROUND_SYSTEM", "MAX_VEHICLES", "Fleet"]
-
 AUTOPILOT_COMPONENT: Final = 1
 GROUND_SYSTEM: Final = 200
 """By convention, system ids from here on belong to ground stations and simulated targets."""

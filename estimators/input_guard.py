@@ -6,8 +6,6 @@ from typing import Final
 
 from estimators.interface import Outcome
 
-__all__ = ["NEW_BOOT_US", "InputGuard"]
-
 NEW_BOOT_US: Final = 1_000_000
 """Time that goes back by more than this means that the vehicle has rebooted, not that a message is late."""
 

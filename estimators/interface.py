@@ -15,8 +15,6 @@ from estimators.messages import Message
 from estimators.observations import Observation
 from flightsim.foundation.geodesy import GeodeticPosition
 
-__all__ = ["Estimate", "EstimateSet", "Estimator", "Need", "Outcome"]
-
 P = TypeVar("P")
 
 

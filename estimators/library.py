@@ -17,8 +17,6 @@ from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hi
 from estimators.errors import EstimatorError, described
 from estimators.interface import Estimator
 
-__all__ = ["ESTIMATORS", "estimator_class", "make_estimator", "parameters_from"]
-
 ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "attitude": "estimators.attitude",

@@ -20,8 +20,6 @@ from estimators.runner import why_excluded
 if TYPE_CHECKING:
     from estimators.logs import Log
 
-__all__ = ["Replay", "log_rate_hz", "log_supplies", "replay", "vehicles_in"]
-
 _LEARNT_FROM = 20
 """Number of SYSTEM_TIMEs of each vehicle that are read before several logs are put in order."""
 

@@ -24,8 +24,6 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.vectors import Quaternion, Vector
 
-__all__ = ["SUFFIX", "Image", "Observation", "ObservationWriter", "observations_beside", "read_observations"]
-
 SUFFIX: Final = ".observations"
 _MAGIC: Final = b"FSO1"
 _HEAD: Final = struct.Struct("<4sIII")

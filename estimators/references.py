@@ -19,23 +19,6 @@ from flightsim.foundation.vectors import euler_from_quaternions, wrap_180, wrap_
 if TYPE_CHECKING:
     from estimators.logs import Log, Table
 
-__all__ = [
-    "AUTOPILOT",
-    "COMPARED",
-    "TRUTH",
-    "ErrorFigures",
-    "Reference",
-    "Series",
-    "error_figures",
-    "errors",
-    "home_of",
-    "lacking_references",
-    "quantity_of",
-    "references",
-    "target_reference",
-    "targets_reference",
-]
-
 Column = NDArray[np.float64]
 
 AUTOPILOT: Final = "autopilot"

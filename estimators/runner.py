@@ -22,16 +22,6 @@ from estimators.needs import message_names
 from estimators.observations import Observation
 from estimators.vehicle_time import TeamTime, VehicleTime
 
-__all__ = [
-    "ESTIMATE_MESSAGES",
-    "ESTIMATOR_COMPONENTS",
-    "TRUTH_COMPONENT",
-    "TRUTH_MESSAGES",
-    "EstimateTable",
-    "Runner",
-    "why_excluded",
-]
-
 TRUTH_COMPONENT: Final = 25
 """Component id of the simulator in an embedded SITL (MAV_COMP_ID_USER1)."""
 TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})

@@ -47,8 +47,6 @@ UNIX_TIME_US: Final = 1_000_000_000_000_000
 _WITHOUT: Final = frozenset({"SERVO_OUTPUT_RAW"})
 _STAMPS: Final = (("time_boot_ms", 1000), ("time_usec", 1))
 
-__all__ = ["TeamTime"]
-
 _LEAST_UNIX_US: Final = 946_684_800_000_000
 """2000-01-01. An autopilot that does not know the date sends 0, or counts from 1970 or 1980."""
 _TOGETHER_US: Final = 2_000

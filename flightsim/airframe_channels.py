@@ -7,8 +7,6 @@ from typing import Any, Final
 from flightsim.airframe_types import ActuatorChannel, AirframeError, Role
 from flightsim.toml_tables import names_of, number, only, text
 
-__all__ = ["read_channels", "standard_channel"]
-
 # JSBSim's standard pilot's commands: its elevator is positive nose down, its rudder positive nose left.
 _STANDARD: Final = (
     ActuatorChannel(role=Role.AILERON, properties=("fcs/aileron-cmd-norm",)),

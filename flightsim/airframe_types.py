@@ -18,17 +18,6 @@ from flightsim.interface import (
     THROTTLE,
 )
 
-__all__ = [
-    "ActuatorChannel",
-    "Airframe",
-    "AirframeError",
-    "AirframeKind",
-    "FlightLimits",
-    "LaunchKind",
-    "LaunchParameters",
-    "Role",
-]
-
 
 class AirframeError(ValueError):
     """A vehicle model cannot be used; the message names the file and the reason."""

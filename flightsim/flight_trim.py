@@ -10,8 +10,6 @@ from flightsim.initial_state import InitialState
 from flightsim.interface import AILERON, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
 from flightsim.wind_tunnel import FlightState
 
-__all__ = ["FlightTrim", "flight_pitch_rad", "flight_state"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightTrim:

@@ -19,8 +19,6 @@ from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.jsbsim_model import LAUNCHER_FORCE, LAUNCHER_MOMENT, find_property
 from flightsim.truth_reading import MOTION
 
-__all__ = ["Launcher"]
-
 Array = NDArray[np.float64]
 
 _SPRING_RAD_S: Final = 20.0  # natural frequency of the carriage's spring, a twelfth of 1/dt at 250 Hz

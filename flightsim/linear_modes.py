@@ -15,8 +15,6 @@ from flightsim.interface import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flightsim.trim_flight import FlightTrim, trim_in_tunnel
 from flightsim.wind_tunnel import FlightState, WindTunnel
 
-__all__ = ["LinearModel", "Mode", "linear_modes", "linearise"]
-
 Array = NDArray[np.float64]
 
 # Places in the state (u v w p q r roll pitch) and in the commands of `LinearModel.b`.

@@ -6,8 +6,6 @@ from typing import Any
 
 from flightsim.airframe_types import AirframeError
 
-__all__ = ["listed", "names_of", "number", "only", "table_of", "text"]
-
 
 def listed(names: Any) -> str:
     """Names in a row, for a message."""

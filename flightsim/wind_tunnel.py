@@ -25,8 +25,6 @@ from flightsim.initial_state import InitialState, height_on_wheels_m, initialise
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
 
-__all__ = ["FlightState", "Reading", "WindTunnel"]
-
 Array = NDArray[np.float64]
 
 _BLOCK_S: Final = 0.4  # servos have followed by then

@@ -6,8 +6,6 @@ from typing import Final
 from estimators.attitude.parameters import AirspeedSource
 from flightsim.foundation.atmosphere import SEA_LEVEL_DENSITY_KG_M3, SEA_LEVEL_PRESSURE_PA
 
-__all__ = ["AirData", "pressure_pa", "true_over_equivalent"]
-
 _DENSITY_EXPONENT: Final = 1.0 - 1.0 / 5.25588
 """Density by pressure in the standard atmosphere, rounded: stored estimates are compared to the bit."""
 _HECTOPASCAL_MAX: Final = 1200.0

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-__all__ = ["AttitudeEstimate"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttitudeEstimate:

@@ -26,8 +26,6 @@ from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message
 
-__all__ = ["LEAST_RATE_HZ", "AttitudeEstimator"]
-
 LEAST_RATE_HZ: Final = 20.0
 WANTED_RATE_HZ: Final = 50.0
 _SLOWEST_US: Final = int(1e6 / (0.9 * LEAST_RATE_HZ))

@@ -7,8 +7,6 @@ from autopilot_bridge.mavlink import dialect
 from estimators.attitude import layout as at
 from estimators.attitude.parameters import VehicleKind
 
-__all__ = ["FORM_NAMES", "FORM_OF_KIND", "FORM_OF_TYPE"]
-
 _WINGED: Final = (
     "FIXED_WING",
     "FLAPPING_WING",

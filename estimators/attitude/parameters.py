@@ -10,8 +10,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["AirspeedSource", "AttitudeParameters", "ImuSource", "VehicleKind"]
-
 TRIM_LIMIT_RAD: Final = 0.3
 """ArduPilot itself accepts 10 degrees."""
 

@@ -15,8 +15,6 @@ from estimators.attitude.parameters import ImuSource
 from estimators.messages import Message, message_class
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
-__all__ = ["DIFFERENTIAL_PRESSURE", "INERTIAL_FIELDS", "SAMPLES", "Sample"]
-
 Sample = tuple[float, float, float, float, float, float]
 """Specific force in m/s^2 and angular rate in rad/s, FRD."""
 

@@ -5,8 +5,6 @@ from typing import ClassVar
 
 from estimators.lissajous.model import Array
 
-__all__ = ["LissajousEstimate"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LissajousEstimate:

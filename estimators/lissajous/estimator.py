@@ -19,8 +19,6 @@ from estimators.lissajous.positions import PositionReader, values_of
 from estimators.messages import Message
 from flightsim.foundation.geodesy import GeodeticPosition
 
-__all__ = ["LissajousEstimator"]
-
 _AUTOPILOT: Final = 1
 _NEEDED_HZ: Final = 2.0
 _WANTED_HZ: Final = 10.0

@@ -20,8 +20,6 @@ from estimators.lissajous.model import (
 )
 from estimators.lissajous.parameters import Form, LissajousParameters
 
-__all__ = ["MotionFilter", "off_pattern_remarks"]
-
 _EXACT = int(Discretisation.EXACT)
 _UNKNOWN_VELOCITY_M_S = 1e3
 _TOO_OFTEN = 0.1

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-__all__ = ["Form", "LissajousParameters", "Source"]
-
 
 class Form(StrEnum):
     """The three estimators of Steckenrider et al. 2020, Table IV."""

@@ -10,8 +10,6 @@ from estimators.lissajous.parameters import LissajousParameters
 from estimators.lissajous.positions import Fix
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
-__all__ = ["PatternFrame", "Track"]
-
 
 class PatternFrame:
     """The pattern's frame: its centre, and its axes relative to north.

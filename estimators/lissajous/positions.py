@@ -8,8 +8,6 @@ from estimators.lissajous.parameters import Source
 from estimators.messages import Message
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
-__all__ = ["MESSAGES", "Fix", "PositionReader"]
-
 MESSAGES: Final = {
     Source.GPS: "GPS_RAW_INT",
     Source.GLOBAL: "GLOBAL_POSITION_INT",

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from autopilot_bridge.errors import BridgeError
 from estimators.messages import field_name
 
-__all__ = ["Condition", "ConditionError"]
-
 _ACCEPTED: Final = (
     "accepted: MESSAGE.field, MESSAGE.field[index], numbers, 'texts', + - * / % & |, comparisons, and, or, "
     "not, abs(), ()"

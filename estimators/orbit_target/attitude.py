@@ -11,8 +11,6 @@ from estimators.messages import Message
 from estimators.needs import message_names
 from flightsim.foundation.vectors import Quaternion, between, from_euler, yaw_of
 
-__all__ = ["ATTITUDE", "AttitudeSource", "AutopilotAttitude", "FilterAttitude"]
-
 ATTITUDE: Final = "ATTITUDE"
 _AUTOPILOT: Final = 1
 _KEPT: Final = 256

@@ -24,8 +24,6 @@ from estimators.vehicle_time import UNIX_TIME_US
 from flightsim.foundation.atmosphere import air_density_ratio
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
-__all__ = ["OrbitTargetEstimate", "OrbitTargetEstimator", "OrbitTargetParameters"]
-
 _AUTOPILOT: Final = 1
 _GROUND_SAMPLES: Final = 20
 _PRESSURES_PA: Final = (10_000.0, 120_000.0)

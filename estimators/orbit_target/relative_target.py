@@ -26,8 +26,6 @@ from numpy.typing import NDArray
 from estimators.tracking.gaussian import Gaussian, Innovation
 from estimators.tracking.line_of_sight import LineOfSight
 
-__all__ = ["RelativeState", "RelativeTarget", "RelativeTargetParameters"]
-
 Array = NDArray[np.float64]
 
 OFFSET: Final = slice(0, 2)  # north, east, m, from aircraft to target

@@ -15,8 +15,6 @@ from estimators.comparison import Comparison
 from estimators.references import AUTOPILOT, TRUTH, quantity_of
 from flightsim.foundation.vectors import wrap_pi
 
-__all__ = ["draw_errors", "tidy"]
-
 _INK: Final = "#1f2937"
 _GRID: Final = "#e5e7eb"
 _ESTIMATE: Final = "#c2410c"

@@ -14,17 +14,6 @@ from estimators.logs import Log
 from estimators.needs import Supply
 from estimators.runner import Runner
 
-__all__ = [
-    "COMPLETED",
-    "FAILED",
-    "INTERRUPTED",
-    "Assessment",
-    "assess",
-    "notes_of",
-    "table_lines",
-    "warnings_of",
-]
-
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
 INTERRUPTED: Final = "interrupted"

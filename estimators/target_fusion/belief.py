@@ -13,8 +13,6 @@ from estimators.interface import Outcome
 from estimators.lissajous.model import Array
 from estimators.target_fusion.transform import INFORMATION, add_information, belief_of
 
-__all__ = ["TargetBelief"]
-
 MEAN: Final = slice(0, 2)
 
 

@@ -19,16 +19,12 @@ from estimators.target_fusion.transform import ground_target
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, between, from_euler, product, yaw_of
 
-__all__ = ["Drone"]
-
 _REACH_US: Final = 300_000
 _REMEMBERED: Final = 64
 _AHEAD_US: Final = 1_000_000
 _IN_VEHICLE_FRAME: Final = 32  # GIMBAL_DEVICE_FLAGS
 _IN_EARTH_FRAME: Final = 64
 _YAW_LOCK: Final = 16
-
-__all__ = ["Orientations"]
 
 
 class Orientations:

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-__all__ = ["TargetEstimate"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetEstimate:

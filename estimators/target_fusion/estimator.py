@@ -21,8 +21,6 @@ from estimators.target_fusion.estimate import TargetEstimate
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
 from flightsim.foundation.geodesy import GeodeticPosition
 
-__all__ = ["TargetFusionEstimator"]
-
 _AUTOPILOT: Final = 1
 _ATTITUDE_HZ: Final = 10.0
 _GIMBAL_HZ: Final = 5.0

@@ -8,8 +8,6 @@ from enum import StrEnum
 
 from estimators.lissajous.parameters import LissajousParameters
 
-__all__ = ["Heading", "Mount", "Range", "TargetFusionParameters"]
-
 
 class Heading(StrEnum):
     """The source of a drone's heading."""

@@ -14,8 +14,6 @@ from estimators.lissajous.model import Array
 from estimators.target_fusion.parameters import Range, TargetFusionParameters
 from flightsim.foundation.vectors import Quaternion, rotate
 
-__all__ = ["Detection", "Seen", "place_in_level_frame"]
-
 _MAX_RANGE_M = 20_000.0
 _STEEPEST = 1e-3  # sine of the depression: below it the place on the ground is too far away to be useful
 

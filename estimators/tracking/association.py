@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["assign"]
-
 Array = NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
 
-__all__ = ["MAX_CELLS", "Cell", "GridBelief", "GridLayout"]
-
 Array = NDArray[np.float64]
 
 MAX_CELLS: Final = 250_000

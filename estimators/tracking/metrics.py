@@ -5,8 +5,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["calibration_error", "crps", "inside_ellipse", "mean_square", "nees", "rms"]
-
 Array = NDArray[np.float64]
 
 

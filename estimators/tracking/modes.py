@@ -13,8 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Mode", "find_modes"]
-
 Array = NDArray[np.float64]
 
 _ANGLE_BINS: Final = 60

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from estimators.tracking.association import assign
 
-__all__ = ["Gospa", "gospa", "ospa"]
-
 Array = NDArray[np.float64]
 
 

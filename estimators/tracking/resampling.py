@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["effective_count", "roulette", "systematic"]
-
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 

@@ -29,8 +29,6 @@ try:  # Numba promises nothing of these; tests/flightsim/foundation/test_kernels
 except ImportError:  # then Numba's own cache serves, and kernels are called with all their arguments
     dumps = None
 
-__all__ = ["bound", "compiled_for", "kernel", "source_stamp"]
-
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PLAIN: Final = (bool, int, float, complex, str, bytes, type(None), slice, range, np.generic, np.dtype)

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from autopilot_bridge.clock import Clock
     from autopilot_bridge.links import Link
 
-__all__ = ["COMPONENT_ID", "FlightEstimators", "heartbeat"]
-
 COMPONENT_ID: Final = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
 _HEARTBEAT_PERIOD_S: Final = 1.0

@@ -34,8 +34,6 @@ from missions.runs.run_folder import LOG_NAME, create_run_folder
 from missions.runs.signing import client_signing
 from missions.vehicle.connection import Connection
 
-__all__ = ["LiveProgress", "LiveRequest", "estimate"]
-
 SILENCE_S: Final = 10.0
 _LOOK_S: Final = 0.25
 

@@ -17,8 +17,6 @@ from missions.errors import PlanError
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.runs.run_folder import RUNS, create_run_folder
 
-__all__ = ["ReplayRequest", "replay_logs"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayRequest:

@@ -8,8 +8,6 @@ from autopilot_bridge.mavlink import definition, dialect
 from estimators.interface import Need
 from estimators.needs import NOT_STREAMED, RATE_TOLERANCE, lacking, wanted_rate_hz
 
-__all__ = ["CHECK_PERIOD_S", "RateWatch", "interval_request"]
-
 CHECK_PERIOD_S: Final = 2.0
 """Interval of vehicle time over which rates are measured; an autopilot answers a request within it."""
 _MARGIN: Final = 1.25

@@ -20,8 +20,6 @@ from estimators.observations import SUFFIX, Observation, ObservationWriter
 from estimators.runner import Runner, why_excluded
 from missions.vehicle.connection import Recorder
 
-__all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
-
 PUBLISH_RATE_HZ: Final = 10.0
 """Highest rate at which estimates are sent, Hz; a telemetry radio can carry it."""
 

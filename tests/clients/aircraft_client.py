@@ -106,7 +106,7 @@ class AircraftClient(Client):
         clock = [0.0]
         self.until(f"airspeed of {airspeed_m_s} m/s", held)
 
-    # what it is asked
+    # what is requested
 
     def send_attitude(self, roll_deg: float, pitch_deg: float, thrust: float, type_mask: int = 0x07) -> None:
         """SET_ATTITUDE_TARGET of roll and pitch; type_mask 0x07 ignores the body rates."""

@@ -33,7 +33,7 @@ class Client:
         flavour: "px4" or "ardupilot".
         url: as mavutil takes it.
         speedup: of the SITL, which says how long a second of the vehicle takes here.
-        stream_hz: what is asked of ArduPilot's streams.
+        stream_hz: what is requested of ArduPilot's streams.
 
     Attributes:
         texts: STATUSTEXTs so far.

@@ -156,7 +156,7 @@ def test_mavsdk_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
     async def script(url: str) -> None:
         async with ground_station(url.replace("udpin:", "udpin://")) as system:
             telemetry, action, offboard = TelemetryAsync(system), ActionAsync(system), OffboardAsync(system)
-            if flavour == "ardupilot":  # which sends what it is asked for
+            if flavour == "ardupilot":  # which sends what was requested of it
                 await until_accepted(lambda: telemetry.set_rate_position(4.0))
                 await until_accepted(lambda: telemetry.set_rate_position_velocity_ned(4.0))
                 await until_accepted(lambda: telemetry.set_rate_landed_state(2.0))

@@ -70,12 +70,12 @@ RATED: Final = frozenset(
 @compatibility(feature="telemetry")
 def test_telemetry(mavsdk: Session, vehicle: str, stream: str, request: pytest.FixtureRequest) -> None:
     reason = NO_STREAM[vehicle].get(stream)
-    asked = stream not in RATED or accepted(mavsdk, "telemetry", f"set_rate_{stream}", 10.0)
+    requested = stream not in RATED or accepted(mavsdk, "telemetry", f"set_rate_{stream}", 10.0)
     if reason is None:
-        assert asked
+        assert requested
         assert mavsdk.first("telemetry", stream, wait_s=8.0) is not None
         return
-    if asked:
+    if requested:
         with pytest.raises(AssertionError, match="not seen"):
             mavsdk.first("telemetry", stream, wait_s=0.3)
     not_offered(request, f"without {stream}: {reason}")

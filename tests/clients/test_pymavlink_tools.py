@@ -15,7 +15,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 SPEEDUP: Final = 5.0
 TRANSFER_S: Final = 15
 UNASKED: Final = 65535
-"""param_index of a value that was not asked for by its index."""
+"""param_index of a value that was not requested by its index."""
 FOLDER: Final = {"px4": "/fs/microsd", "ardupilot": "/APM"}
 
 compatibility = pytest.mark.compatibility
@@ -74,7 +74,7 @@ def test_mavparm(script: Client, tmp_path: Path) -> None:
         return len(received) == count > 0
 
     def missing() -> None:
-        """What a busy machine has dropped is asked for again, as every client does."""
+        """What a busy machine has dropped is requested again, as every client does."""
         if count and not script.link.mav.total_packets_received % 50:
             for index in sorted(set(range(count)) - received)[:20]:
                 script.link.mav.param_request_read_send(1, 1, b"", index)
@@ -182,13 +182,13 @@ def test_calibration(script: Client, request: pytest.FixtureRequest) -> None:
         return
     script.command(mavlink.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 1)
     for position in (1, 2, 3, 4, 5, 6):
-        asked = script.next(
+        requested = script.next(
             "COMMAND_LONG",
             lambda m, position=position: (
                 m.command == mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS and m.param1 == position
             ),
         )
-        script.command(mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS, asked.param1)
+        script.command(mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS, requested.param1)
     script.next("STATUSTEXT", lambda m: m.text == "Calibration successful")
     script.command(mavlink.MAV_CMD_DO_START_MAG_CAL)
     script.next("MAG_CAL_PROGRESS", lambda m: m.completion_pct > 50)

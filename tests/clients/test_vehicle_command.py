@@ -187,7 +187,7 @@ def logged_flight(user: User) -> None:
         script.link.close()
 
 
-def test_logs_are_fetched_once_and_erased_when_asked_for(user: User, tmp_path: Path) -> None:
+def test_logs_are_fetched_once_and_erased_when_requested(user: User, tmp_path: Path) -> None:
     if user.flavour == "ardupilot":
         assert user.json("logs", "list") == []
         assert user.run("logs", "download", "--to", str(tmp_path)).returncode == 2

@@ -55,13 +55,15 @@ class Flight:
 
     def uri(self) -> str:
         number = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
-        asked = self.ask(CAMERA, mavlink.MAV_CMD_REQUEST_MESSAGE, number, reply="VIDEO_STREAM_INFORMATION")
-        assert (asked.type, asked.encoding) == (
+        requested = self.ask(
+            CAMERA, mavlink.MAV_CMD_REQUEST_MESSAGE, number, reply="VIDEO_STREAM_INFORMATION"
+        )
+        assert (requested.type, requested.encoding) == (
             mavlink.VIDEO_STREAM_TYPE_RTSP,
             mavlink.VIDEO_STREAM_ENCODING_H264,
         )
-        assert (asked.resolution_h, asked.resolution_v) == (1280, 720)
-        return str(asked.uri)
+        assert (requested.resolution_h, requested.resolution_v) == (1280, 720)
+        return str(requested.uri)
 
 
 def eventually(found: Callable[[], bool], what: str) -> None:

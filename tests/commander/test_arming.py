@@ -189,7 +189,7 @@ def test_ardupilot_reports_prearm_problems_every_thirty_seconds() -> None:
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_every_mode_on_the_ground_and_in_flight(flavour: str) -> None:
-    """Whatever is asked for, the answer is a verdict and the vehicle stays where the answer says."""
+    """Whatever is requested, the answer is a verdict and the vehicle stays where the answer says."""
     for mode in MODE_NEEDS:
         for flying in (False, True):
             rig = Rig(flavour)

@@ -120,7 +120,7 @@ def test_airspeed_is_checked_before_arming_and_watched_in_flight() -> None:
     assert [event.valid for event in rig.happened(AirspeedChanged)] == [False, True]
 
 
-def test_px4_takeoff_ends_circling_at_the_height_asked_for() -> None:
+def test_px4_takeoff_ends_circling_at_the_height_requested() -> None:
     rig = aircraft("px4")
     commander = rig.commander
     assert commander.guidance.takeoff(down_m=-60.0, yaw_rad=math.nan, north_m=200.0, east_m=10.0).accepted

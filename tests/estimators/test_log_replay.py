@@ -153,7 +153,7 @@ def test_several_logs_are_for_teams(make_log, make):
 
 
 def test_a_boot_that_is_left_out_is_counted_all_the_same(make_log, make):
-    """Of three boots the first is over before the part that is asked for begins."""
+    """Of three boots the first is over before the part that is requested begins."""
     log = make_log()
     for seconds, roll in ((4, 0.1), (20, 0.2), (20, 0.3)):
         for k in range(seconds * 20):

@@ -55,7 +55,7 @@ def test_lissajous_waypoints_are_passed_without_stopping() -> None:
     misses = [np.linalg.norm(track - point, axis=1).min() for point in points]
     assert max(misses) < 1.6  # of 2 m
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-    # 5 m/s asked; tight corners may slow the vehicle, but it never stops on the way
+    # 5 m/s commanded; tight corners may slow the vehicle, but it never stops on the way
     assert len(log) * 0.02 < length / 5.0 * 1.35 + 10.0
     speed = np.linalg.norm(velocities(log)[200:-400, 0:2], axis=1)
     assert speed.min() > 1.5

@@ -182,7 +182,7 @@ def test_leg_of_thirty_metres_with_arducopter_limits_takes_eight_seconds() -> No
     assert rig.nav[nav_layout.YAW] == pytest.approx(math.pi / 2.0, abs=0.1)  # the nose turned to the target
 
 
-def test_reposition_keeps_what_is_nan_and_takes_off_when_asked_up() -> None:
+def test_reposition_keeps_what_is_nan_and_takes_off_when_commanded_up() -> None:
     rig = Rig()
     task = RepositionTask(np.array([math.nan, math.nan, -4.0]))
     rig.fly(task)

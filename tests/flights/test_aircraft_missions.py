@@ -172,7 +172,7 @@ def test_landings(flavour: str, wind_from_deg: float) -> None:
 @pytest.mark.parametrize("wind_from_deg", [0.0, 60.0, -60.0])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_landings_in_moderate_turbulence(flavour: str, wind_from_deg: float) -> None:
-    """The worst downdraught at the touch is luck: one landing of four may be harder than what is asked."""
+    """The worst downdraught at the touch is luck: one landing of four may be harder than what is required."""
     flown = [mission(Case(flavour, None, tuple(RECTANGLE), wind_from_deg, seed)) for seed in range(4)]
     away_m = [abs(figures.touch_along_m) for figures in flown]
     sinks_m_s = [figures.touch_sink_m_s for figures in flown]

@@ -85,7 +85,7 @@ def test_higher_and_hotter_climbs_less(aerosonde: FlightEnvelope) -> None:
     assert thin.stall_speed_m_s == pytest.approx(aerosonde.stall_speed_m_s, rel=0.03)  # equivalent airspeed
 
 
-def test_asked_again_it_is_remembered(aerosonde: FlightEnvelope) -> None:
+def test_computed_once_it_is_remembered(aerosonde: FlightEnvelope) -> None:
     assert flight_envelope("aerosonde") is aerosonde
 
 

@@ -164,14 +164,16 @@ def test_a_fault_changes_no_other_sensor(unit: SensorUnit) -> None:
 
 
 def test_every_sensor_and_every_unit_has_a_stream_of_its_own() -> None:
-    asked: list[str] = []
+    requested: list[str] = []
 
     def seeds(name: str) -> np.random.SeedSequence:
-        asked.append(name)
+        requested.append(name)
         return RandomStreams(1).child(name)
 
     suite = SensorSuite(EVERYTHING, physics_rate_hz=RATE_HZ, truth=np.zeros(t.TRUTH_SIZE), seeds=seeds)
-    assert sorted(asked) == sorted([*NAMES, *(f"fault_{unit.name.lower()}" for unit in suite.faults.units)])
+    assert sorted(requested) == sorted(
+        [*NAMES, *(f"fault_{unit.name.lower()}" for unit in suite.faults.units)]
+    )
 
 
 def test_same_seed_same_bytes_and_another_seed_other_bytes() -> None:

@@ -60,7 +60,7 @@ def test_yes_flies_only_when_nothing_is_found(capsys: pytest.CaptureFixture[str]
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
+def confirm(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
     confirm = confirmation(SERIAL, yes=False, check=False)
     assert confirm is not None
@@ -82,10 +82,10 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
     ],
 )
 def test_what_the_answers_do(
-    asked: Confirm, look: Look, answer: str, flies: bool, monkeypatch: pytest.MonkeyPatch
+    confirm: Confirm, look: Look, answer: str, flies: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def typed(_question: str) -> str:
         return answer
 
     monkeypatch.setattr("missions.cli.confirm.ask", typed)
-    assert asyncio.run(asked([look])) is flies
+    assert asyncio.run(confirm([look])) is flies

@@ -178,15 +178,15 @@ def test_the_wind_in_words(speed_m_s: float, profile: str, turbulence: str, word
 def test_turns_are_planned_for_the_wind_the_user_expects(
     arguments: list[str], planned_m_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = []
+    requested = []
 
     def refuse(_mission: object, request: RunRequest, _on_progress: object) -> None:
-        asked.append(request)
+        requested.append(request)
         raise PlanError("enough")
 
     monkeypatch.setattr("missions.runs.session.fly", refuse)
     assert CliRunner().invoke(fly, arguments).exit_code == 2
-    assert [request.planning_wind_m_s for request in asked] == [planned_m_s]
+    assert [request.planning_wind_m_s for request in requested] == [planned_m_s]
 
 
 @pytest.mark.parametrize(

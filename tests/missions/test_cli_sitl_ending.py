@@ -1,4 +1,4 @@
-"""`flightstack sitl`: asked to end while it starts or runs, and what it leaves behind when it can't start."""
+"""`flightstack sitl`: terminated while it starts or runs, and what it leaves behind when it can't start."""
 
 import os
 import shutil
@@ -70,18 +70,18 @@ def sitl(*arguments: str) -> Result:
 
 
 @pytest.mark.parametrize("number", ASKING)
-def test_asked_while_it_starts_it_leaves_nothing(
+def test_terminated_while_it_starts_it_leaves_nothing(
     number: signal.Signals,
     cards: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def asked(_: Any) -> None:
+    def requested(_: Any) -> None:
         assert list(cards.iterdir())
         os.kill(os.getpid(), number)
 
-    monkeypatch.setattr("autopilot_bridge.sitl.compile_flight_code", asked)
+    monkeypatch.setattr("autopilot_bridge.sitl.compile_flight_code", requested)
     log = tmp_path / "said.tlog"
     assert run_command_line([*QUICK, "--duration", "3", "--log", str(log)]) == 130
     assert capsys.readouterr().err.endswith("interrupted\n")
@@ -89,7 +89,7 @@ def test_asked_while_it_starts_it_leaves_nothing(
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_asked_where_nothing_can_be_raised_it_does_not_start(
+def test_terminated_where_nothing_can_be_raised_it_does_not_start(
     cards: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Dying:
@@ -107,7 +107,7 @@ def test_asked_where_nothing_can_be_raised_it_does_not_start(
 
 
 @pytest.mark.parametrize("number", ASKING)
-def test_asked_in_flight_it_ends_in_good_order(
+def test_terminated_in_flight_it_ends_in_good_order(
     number: signal.Signals, cards: Path, tmp_path: Path, in_flight: Callable[..., None]
 ) -> None:
     in_flight(lambda: os.kill(os.getpid(), number))

@@ -73,7 +73,7 @@ def test_a_slow_reader_loses_the_oldest_and_counts_them():
     on_memory(script)
 
 
-def test_latest_is_decoded_once_and_only_when_asked():
+def test_latest_is_decoded_once_and_only_when_read():
     async def script(connection, send):
         assert connection.latest("ATTITUDE", 1) is None
         send(attitude(1))

@@ -74,7 +74,7 @@ def test_it_is_obeyed_in_the_background_where_ctrl_c_is_ignored(
     assert elsewhere.kind == "return"
 
 
-def test_what_is_sent_twice_at_once_is_asked_once(
+def test_what_is_sent_twice_at_once_is_sent_once(
     elsewhere: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("missions.runs.ending.wall_time_s", lambda: 5.0)

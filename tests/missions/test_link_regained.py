@@ -85,10 +85,10 @@ def test_setpoints_wait_where_they_were_and_go_on(flown):
     async def script(vehicle, autopilot):
         vehicle.link.regain_s = 60.0
         await vehicle.takeoff(10.0)
-        asked = []
+        requested = []
 
         def source(t_s):
-            asked.append(t_s)
+            requested.append(t_s)
             north_m = 2.0 * t_s
             return (
                 Setpoint(position_ned_m=(north_m, 0.0, -10.0), velocity_ned_m_s=(2.0, 0.0, 0.0))
@@ -99,10 +99,10 @@ def test_setpoints_wait_where_they_were_and_go_on(flown):
         cut(vehicle, autopilot, after_s=10.0, for_s=20.0, both_ways=False)
         begun_us = autopilot.time_us
         await vehicle.follow(source)
-        return asked, autopilot.setpoints, (autopilot.time_us - begun_us) * 1e-6
+        return requested, autopilot.setpoints, (autopilot.time_us - begun_us) * 1e-6
 
-    asked, setpoints, seconds = flown(script)
-    steps = [b - a for a, b in pairwise(asked[1:])]
+    requested, setpoints, seconds = flown(script)
+    steps = [b - a for a, b in pairwise(requested[1:])]
     assert max(steps) < 0.1  # the source's own time has no gap
     assert 40.0 + 15.0 < seconds < 40.0 + 24.0
     held = [m for _, m in setpoints if m.type_mask & 0x38 == 0x38]  # without velocity
@@ -128,7 +128,7 @@ def test_setpoints_end_when_the_mode_is_no_longer_ours(flown):
 
 @both
 @pytest.mark.parametrize("asking", ["command", "mode", "parameter"])
-def test_what_is_asked_in_the_silence_is_answered_after_it(flown, flavour, asking):
+def test_what_is_requested_in_the_silence_is_answered_after_it(flown, flavour, asking):
     """A command is sent five times, a second apart, and is not received for much longer."""
 
     async def script(vehicle, autopilot):
@@ -148,7 +148,7 @@ def test_what_is_asked_in_the_silence_is_answered_after_it(flown, flavour, askin
     assert 20.0 < flown(script, flavour) < 25.0
 
 
-def test_streams_are_asked_for_again(flown):
+def test_streams_are_requested_again(flown):
     async def script(vehicle, autopilot):
         vehicle.link.regain_s = 60.0
         await vehicle.commands.set_message_rate("VFR_HUD", 10.0)

@@ -180,7 +180,7 @@ def test_what_is_not_on_board_is_named(flown):
     flown(mission)
 
 
-def test_wings_are_asked_of_wings_only(flown):
+def test_wings_are_required_of_wings_only(flown):
     async def mission(vehicle, _autopilot):
         with pytest.raises(PlanError, match="for aircraft with wings; this is a multicopter"):
             _ = vehicle.wing

@@ -56,7 +56,7 @@ waitpid, kill, reported = os.waitpid, os.kill, threading.Event()
 os.kill = lambda *signal: (reported.set(), kill(*signal))
 os.waitpid = lambda *which: (waitpid(*which), print("ended", flush=True), reported.wait(60.0))[0]
 """
-"""What watches the child learns that it has ended only after it was asked to end it."""
+"""What watches the child learns that it has ended only after it has terminated it."""
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -41,7 +41,7 @@ AEROSONDE = FixedWingLimits(
     radius=st.floats(20.0, 800.0),
     ramp_share=st.floats(0.01, 0.6),
 )
-def test_a_corner_turns_as_asked_and_no_tighter(turn: float, radius: float, ramp_share: float) -> None:
+def test_a_corner_turns_as_commanded_and_no_tighter(turn: float, radius: float, ramp_share: float) -> None:
     corner = Corner.of(turn, radius, ramp_share * radius)
     assert corner.course_rad[-1] == pytest.approx(turn, abs=1e-9)
     assert corner.curvature_per_m.max() <= 1.0 / radius + 1e-12
@@ -270,12 +270,12 @@ def test_one_refusal_tells_what_will_be_flown(name: str, chosen: dict[str, Any])
     with pytest.raises(PlanError) as refusal:
         flown(name, limits, **chosen)
     advice = r"`(width_m, height_m|spacing_m)` ([0-9.]+)(?:x([0-9.]+))?(?: or more)?,"
-    asked = re.search(advice, str(refusal.value))
-    assert asked is not None, refusal.value
-    if asked[1] == "spacing_m":
-        flown(name, limits, **(chosen | {"spacing_m": float(asked[2])}))
+    requested = re.search(advice, str(refusal.value))
+    assert requested is not None, refusal.value
+    if requested[1] == "spacing_m":
+        flown(name, limits, **(chosen | {"spacing_m": float(requested[2])}))
         return
-    wide_m, high_m = float(asked[2]), float(asked[3] or asked[2])
+    wide_m, high_m = float(requested[2]), float(requested[3] or requested[2])
     flown(name, limits, **(chosen | {"width_m": wide_m, "height_m": high_m}))
 
 

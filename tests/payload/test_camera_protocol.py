@@ -155,7 +155,7 @@ def test_photos_by_time_pause_and_go_on(world):
 
 def test_the_old_shutter_command(world):
     assert say(world, m.MAV_CMD_DO_DIGICAM_CONTROL, 0, 0, 0, 0, 1) == ACCEPTED
-    assert say(world, m.MAV_CMD_DO_DIGICAM_CONTROL) == ACCEPTED  # nothing is asked for
+    assert say(world, m.MAV_CMD_DO_DIGICAM_CONTROL) == ACCEPTED  # nothing is requested
     assert len(photos(world)) == 1
 
 

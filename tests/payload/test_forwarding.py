@@ -120,7 +120,7 @@ def test_the_heartbeat_of_another_device_is_not_the_cameras(system: int, compone
 
 
 @pytest.mark.parametrize(
-    ("asked", "forwarded"),
+    ("requested", "forwarded"),
     [
         ((-2.0, -2.0, -1.0, -1.0), (255, 190, -1, -1)),
         ((-1.0, -1.0, -2.0, -2.0), (-1, -1, 255, 190)),
@@ -129,10 +129,10 @@ def test_the_heartbeat_of_another_device_is_not_the_cameras(system: int, compone
     ],
 )
 def test_the_client_itself_takes_control_and_gives_it_up(
-    asked: tuple[float, ...], forwarded: tuple[float, ...]
+    requested: tuple[float, ...], forwarded: tuple[float, ...]
 ) -> None:
     talk = Talk("px4", GIMBAL)
-    assert talk.ask(CONFIGURE, *asked) == ACCEPTED
+    assert talk.ask(CONFIGURE, *requested) == ACCEPTED
     assert talk.sent[0][2:6] == forwarded
     talk.controlled_by((255, 190))
     talk.ask(CONFIGURE, -3.0, -3.0, -1.0, -1.0)

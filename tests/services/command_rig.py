@@ -47,7 +47,7 @@ class Channel:
 
 
 class Intervals:
-    """Remembers what was asked."""
+    """Remembers what was requested."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []

@@ -83,7 +83,7 @@ class PlaneRig(ServiceRig):
             self.context.nav[nav.AIRSPEED_M_S] = self.context.nav[nav.AIRSPEED_TRUE_M_S] = 25.0
 
     def fly(self, mode: FlightMode | None = None) -> "PlaneRig":
-        """In the air, in the mode that goes to places unless another is asked for."""
+        """In the air, in the mode that goes to places unless another is requested."""
         start = FlightMode.MANUAL if self.flavour.name == "ardupilot" else HOLD
         self.commander.set_mode(start)
         assert self.commander.arm().accepted, self.commander.arming_reasons

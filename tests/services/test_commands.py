@@ -451,7 +451,7 @@ RIGS: dict[tuple[str, str], Callable[[], ServiceRig]] = {
 
 
 def sane(rig: ServiceRig) -> None:
-    """Whatever was asked for, the control setpoint is usable and home is a place."""
+    """Whatever was requested, the control setpoint is usable and home is a place."""
     setpoint = rig.context.setpoint
     assert setpoint[sp.LEVEL] in (sp.OFF, sp.IDLE, sp.RATES, sp.ATTITUDE, sp.TRAJECTORY)
     assert not any(math.isinf(value) for value in setpoint)

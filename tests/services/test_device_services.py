@@ -22,7 +22,7 @@ FLYING_FLAGS = mavlink.ADSB_FLAGS_VALID_COORDS | mavlink.ADSB_FLAGS_VALID_ALTITU
 
 
 class Vehicle:
-    """A rig with the small services, which are asked before the flavour's commands."""
+    """A rig with the small services, which get commands before the flavour's commands."""
 
     def __init__(self, flavour: str, *, plane: bool = False, **parameters: float) -> None:
         self.rig = PlaneRig(flavour, **parameters) if plane else ServiceRig(flavour, **parameters)
@@ -124,8 +124,8 @@ def test_ardupilot_asks_for_six_positions() -> None:
     assert vehicle.long(CALIBRATE, 0, 0, 0, 0, 1) == [ACCEPTED]
     for position in range(1, 7):
         vehicle.run(1.2)
-        asked = vehicle.sent(mavlink.MAVLink_command_long_message)
-        assert {message.param1 for message in asked} == {position} and len(asked) >= 1  # repeated
+        requested = vehicle.sent(mavlink.MAVLink_command_long_message)
+        assert {message.param1 for message in requested} == {position} and len(requested) >= 1  # repeated
         assert vehicle.long(mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS, position % 6 + 1) == [FAILED]
         assert vehicle.long(mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS, position) == [ACCEPTED]
         vehicle.rig.channel.sent.clear()
@@ -194,7 +194,7 @@ def test_px4_gripper_is_acknowledged_when_it_is_done() -> None:
     vehicle = Vehicle("px4")
     assert vehicle.long(mavlink.MAV_CMD_DO_GRIPPER, 1, 1) == []
     vehicle.run(0.5)
-    assert vehicle.long(mavlink.MAV_CMD_DO_GRIPPER, 1, 1) == []  # asked again: no second answer
+    assert vehicle.long(mavlink.MAV_CMD_DO_GRIPPER, 1, 1) == []  # requested again: no second answer
     vehicle.run(2.0)
     assert [ack.result for ack in vehicle.sent(mavlink.MAVLink_command_ack_message)] == [ACCEPTED]
 

@@ -78,7 +78,7 @@ def test_px4s_gripper_takes_its_time(parameter_s: float, takes_s: float) -> None
 
 
 def test_px4_acknowledges_grippers_of_two_clients_in_the_order_in_which_they_end() -> None:
-    """The one with the shorter time ends first, though it was asked last."""
+    """The one with the shorter time ends first, though it was requested last."""
     vehicle = Vehicle("px4", PD_GRIPPER_TYPE=0, PD_GRIPPER_TO=5.0)
     assert vehicle.long(GRIPPER, 1, 0) == []
     vehicle.rig.store.set("PD_GRIPPER_TO", 1.0)
@@ -252,15 +252,15 @@ class Dialogue:
 
     def run(self, seconds: float) -> list[tuple[float, float]]:
         """(time s to the hundredth, position) of every request that is sent."""
-        asked = []
+        requested = []
         for _ in range(round(seconds * 50)):
             self.rig.channel.sent.clear()
             self.rig.tick()
             self.service.tick(self.rig.time_us)
             for message in self.rig.channel.sent:
                 assert message.command == m.MAV_CMD_ACCELCAL_VEHICLE_POS
-                asked.append((round((self.rig.time_us - self.start_us) * 1e-6, 2), message.param1))
-        return asked
+                requested.append((round((self.rig.time_us - self.start_us) * 1e-6, 2), message.param1))
+        return requested
 
 
 def test_a_position_is_requested_every_second_and_measured_for_one_and_a_half() -> None:
@@ -298,7 +298,9 @@ def test_a_calibration_without_an_answer_fails_after_five_minutes() -> None:
 def test_an_old_ground_station_confirms_with_an_acknowledgement(number: int, confirms: bool) -> None:
     dialogue = Dialogue()
     ack = m.MAVLink_command_ack_message(number, 0)
-    deliver(ack, Source(Channel(), 255, 190), dialogue.rig.time_us, dialogue.service)  # nothing is asked yet
+    deliver(
+        ack, Source(Channel(), 255, 190), dialogue.rig.time_us, dialogue.service
+    )  # nothing is requested yet
     dialogue.calibrate(p5=1)
     deliver(ack, Source(Channel(), 255, 190), dialogue.rig.time_us, dialogue.service)
     assert (dialogue.run(1.6)[0][1] == 2) == confirms

@@ -60,7 +60,7 @@ def test_every_fixed_text_is_an_event() -> None:
         assert occurrence.kind.message == notice.text
 
 
-def test_sequence_wraps_and_lost_events_can_be_asked_for() -> None:
+def test_sequence_wraps_and_lost_events_can_be_requested() -> None:
     rig = Rig()
     for _ in range(KEPT + 6):
         rig.service.follow(events.TakeoffDetected(time_us=0))
@@ -107,8 +107,8 @@ def test_report_comes_to_a_station_that_is_received_and_to_who_asks() -> None:
     assert [message.arguments for message in rig.sent()] == [message.arguments for message in first]
     rig.service.tick(30_000_000)
     assert rig.sent() == []
-    asked = Command(mavlink.MAV_CMD_RUN_PREARM_CHECKS, *(0.0,) * 7, None)
-    assert rig.service.commands[asked.id](asked, Source(rig.link, 255, 190)) is Result.ACCEPTED
+    requested = Command(mavlink.MAV_CMD_RUN_PREARM_CHECKS, *(0.0,) * 7, None)
+    assert rig.service.commands[requested.id](requested, Source(rig.link, 255, 190)) is Result.ACCEPTED
     reported = [message.id for message in rig.sent()]
     assert not rig.commander.arming_reasons and px4_events.HEALTH_SUMMARY.event_id in reported
 

@@ -304,19 +304,21 @@ def test_a_speed_limit_stops_before_the_margin(
 
 def test_old_and_absent_sectors_limit_nothing() -> None:
     circle = ObstacleMap()
-    asked: Any = {
+    requested: Any = {
         "margin_m": 1.0,
         "acceleration_m_s2": 2.0,
         "delay_s": 0.0,
         "guard_rad": 0.5,
         "timeout_us": 500_000,
     }
-    assert circle.speed_limit(0.0, 10, **asked) == math.inf and not circle.known(0.0, 10, timeout_us=500_000)
+    assert circle.speed_limit(0.0, 10, **requested) == math.inf and not circle.known(
+        0.0, 10, timeout_us=500_000
+    )
     circle.take(0.0, 0.1, 1.0, 10)
-    assert circle.speed_limit(0.0, 10, **asked) == 0.0 and circle.known(0.0, 10, timeout_us=500_000)
-    assert circle.speed_limit(0.0, 600_000, **asked) == math.inf
+    assert circle.speed_limit(0.0, 10, **requested) == 0.0 and circle.known(0.0, 10, timeout_us=500_000)
+    assert circle.speed_limit(0.0, 600_000, **requested) == math.inf
     circle.take(0.0, math.tau, math.inf, 700_000)
-    assert circle.speed_limit(0.0, 700_000, **asked) == math.inf
+    assert circle.speed_limit(0.0, 700_000, **requested) == math.inf
     assert int((circle.measured_us == 700_000).sum()) == SECTORS
 
 

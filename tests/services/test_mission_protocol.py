@@ -181,8 +181,8 @@ def test_ardupilot_partial_write(ardupilot: Vehicle) -> None:
         (reply,) = ardupilot.deliver(write(1, 1, start, end, 0))
         assert reply.type == 1
         assert ardupilot.take_texts() == [(4, "Flight plan update rejected")]
-    (asked,) = ardupilot.deliver(write(1, 1, 1, 2, 0))
-    assert asked.seq == 1
+    (requested,) = ardupilot.deliver(write(1, 1, 1, 2, 0))
+    assert requested.seq == 1
     ardupilot.deliver(item(1, z=55.0))
     assert [each.z for each in ardupilot.mission[1:]] == [10.0, 10.0, 10.0]
     (end,) = ardupilot.deliver(item(2, z=56.0))

@@ -45,14 +45,14 @@ def test_px4_asks_for_the_first_item_ever_with_the_float_message(px4: Vehicle) -
 
 def test_px4_turns_to_the_integer_message_when_the_float_one_is_refused(px4: Vehicle) -> None:
     px4.deliver(count(2))
-    (asked,) = px4.deliver(ack(mavlink.MAV_MISSION_UNSUPPORTED))
-    assert (asked.get_type(), asked.seq) == ("MISSION_REQUEST_INT", 0)
+    (requested,) = px4.deliver(ack(mavlink.MAV_MISSION_UNSUPPORTED))
+    assert (requested.get_type(), requested.seq) == ("MISSION_REQUEST_INT", 0)
 
 
 def test_ardupilot_always_asks_with_mission_request(ardupilot: Vehicle) -> None:
     items = plan(3)
-    asked = ardupilot.deliver(count(3)) + ardupilot.deliver(items[0]) + ardupilot.deliver(items[1])
-    assert [(message.get_type(), message.seq) for message in asked] == [
+    requested = ardupilot.deliver(count(3)) + ardupilot.deliver(items[0]) + ardupilot.deliver(items[1])
+    assert [(message.get_type(), message.seq) for message in requested] == [
         ("MISSION_REQUEST", 0),
         ("MISSION_REQUEST", 1),
         ("MISSION_REQUEST", 2),
@@ -125,16 +125,16 @@ def test_second_count(px4: Vehicle, ardupilot: Vehicle) -> None:
     (reply,) = px4.deliver(count(4))
     assert (reply.get_type(), reply.type) == ("MISSION_ACK", 1)
     assert px4.take_texts() == [(2, "WPM: REJ. CMD: Busy")]
-    (asked,) = px4.deliver(plan(4)[1])
-    assert asked.seq == 2
+    (requested,) = px4.deliver(plan(4)[1])
+    assert requested.seq == 2
     (restarted,) = ardupilot.deliver(count(2))
     assert (restarted.get_type(), restarted.seq) == ("MISSION_REQUEST", 0)
 
 
 def test_a_count_again_before_the_first_item_is_answered_again(px4: Vehicle) -> None:
     px4.deliver(count(4))
-    (asked,) = px4.deliver(count(4))
-    assert (asked.get_type(), asked.seq) == ("MISSION_REQUEST", 0)
+    (requested,) = px4.deliver(count(4))
+    assert (requested.get_type(), requested.seq) == ("MISSION_REQUEST", 0)
 
 
 def test_unsolicited_items(vehicle: Vehicle) -> None:
@@ -154,8 +154,8 @@ def test_px4_acknowledges_the_last_item_again(px4: Vehicle) -> None:
 @pytest.mark.parametrize(("flavour", "capacity"), [("px4", 10_000), ("ardupilot", 650)])
 def test_capacity(flavour: str, capacity: int) -> None:
     vehicle = Vehicle(flavour)
-    (asked,) = vehicle.deliver(count(capacity))
-    assert "REQUEST" in asked.get_type()
+    (requested,) = vehicle.deliver(count(capacity))
+    assert "REQUEST" in requested.get_type()
     vehicle = Vehicle(flavour)
     (reply,) = vehicle.deliver(count(capacity + 1))
     assert reply.type == mavlink.MAV_MISSION_NO_SPACE
@@ -272,10 +272,10 @@ def test_when_an_item_is_requested_again_and_when_the_upload_ends(
     vehicle = Vehicle(flavour)
     vehicle.deliver(count(2))
     received = vehicle.tick(timeout_s + 3.0)
-    asked = [at for at, message in received if message.get_type().startswith("MISSION_REQUEST")]
+    requested = [at for at, message in received if message.get_type().startswith("MISSION_REQUEST")]
     tick_s = 0.02
     step_s = tick_s * (math.floor(retry_s / tick_s + 1e-9) + 1)  # after the time, not at it
-    assert asked == pytest.approx([step_s * (k + 1) for k in range(int(timeout_s / step_s + 1e-9))])
+    assert requested == pytest.approx([step_s * (k + 1) for k in range(int(timeout_s / step_s + 1e-9))])
     acks = [(at, message.type) for at, message in received if message.get_type() == "MISSION_ACK"]
     assert [kind for _, kind in acks] == ends
     assert [at for at, _ in acks] == pytest.approx([timeout_s + tick_s] * len(ends))

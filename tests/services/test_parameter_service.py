@@ -177,7 +177,7 @@ def test_ardupilot_set_is_echoed_once_to_everybody(ardupilot: Vehicle) -> None:
     ("value", "stored"), [(255.7, 255), (-255.7, -255), (3.995, 4), (1e9, 32767), (-1e9, -32768)]
 )
 def test_ardupilot_truncates_integers(ardupilot: Vehicle, value: float, stored: int) -> None:
-    (reply,) = ardupilot.write("LAND_SPEED", value, 9)  # INT16; the type code asked for is ignored
+    (reply,) = ardupilot.write("LAND_SPEED", value, 9)  # INT16; the type code requested is ignored
     assert (reply.param_value, reply.param_type) == (stored, mavlink.MAV_PARAM_TYPE_INT16)
 
 

@@ -123,7 +123,7 @@ def test_a_burst_with_gaps_is_filled() -> None:
     assert b"".join(got[start] for start in sorted(got)) == data
 
 
-def test_a_log_is_downloaded_and_gaps_are_asked_for() -> None:
+def test_a_log_is_downloaded_and_gaps_are_requested() -> None:
     station = Station(BAD)
     data = random.Random(5).randbytes(50_000)
     make_directories(station.files, ("log", "2025-01-01"))
@@ -152,6 +152,6 @@ def test_a_client_that_goes_away_leaves_nothing_open() -> None:
     message = mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, head.ljust(251, b"\0"))
     station.link.send(station.encoder.encode(message))
     sent = [m for m in station.run(3.0) if m.get_type() == "FILE_TRANSFER_PROTOCOL"]
-    assert len(sent) == 100  # one burst, and no more unless it is asked for
+    assert len(sent) == 100  # one burst, and no more unless it is requested
     station.run(62.0)
     assert station.ask(Opcode.READ_FILE, session=session, size=10)[-1] == bytes((FtpError.INVALID_SESSION,))

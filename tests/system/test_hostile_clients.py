@@ -1,6 +1,6 @@
 """What clients may do to a vehicle in the air, short of flying it: storms, sessions left open, crowds.
 
-Work is counted, not timed: so many frames are looked at, and so many are sent, whatever is asked for.
+Work is counted, not timed: so many frames are looked at, and so many are sent, whatever is requested.
 """
 
 from collections import Counter

@@ -90,7 +90,7 @@ def test_the_vehicle_finds_its_line_again(flavour: str, tmp_path: Path) -> None:
         back = bench.run(3.0)
         assert bench.link.connected and bench.link.counters.connects == 2
         names = {m.get_type() for m in back}
-        assert {"HEARTBEAT", "ATTITUDE"} <= names  # streams that were asked for go on
+        assert {"HEARTBEAT", "ATTITUDE"} <= names  # streams that were requested go on
         times_ms = [m.time_boot_ms for m in back if m.get_type() == "ATTITUDE"]
         assert min(times_ms) >= pulled_ms + OUT_S * 1000  # nothing stale
         assert {"AUTOPILOT_VERSION", "COMMAND_ACK"} <= {m.get_type() for m in bench.greet()}

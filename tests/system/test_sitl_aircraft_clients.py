@@ -33,11 +33,11 @@ class Client:
         self.link.mav.heartbeat_send(6, 8, 0, 0, 4)
         return self.link.recv_match(type=kind, blocking=True, timeout=0.1)
 
-    def insists(self, kind: str, asked: int, parameters: tuple[float, ...], **expected: float) -> None:
+    def insists(self, kind: str, requested: int, parameters: tuple[float, ...], **expected: float) -> None:
         """Ask until it is seen."""
 
         def done() -> bool:
-            self.ask(asked, *parameters)
+            self.ask(requested, *parameters)
             message = self.receive(kind)
             return message is not None and all(getattr(message, k) == v for k, v in expected.items())
 

@@ -60,12 +60,12 @@ class Client:
         self.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), kind))
         for _ in range(100):
             self.run(0.02)
-            asked = self.all("MISSION_REQUEST_INT") + self.all("MISSION_REQUEST")
+            requested = self.all("MISSION_REQUEST_INT") + self.all("MISSION_REQUEST")
             if self.all("MISSION_ACK"):
                 assert self.all("MISSION_ACK")[0].type == 0
                 return
             self.received.clear()
-            for request in asked:
+            for request in requested:
                 item = items[request.seq]
                 place = (round(item.x * 1e7), round(item.y * 1e7), item.z)
                 params = (item.param1, item.param2, item.param3, item.param4)

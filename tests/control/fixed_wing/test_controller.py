@@ -187,7 +187,7 @@ def test_surfaces_scale_with_airspeed(airspeed: float) -> None:
     )
 
 
-def test_turn_rate_of_a_coordinated_turn_is_asked_for() -> None:
+def test_turn_rate_of_a_coordinated_turn_is_requested() -> None:
     bank = math.radians(35.0)
     made = controller(roll_rad=bank, pitch_rad=0.0, throttle=0.5)
     level_flight(made.nav, roll=bank)

@@ -46,5 +46,5 @@ def test_a_sloping_path_is_followed_without_lag() -> None:
 
 def test_the_reference_waits_for_a_vehicle_that_cannot_follow() -> None:
     rows = trajectory(500.0, 0.0, 120.0, held_at=100.0)
-    asked = (rows[-1, 0] - 100.0) / PARAMETERS.height_time_constant_s
-    assert PARAMETERS.climb_max_m_s <= asked < 1.5 * PARAMETERS.climb_max_m_s
+    requested = (rows[-1, 0] - 100.0) / PARAMETERS.height_time_constant_s
+    assert PARAMETERS.climb_max_m_s <= requested < 1.5 * PARAMETERS.climb_max_m_s

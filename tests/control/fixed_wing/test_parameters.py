@@ -65,7 +65,7 @@ def test_a_control_without_effect_is_refused(field: str, value: float) -> None:
         FixedWingParameters.for_envelope(replace(AEROSONDE, **{field: value}))  # type: ignore[arg-type]
 
 
-def test_without_a_rudder_nothing_is_asked_of_it() -> None:
+def test_without_a_rudder_nothing_is_commanded_to_it() -> None:
     parameters = FixedWingParameters.for_envelope(
         replace(AEROSONDE, yaw_acceleration_per_rudder_rad_s2=0.0, sideslip_per_rudder_rad=0.0)
     )

@@ -46,10 +46,10 @@ def replays():
 def test_errors_against_the_autopilot(replays, name):
     _, compared = replays(name)
     counted = compared.counted
-    for angle, asked, measured in zip(("roll", "pitch"), *CASES[name], strict=True):
+    for angle, requested, measured in zip(("roll", "pitch"), *CASES[name], strict=True):
         error_deg = np.degrees(compared.errors("autopilot", f"{angle}_rad"))[counted]
         mean_square = np.nanmean(error_deg**2)
-        assert mean_square <= asked
+        assert mean_square <= requested
         assert mean_square < measured
 
 

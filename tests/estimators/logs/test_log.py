@@ -1,4 +1,4 @@
-"""What may be asked of a log, and what it answers when the question or the file is wrong."""
+"""What may be requested of a log, and what it answers when the question or the file is wrong."""
 
 import json
 import math

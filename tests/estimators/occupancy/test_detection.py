@@ -17,7 +17,7 @@ def probability(model: DetectionModel, target, start, end) -> float:
     return float(model.probability(np.array(target[0]), np.array(target[1]), start, end))
 
 
-def test_straight_pass_overhead_has_the_probability_asked_for():
+def test_straight_pass_overhead_has_the_probability_requested():
     model = DetectionModel(probability_overhead=0.9, range_m=50.0)
     assert probability(model, (0.0, 0.0), (-1000.0, 0.0), (1000.0, 0.0)) == pytest.approx(0.9, abs=1e-4)
 

@@ -82,7 +82,7 @@ def test_an_old_roll_is_none(fed):
 
 
 def test_between_samples():
-    """A turn of 20 degrees a second, asked for half way between two samples."""
+    """A turn of 20 degrees a second, requested half way between two samples."""
     source, sender = FilterAttitude(), Sender()
     rate = math.radians(20.0)
     for k in range(21):

@@ -1,6 +1,6 @@
 """A point mass that turns by bank angle, for tests of guidance apart from any control law or aerodynamics.
 
-Bank, airspeed and climb rate follow what is asked for as first-order lags; the course is flown through the
+Bank, airspeed and climb rate follow what is requested as first-order lags; the course is flown through the
 wind triangle with a proportional law of its own.
 """
 

@@ -247,11 +247,11 @@ def test_a_glider_comes_down_wherever_the_flare_carries_it() -> None:
     assert task.phase is LandPhase.ROLL_OUT
 
 
-@pytest.mark.parametrize("asked", [False, True])
-def test_a_go_around_without_power_comes_down_straight_ahead(asked: bool) -> None:
+@pytest.mark.parametrize("requested", [False, True])
+def test_a_go_around_without_power_comes_down_straight_ahead(requested: bool) -> None:
     rig, task = flaring((-3.0, 0.0), rangefinder=True)
     rig.vehicle.set_motor_effectiveness(0, 0.0)
-    if asked:
+    if requested:
         assert task.go_around(rig.ctx)
     else:
         _carried_on(rig, 60.0)

@@ -90,12 +90,12 @@ def test_estimates_are_reported_on_the_link_and_logged_as_a_component_of_the_veh
     assert not any(loss.lost for loss in log.source.losses if loss.component_id == 191)
 
 
-def test_rates_are_asked_for(scripted, tmp_path):
-    """A firmware that streams nothing by itself is asked for what the estimator needs."""
+def test_rates_are_requested(scripted, tmp_path):
+    """A firmware that streams nothing by itself gets requests for what the estimator needs."""
     result = flight(tmp_path, autopilot="ardupilot", estimator=LEVEL)
     log = open_log(result.folder / "flight.tlog")
-    asked = log.table("COMMAND_LONG", system_id=1, component_id=191)
-    assert set(asked["command"].tolist()) == {511}
+    requested = log.table("COMMAND_LONG", system_id=1, component_id=191)
+    assert set(requested["command"].tolist()) == {511}
     assert result.summary["estimator"]["needs"][0]["met"]
 
 

@@ -227,8 +227,8 @@ def test_a_base_station_hears_a_team_on_one_link(tmp_path):
     there = threading.Thread(target=say, daemon=True)
     there.start()
     settings = ("--set", "omega_y_rad_s=0.1")
-    asked = ("--duration", LONG, *settings)
-    code = estimate(tmp_path, port, *asked, estimator="target-fusion", connect="tcpin")
+    requested = ("--duration", LONG, *settings)
+    code = estimate(tmp_path, port, *requested, estimator="target-fusion", connect="tcpin")
     done.set()
     there.join()
     assert code == 0
@@ -284,9 +284,9 @@ def test_what_the_link_lacks_is_reported_and_nothing_is_published(tmp_path, port
 
 @pytest.mark.parametrize(("says", "seconds", "period_ms"), [(imu, LONG, 500), (untimed, "1.5", 10)])
 def test_its_duration_ends_on_a_vehicle_that_says_little(tmp_path, port, vehicle, says, seconds, period_ms):
-    """Nothing but what was asked for, as ArduPilot does; or nothing that tells a time: wall time counts.
+    """Nothing but what was requested, as ArduPilot does; or nothing that tells a time: wall time counts.
 
-    Of that a busy machine leaves little: enough has to come without being asked for.
+    Of that a busy machine leaves little: enough has to come without being requested.
     """
     vehicle(says=says, period_ms=period_ms)
     own, name = tmp_path / "own.py", says(0).get_type()

@@ -31,7 +31,7 @@ def test_messages_that_stop_coming_starve_the_estimator_though_their_mean_rate_i
 @pytest.mark.parametrize(
     "rates_hz",
     [
-        [0.0, 0.0, 20.0, 20.0, 20.0],  # the autopilot had to be asked first
+        [0.0, 0.0, 20.0, 20.0, 20.0],  # the autopilot needed a request first
         [20.0] * 40 + [0.0] * 3,  # less than a tenth
         [20.0, 5.0, 20.0, 20.0],  # a moment
         [0.0] * 20,  # never: the log says so

@@ -281,8 +281,8 @@ def test_a_quadrotor_and_two_aircraft_search_together(tmp_path):
     options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0)
     models = ("aerosonde", "aerosonde", "iris")
     air = Environment.from_wind(speed_m_s=4.0, from_deg=0.0)
-    asked = request(tmp_path / "run", options, model=models, target_ne_m=(-500.0, 400.0), air=air)
-    result = fly(OccupancyMission(), asked)
+    requested = request(tmp_path / "run", options, model=models, target_ne_m=(-500.0, 400.0), air=air)
+    result = fly(OccupancyMission(), requested)
     assert (result.outcome, result.reason) == ("completed", "")
     summary = result.summary
     assert [searcher["kind"] for searcher in summary["searchers"]] == ["fixed_wing"] * 2 + ["multicopter"]

@@ -22,7 +22,7 @@ both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def request(path: Path, flavour: str = "px4", **more) -> RunRequest:
     defaults = find_mission(str(path)).world_defaults
     home = more.pop("home", defaults.home)
-    asked = RunRequest(
+    requested = RunRequest(
         options=FileOptions(),
         world=WorldSpec.of_team(
             model=more.pop("model", defaults.model),
@@ -32,7 +32,7 @@ def request(path: Path, flavour: str = "px4", **more) -> RunRequest:
         picture=False,
         out=path.parent / "run",
     )
-    return replace(asked, **more)
+    return replace(requested, **more)
 
 
 @both
@@ -116,11 +116,11 @@ def test_an_aircraft_flies_its_plan_and_lands(flavour: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(("flavour", "suffix"), [("px4", ".plan"), ("ardupilot", ".waypoints")])
 def test_a_pattern_is_written_and_flown_from_its_file(flavour: str, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"l2{suffix}"
-    asked = RunRequest(
+    requested = RunRequest(
         options=FlightOptions(pattern="L2", width_m=40.0, height_m=40.0),
         world=WorldSpec.of_team(autopilot=flavour),
     )
-    count = export_plan(find_mission("lissajous"), asked, path)
+    count = export_plan(find_mission("lissajous"), requested, path)
     document = read_mission_file(path)
     assert len(document.items) == count > 10
     assert document.lands

@@ -127,7 +127,7 @@ def test_workers_and_runs_change_no_run(tmp_path) -> None:
     assert not np.any(other == alone)
 
 
-def test_equations_that_are_not_asked_for_change_no_run(localization, tmp_path) -> None:
+def test_equations_that_are_not_requested_change_no_run(localization, tmp_path) -> None:
     alone = localized(tmp_path, runs=2, equations="printed")
     for equations, errors in errors_of(alone).items():
         assert np.array_equal(errors, errors_of(localization)[equations][:, :2])
