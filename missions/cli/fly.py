@@ -123,8 +123,8 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_estimator(
     "--estimator",
     metavar="NAME|FILE.py",
-    help="Estimator beside the flight: attitude, lissajous, magnetic-identification, orbit-target, "
-    "target-fusion.",
+    help="Estimator beside the flight: attitude, lissajous, magnetic-identification, multi-target, "
+    "orbit-target, target-fusion.",
 )
 @_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
