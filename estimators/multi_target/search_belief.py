@@ -47,6 +47,7 @@ class SearchBelief:
 
     Attributes:
         parameters: as given.
+        sensor: what is known about it.
         intensity: of targets that were detected and do not count as found.
         exploration: probability that a target was never detected.
         found: found targets in order; always empty when targets move, because a place does not stay found.
@@ -57,16 +58,16 @@ class SearchBelief:
 
     def __init__(self, parameters: MultiTargetParameters) -> None:
         p = self.parameters = parameters
-        self._sensor = p.sensor
+        self.sensor = p.sensor
         motion = p.target_motion
         self.intensity: TargetIntensity
         if p.belief is Belief.PARTICLES:
             seed = RandomStreams(p.seed).child("multi_target")
-            self.intensity = SmcPhd(self._sensor, motion, p.particles, seed=seed)
+            self.intensity = SmcPhd(self.sensor, motion, p.particles, seed=seed)
         else:
-            self.intensity = GaussianPhd(self._sensor, motion)
+            self.intensity = GaussianPhd(self.sensor, motion)
         self._static = not motion.moves
-        self.exploration = ExplorationMap(p.layout, self._sensor, math.inf if self._static else p.forget_s)
+        self.exploration = ExplorationMap(p.layout, self.sensor, math.inf if self._static else p.forget_s)
         self.found: list[FoundTarget] = []
         self.clusters: Sequence[Cluster] = ()
         self.scans = self.removed = self.outside = 0
@@ -102,11 +103,11 @@ class SearchBelief:
         """
         if not len(scan):
             return scan
-        places = self._sensor.places(scan, viewpoint)
+        places = self.sensor.places(scan, viewpoint)
         kept = self.exploration.near_area(places[:, 0], places[:, 1])
         self.outside += int(np.count_nonzero(~kept))
         if self.found:
-            inverse = np.linalg.inv(self._sensor.covariances(scan, viewpoint))
+            inverse = np.linalg.inv(self.sensor.covariances(scan, viewpoint))
             for target in self.found:
                 off = places - (target.north_m, target.east_m)
                 away = np.hypot(off[:, 0], off[:, 1])

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from estimators.tracking.range_bearing import FORWARD, GAIN, REACH, RIGHT
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["detection_information", "information_at"]
+__all__ = ["condensed", "detection_information", "information_at"]
 
 Array = NDArray[np.float64]
 
@@ -151,3 +151,26 @@ def _from_moments(kept: Array, total: float, log_term: float, octaves: int) -> f
         first *= 2.0
     series -= math.exp(-total) * math.log1p(-1.0 / first)
     return max(0.0, entropy + none * log_term - none + series)
+
+
+def condensed(north_m: Array, east_m: Array, mass: Array, *, cell_m: float) -> tuple[Array, Array, Array]:
+    """The masses summed up in square cells, at their centres of mass: fewer points for a sensor whose
+    probability of detection hardly changes within a cell.
+
+    Args:
+        north_m, east_m, mass: (n,) points of an intensity.
+        cell_m: side of a cell.
+    """
+    if not len(mass):
+        return north_m, east_m, mass
+    row, column = np.floor(north_m / cell_m).astype(np.int64), np.floor(east_m / cell_m).astype(np.int64)
+    row -= row.min()
+    column -= column.min()
+    cell = row * (int(column.max()) + 1) + column
+    _, number = np.unique(cell, return_inverse=True)
+    total: Array = np.bincount(number, weights=mass).astype(np.float64)
+    kept = total > 0.0
+    total = total[kept]
+    north = np.bincount(number, weights=mass * north_m)[kept] / total
+    east = np.bincount(number, weights=mass * east_m)[kept] / total
+    return north, east, total
