@@ -118,8 +118,6 @@ class TargetScan:
 class _Stream:
     """The random numbers of one target: uniform, and two normal ones, per scan."""
 
-    __slots__ = ("_normals", "_rng", "_row", "_uniforms")
-
     def __init__(self, seed: np.random.SeedSequence) -> None:
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._row = _BLOCK
@@ -143,20 +141,6 @@ class TargetSensor:
         parameters: as given.
         scan: newest scan; None before the first.
     """
-
-    __slots__ = (
-        "_clutter",
-        "_countdown",
-        "_home_frame",
-        "_interval_steps",
-        "_number",
-        "_streams",
-        "_targets",
-        "_terrain",
-        "_truth",
-        "parameters",
-        "scan",
-    )
 
     def __init__(
         self,

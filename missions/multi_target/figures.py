@@ -85,10 +85,12 @@ def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchSc
     for k, (time_us, place) in enumerate(truth):
         for axis in (0, 1):
             places[:, k, axis] = np.interp(times, time_us, place[:, axis])
+    moving = team.watch.belief.parameters.target_motion.moves  # then the reported ones count as found
     right, apart, apart_general = [], [], []
     for state, true in zip(states, places, strict=True):
         reported = np.array([(t.north_m, t.east_m) for t in state.targets]).reshape(-1, 2)
-        found = np.array([(t.north_m, t.east_m) for t in state.targets if t.found]).reshape(-1, 2)
+        counted = [t for t in state.targets if t.found or moving]
+        found = np.array([(t.north_m, t.east_m) for t in counted]).reshape(-1, 2)
         right.append(matched(found, true, match_m))
         apart.append(ospa(reported, true, cutoff=CUTOFF_M))
         apart_general.append(gospa(reported, true, cutoff=CUTOFF_M).distance)

@@ -34,7 +34,7 @@ class MultiTargetMission(Mission[MultiTargetOptions]):
 
     name = "multi-target"
     world_defaults = WorldDefaults(model="iris")
-    together = True
+    flies_as_team = True
 
     def __init__(self) -> None:
         self._flown: _Flown | None = None
@@ -72,7 +72,7 @@ class MultiTargetMission(Mission[MultiTargetOptions]):
         flown = self._flight_of(debriefing)
         return {} if flown is None else search_figures(flown.team, debriefing)
 
-    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         if "targets_found" not in summary:
             return ()
         found, end = summary["targets_found"], summary["search_end"]

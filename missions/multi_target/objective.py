@@ -73,15 +73,15 @@ class SearchObjective:
         left = outlook.mass * (1.0 - self._sensor.probability(self._north, self._east, view))
         return Outlook(mass=left, views=(*outlook.views, view))
 
-    def values(self, outlook: Outlook, places: Array, heading_rad: float) -> Array:
+    def values(self, outlook: Outlook, places: Array, heading_rad: Array) -> Array:
         """Information plus alpha times exploration of a scan at each place.
 
         Args:
             outlook: what is left before it.
             places: (k, 2) north and east.
-            heading_rad: heading of the vehicle there.
+            heading_rad: (k,) heading of the vehicle there.
         """
-        viewpoints = np.column_stack((places, np.full(len(places), heading_rad)))
+        viewpoints = np.column_stack((places, heading_rad))
         information = information_at(self._north, self._east, outlook.mass, self._sensor.values, viewpoints)
         if not self._alpha > 0.0:
             return information

@@ -50,6 +50,8 @@ class MultiTargetOptions(MissionOptions):
         planner: how the next place is chosen.
         step_m, alpha, horizon, beam: of the exploring planner, as in `PlannerParameters`; None: 9 m for a
             multicopter, 2.5 turn radii for an aircraft.
+        turn_limit_rad: largest change of direction in a step; None: any for a multicopter, 90 degrees for an
+            aircraft.
         spacing_m: track spacing of the sweep; None: so that the steps are just enough for one pass.
         steps: the search ends after this number of steps of a vehicle (paper: 240).
         search_time_s: the search ends after this time; None: no limit.
@@ -82,6 +84,7 @@ class MultiTargetOptions(MissionOptions):
     alpha: float = 1.0
     horizon: int = 1
     beam: int = 6
+    turn_limit_rad: float | None = None
     spacing_m: float | None = None
     steps: int = 240
     search_time_s: float | None = None
@@ -161,6 +164,7 @@ class MultiTargetOptions(MissionOptions):
             alpha=0.0 if self.planner is PlannerKind.INFORMATION else self.alpha,
             horizon=self.horizon,
             beam=self.beam,
+            turn_limit_rad=math.pi if self.turn_limit_rad is None else self.turn_limit_rad,
         )
 
     @property
@@ -199,7 +203,9 @@ class MultiTargetOptions(MissionOptions):
             return self.unless_none(step_m=step_m, speed_m_s=4.0, acceptance_m=min(2.0, 0.4 * step_m))
         speed_m_s = limits.airspeed_trim_m_s if self.speed_m_s is None else self.speed_m_s
         step_m = self.step_m or _TURNS * limits.turn_radius_m(speed_m_s)
-        own = self.unless_none(step_m=step_m, speed_m_s=speed_m_s, acceptance_m=0.4 * step_m)
+        own = self.unless_none(
+            step_m=step_m, speed_m_s=speed_m_s, acceptance_m=0.4 * step_m, turn_limit_rad=0.5 * math.pi
+        )
         return own if self.chosen("altitude_m") else own.unless_chosen(altitude_m=60.0)
 
     def unless_none(self, **values: float) -> "MultiTargetOptions":

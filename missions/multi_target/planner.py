@@ -140,12 +140,12 @@ class ExploringPlanner:
     Args:
         parameters: of the planner.
         area: places outside are not flown to.
-        heading_rad: heading of the vehicle while it searches (paper: 0).
+        heading_rad: heading of the vehicle while it searches (paper: 0); None: along the step.
         seed: of the choice among equal values, such as those of the information when no target is detected.
     """
 
     def __init__(
-        self, parameters: PlannerParameters, area: Area, *, heading_rad: float = 0.0, seed: int = 0
+        self, parameters: PlannerParameters, area: Area, *, heading_rad: float | None = 0.0, seed: int = 0
     ) -> None:
         self._parameters = parameters
         self._area = area
@@ -164,7 +164,7 @@ class ExploringPlanner:
             kept = sorted(branches, key=lambda branch: -branch.value)[: p.beam]
             grown = []
             for branch in kept:
-                outlook = objective.after(branch.outlook, self._view(branch.here))
+                outlook = objective.after(branch.outlook, self._view(branch))
                 grown += [
                     _Branch(
                         branch.value + p.discount**depth * further.value,
@@ -183,8 +183,10 @@ class ExploringPlanner:
             best = [b for b, turn in zip(best, turns, strict=True) if turn <= min(turns) + 1e-6]
         return best[int(self._rng.integers(len(best)))].first
 
-    def _view(self, place: Place) -> Viewpoint:
-        return Viewpoint(north_m=place[0], east_m=place[1], heading_rad=self._heading_rad)
+    def _view(self, branch: _Branch) -> Viewpoint:
+        """The scan at the end of a sequence of steps."""
+        heading_rad = branch.direction_rad if self._heading_rad is None else self._heading_rad
+        return Viewpoint(north_m=branch.here[0], east_m=branch.here[1], heading_rad=heading_rad)
 
     def _grown(
         self, objective: SearchObjective, outlook: Outlook, here: Place, direction_rad: float | None
@@ -204,7 +206,9 @@ class ExploringPlanner:
         steps = [(direction, place) for direction, place in steps if self._area.contains(*place)]
         if not steps:
             return []
-        values = objective.values(outlook, np.array([place for _, place in steps]), self._heading_rad)
+        fixed = self._heading_rad
+        headings = np.array([direction if fixed is None else fixed for direction, _ in steps])
+        values = objective.values(outlook, np.array([place for _, place in steps]), headings)
         return [
             _Branch(value, place, place, direction, outlook)
             for value, (direction, place) in zip(values.tolist(), steps, strict=True)

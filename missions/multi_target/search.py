@@ -106,8 +106,9 @@ def planner_of(options: MultiTargetOptions) -> SearchPlanner:
         share = area if options.vehicles == 1 else _strip(area, options.index, options.vehicles)
         path = sweep_path(share, options.own_start_ne_m, parameters.step_m * options.steps, options.spacing_m)
         return SweepPlanner(path, parameters.step_m)
+    heading_rad = HEADING_RAD if options.turn_limit_rad is None else None  # an aircraft flies where it looks
     return ExploringPlanner(
-        parameters, area, heading_rad=HEADING_RAD, seed=options.search_seed * 256 + options.index
+        parameters, area, heading_rad=heading_rad, seed=options.search_seed * 256 + options.index
     )
 
 

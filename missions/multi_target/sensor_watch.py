@@ -62,7 +62,7 @@ class SensorWatch:
                 if frame.system_id == system_id:
                     self._take(frame)
 
-            self._stops += [connection.listen(name, take) for name in sorted(self._runner.heard_names)]
+            self._stops += [connection.listen(name, take) for name in sorted(self._runner.read_names)]
 
     def stop(self) -> None:
         """Stop processing messages."""

@@ -117,7 +117,7 @@ class BacksteppingLaw:
 
     Args:
         place_ned_m: start.
-        speed_m_s: largest speed of the virtual velocity.
+        speed_m_s: largest speed.
         limits: of the vehicle.
         yaw_rad: heading of the vehicle.
         gains: of the law.
@@ -133,10 +133,11 @@ class BacksteppingLaw:
         gains: BacksteppingGains | None = None,
     ) -> None:
         self._aim = place_ned_m
-        self._speed_m_s = speed_m_s
+        g = self._gains = gains or BacksteppingGains()
+        # far from the place the coupling adds a constant share to the virtual velocity
+        self._virtual_m_s = speed_m_s / (1.0 + g.coupling_per_s2 / (g.position_per_s * g.velocity_per_s))
         self._most_m_s2 = limits.acceleration_m_s2
         self._yaw_rad = yaw_rad
-        self._gains = gains or BacksteppingGains()
 
     def aim(self, place_ned_m: Vector) -> None:
         self._aim = place_ned_m
@@ -145,17 +146,18 @@ class BacksteppingLaw:
         g = self._gains
         off = _minus(place_ned_m, self._aim)  # z1
         away_m, velocity = _norm(off), velocity_ned_m_s
-        if g.position_per_s * away_m <= self._speed_m_s:
-            virtual = _times(off, -g.position_per_s)
+        if g.position_per_s * away_m <= self._virtual_m_s:
+            near = off
             virtual_rate = _times(velocity, -g.position_per_s)
         else:  # at the largest speed towards the place: only its direction changes
             unit = _times(off, 1.0 / away_m)
-            virtual = _times(unit, -self._speed_m_s)
+            near = _times(unit, self._virtual_m_s / g.position_per_s)
             across = _minus(velocity, _times(unit, _dot(unit, velocity)))
-            virtual_rate = _times(across, -self._speed_m_s / away_m)
+            virtual_rate = _times(across, -self._virtual_m_s / away_m)
+        virtual = _times(near, -g.position_per_s)
         error = _minus(velocity, virtual)  # z2
         acceleration = _minus(
-            _minus(virtual_rate, _times(off, g.coupling_per_s2)), _times(error, g.velocity_per_s)
+            _minus(virtual_rate, _times(near, g.coupling_per_s2)), _times(error, g.velocity_per_s)
         )
         command = _plus(velocity, _times(_bounded(acceleration, self._most_m_s2), g.response_s))
         return Setpoint(velocity_ned_m_s=command, yaw_rad=self._yaw_rad)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from estimators.multi_target.estimate import TargetRow
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.vectors import wrap_pi
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.multi_target.options import MultiTargetOptions, StepLawKind, check_vehicle
@@ -247,7 +248,7 @@ class TargetSearchTeam:
             vehicle, altitude_m=own.own_altitude_m, speed_m_s=own.speed_m_s or 0.0, rate_hz=own.rate_hz
         ) as flight:
             self._begin(index)
-            commanded = math.inf
+            commanded: float | None = None
             with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
                 async with vehicle.link.guard("the end of the search"):
                     async for _ in stream:
@@ -262,6 +263,6 @@ class TargetSearchTeam:
                         if self.search.over:
                             break
                         bearing = math.atan2(searcher.goal[1] - east_m, searcher.goal[0] - north_m)
-                        if not abs(math.remainder(bearing - commanded, math.tau)) <= _SAME_RAD:
+                        if commanded is None or abs(wrap_pi(bearing - commanded)) > _SAME_RAD:
                             commanded = bearing % math.tau
                             await flight.turn_to(commanded)
