@@ -51,10 +51,13 @@ def draw_search(path: Path, title: str, team: "TargetSearchTeam", debriefing: "D
 
 
 def _four(team: "TargetSearchTeam") -> list["Moment"]:
-    """Intensities at four times, evenly spread from the first fifth to the end."""
-    moments, search = team.search.moments, team.search
-    start_us, end_us = max(0, search.began_us), moments[-1].time_us
-    wanted = [start_us + (end_us - start_us) * (k + 1) / _MOMENTS for k in range(_MOMENTS)]
+    """Intensities at four times, evenly spread from the begin until the last target was found; at the end of
+    the search when none was.
+    """
+    moments, found = team.search.moments, team.watch.belief.found
+    start_us = max(0, team.search.began_us)
+    end_us = found[-1].time_us if found else moments[-1].time_us
+    wanted = [start_us + (end_us - start_us) * (k + 0.5) / _MOMENTS for k in range(_MOMENTS)]
     return [min(moments, key=lambda moment: abs(moment.time_us - time_us)) for time_us in wanted]
 
 
