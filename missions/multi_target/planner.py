@@ -98,10 +98,10 @@ class PlannerParameters:
         if not 1 <= self.beam <= 100:
             raise PlanError(f"`beam` {self.beam} is not in 1..100")
         if not 0.0 < self.discount <= 1.0:
-            raise PlanError(f"`discount` {self.discount:g} is not in 0..1, or is 0")
+            raise PlanError(f"discount {self.discount:g} is not in 0..1, or is 0")
         if not 0.25 * math.pi <= self.turn_limit_rad <= math.pi:
             raise PlanError(
-                f"`turn_limit_rad` {math.degrees(self.turn_limit_rad):g} degrees is not in 45..180 degrees"
+                f"turn_limit_rad {math.degrees(self.turn_limit_rad):g} degrees is not in 45..180 degrees"
             )
 
 

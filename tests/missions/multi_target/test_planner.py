@@ -153,8 +153,8 @@ def test_a_sweep_visits_its_path_step_by_step_and_comes_back():
         ({"alpha": -1.0}, "`alpha` -1"),
         ({"horizon": 9}, "`horizon` 9"),
         ({"beam": 0}, "`beam` 0"),
-        ({"discount": 1.5}, "`discount` 1.5"),
-        ({"turn_limit_rad": 0.1}, "`turn_limit_rad`"),
+        ({"discount": 1.5}, "discount 1.5"),
+        ({"turn_limit_rad": 0.1}, "turn_limit_rad"),
     ],
 )
 def test_impossible_parameters_are_named(values, reason):
