@@ -26,9 +26,10 @@ from estimators.tracking.range_bearing import (
     RangeBearingSensor,
     Viewpoint,
 )
+from estimators.tracking.resampling import systematic
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["SmcPhd", "SmcPhdParameters", "resample", "update_weights"]
+__all__ = ["SmcPhd", "SmcPhdParameters", "update_weights"]
 
 Array = NDArray[np.float64]
 
@@ -186,9 +187,10 @@ class SmcPhd:
         if not always and total * total >= 0.5 * len(weights) * float(weights @ weights):
             return
         size = min(p.max_particles, max(p.min_particles, math.ceil(p.particles_per_target * total)))
-        resized = np.empty((ROWS, size))
-        resample(self._particles, float(self._rng.random()), resized)
-        self._particles = resized
+        chosen = np.empty(size, dtype=np.int64)
+        systematic(weights / total, float(self._rng.random()), chosen)
+        self._particles = np.ascontiguousarray(self._particles[:, chosen])
+        self._particles[WEIGHT] = total / size
 
     def clusters(self) -> Sequence[Cluster]:
         particles = self._particles
@@ -287,28 +289,3 @@ def update_weights(
         explained[j] = 1.0 / (explained[j] + clutter[j])
     for hit in range(hits):
         weight[hit_particle[hit]] += hit_value[hit] * explained[hit_scan[hit]]
-
-
-@kernel
-def resample(particles: Array, start: float, resized: Array) -> None:
-    """Systematic resampling (Kitagawa 1996): equal weights with the same sum.
-
-    Args:
-        particles: (5, n).
-        start: a uniform random number in 0..1.
-        resized: (5, k), overwritten.
-    """
-    count, size = particles.shape[1], resized.shape[1]
-    total = 0.0
-    for i in range(count):
-        total += particles[WEIGHT, i]
-    step = total / size
-    at, below = 0, 0.0
-    for k in range(size):
-        wanted = (k + start) * step
-        while at < count - 1 and below + particles[WEIGHT, at] <= wanted:
-            below += particles[WEIGHT, at]
-            at += 1
-        for row in range(WEIGHT):
-            resized[row, k] = particles[row, at]
-        resized[WEIGHT, k] = step

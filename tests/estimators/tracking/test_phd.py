@@ -9,7 +9,7 @@ from estimators.tracking.clusters import find_clusters
 from estimators.tracking.gaussian_phd import GaussianPhd
 from estimators.tracking.intensity import Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
-from estimators.tracking.smc_phd import SmcPhd, resample, update_weights
+from estimators.tracking.smc_phd import SmcPhd, update_weights
 
 SENSOR = RangeBearingSensor(clutter_per_scan=0.5)
 
@@ -81,17 +81,6 @@ def test_each_measurement_adds_at_most_one_target():
     viewpoint = Viewpoint(north_m=0.0, east_m=0.0)
     belief.update(np.array([[20.0, 0.3], [35.0, -2.0]]), viewpoint, constant(2e-4))
     assert belief.expected_targets == pytest.approx(2.0, abs=1e-3)
-
-
-def test_systematic_resampling_keeps_sum_and_proportions():
-    rng = np.random.default_rng(1)
-    particles = rng.random((5, 400))
-    resized = np.empty((5, 1000))
-    resample(particles, 0.37, resized)
-    assert resized[4].sum() == pytest.approx(particles[4].sum())
-    copies = np.array([np.count_nonzero(resized[0] == value) for value in particles[0]])
-    expected = 1000 * particles[4] / particles[4].sum()
-    assert np.all(np.abs(copies - expected) < 1.0)  # systematic: floor or ceiling of the expected number
 
 
 def test_clusters_find_separate_masses_and_their_widths():
