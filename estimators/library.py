@@ -22,6 +22,7 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
         "attitude": "estimators.attitude",
         "lissajous": "estimators.lissajous",
         "magnetic-identification": "estimators.magnetic_identification",
+        "multi-target": "estimators.multi_target",
         "orbit-target": "estimators.orbit_target",
         "target-fusion": "estimators.target_fusion",
     }

@@ -31,6 +31,8 @@ from flightsim.payload import (
     SignatureSpec,
     Static,
     TargetMotion,
+    Terrain,
+    TerrainSpec,
 )
 from flightsim.payload.detection import DetectionModel
 from flightsim.toml_tables import listed
@@ -49,6 +51,7 @@ _MAKERS: Final[Mapping[Any, Callable[..., Any]]] = {
     Environment: Environment.from_wind,
     Home: _home,
     MagneticSpec | MagneticField: MagneticSpec,
+    TerrainSpec | Terrain: TerrainSpec,
 }
 """What makes a value of a type from a table, where it is not the class itself."""
 

@@ -15,7 +15,14 @@ from typing import Any, Final, Self
 from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
-from flightsim.payload import GroundTargetParameters, MagneticField, MagneticSpec, PayloadParameters
+from flightsim.payload import (
+    GroundTargetParameters,
+    MagneticField,
+    MagneticSpec,
+    PayloadParameters,
+    Terrain,
+    TerrainSpec,
+)
 from flightsim.sensors import GpsParameters, SensorSuiteParameters
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.world import WorldParameters
@@ -159,8 +166,9 @@ class WorldSpec:
         seed: root of every random stream.
         physics_rate_hz: steps per second.
         unix_epoch_us: the time of boot by the vehicles' clocks.
-        targets: targets on the ground that cameras can detect.
+        targets: targets on the ground that cameras and target sensors can detect.
         magnetic_field: the field that survey magnetometers measure: data, or a field made in Python.
+        terrain: hides targets from target sensors: generated, or given in Python; None: level ground.
         faults: scheduled faults; a later one of the same unit replaces an earlier one.
     """
 
@@ -172,6 +180,7 @@ class WorldSpec:
     unix_epoch_us: int = FIXED_EPOCH_UNIX_US
     targets: tuple[GroundTargetParameters, ...] = ()
     magnetic_field: MagneticSpec | MagneticField | None = None
+    terrain: TerrainSpec | Terrain | None = None
     faults: tuple[FaultSpec, ...] = ()
 
     def __post_init__(self) -> None:

@@ -11,6 +11,7 @@ from typing import Any, Final
 from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
+from missions.multi_target.mission import MultiTargetMission
 from missions.occupancy.mission import OccupancyMission
 from missions.options import FlightOptions
 from missions.orbit.mission import OrbitMission
@@ -38,6 +39,7 @@ MISSIONS: Final[Mapping[str, Mission[Any]]] = MappingProxyType(
         "expanding-square": PatternMission("expanding-square", expanding_square_curve, square_size),
         "orbit": OrbitMission(),
         "occupancy": OccupancyMission(),
+        "multi-target": MultiTargetMission(),
     }
 )
 """The missions with a name on the command line."""

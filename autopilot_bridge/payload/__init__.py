@@ -1,4 +1,5 @@
-"""MAVLink components beside the autopilot: camera (100), gimbal (154), survey magnetometer (158).
+"""MAVLink components beside the autopilot: target sensor (26), camera (100), gimbal (154), survey
+magnetometer (158).
 
 Each represents one device of `flightsim.payload`. They do no I/O: they take decoded messages and device
 outputs, and produce frames.
@@ -11,14 +12,17 @@ from autopilot_bridge.payload.gimbal import GimbalComponent
 from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MAGNETOMETER_COMPONENT, MagnetometerComponent
 from autopilot_bridge.payload.station import PayloadStation
+from autopilot_bridge.payload.target_sensor import TARGET_SENSOR_COMPONENT, TargetSensorComponent
 
 __all__ = [
     "CAMERA_COMPONENT",
     "GIMBAL_COMPONENT",
     "MAGNETOMETER_COMPONENT",
+    "TARGET_SENSOR_COMPONENT",
     "CameraComponent",
     "Component",
     "GimbalComponent",
     "MagnetometerComponent",
     "PayloadStation",
+    "TargetSensorComponent",
 ]

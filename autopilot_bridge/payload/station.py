@@ -8,6 +8,7 @@ from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
 from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MagnetometerComponent
+from autopilot_bridge.payload.target_sensor import TargetSensorComponent
 from flightsim.payload import Payload
 
 
@@ -46,6 +47,10 @@ class PayloadStation:
         if payload.magnetometer is not None:
             self._magnetometer = MagnetometerComponent(system_id=system_id, send=send)
             self.components.append(self._magnetometer)
+        self._target_sensor: TargetSensorComponent | None = None
+        if payload.target_sensor is not None:
+            self._target_sensor = TargetSensorComponent(system_id=system_id, send=send)
+            self.components.append(self._target_sensor)
 
     def step(self, time_us: int) -> None:
         """One physics step: the devices, then the messages of their components."""
@@ -55,6 +60,8 @@ class PayloadStation:
             self.camera.update(payload.frame)
         if self._magnetometer is not None and payload.reading is not None:
             self._magnetometer.update(payload.reading)
+        if self._target_sensor is not None and payload.scan is not None:
+            self._target_sensor.update(payload.scan)
         for component in self.components:
             component.step(time_us)
 

@@ -17,7 +17,7 @@ from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
 from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogWriter
-from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, magnetic_field_of
+from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, TerrainSpec, magnetic_field_of
 from flightsim.world import World, WorldParameters
 from flightsim.world_spec import WorldSpec
 
@@ -74,9 +74,12 @@ class Sitl:
             field, self.published_map = magnetic_field_of(
                 field, home=spec.place, seed=spec.seed, decimal_year=spec.air.decimal_year
             )
+        terrain = spec.terrain.made(spec.seed) if isinstance(spec.terrain, TerrainSpec) else spec.terrain
         cards = [MemoryCard() for _ in spec.vehicles] if cards is None else cards
         self.vehicles = tuple(
-            SitlVehicle(vehicle, index, spec, self.world, self.targets, field, signing, card, backend)
+            SitlVehicle(
+                vehicle, index, spec, self.world, self.targets, field, terrain, signing, card, backend
+            )
             for index, (vehicle, card) in enumerate(zip(spec.vehicles, cards, strict=True))
         )
         self.shared_links: list[SharedLink] = []

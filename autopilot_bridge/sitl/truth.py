@@ -19,11 +19,12 @@ from flightsim import truth as t
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.home import Home
-from flightsim.payload import GroundTargets
+from flightsim.payload import GroundTargets, Static
 
 SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
 TARGET_SYSTEM: Final = 251
 MAX_TARGETS: Final = 250
+_STATIC_EVERY: Final = 5
 TRUTH_RATE_HZ: Final = 50
 _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 _Q: Final[int] = t.Q_NED_FROM_FRD.start
@@ -89,14 +90,14 @@ class TruthEncoder:
 
 
 class TargetTruthEncoder:
-    """Packs the positions of the ground targets.
+    """Packs the positions of the ground targets: those that move every time, static ones every fifth time.
 
     Args:
         targets: the world's targets.
         home: origin of their frame.
     """
 
-    __slots__ = ("_encoders", "_home", "_targets")
+    __slots__ = ("_calls", "_encoders", "_home", "_moving", "_targets")
 
     def __init__(self, targets: GroundTargets, home: Home) -> None:
         if len(targets) > MAX_TARGETS:
@@ -104,19 +105,26 @@ class TargetTruthEncoder:
         self._targets = targets
         self._home = home
         self._encoders = [FrameEncoder(TARGET_SYSTEM, number + 1) for number in range(len(targets))]
+        self._moving = [not isinstance(target.parameters.motion, Static) for target in targets.targets]
+        self._calls = 0
 
     def encode(self, time_us: int) -> list[bytes]:
-        """A HIL_STATE_QUATERNION frame for each target, with its state at a vehicle time."""
-        if not self._encoders:
+        """HIL_STATE_QUATERNION frames of the targets, with their state at a vehicle time."""
+        everyone = self._calls % _STATIC_EVERY == 0
+        self._calls += 1
+        if not (everyone or any(self._moving)):
             return []
         self._targets.step(time_us)
         frames = []
-        for encoder, position, velocity in zip(
+        for encoder, moving, position, velocity in zip(
             self._encoders,
+            self._moving,
             self._targets.positions_ned_m.tolist(),
             self._targets.velocities_ned_m_s.tolist(),
             strict=True,
         ):
+            if not (moving or everyone):
+                continue
             lat_deg, lon_deg = self._home.offset(position[0], position[1])
             message = mavlink.MAVLink_hil_state_quaternion_message(
                 time_us,

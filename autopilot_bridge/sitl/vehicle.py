@@ -28,7 +28,7 @@ from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.airframe import AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.payload import GroundTargets, MagneticField, Payload, PayloadParameters
+from flightsim.payload import GroundTargets, MagneticField, Payload, PayloadParameters, Terrain
 from flightsim.sensors import GpsParameters, SensorSuite, SensorSuiteParameters
 from flightsim.world import World
 from flightsim.world_spec import VehicleSpec, WorldSpec
@@ -58,6 +58,7 @@ class SitlVehicle:
         world: World,
         targets: GroundTargets,
         magnetic_field: MagneticField | None,
+        terrain: Terrain | None,
         signing: SigningParameters,
         card: MemoryCard,
         backend: BackendMaker,
@@ -125,6 +126,7 @@ class SitlVehicle:
                     seeds=lambda name: streams.child("vehicle", index, "sensor", name),
                     targets=targets,
                     magnetic_field=magnetic_field,
+                    terrain=terrain,
                 )
             )
 

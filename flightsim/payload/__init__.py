@@ -1,7 +1,8 @@
 """Simulated mission payload: the devices that a vehicle carries for its mission, and their targets.
 
-A camera on a gimbal with a detector, over ground targets; a survey magnetometer over a magnetic map with
-targets' signatures in it. All read the vehicle's truth and give measurements.
+A camera on a gimbal with a detector, and a sensor of range and bearing, over ground targets; a survey
+magnetometer over a magnetic map with targets' signatures in it. All read the vehicle's truth and give
+measurements.
 """
 
 from flightsim.payload.camera import Camera, CameraParameters
@@ -43,7 +44,14 @@ from flightsim.payload.target_motion import (
     TargetMotion,
     Trajectory,
 )
+from flightsim.payload.target_sensor import (
+    ScanDisturbance,
+    TargetScan,
+    TargetSensor,
+    TargetSensorParameters,
+)
 from flightsim.payload.targets import NO_TAG, GroundTarget, GroundTargetParameters, GroundTargets
+from flightsim.payload.terrain import Terrain, TerrainSpec
 
 __all__ = [
     "LEVEL",
@@ -78,6 +86,7 @@ __all__ = [
     "PinholeModel",
     "RandomWalk",
     "ResolutionDetection",
+    "ScanDisturbance",
     "SeenTargets",
     "Signature",
     "SignatureSpec",
@@ -87,7 +96,12 @@ __all__ = [
     "SurveyParameters",
     "SyntheticMapParameters",
     "TargetMotion",
+    "TargetScan",
+    "TargetSensor",
+    "TargetSensorParameters",
     "TargetView",
+    "Terrain",
+    "TerrainSpec",
     "Trajectory",
     "camera_from_gimbal",
     "gimbal_from_camera",

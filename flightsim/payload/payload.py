@@ -1,4 +1,6 @@
-"""The payload of one vehicle, composed and stepped together: gimbal, camera, survey magnetometer."""
+"""The payload of one vehicle, composed and stepped together: gimbal, camera, survey magnetometer, target
+sensor.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +18,9 @@ from flightsim.payload.survey_magnetometer import (
     SurveyMagnetometer,
     SurveyMagnetometerParameters,
 )
+from flightsim.payload.target_sensor import TargetScan, TargetSensor, TargetSensorParameters
 from flightsim.payload.targets import GroundTargets
+from flightsim.payload.terrain import Terrain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,18 +30,20 @@ class PayloadParameters:
     gimbal: GimbalParameters | None = None
     camera: CameraParameters | None = None
     magnetometer: SurveyMagnetometerParameters | None = None
+    target_sensor: TargetSensorParameters | None = None
 
 
 class Payload:
     """Mission payload of one vehicle. Call `step` once per physics step, after the vehicle's.
 
     Attributes:
-        gimbal, camera, magnetometer: the devices; None: not carried.
+        gimbal, camera, magnetometer, target_sensor: the devices; None: not carried.
         frame: the camera's frame delivered on this step, or None.
         reading: the magnetometer's reading delivered on this step, or None.
+        scan: the target sensor's scan taken on this step, or None.
     """
 
-    __slots__ = ("camera", "frame", "gimbal", "magnetometer", "reading")
+    __slots__ = ("camera", "frame", "gimbal", "magnetometer", "reading", "scan", "target_sensor")
 
     def __init__(
         self,
@@ -49,6 +55,7 @@ class Payload:
         seeds: Callable[[str], np.random.SeedSequence],
         targets: GroundTargets | None = None,
         magnetic_field: MagneticField | None = None,
+        terrain: Terrain | None = None,
     ) -> None:
         """Fit the devices.
 
@@ -58,9 +65,11 @@ class Payload:
             home: origin of the world.
             physics_rate_hz: calls of `step` per second.
             seeds: a separate seed sequence for each name ("gimbal", "camera", "camera_target_0", ...,
-                "survey_magnetometer"): `lambda name: streams.child("vehicle", i, "sensor", name)`.
-            targets: what a camera sees; None: nothing.
+                "survey_magnetometer", "target_sensor", ...):
+                `lambda name: streams.child("vehicle", i, "sensor", name)`.
+            targets: what a camera and a target sensor see; None: nothing.
             magnetic_field: what a magnetometer measures.
+            terrain: hides targets from the target sensor; None: level ground.
 
         Raises:
             ValueError: a rate that doesn't divide the physics rate; a magnetometer without a field.
@@ -69,7 +78,11 @@ class Payload:
         self.camera: Camera | None = None
         self.magnetometer: SurveyMagnetometer | None = None
         self.frame: CameraFrame | None = None
+        self.target_sensor: TargetSensor | None = None
         self.reading: MagneticReading | None = None
+        self.scan: TargetScan | None = None
+        if targets is None:
+            targets = GroundTargets(seeds=_no_seeds)
         if parameters.gimbal is not None:
             self.gimbal = Gimbal(
                 parameters.gimbal, truth=truth, physics_rate_hz=physics_rate_hz, seed=seeds("gimbal")
@@ -79,7 +92,7 @@ class Payload:
                 parameters.camera,
                 truth=truth,
                 home=home,
-                targets=GroundTargets(seeds=_no_seeds) if targets is None else targets,
+                targets=targets,
                 gimbal=self.gimbal,
                 physics_rate_hz=physics_rate_hz,
                 seeds=seeds,
@@ -94,15 +107,27 @@ class Payload:
                 physics_rate_hz=physics_rate_hz,
                 seed=seeds("survey_magnetometer"),
             )
+        if parameters.target_sensor is not None:
+            self.target_sensor = TargetSensor(
+                parameters.target_sensor,
+                truth=truth,
+                home=home,
+                targets=targets,
+                physics_rate_hz=physics_rate_hz,
+                seeds=seeds,
+                terrain=terrain,
+            )
 
     def step(self, time_us: int) -> None:
-        """One physics step ending at `time_us`: gimbal, then what hangs on it, then the magnetometer."""
+        """One physics step ending at `time_us`: gimbal, then what hangs on it, then the others."""
         if self.gimbal is not None:
             self.gimbal.step(time_us)
         if self.camera is not None:
             self.frame = self.camera.step(time_us)
         if self.magnetometer is not None:
             self.reading = self.magnetometer.step(time_us)
+        if self.target_sensor is not None:
+            self.scan = self.target_sensor.step(time_us)
 
 
 def _no_seeds(index: int) -> np.random.SeedSequence:

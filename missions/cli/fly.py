@@ -123,8 +123,8 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_estimator(
     "--estimator",
     metavar="NAME|FILE.py",
-    help="Estimator beside the flight: attitude, lissajous, magnetic-identification, orbit-target, "
-    "target-fusion.",
+    help="Estimator beside the flight: attitude, lissajous, magnetic-identification, multi-target, "
+    "orbit-target, target-fusion.",
 )
 @_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
@@ -138,8 +138,8 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_results("--no-picture", is_flag=True, help="Don't draw track.png.")
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
-    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
-    file (.plan, .waypoints), or a Python file of your own.
+    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy,
+    multi-target, a mission file (.plan, .waypoints), or a Python file of your own.
 
     `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
     options)`. The run folder gets flight.tlog, summary.json and track.png.

@@ -22,6 +22,7 @@ _MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
     "expanding-square": (_PATTERNS, "EXPANDING_SQUARE"),
     "orbit": ("missions.cli.orbit_command", "COMMAND"),
     "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
+    "multi-target": ("missions.cli.multi_target_command", "COMMAND"),
 }
 _FILES_OF_USERS: Final = "missions.cli.file_command"
 _OWN: Final = "a mission of your own"

@@ -21,8 +21,8 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     "--estimator",
     required=True,
     metavar="NAME|FILE.py",
-    help="attitude, lissajous, magnetic-identification, orbit-target, target-fusion, or a Python file with "
-    "an Estimator of your own.",
+    help="attitude, lissajous, magnetic-identification, multi-target, orbit-target, target-fusion, or a "
+    "Python file with an Estimator of your own.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
 @click.option(
@@ -60,8 +60,8 @@ def replay(**given: Any) -> int:
     """Run an estimator over each LOG and compare it with the autopilot and, where the log has it, the truth.
 
     Each log gets a run folder: summary.json, estimates.npz, estimates.csv, errors.png. Errors are those of
-    the part in the air. For an estimator of a team (magnetic-identification, target-fusion) the logs are
-    those of one team.
+    the part in the air. For an estimator of a team (magnetic-identification, multi-target, target-fusion)
+    the logs are those of one team.
 
     Exit codes: 0 done, 1 a log could not be read or lacks what the estimator needs, 2 usage.
     """

@@ -1,6 +1,7 @@
 """Embedded worlds: a simulated world in this process that missions are flown in."""
 
 from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
+from missions.embedded.target_fields import TargetField, multi_target_world
 from missions.embedded.worlds import (
     CAMERA,
     MAGNETOMETER,
@@ -17,10 +18,12 @@ __all__ = [
     "MAX_FLIGHT_S",
     "EmbeddedSitl",
     "MotionKind",
+    "TargetField",
     "alone",
     "carrying",
     "model_kind",
     "motion_of",
+    "multi_target_world",
     "occupancy_world",
     "orbit_world",
 ]

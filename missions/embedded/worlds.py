@@ -67,6 +67,7 @@ def carrying(world: WorldSpec, payload: PayloadParameters) -> WorldSpec:
                     gimbal=vehicle.payload.gimbal or payload.gimbal,
                     camera=vehicle.payload.camera or payload.camera,
                     magnetometer=vehicle.payload.magnetometer or payload.magnetometer,
+                    target_sensor=vehicle.payload.target_sensor or payload.target_sensor,
                 ),
             )
             for vehicle in world.vehicles

@@ -1,4 +1,4 @@
-"""The payload of a vehicle: camera, gimbal, survey magnetometer.
+"""The payload of a vehicle: camera, gimbal, survey magnetometer, target sensor.
 
 Each is a MAVLink component of the vehicle's system with its own component id (docs/fixed_wing.md). Their
 messages are used as they arrive; only requested messages are sent.
@@ -16,6 +16,7 @@ from missions.vehicle.link import VehicleLink
 CAMERA_COMPONENT: Final = 100
 GIMBAL_COMPONENT: Final = 154
 SURVEY_MAGNETOMETER_COMPONENT: Final = 158
+TARGET_SENSOR_COMPONENT: Final = 26
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 
 # within this time the gimbal manager reports which component has the control
@@ -87,6 +88,7 @@ class Payload:
             CAMERA_COMPONENT: "camera",
             GIMBAL_COMPONENT: "gimbal",
             SURVEY_MAGNETOMETER_COMPONENT: "survey magnetometer",
+            TARGET_SENSOR_COMPONENT: "target sensor",
         }
 
         def missing() -> list[str]:

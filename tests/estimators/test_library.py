@@ -34,8 +34,8 @@ def test_the_library_alone_imports_no_estimator():
     [
         (
             "atitude",
-            "'atitude' is not known; there are attitude, lissajous, magnetic-identification, orbit-target, "
-            "target-fusion",
+            "'atitude' is not known; there are attitude, lissajous, magnetic-identification, multi-target, "
+            "orbit-target, target-fusion",
         ),
         ("nowhere.py", "nowhere.py does not exist"),
     ],

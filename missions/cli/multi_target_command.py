@@ -1,0 +1,183 @@
+"""The command-line options of the search for an unknown number of targets."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from missions.cli.mission_command import Given, MissionCommand, Scope, option
+
+if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
+
+
+def _numbers(name: str, text: str, count: int, shown: str) -> tuple[float, ...]:
+    parts = text.split(",")
+    try:
+        found = tuple(float(part) for part in parts)
+    except ValueError:
+        found = ()
+    if len(found) != count or not all(map(math.isfinite, found)):
+        raise click.UsageError(f"{name} {text!r} is not {shown}, metres from home")
+    return found
+
+
+def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from estimators.multi_target.parameters import Belief
+    from estimators.tracking.intensity import MotionKind
+    from missions.multi_target.options import MultiTargetOptions, PlannerKind, StepLawKind
+    from missions.options import parse_pair
+
+    area = _numbers("--area", given["area"], 4, "SOUTH,WEST,NORTH,EAST")
+    start = _numbers("--start", given["start"], 2, "NORTH,EAST")
+    return MultiTargetOptions(
+        **common,
+        altitude_m=given["altitude"],
+        separation_m=given["separation"],
+        rate_hz=given["rate"],
+        area_m=(area[0], area[1], area[2], area[3]),
+        start_ne_m=(start[0], start[1]),
+        planner=PlannerKind(given["planner"]),
+        step_m=given["step"],
+        alpha=given["alpha"],
+        horizon=given["horizon"],
+        beam=given["beam"],
+        spacing_m=given["spacing"],
+        steps=given["steps"],
+        search_time_s=given["search_time"],
+        undetected=given["undetected"],
+        speed_m_s=given["speed"],
+        law=StepLawKind(given["law"]),
+        acceptance_m=given["acceptance"],
+        belief=Belief(given["belief"]),
+        expected_targets=given["expected_targets"],
+        motion=MotionKind(given["motion"]),
+        gain=given["gain"],
+        field_of_view_m=parse_pair(given["field_of_view"], "--field-of-view", "x,"),
+        range_sigma_m=given["range_sigma"],
+        bearing_sigma_rad=math.radians(given["bearing_sigma"]),
+        clutter_per_scan=given["clutter"],
+        found_width_m=given["found_width"],
+        found_mass=given["found_mass"],
+        found_distance_m=given["found_distance"],
+        sensor_limit_s=given["sensor_limit"],
+        search_seed=given["search_seed"],
+    )
+
+
+def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
+    from missions.embedded.target_fields import TargetField, multi_target_world
+
+    field = TargetField(
+        count=given["targets"],
+        clusters=min(given["clusters"], given["targets"]),
+        cluster_sigma_m=given["cluster_sigma"],
+        speed_m_s=given["target_speed"],
+    )
+    return multi_target_world(
+        world,
+        options,
+        field,
+        terrain_relief_m=given["terrain"],
+        scan_period_s=given["scan_period"],
+    )
+
+
+COMMAND: Final = MissionCommand(
+    help=(
+        "Find an unknown number of targets with a sensor of range and bearing that misses some.\n\n"
+        "The vehicle fuses each scan in a PHD filter and flies, step by step, where a scan gives most: "
+        "information about targets that it has detected, or area that it has not seen. The vehicles of a "
+        "team share the belief and plan in turn. Places are metres from the first vehicle's home."
+    ),
+    options=(
+        option(
+            "--area", default="-30,-30,270,270", metavar="SOUTH,WEST,NORTH,EAST", help="Of the search, m."
+        ),
+        option("--start", default="10,10", metavar="NORTH,EAST", help="Place of the first scan, m."),
+        option(
+            "--planner",
+            type=click.Choice(["exploring", "information", "sweep"]),
+            default="exploring",
+            help="Information and exploration, information alone, or the legs of a parallel sweep.",
+        ),
+        option("--step", type=float, help="To the next scan, m. [default: 9; an aircraft: 2.5 turn radii]"),
+        option("--alpha", type=float, default=1.0, help="Weight of exploration against information, nats."),
+        option("--horizon", type=int, default=1, help="Steps that are planned; the first one is flown."),
+        option("--beam", type=int, default=6, help="Sequences of steps that are kept at each depth."),
+        option("--spacing", type=float, help="Of the sweep's legs, m. [default: one pass in all steps]"),
+        option("--steps", type=int, default=240, help="The search ends after so many."),
+        option("--search-time", type=float, help="And after this time, s. [default: no limit]"),
+        option(
+            "--undetected",
+            type=float,
+            help="And when fewer targets than this are expected to be left. [default: never]",
+        ),
+        option("--speed", type=float, help="m/s. [default: 4; an aircraft: its own airspeed]"),
+        option(
+            "--law",
+            type=click.Choice(["trajectory", "backstepping"]),
+            default="trajectory",
+            help="How a multicopter flies a step: a reference within its limits, or a backstepping law.",
+        ),
+        option("--acceptance", type=float, help="A place is reached within it, m. [default: 2]"),
+        option("--rate", type=float, default=25.0, help="Setpoints per vehicle second."),
+        option("--altitude", type=float, default=20.0, help="Above home, m. [default for an aircraft: 60]"),
+        option("--separation", type=float, default=4.0, help="Between the altitudes of a team, m."),
+        option(
+            "--belief",
+            type=click.Choice(["particles", "gaussians"]),
+            default="particles",
+            help="How the filter represents the targets.",
+        ),
+        option("--expected-targets", type=float, default=18.0, help="In the area, before the search."),
+        option(
+            "--motion",
+            type=click.Choice(["static", "random-walk", "constant-velocity"]),
+            default="static",
+            help="How targets move, as the filter expects.",
+        ),
+        option("--gain", type=float, default=0.98, help="Probability to detect a target below the vehicle."),
+        option(
+            "--field-of-view", default="15", metavar="FORWARD[xRIGHT]", help="Scales of the sensor's fall, m."
+        ),
+        option("--range-sigma", type=float, default=0.5, help="Noise of the sensor's range, m."),
+        option("--bearing-sigma", type=float, default=1.7, help="Noise of its bearing, degrees."),
+        option("--clutter", type=float, default=0.0, help="False detections per scan, on average."),
+        option("--found-width", type=float, default=0.5, help="A found target is narrower, m."),
+        option("--found-mass", type=float, default=0.9, help="And has at least this expected number."),
+        option("--found-distance", type=float, default=4.0, help="Its measurements lie within, m."),
+        option("--sensor-limit", type=float, default=120.0, help="Give up without a scan for so long, s."),
+        option("--search-seed", type=int, default=0, help="Of the random numbers of filter and planner."),
+        option("--targets", scope=Scope.EMBEDDED, type=int, default=18, help="Number of true targets."),
+        option(
+            "--clusters",
+            scope=Scope.EMBEDDED,
+            type=int,
+            default=3,
+            help="They lie in; 0: uniform over the area.",
+        ),
+        option("--cluster-sigma", scope=Scope.EMBEDDED, type=float, default=14.0, help="Of a cluster, m."),
+        option("--target-speed", scope=Scope.EMBEDDED, type=float, default=0.0, help="Of each target, m/s."),
+        option(
+            "--terrain",
+            scope=Scope.EMBEDDED,
+            type=float,
+            metavar="RELIEF",
+            help="Terrain of this standard deviation, m, hides targets. [default: level ground]",
+        ),
+        option("--scan-period", scope=Scope.EMBEDDED, type=float, default=1.0, help="Between scans, s."),
+    ),
+    build=_build,
+    world=_world,
+    fields=MappingProxyType(
+        {
+            "area": ("area_m",),
+            "start": ("start_ne_m",),
+            "field_of_view": ("field_of_view_m",),
+            "clutter": ("clutter_per_scan",),
+        }
+    ),
+)

@@ -1,0 +1,128 @@
+"""Whole searches in embedded worlds: found targets, the same numbers on every way, a silent sensor."""
+
+import json
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from autopilot_bridge.mavlink import dialect
+from estimators.library import make_estimator
+from estimators.log_replay import replay
+from estimators.logs import open_log
+from flightsim.payload import ScanDisturbance
+from flightsim.world_spec import WorldSpec
+from missions.embedded import TargetField, multi_target_world
+from missions.multi_target.mission import MultiTargetMission
+from missions.multi_target.options import MultiTargetOptions, StepLawKind
+from missions.runs.request import RunRequest
+from missions.runs.session import fly
+from tests.slow import slow
+
+SMALL = MultiTargetOptions(
+    altitude_m=8.0,
+    area_m=(-20.0, -20.0, 60.0, 60.0),
+    start_ne_m=(0.0, 0.0),
+    steps=12,
+    expected_targets=4.0,
+)
+FIELD = TargetField(count=4, clusters=1, cluster_sigma_m=12.0)
+
+
+def flown(out, options=SMALL, *, picture=False, disturbances=(), mission=None, **values):
+    world = multi_target_world(
+        WorldSpec.of_team(options.vehicles, seed=2, **values), options, FIELD, disturbances=disturbances
+    )
+    request = RunRequest(options=options, world=world, out=out, picture=picture, estimator="multi-target")
+    return fly(mission or MultiTargetMission(), request)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    mission = MultiTargetMission()
+    result = flown(tmp_path_factory.mktemp("runs") / "run", picture=True, mission=mission)
+    return result, mission
+
+
+def test_targets_are_found_and_the_vehicle_is_home(run):
+    result, _ = run
+    summary = result.summary
+    assert (result.outcome, result.reason) == ("completed", "")
+    assert summary["targets_true"] == 4
+    assert summary["targets_found_right"] >= 3
+    assert summary["steps"] == 12
+    assert 1.5 < summary["step_s_mean"] < 4.0
+    assert summary["late_steps"] == 0
+    assert [phase["name"] for phase in summary["vehicles"][0]["phases"]][-2:] == ["search", "return"]
+    assert {path.name for path in result.folder.iterdir()} >= {"flight.tlog", "summary.json", "track.png"}
+    json.dumps(summary, allow_nan=False)
+
+
+def test_the_mission_and_the_estimator_beside_it_have_the_same_numbers(run):
+    result, mission = run
+    with np.load(result.folder / "estimates-MultiTargetEstimate.npz") as file:
+        recorded = {name: file[name] for name in file.files}
+    states = mission._flown.team.search.states
+    for state in states:
+        rows = recorded["time_us"] == state.time_us
+        kept = rows & (recorded["target_index"] >= 0)
+        values = [(t.north_m, t.east_m, t.mass, t.width_m, float(t.found)) for t in state.targets]
+        found = np.column_stack(
+            [recorded[name][kept] for name in ("north_m", "east_m", "mass", "width_m", "found")]
+        )
+        assert rows.any()
+        assert np.array_equal(found, np.array(values).reshape(-1, 5))
+    assert len(states) > 20
+
+
+def test_a_replay_of_the_log_has_the_same_numbers(run):
+    result, _ = run
+    settings = result.summary["estimator"]["settings"]
+    done = replay(open_log(result.folder / "flight.tlog"), partial(make_estimator, "multi-target", settings))
+    (runner,) = done.fleet.runners.values()
+    for name, table in runner.tables.items():
+        with np.load(result.folder / f"estimates-{name}.npz") as file:
+            assert np.array_equal(file["time_us"], table.time_us)
+            for column in table.columns:
+                assert np.array_equal(file[column], table[column], equal_nan=True)
+
+
+def test_a_sensor_that_is_off_stops_the_search_and_the_vehicle_waits(tmp_path):
+    """Off for a minute from 30 s: the vehicle holds its place and goes on afterwards."""
+    pause = ScanDisturbance(start_s=30.0, duration_s=60.0)
+    result = flown(tmp_path / "run", replace(SMALL, steps=6), disturbances=(pause,))
+    assert (result.outcome, result.reason) == ("completed", "")
+    assert result.summary["search_s"] > 60.0
+    assert result.summary["steps"] == 6
+
+
+def test_a_sensor_that_stays_off_ends_the_search(tmp_path):
+    pause = ScanDisturbance(start_s=30.0, duration_s=1000.0)
+    options = replace(SMALL, sensor_limit_s=10.0)
+    result = flown(tmp_path / "run", options, disturbances=(pause,))
+    assert result.outcome == "failed"
+    assert "no scan was received for 1" in result.reason
+    assert result.summary["vehicles"][0]["phases"][-1]["name"] == "return"
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "changes"),
+    [
+        slow("px4", {"law": StepLawKind.BACKSTEPPING}),
+        slow("ardupilot", {}),
+        slow("px4", {"vehicles": 2, "horizon": 3}),
+    ],
+)
+def test_other_laws_autopilots_and_teams_search_too(tmp_path, autopilot, changes):
+    result = flown(tmp_path / "run", replace(SMALL, **changes), autopilot=autopilot)
+    assert (result.outcome, result.reason) == ("completed", "")
+    assert result.summary["targets_found_right"] >= 3
+
+
+def test_a_vehicle_without_the_sensor_is_refused_on_the_ground(tmp_path):
+    request = RunRequest(options=SMALL, world=WorldSpec(), out=tmp_path / "run", picture=False)
+    result = fly("multi-target", request)
+    assert result.outcome == "failed"
+    assert "no target sensor (26)" in result.reason
+    assert dialect.MAV_COMP_ID_USER2 == 26
