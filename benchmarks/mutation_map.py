@@ -139,16 +139,23 @@ class TestMap:
 
         Inside a function these are the tests that execute the line; in the middle of a long statement, those
         that execute anything of the statement or of the function. A constant, a field and its default are
-        executed at import: the tests are those that execute a line of any module that names it, then those
-        that execute a function of the module, and where there are none, those of the package."""
-        places = self._in_function(mutant) if mutant.in_function() else self._at_import(mutant)
-        found = next(filter(None, places), set())
+        executed at import, by every test: half of the budget is for the tests that execute a line that names
+        it (where there is none: a function of the module), the rest for the quickest of the package."""
+        if mutant.in_function():
+            return self._quickest(next(filter(None, self._in_function(mutant)), set()), mutant, budget_s)
+        chosen = self._quickest(next(filter(None, self._at_import(mutant)), set()), mutant, 0.5 * budget_s)
+        folder, times_s = self._folder_of_package(mutant), self._times_s[is_plain(mutant.path)]
+        package = {test for test in times_s if test.startswith(folder)} - chosen.keys()
+        return chosen | self._quickest(package, mutant, budget_s - sum(chosen.values()))
+
+    def _quickest(self, tests: set[str], mutant: Mutant, budget_s: float) -> dict[str, float]:
         times_s = self._times_s[is_plain(mutant.path)]
-        found &= times_s.keys()
+        folder = self._folder_of_package(mutant)
         chosen: dict[str, float] = {}
-        own_folder = self._folder_of_package(mutant)
-        for test in sorted(found, key=lambda test: (not test.startswith(own_folder), times_s[test], test)):
-            if chosen and sum(chosen.values()) + times_s[test] > budget_s:
+        left_s = budget_s
+        for test in sorted(tests & times_s.keys(), key=lambda t: (not t.startswith(folder), times_s[t], t)):
+            left_s -= times_s[test]
+            if chosen and left_s < 0.0:
                 break
             chosen[test] = times_s[test]
         return chosen
@@ -170,15 +177,13 @@ class TestMap:
         yield set().union(
             *(self._that_execute(mutant.path, first, last) for first, last in _functions(mutant.path))
         )
-        folder = self._folder_of_package(mutant)
-        yield {test for test in self._times_s[is_plain(mutant.path)] if test.startswith(folder)}
 
     def _that_name(self, names: set[str], mutant: Mutant) -> set[str]:
         """Tests that execute, in a function of any module, a line that names one of these."""
         found: set[str] = set()
-        plain = is_plain(mutant.path)
+        plain, private = is_plain(mutant.path), all(name.startswith("_") for name in names)
         for path, lines in self._lines.items():
-            if is_plain(path) is not plain:
+            if is_plain(path) is not plain or (private and path != mutant.path):
                 continue
             named = _lines_that_name(path, names)
             if path == mutant.path:

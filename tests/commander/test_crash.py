@@ -62,3 +62,11 @@ def test_what_is_no_crash(case: str) -> None:
         rig.commander.set_mode(FlightMode.ACRO)
     assert lie(rig, 5.0, roll_rad)
     assert not rig.happened(Crashed)
+
+
+@pytest.mark.parametrize(("speed_m_s", "disarmed"), [(9.5, True), (10.5, False)])
+def test_a_vehicle_that_falls_fast_has_not_crashed_yet(speed_m_s: float, disarmed: bool) -> None:
+    rig = crashed()
+    rig.context.setpoint[:] = math.nan
+    rig._follow = lambda: rig.context.nav.__setitem__(nav.VEL_NED_M_S, (0.0, 0.0, speed_m_s))  # type: ignore[method-assign]
+    assert lie(rig, 3.0) is not disarmed

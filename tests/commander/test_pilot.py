@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from autopilot_bridge.commander.pilot import PilotInput
+from autopilot_bridge.commander.pilot import PilotInput, stick_travel
 from autopilot_bridge.flight.context import ManualInput
+from tests.commander.rig import Rig
 
 
 def moved(*, built_in_radio: bool = False, **sticks: float) -> PilotInput:
@@ -55,3 +56,31 @@ def test_a_pilot_who_never_was_there_is_infinitely_old() -> None:
     assert pilot.gcs_age_s(1) == math.inf
     pilot.on_gcs(0)
     assert pilot.gcs_age_s(3_000_000) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("throttle", "high"), [(-1.0, False), (-0.81, False), (-0.79, True), (-0.5, True), (0.0, True)]
+)
+def test_the_throttle_is_down_in_its_lowest_tenth(throttle: float, high: bool) -> None:
+    rig = Rig("px4")
+    rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=throttle, yaw=0.0, time_us=rig.time_us)
+    rig.tick()
+    rig.tick()
+    rig.run(0.2)
+    assert rig.commander.situation.throttle_high is high
+
+
+@pytest.mark.parametrize(
+    ("now", "before", "travel"),
+    [
+        ({"roll": 0.5}, {"roll": 0.1}, 0.4),
+        ({"pitch": -0.5}, {"pitch": 0.2}, 0.7),
+        ({"roll": -1.0, "pitch": 0.1}, {"roll": 1.0}, 2.0),
+        ({"yaw": 1.0, "throttle": 1.0}, {}, 0.0),
+        ({"roll": 0.5, "valid": False}, {}, 0.0),
+        ({"roll": 0.5}, {"valid": False}, 0.0),
+    ],
+)
+def test_travel_of_the_sticks(now: dict[str, float], before: dict[str, float], travel: float) -> None:
+    sticks = [ManualInput(**({"valid": True} | values)) for values in (now, before)]  # type: ignore[arg-type]
+    assert stick_travel(*sticks) == pytest.approx(travel)

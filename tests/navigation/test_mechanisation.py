@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from autopilot_bridge.navigation import layout, mechanisation
 from autopilot_bridge.navigation import states as s
@@ -12,6 +13,7 @@ from flightsim import truth as t
 from flightsim.foundation.geodesy import earth_rate_ned_rad_s
 from tests.navigation.bench import attitude_error
 from tests.navigation.kinematic_flight import GRAVITY_M_S2, HOME, Lissajous, fly
+from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
 
@@ -102,3 +104,104 @@ def test_without_samples_motion_is_not_invented() -> None:
     turned = float(np.linalg.norm(attitude))
     assert 0.9 < turned < 2.0  # the last sample is held for 0.2 s, not for 2 s
     assert np.abs(core[s.X_VEL : s.X_VEL + 3]).max() < 4.0
+
+
+def moving_core() -> Array:
+    """Some state of flight, with every sum and correction at a value of its own."""
+    core = np.linspace(0.1, 0.9, s.CORE_SIZE)
+    core[s.Q : s.Q + 4] = 0.5, -0.5, 0.1, 0.7
+    core[s.Q : s.Q + 4] /= np.linalg.norm(core[s.Q : s.Q + 4])
+    core[s.GYRO : s.GYRO + 3] = 0.8, -1.1, 0.6
+    core[s.GYRO_LAST : s.GYRO_LAST + 3] = 0.5, -0.9, 0.4
+    core[s.ACCEL : s.ACCEL + 3] = 1.0, -2.0, -11.0
+    core[s.X_GYRO_BIAS : s.X_GYRO_BIAS + 3] = 0.02, -0.03, 0.01
+    core[s.X_ACCEL_BIAS : s.X_ACCEL_BIAS + 3] = 0.1, 0.2, -0.3
+    core[s.X_VEL : s.X_VEL + 3] = 12.0, -7.0, 2.0
+    core[s.EARTH_RATE : s.EARTH_RATE + 3] = 0.03, -0.02, -0.05  # much more than the Earth's, to be seen
+    core[s.GRAVITY], core[s.SAMPLE_AGE_S] = 9.81, 0.0
+    mechanisation.refresh_rotation(core)
+    return core
+
+
+@pytest.mark.parametrize("dt_s", [0.004, 1e-4])
+@pytest.mark.parametrize("alive", [True, False])
+def test_one_step_with_vectors(dt_s: float, alive: bool) -> None:
+    """Attitude by the rotation vector of the mean rate; velocity by the mean force, gravity and Coriolis;
+    position by the mean velocity; and what the covariance's prediction sums up."""
+    core = moving_core()
+    core[s.SAMPLE_AGE_S] = 0.0 if alive else 0.3
+    before = core.copy()
+
+    def of(place: int, state: Array = before) -> Array:
+        return state[place : place + 3]
+
+    mechanisation.advance(core, dt_s, 0.2)
+    r_before = rotation_matrix(before[s.Q : s.Q + 4])
+    gyro = of(s.GYRO) if alive else of(s.X_GYRO_BIAS)
+    turn = (0.5 * (gyro + of(s.GYRO_LAST)) - of(s.X_GYRO_BIAS) - r_before.T @ of(s.EARTH_RATE)) * dt_s
+    r_after = r_before @ Rotation.from_rotvec(turn).as_matrix()
+    np.testing.assert_allclose(rotation_matrix(core[s.Q : s.Q + 4]), r_after, atol=1e-12)
+    np.testing.assert_allclose(core[s.R : s.R + 9].reshape(3, 3), r_after, atol=1e-12)
+    assert np.linalg.norm(core[s.Q : s.Q + 4]) == pytest.approx(1.0, abs=1e-14)
+    force = r_after @ (of(s.ACCEL) - of(s.X_ACCEL_BIAS)) if alive else np.array([0.0, 0.0, -9.81])
+    impulse = 0.5 * (of(s.FORCE_NED) + force) * dt_s
+    coriolis = -2.0 * np.cross(of(s.EARTH_RATE), of(s.X_VEL))
+    change = impulse + (coriolis + np.array([0.0, 0.0, 9.81])) * dt_s
+    np.testing.assert_allclose(of(s.X_VEL, core), of(s.X_VEL) + change, rtol=1e-12)
+    np.testing.assert_allclose(
+        of(s.X_POS, core), of(s.X_POS) + (of(s.X_VEL) + 0.5 * change) * dt_s, rtol=1e-12
+    )
+    np.testing.assert_allclose(of(s.FORCE_NED, core), force, atol=1e-12)
+    np.testing.assert_allclose(of(s.GYRO_LAST, core), gyro)
+    np.testing.assert_allclose(of(s.SUM_FORCE, core) - of(s.SUM_FORCE), impulse, atol=1e-14)
+    np.testing.assert_allclose(of(s.SUM_TURN, core) - of(s.SUM_TURN), np.abs(r_before @ turn), atol=1e-14)
+    np.testing.assert_allclose(of(s.SUM_GYRO, core) - of(s.SUM_GYRO), gyro * dt_s, atol=1e-14)
+    np.testing.assert_allclose(
+        core[s.SUM_R : s.SUM_R + 9] - before[s.SUM_R : s.SUM_R + 9], r_after.ravel() * dt_s, atol=1e-14
+    )
+    assert core[s.SUM_TIME] - before[s.SUM_TIME] == pytest.approx(dt_s)
+    assert core[s.SUM_GYRO_TIME] - before[s.SUM_GYRO_TIME] == pytest.approx(dt_s)
+    assert core[s.SAMPLE_AGE_S] - before[s.SAMPLE_AGE_S] == pytest.approx(dt_s)
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+def test_a_step_writes_the_navigation_state_and_the_history(fresh: bool) -> None:
+    core = moving_core()
+    nav, history, imu = np.zeros(layout.NAV_SIZE), np.zeros((4, s.HISTORY_COLUMNS)), np.zeros(7)
+    imu[:6] = 0.3, 0.2, -0.4, 2.0, 1.0, -9.0
+    alone = core.copy()
+    mechanisation.step(core, nav, history, imu, 0.004, 60.0, 400.0, 0.2, fresh, 2)
+    if fresh:
+        mechanisation.take_sample(alone, imu, 60.0, 400.0)
+    mechanisation.advance(alone, 0.004, 0.2)
+    np.testing.assert_array_equal(core, alone)
+    np.testing.assert_array_equal(nav[layout.Q_NED_FROM_FRD], core[s.Q : s.Q + 4])
+    np.testing.assert_array_equal(nav[layout.VEL_NED_M_S], core[s.X_VEL : s.X_VEL + 3])
+    np.testing.assert_array_equal(nav[layout.POS_NED_M], core[s.X_POS : s.X_POS + 3])
+    gyro_bias, accel_bias = core[s.X_GYRO_BIAS : s.X_GYRO_BIAS + 3], core[s.X_ACCEL_BIAS : s.X_ACCEL_BIAS + 3]
+    np.testing.assert_allclose(nav[layout.RATES_FRD_RAD_S], core[s.GYRO : s.GYRO + 3] - gyro_bias)
+    np.testing.assert_allclose(nav[layout.SPECIFIC_FORCE_FRD_M_S2], core[s.ACCEL : s.ACCEL + 3] - accel_bias)
+    np.testing.assert_array_equal(nav[layout.GYRO_BIAS_RAD_S], gyro_bias)
+    np.testing.assert_array_equal(nav[layout.ACCEL_BIAS_M_S2], accel_bias)
+    force = core[s.FORCE_NED : s.FORCE_NED + 3]
+    np.testing.assert_allclose(nav[layout.ACC_NED_M_S2], force + np.array([0.0, 0.0, 9.81]))
+    yaw, pitch, roll = Rotation.from_matrix(core[s.R : s.R + 9].reshape(3, 3)).as_euler("ZYX")
+    np.testing.assert_allclose(nav[layout.EULER_RAD], [roll, pitch, yaw], atol=1e-9)
+    assert nav[layout.HEIGHT_ABOVE_GROUND_M] == pytest.approx(core[s.TERRAIN_DOWN] - core[s.X_POS + 2])
+    correction_pos, correction_vel = s.CORRECTION_POS, s.CORRECTION_VEL
+    expected = np.zeros((4, s.HISTORY_COLUMNS))
+    expected[2, :3] = core[s.X_POS : s.X_POS + 3] - core[correction_pos : correction_pos + 3]
+    expected[2, 3:6] = core[s.X_VEL : s.X_VEL + 3] - core[correction_vel : correction_vel + 3]
+    expected[2, 6:] = core[s.Q : s.Q + 4]
+    np.testing.assert_array_equal(history, expected)
+
+
+def test_samples_at_the_ends_of_the_ranges_are_taken() -> None:
+    for sign in (1.0, -1.0):
+        core = np.zeros(s.CORE_SIZE)
+        imu = sign * np.array([60.0, 60.0, 60.0, 400.0, 400.0, 400.0, 0.0])
+        core[s.SAMPLE_AGE_S] = 1.0
+        mechanisation.take_sample(core, imu, 60.0, 400.0)
+        np.testing.assert_array_equal(core[s.GYRO : s.GYRO + 6], imu[:6])
+        assert core[s.SAMPLE_AGE_S] == 0.0
+        assert core[s.INVALID_SAMPLES] == 0.0

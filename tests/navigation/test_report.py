@@ -3,9 +3,10 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
-from autopilot_bridge.navigation import NavigationParameters
+from autopilot_bridge.navigation import NavigationParameters, fusion
 from autopilot_bridge.navigation import covariance as cov
 from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.clocks import Clocks
@@ -99,3 +100,64 @@ def test_an_absurd_variance_is_unsound(variance: float, sound: bool) -> None:
         solution.p[:] = 0.0
         solution.p[index, index] = variance
         assert bool(cov.is_sound(solution.p, solution.core)) == sound
+
+
+def test_accuracies_are_those_of_the_covariance() -> None:
+    solution, clocks, health = Solution(PARAMETERS, physics_rate_hz=250), Clocks(), NavigationHealth()
+    variances = np.linspace(1e-4, 3e-3, len(solution.p))
+    solution.p[:] = np.diag(variances)
+    report(health, PARAMETERS, solution, clocks, NOW_US, held=False, at_rest=False)
+    assert health.position_horizontal_accuracy_m == pytest.approx(
+        math.sqrt(variances[s.POS : s.POS + 2].sum())
+    )
+    assert health.position_vertical_accuracy_m == pytest.approx(math.sqrt(variances[s.POS + 2]))
+    assert health.velocity_accuracy_m_s == pytest.approx(math.sqrt(variances[s.VEL : s.VEL + 2].sum()))
+    assert health.attitude_accuracy_rad == pytest.approx(
+        (math.sqrt(variances[s.ATT : s.ATT + 2].sum()), math.sqrt(variances[s.ATT + 2]))
+    )
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("sigma_deg", "known"), [(9.9, True), (10.1, False)])
+def test_attitude_is_known_within_ten_degrees_of_tilt(axis: int, sigma_deg: float, known: bool) -> None:
+    solution, clocks, health = Solution(PARAMETERS, physics_rate_hz=250), Clocks(), NavigationHealth()
+    solution.p[s.ATT + axis, s.ATT + axis] = math.radians(sigma_deg) ** 2
+    solution.p[s.ATT + 2, s.ATT + 2] = 4.0  # whatever the heading
+    report(health, PARAMETERS, solution, clocks, NOW_US, held=False, at_rest=False)
+    assert health.attitude is known
+
+
+@pytest.mark.parametrize(
+    ("speed", "sigma", "known"), [(0.49, 0.1, True), (0.51, 0.1, False), (0.0, 0.51, False)]
+)
+@pytest.mark.parametrize("axis", [0, 1])
+def test_velocity_at_rest_is_known_once_it_is_about_zero(
+    axis: int, speed: float, sigma: float, known: bool
+) -> None:
+    solution, clocks, health = Solution(PARAMETERS, physics_rate_hz=250), Clocks(), NavigationHealth()
+    solution.core[s.X_VEL + axis] = -speed
+    solution.p[s.VEL + axis, s.VEL + axis] = sigma**2
+    report(health, PARAMETERS, solution, clocks, NOW_US, held=True, at_rest=True)
+    assert health.velocity_horizontal is known
+    report(health, PARAMETERS, solution, clocks, NOW_US, held=True, at_rest=False)
+    assert not health.velocity_horizontal
+
+
+@pytest.mark.parametrize(
+    ("baro", "gps", "age_us", "error"),
+    [
+        (1.1, 1.1, 1_000_001, True),
+        (1.1, 1.1, 1_000_000, False),
+        (0.9, 1.1, 1_000_001, False),
+        (1.1, 0.9, 1_000_001, False),
+        (1.1, 1.1, None, False),
+    ],
+)
+def test_the_accelerometer_is_suspected_when_both_heights_are_refused(
+    baro: float, gps: float, age_us: int | None, error: bool
+) -> None:
+    solution, clocks, health = Solution(PARAMETERS, physics_rate_hz=250), Clocks(), NavigationHealth()
+    solution.obs[fusion.RATIO_BARO], solution.obs[fusion.RATIO_GPS_HEIGHT] = baro, gps
+    clocks.height_us = -1 if age_us is None else NOW_US - age_us
+    report(health, PARAMETERS, solution, clocks, NOW_US, held=False, at_rest=False)
+    assert health.accel_error is error

@@ -344,3 +344,55 @@ def test_plan_identifiers_are_of_the_plan() -> None:
     items = px4.mission
     assert plan_checksum(items) == plan_checksum(items) != plan_checksum(items[:2])
     assert plan_checksum(()) == 0
+
+
+def test_there_is_no_item_after_the_last(vehicle: Vehicle) -> None:
+    upload(vehicle, plan(4))
+    assert vehicle.service.set_current(3)
+    assert vehicle.stores[MissionType.MISSION].current == 3
+    for seq in (4, 5, -1):
+        assert not vehicle.service.set_current(seq)
+    assert vehicle.stores[MissionType.MISSION].current == 3
+
+
+def test_px4_continues_from_the_item_that_is_marked(px4: Vehicle) -> None:
+    items = plan(4)
+    items[2].current = 1
+    upload(px4, items)
+    assert px4.stores[MissionType.MISSION].current == 2
+    upload(px4, plan(3))
+    assert px4.stores[MissionType.MISSION].current == 0
+
+
+def test_px4_flies_on_only_with_the_same_plan(px4: Vehicle) -> None:
+    upload(px4, plan(4))
+    px4.task.active = True
+    px4.stores[MissionType.MISSION].current = 2
+    upload(px4, plan(4))
+    assert px4.stores[MissionType.MISSION].current == 2
+    other = plan(4)
+    other[3].x += 5000
+    upload(px4, other)  # as many items, other ones
+    assert px4.stores[MissionType.MISSION].current == 0
+    assert px4.mission[3].x == pytest.approx(other[3].x * 1e-7)
+    px4.stores[MissionType.MISSION].current = 2
+    upload(px4, plan(3))
+    assert px4.stores[MissionType.MISSION].current == 0
+
+
+@pytest.mark.parametrize(("flown", "size", "current"), [(3, 2, 1), (1, 2, 1), (2, 5, 2)])
+def test_ardupilot_finishes_its_leg_within_a_new_plan(
+    ardupilot: Vehicle, flown: int, size: int, current: int
+) -> None:
+    upload(ardupilot, plan(5))
+    ardupilot.task.active = True
+    ardupilot.stores[MissionType.MISSION].current = flown
+    upload(ardupilot, plan(size))
+    assert ardupilot.stores[MissionType.MISSION].current == current
+
+
+@pytest.mark.parametrize(("seq", "sent"), [(0, True), (65_535, True), (-1, False), (65_536, False)])
+def test_numbers_of_reached_items_fit_their_message(px4: Vehicle, seq: int, sent: bool) -> None:
+    px4.service.item_reached(seq)
+    found = [m for _, m in px4.tick(0.1) if m.get_type() == "MISSION_ITEM_REACHED"]
+    assert bool(found) is sent

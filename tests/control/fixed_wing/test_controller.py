@@ -164,6 +164,23 @@ def test_past_the_guidance_nothing_of_it_is_reported(level: float) -> None:
     assert made.underspeed == 0.0
 
 
+@pytest.mark.parametrize("level", [sp.RATES, sp.SURFACES_DIRECT])
+def test_guidance_starts_anew_after_a_flight_without_it(level: float) -> None:
+    """The integrals of an earlier flight are not flown again."""
+    made = controller(down_m=-140.0, airspeed_m_s=18.0)
+    run(made, 1000)
+    write(made, level=level, throttle=0.5)
+    run(made, 20)
+    write(made, down_m=-100.0)
+    run(made, 10)
+    fresh = controller(level=level, throttle=0.5)
+    run(fresh, 20)
+    write(fresh, down_m=-100.0)
+    run(fresh, 10)
+    assert made.actuators[THROTTLE] == pytest.approx(fresh.actuators[THROTTLE], abs=1e-3)
+    assert made.pitch_setpoint_rad == pytest.approx(fresh.pitch_setpoint_rad, abs=1e-3)
+
+
 def test_guidance_runs_at_fifty_hertz() -> None:
     made = controller(heading_rad=0.5, down_m=-100.0)
     run(made, 5)

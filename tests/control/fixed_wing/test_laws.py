@@ -528,6 +528,14 @@ def test_a_course_can_be_flown_from_rest() -> None:
     assert s[c.HEADING_SETPOINT] == pytest.approx(1.2)
 
 
+@pytest.mark.parametrize("airspeed", [7.0, 3.0, 7.75])
+def test_a_slow_wing_may_still_bank_by_fifteen_degrees(airspeed: float) -> None:
+    nav, setpoint, s = flying(airspeed=airspeed)
+    setpoint[sp.LATERAL_ACCELERATION_M_S2] = 20.0
+    lateral_control(nav, setpoint, parameters(roll_slew_rad_s=1e3), s, GUIDANCE_S)
+    assert s[c.ROLL_SETPOINT] == pytest.approx(math.radians(15.0))
+
+
 # -- heights
 
 
@@ -691,6 +699,22 @@ def test_trim_throttle_lies_between_the_three_that_are_known(airspeed: float, th
         nav, _, s = flying(airspeed=15.0)
         energy_control(nav, setpoint, flat, s, GUIDANCE_S, False)
         assert s[c.THROTTLE] == pytest.approx(0.5, abs=2e-3)
+
+
+def test_trim_throttle_is_known_near_the_trim_airspeed_too() -> None:
+    """The lowest and the highest airspeed may be less than 1 m/s from the trim."""
+    near = parameters(**(ENERGY | {"airspeed_min_m_s": 14.5, "airspeed_max_m_s": 15.5}))
+    for wanted, throttle in ((14.5, 0.35), (14.75, 0.425), (15.25, 0.65), (15.5, 0.8)):
+        nav, setpoint, s = flying(airspeed=15.2)
+        s[c.EAS] = wanted + 1e-12
+        setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = 0.0, wanted
+        p = near.copy()
+        p[c.AIRSPEED_STALL] = 7.0
+        p[c.THROTTLE_DAMPING] = p[c.THROTTLE_I] = 0.0
+        s[c.ENERGY_RATE_SETPOINT] = 0.0
+        energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
+        under = s[c.UNDERSPEED]
+        assert s[c.THROTTLE] == pytest.approx(under + (1.0 - under) * throttle, abs=1e-6)
 
 
 @pytest.mark.parametrize("bank", [0.7, -0.7])

@@ -87,9 +87,12 @@ def test_controller_refuses_bad_arguments(rate: float, shape: tuple[int], text: 
         FixedWingController(physics_rate_hz=rate, nav=np.zeros(shape))
 
 
-GAINS = FixedWingParameters.for_envelope(AEROSONDE)
 SEA_LEVEL_DENSITY_KG_M3 = 1.225
 G_M_S2 = 9.80665
+
+
+def aerosonde() -> FixedWingParameters:
+    return FixedWingParameters.for_envelope(AEROSONDE)
 
 
 def test_roll_rate_loop_is_four_times_as_quick_as_the_roll_angle() -> None:
@@ -102,7 +105,7 @@ def test_roll_rate_loop_is_four_times_as_quick_as_the_roll_angle() -> None:
     assert gains.rate_roll_ff * sluggish.roll_rate_per_aileron_rad_s == pytest.approx(1.0)
     assert gains.rate_roll_i * sluggish.roll_rate_per_aileron_rad_s == pytest.approx(1.0)
     # a roll that damps itself quickly gets the least gain
-    assert pytest.approx(0.2) == GAINS.rate_roll_p * AEROSONDE.roll_rate_per_aileron_rad_s
+    assert pytest.approx(0.2) == aerosonde().rate_roll_p * AEROSONDE.roll_rate_per_aileron_rad_s
     # and a wing whose roll hardly damps itself is not waited for
     assert FixedWingParameters.for_envelope(
         replace(AEROSONDE, roll_time_constant_s=2.0)
@@ -110,7 +113,7 @@ def test_roll_rate_loop_is_four_times_as_quick_as_the_roll_angle() -> None:
 
 
 def test_roll_rate_limit_is_what_span_and_ailerons_allow() -> None:
-    assert pytest.approx(min(2.6 / math.sqrt(2.8956), 0.6 * 3.03)) == GAINS.roll_rate_max_rad_s
+    assert pytest.approx(min(2.6 / math.sqrt(2.8956), 0.6 * 3.03)) == aerosonde().roll_rate_max_rad_s
     weak = FixedWingParameters.for_envelope(replace(AEROSONDE, roll_rate_per_aileron_rad_s=1.0))
     assert weak.roll_rate_max_rad_s == pytest.approx(0.6)
     # 1.2 times the time in which the bank of a turn is rolled out
@@ -118,10 +121,10 @@ def test_roll_rate_limit_is_what_span_and_ailerons_allow() -> None:
         replace(AEROSONDE, roll_rate_per_aileron_rad_s=0.5, bank_max_rad=1.0)
     )
     assert slow.heading_p_1_s == pytest.approx(1.2 * 0.3 / 1.0)
-    assert GAINS.heading_p_1_s == 0.8885
+    assert aerosonde().heading_p_1_s == 0.8885
     assert pytest.approx(
-        min(math.radians(90.0), GAINS.roll_rate_max_rad_s, 0.6 / GAINS.roll_time_constant_s)
-    ) == (GAINS.roll_slew_rad_s)
+        min(math.radians(90.0), aerosonde().roll_rate_max_rad_s, 0.6 / aerosonde().roll_time_constant_s)
+    ) == (aerosonde().roll_slew_rad_s)
 
 
 @pytest.mark.parametrize(("damping", "closed"), [(0.2, 0.8), (0.7, 0.7 + 0.45)])
@@ -141,8 +144,8 @@ def test_pitch_angle_waits_for_the_short_period() -> None:
     assert slow.pitch_time_constant_s == pytest.approx(2.5 / 4.0)
     quick = FixedWingParameters.for_envelope(replace(AEROSONDE, short_period_frequency_rad_s=40.0))
     assert quick.pitch_time_constant_s == 0.25
-    assert pytest.approx(0.6 * 0.99) == GAINS.pitch_rate_max_up_rad_s
-    assert GAINS.pitch_rate_max_up_rad_s == GAINS.pitch_rate_max_down_rad_s
+    assert pytest.approx(0.6 * 0.99) == aerosonde().pitch_rate_max_up_rad_s
+    assert aerosonde().pitch_rate_max_up_rad_s == aerosonde().pitch_rate_max_down_rad_s
     agile = FixedWingParameters.for_envelope(replace(AEROSONDE, pitch_rate_per_elevator_rad_s=9.0))
     assert agile.pitch_rate_max_up_rad_s == pytest.approx(math.radians(60.0))
 
@@ -179,8 +182,8 @@ def test_extra_drag_of_a_turn_is_that_of_its_lift() -> None:
         return drag_n * 25.0 / 11.0
 
     extra = induced_power_per_mass(1.2) - induced_power_per_mass(1.0)
-    assert extra == pytest.approx(GAINS.turn_energy_rate_m2_s3 * 0.2, rel=1e-3)
-    assert pytest.approx(lift_n / (pressure_pa * 0.55) / 5.61) == GAINS.lift_angle_rad
+    assert extra == pytest.approx(aerosonde().turn_energy_rate_m2_s3 * 0.2, rel=1e-3)
+    assert pytest.approx(lift_n / (pressure_pa * 0.55) / 5.61) == aerosonde().lift_angle_rad
 
 
 def test_height_and_airspeed_wait_for_the_pitch_angle() -> None:
@@ -223,19 +226,30 @@ def test_climb_and_sink_are_the_envelopes(
 
 
 def test_limits_of_the_envelope_are_flown() -> None:
-    assert GAINS.roll_limit_rad == AEROSONDE.bank_max_rad
-    assert (GAINS.pitch_min_rad, GAINS.pitch_max_rad) == (AEROSONDE.pitch_min_rad, AEROSONDE.pitch_max_rad)
-    assert GAINS.load_factor_max == 2.5
+    assert aerosonde().roll_limit_rad == AEROSONDE.bank_max_rad
+    assert (aerosonde().pitch_min_rad, aerosonde().pitch_max_rad) == (
+        AEROSONDE.pitch_min_rad,
+        AEROSONDE.pitch_max_rad,
+    )
+    assert aerosonde().load_factor_max == 2.5
     steep = FixedWingParameters.for_envelope(replace(AEROSONDE, bank_max_rad=math.radians(75.0)))
     assert steep.load_factor_max == pytest.approx(1.0 / math.cos(math.radians(75.0)))
-    assert (GAINS.airspeed_stall_m_s, GAINS.airspeed_min_m_s, GAINS.airspeed_max_m_s) == (13.5, 18.0, 33.0)
-    assert (GAINS.trim_throttle, GAINS.trim_throttle_min_speed, GAINS.trim_throttle_max_speed) == (
+    assert (aerosonde().airspeed_stall_m_s, aerosonde().airspeed_min_m_s, aerosonde().airspeed_max_m_s) == (
+        13.5,
+        18.0,
+        33.0,
+    )
+    assert (
+        aerosonde().trim_throttle,
+        aerosonde().trim_throttle_min_speed,
+        aerosonde().trim_throttle_max_speed,
+    ) == (
         0.795,
         0.596,
         1.0,
     )
-    assert GAINS.trim_elevator == AEROSONDE.trim_elevator
-    assert GAINS.trim_pitch_rad == AEROSONDE.trim_pitch_rad
+    assert aerosonde().trim_elevator == AEROSONDE.trim_elevator
+    assert aerosonde().trim_pitch_rad == AEROSONDE.trim_pitch_rad
     glider = FixedWingParameters.for_envelope(replace(AEROSONDE, powered=False, throttle_max=0.4))
     assert glider.throttle_max == 1.0
     assert FixedWingParameters.for_envelope(replace(AEROSONDE, throttle_max=0.4)).throttle_max == 0.4
