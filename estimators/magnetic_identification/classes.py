@@ -1,5 +1,5 @@
-"""The classes of anomalies that are told apart: the targets sought, known false anomalies, and dipoles of any
-kind.
+"""The classes of anomalies that are distinguished: the targets sought, known false anomalies, and dipoles of
+any kind.
 """
 
 import math

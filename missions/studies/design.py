@@ -123,8 +123,8 @@ class Design:
     def fingerprint(self) -> str:
         """Text that differs for designs that differ."""
         ranges = [(n, b if isinstance(b, tuple) else _of_distribution(b)) for n, b in self.sampled.items()]
-        told = repr(([tuple(cell.items()) for cell in self.cells], ranges, str(self.sampling)))
-        return hashlib.blake2b(told.encode(), digest_size=16).hexdigest()
+        content = repr(([tuple(cell.items()) for cell in self.cells], ranges, str(self.sampling)))
+        return hashlib.blake2b(content.encode(), digest_size=16).hexdigest()
 
 
 def _quantiles(bounds: tuple[float, float] | Distribution, unit: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -80,18 +80,18 @@ def _places(results: Results) -> tuple[list[float], list[int], Sequence[str], Se
         where.append(levels.index(cell[first]) + step * (group - 0.5 * (len(groups) - 1)))
         group_of.append(group)
     ticks = [f"{level:g}" if isinstance(level, float) else str(level) for level in levels]
-    told = [name_of(dict(zip(others, group, strict=True))) for group in groups]
-    return where, group_of, ticks, told, first
+    labels = [name_of(dict(zip(others, group, strict=True))) for group in groups]
+    return where, group_of, ticks, labels, first
 
 
 def _draw_rates(axes: Any, results: Results) -> None:
-    where, groups, ticks, told, label = _places(results)
+    where, groups, ticks, labels, label = _places(results)
     succeeded, finished = results.succeeded, results.finished
     seen: set[int] = set()
     for cell, (x, group) in enumerate(zip(where, groups, strict=True)):
         rate = rate_of(int(succeeded[cell].sum()), int(finished[cell].sum()))
         if rate.n:
-            name = told[group] if group not in seen and told[group] else None
+            name = labels[group] if group not in seen and labels[group] else None
             seen.add(group)
             _mark(axes, x, rate.rate, rate.ci95, group, name)
     axes.set_ylim(-0.03, 1.03)

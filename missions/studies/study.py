@@ -179,7 +179,7 @@ class Trials:
     def fingerprint(self) -> str:
         """Text that differs for studies whose rows do not belong together."""
         study = self.study
-        told = [
+        content = [
             study.name,
             study.design.fingerprint(),
             self.runs,
@@ -187,7 +187,7 @@ class Trials:
             study.schema.text(),
             _plain(study),
         ]
-        return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
+        return hashlib.blake2b(json.dumps(content).encode(), digest_size=16).hexdigest()
 
 
 def _plain(study: Study[Any, Any]) -> list[list[Any]]:

@@ -309,7 +309,7 @@ def interval_text(figures: Mapping[str, Any], key: str, interval: str, *, mark: 
     if not figures["n"]:
         return "-"
     low, high = figures[interval]
-    told = f"{figures[key]:.4g}"
+    figure = f"{figures[key]:.4g}"
     if math.isfinite(low):
-        told += f" [{low:.4g}, {high:.4g}]"
-    return f"{told} *" if mark and figures["conclusive"] else told
+        figure += f" [{low:.4g}, {high:.4g}]"
+    return f"{figure} *" if mark and figures["conclusive"] else figure
