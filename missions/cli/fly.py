@@ -1,6 +1,7 @@
 """`flightstack fly`: flies a mission with one command."""
 
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
     from missions.cli.mission_command import MissionCommand
     from missions.mission import Mission
-    from missions.runs.session import RunRequest
+    from missions.runs.request import RunRequest
 
 _link = partial(flight_option, group="Vehicles")
 _embedded = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
@@ -145,7 +146,6 @@ def fly(**given: Any) -> int:
     from missions.errors import PlanError
     from missions.runs.ending import signal_of
 
-    refuse_idle_options(click.get_current_context(), connected=bool(given["connect"]))
     try:
         return _fly(given)
     except PlanError as error:
@@ -174,12 +174,18 @@ def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
     return 0
 
 
-def _fly(given: dict[str, Any]) -> int:
+def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
+    """The mission and the request that the options of a parsed command line `fly` make.
+
+    Raises:
+        click.UsageError, PlanError: a value is not accepted.
+    """
     from missions.library import find_mission
     from missions.options import check_positive, parameters_from_file
 
+    given = context.params
+    refuse_idle_options(context, connected=bool(given["connect"]))
     mission = find_mission(given["mission"])
-    context = click.get_current_context()
     declared: MissionCommand = context.meta["mission command"]
     chosen = chosen_names(context)
     world = _world(given, mission, chosen)
@@ -198,6 +204,32 @@ def _fly(given: dict[str, Any]) -> int:
         height_m = max(options.altitude_m, _FORECAST_HEIGHT_M)
         forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
+    from missions.runs.request import REGAIN_S, RunRequest
+    from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.vehicle.firmware import Mode
+
+    request = RunRequest(
+        options=options,
+        connect=given["connect"],
+        system_ids=given["system_id"],
+        world=world,
+        speedup=given["speedup"],
+        expected_wind_m_s=forecast_m_s,
+        parameters=parameters,
+        out=given["out"],
+        picture=not given["no_picture"],
+        identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
+        on_failure=Mode(given["on_failure"]),
+        max_error_m=given["max_error"],
+        regain_s=REGAIN_S if given["regain"] is None else given["regain"],
+        estimator=given["estimator"],
+        estimator_settings=given["settings"],
+    )
+    return mission, request
+
+
+def _fly(given: dict[str, Any]) -> int:
+    mission, request = flight_of(click.get_current_context())
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
             f"{given['out']} is not empty, and nothing is overwritten; choose another --out"
@@ -208,11 +240,7 @@ def _fly(given: dict[str, Any]) -> int:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
     from missions.errors import MissionError
-    from missions.runs.request import REGAIN_S
-    from missions.runs.session import RunRequest as Request
     from missions.runs.session import fly as fly_mission
-    from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
-    from missions.vehicle.firmware import Mode
 
     line = ProgressLine()
     confirm = None
@@ -226,24 +254,10 @@ def _fly(given: dict[str, Any]) -> int:
             raise click.UsageError(in_options(error)) from error
     try:
         key = key_from(given["signing_key"])
-        request = Request(
-            options=options,
-            connect=given["connect"],
-            system_ids=given["system_id"],
-            world=world,
-            speedup=given["speedup"],
-            expected_wind_m_s=forecast_m_s,
-            parameters=parameters,
-            out=given["out"],
-            picture=not given["no_picture"],
-            identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
-            on_failure=Mode(given["on_failure"]),
-            max_error_m=given["max_error"],
+        request = replace(
+            request,
             confirm=confirm,
             on_open=lambda: warn_if_open(given["connect"], key),
-            regain_s=REGAIN_S if given["regain"] is None else given["regain"],
-            estimator=given["estimator"],
-            estimator_settings=given["settings"],
             command=" ".join(["flightstack", *sys.argv[1:]]),
             signing_key=key,
         )

@@ -6,8 +6,10 @@ import click
 
 from missions.cli.study_command import file_command
 from missions.cli.study_library import STUDIES
+from missions.cli.study_results import compare, show
+from missions.cli.sweep import SWEEP
 
-_OTHERS: Final = ("sweep", "show", "compare")
+_OTHERS: Final = {"sweep": SWEEP.command("sweep"), "show": show, "compare": compare}
 
 
 class _Studies(click.Group):
@@ -21,7 +23,7 @@ class _Studies(click.Group):
             return STUDIES[cmd_name].command(cmd_name)
         if cmd_name.endswith(".py"):
             return file_command().command(cmd_name)
-        return super().get_command(ctx, cmd_name)
+        return _OTHERS.get(cmd_name)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -34,12 +34,13 @@ class StudyCommand:
         help: text of `flightstack study NAME --help`.
         build: makes the study from the values of its own options.
         options: its own options, besides those of every study.
-        repeat: the command that repeats a trial; None: this command with `--trial`.
+        kind: class of the command.
     """
 
     help: str
     build: Callable[[Given], "Study[Any, Any]"]
     options: tuple[click.Parameter, ...] = ()
+    kind: type[click.Command] = click.Command
 
     def command(self, name: str) -> click.Command:
         """The command.
@@ -51,7 +52,7 @@ class StudyCommand:
         def run(**given: Any) -> int:
             return _run(self, name, given)
 
-        return click.Command(
+        return self.kind(
             name,
             callback=run,
             params=[*self.options, *engine_options()],

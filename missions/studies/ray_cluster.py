@@ -105,9 +105,19 @@ def _connect(address: str, workers: int | None, files: Path | None) -> None:
         options |= {"address": "local", "num_cpus": workers, "include_dashboard": False}
     else:
         options |= {"address": address}
+        host = address.rpartition(":")[0]
+        if host.startswith("127."):  # Ray would look for the nodes on the network's address
+            options["_node_ip_address"] = host
     try:
         ray.init(**options)
     except (ConnectionError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+        cause = error.__cause__ or error.__context__
+        if isinstance(cause, RuntimeError) and "AuthenticationError" in str(cause):
+            raise MissionError(
+                f"the Ray cluster at {where} requires a token: set RAY_AUTH_MODE=token, and "
+                "RAY_AUTH_TOKEN or "
+                "the file .ray/auth_token in the home folder, as for its nodes"
+            ) from error
         raise MissionError(
             f"no Ray cluster at {where}: {_first_line(error)}; start a head node (docs/studies.md)"
         ) from error

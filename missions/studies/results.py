@@ -100,6 +100,13 @@ class Results:
         ended[self._cell, self._run] = True
         return ended
 
+    @property
+    def seed_of_run(self) -> NDArray[np.int64]:
+        """(runs,) seed of each run; -1 for a run without a finished trial."""
+        seeds = np.full(self.runs, -1, dtype=np.int64)
+        seeds[self._run] = self.table["seed"].to_numpy()
+        return seeds
+
     def numeric_fields(self) -> list[str]:
         """Columns of the row that are single numbers, without those that are True or False."""
         return [

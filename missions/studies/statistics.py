@@ -1,6 +1,7 @@
 """Statistics of trials: figures with intervals, success rates, and differences in pairs of equal seeds."""
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -11,13 +12,27 @@ from scipy import stats
 
 from flightsim.foundation.random_streams import RandomStreams
 
-__all__ = ["Difference", "Figures", "Rate", "figures_of", "paired_difference", "paired_rates", "rate_of"]
+__all__ = [
+    "Difference",
+    "Figures",
+    "Rate",
+    "figures_of",
+    "paired_difference",
+    "paired_rates",
+    "rate_of",
+    "unpaired_difference",
+    "unpaired_rates",
+]
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 LEVEL: Final = 0.95
 RESAMPLES: Final = 2000
+FEW: Final = 10
+"""Below so many values the bootstrap's intervals are too narrow, and Student's and order statistics are
+used.
+"""
 _MANY: Final = 5000
 """From so many values on, intervals are Student's and of order statistics: the bootstrap gives the same
 there.
@@ -110,47 +125,48 @@ def figures_of(values: Array) -> Figures:
 
 
 def mean_interval(values: Array) -> Interval:
-    """95 % interval of the mean."""
-    if len(values) < _MANY:
+    """95 % interval of the mean: bootstrap (BCa); of few or very many values Student's."""
+    n = len(values)
+    if n < 2:
+        return math.nan, math.nan
+    if FEW <= n < _MANY:
         return _bootstrap(values, np.mean)
-    half = (
-        float(stats.t.ppf(0.5 + 0.5 * LEVEL, len(values) - 1))
-        * float(values.std(ddof=1))
-        / math.sqrt(len(values))
-    )
+    half = float(stats.t.ppf(0.5 + 0.5 * LEVEL, n - 1)) * float(values.std(ddof=1)) / math.sqrt(n)
     return float(values.mean()) - half, float(values.mean()) + half
 
 
 def median_interval(values: Array) -> Interval:
-    """95 % interval of the median."""
-    if len(values) < _MANY:
+    """95 % interval of the median: bootstrap (BCa); of few or very many values that of the order statistics,
+    NaN if there are too few for it (below 6).
+    """
+    n = len(values)
+    if FEW <= n < _MANY:
         return _bootstrap(values, np.median)
-    below = int(stats.binom.ppf(0.5 - 0.5 * LEVEL, len(values), 0.5))
+    below = int(stats.binom.ppf(0.5 - 0.5 * LEVEL, n, 0.5))
+    # the interval between the k-th value and the k-th from the end covers 1 - 2 P(B < k)
+    if below < 1:
+        return math.nan, math.nan
     ordered = np.sort(values)
-    return float(ordered[below]), float(ordered[len(values) - 1 - below])
+    return float(ordered[below - 1]), float(ordered[n - below])
 
 
 def _bootstrap(values: Array, statistic: Callable[..., object]) -> Interval:
-    if len(values) < 2:
-        return math.nan, math.nan
     if np.ptp(values) == 0.0:
         return float(values[0]), float(values[0])
-    generator = RandomStreams(0).generator("study", "bootstrap")
-    with np.errstate(all="ignore"):
-        found = stats.bootstrap(
-            (values,), statistic, n_resamples=RESAMPLES, confidence_level=LEVEL, method="BCa", rng=generator
-        ).confidence_interval
-        if not (
-            math.isfinite(found.low) and math.isfinite(found.high)
-        ):  # of a median: all resamples may be equal
+    for method in ("BCa", "percentile"):  # BCa has no interval if a resampled median hardly varies
+        generator = RandomStreams(0).generator("study", "bootstrap")
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", stats.DegenerateDataWarning)
             found = stats.bootstrap(
                 (values,),
                 statistic,
                 n_resamples=RESAMPLES,
                 confidence_level=LEVEL,
-                method="percentile",
+                method=method,
                 rng=generator,
             ).confidence_interval
+        if math.isfinite(found.low) and math.isfinite(found.high):
+            break
     return float(found.low), float(found.high)
 
 
@@ -179,7 +195,7 @@ def paired_difference(values: Array, baseline: Array) -> Difference:
     if found.conclusive or n < 2:
         return found
     return Difference(
-        n=n, mean=mean, ci95=interval, runs_needed=_runs_for(mean, float(differences.std(ddof=1)))
+        n=n, mean=mean, ci95=interval, runs_needed=_runs_for(mean, float(differences.std(ddof=1)), n)
     )
 
 
@@ -205,12 +221,39 @@ def paired_rates(count: NDArray[np.bool_], baseline: NDArray[np.bool_]) -> Diffe
     if found.conclusive:
         return found
     deviation = math.sqrt(max(0.0, (only + only_baseline) / n - mean**2))
-    return Difference(n=n, mean=mean, ci95=found.ci95, runs_needed=_runs_for(mean, deviation))
+    return Difference(n=n, mean=mean, ci95=found.ci95, runs_needed=_runs_for(mean, deviation, n))
 
 
-def _runs_for(mean: float, deviation: float) -> int | None:
-    """Pairs that show a difference of this mean and standard deviation with a power of 80 %."""
+def unpaired_difference(values: Array, baseline: Array) -> Difference:
+    """The difference of the means of independent values, with Welch's interval."""
+    one, other = values[np.isfinite(values)], baseline[np.isfinite(baseline)]
+    n = min(len(one), len(other))
+    if n < 2:
+        return Difference(n=n, mean=math.nan, ci95=(math.nan, math.nan), runs_needed=None)
+    mean = float(one.mean() - other.mean())
+    interval = stats.ttest_ind(one, other, equal_var=False).confidence_interval(LEVEL)
+    return Difference(n=n, mean=mean, ci95=(float(interval.low), float(interval.high)), runs_needed=None)
+
+
+def unpaired_rates(count: NDArray[np.bool_], baseline: NDArray[np.bool_]) -> Difference:
+    """The difference of two rates of independent trials, with the interval of Newcombe (1998, method 10),
+    which combines the Wilson intervals of both.
+    """
+    n = min(len(count), len(baseline))
+    if not n:
+        return Difference(n=0, mean=math.nan, ci95=(math.nan, math.nan), runs_needed=None)
+    one, other = (rate_of(int(c.sum()), len(c)) for c in (count, baseline))
+    mean = one.rate - other.rate
+    low = mean - math.hypot(one.rate - one.ci95[0], other.ci95[1] - other.rate)
+    high = mean + math.hypot(one.ci95[1] - one.rate, other.rate - other.ci95[0])
+    return Difference(n=n, mean=mean, ci95=(low, high), runs_needed=None)
+
+
+def _runs_for(mean: float, deviation: float, n: int) -> int | None:
+    """Pairs that show a difference of this mean and standard deviation with a power of 80 %: the normal
+    formula and two more for Student's quantile, and more than the `n` that did not show it.
+    """
     if mean == 0.0 or not math.isfinite(mean):
         return None
     quantiles = float(stats.norm.ppf(0.5 + 0.5 * LEVEL)) + float(stats.norm.ppf(_POWER))
-    return math.ceil((quantiles * deviation / mean) ** 2)
+    return max(n + 1, 2 + math.ceil((quantiles * deviation / mean) ** 2))

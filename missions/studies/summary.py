@@ -11,6 +11,7 @@ import numpy as np
 from missions.studies.results import Results
 from missions.studies.rows import Outcome
 from missions.studies.statistics import (
+    FEW,
     Difference,
     Figures,
     Rate,
@@ -24,12 +25,21 @@ if TYPE_CHECKING:
     from missions.studies.engine import Engine
     from missions.studies.study import Study
 
-__all__ = ["cells_of", "differences_of", "metrics_of", "name_of", "summary_of", "table_of"]
+__all__ = [
+    "aligned",
+    "cells_of",
+    "differences_of",
+    "failures_of",
+    "interval_text",
+    "metrics_of",
+    "name_of",
+    "summary_of",
+    "table_of",
+]
 
 SUCCESS: Final = "success"
-FEW_RUNS: Final = 10
-"""Below so many values an interval is not trusted: the bootstrap of few values is too narrow."""
 _MOST_COLUMNS: Final = 8
+_MOST_NAMED: Final = 6
 
 
 def metrics_of(results: Results) -> list[str]:
@@ -99,24 +109,38 @@ def differences_of(results: Results) -> list[dict[str, Any]]:
     return found
 
 
+def failures_of(results: Results) -> list[dict[str, Any]]:
+    """The trials that were not successful: number, error or reason, and command."""
+    found = []
+    rows = results.table.to_pylist()
+    for row in rows:
+        error = row["error"]
+        if row["outcome"] == Outcome.DONE.value:
+            if not results.success or row[results.success]:
+                continue
+            error = row.get("reason") or f"{results.success} is False"
+        found.append({"trial": row["trial"], "error": error, "command": row["command"]})
+    return found
+
+
 def notes_of(
     results: Results, cells: Sequence[Mapping[str, Any]], differences: Sequence[Mapping[str, Any]]
 ) -> list[str]:
     """What the number of runs does not carry."""
     notes = []
+    metrics = list(differences[0]["metrics"]) if differences else []
     trials = results.runs * len(results.cells)
     if not results.complete:
         notes.append(
             f"{trials - results.table.num_rows} of {trials} trials are missing: the figures are preliminary"
         )
     counts = [figures["n"] for cell in cells for figures in cell["metrics"].values()]
-    if results.runs < FEW_RUNS:
+    if results.runs < FEW:
         notes.append(
-            f"{results.runs} runs per cell are too few for intervals, which are too narrow below "
-            f"{FEW_RUNS} runs"
+            f"{results.runs} runs per cell carry no more than a first impression; {FEW} or more are needed"
         )
-    elif counts and min(counts) < FEW_RUNS:
-        notes.append(f"some figures are from fewer than {FEW_RUNS} values; their intervals are too narrow")
+    elif counts and min(counts) < FEW:
+        notes.append(f"some figures are from fewer than {FEW} values: no more than a first impression")
     failed = [cell for cell in cells if cell[SUCCESS]["count"] < cell["trials"]]
     if failed:
         count = sum(cell["trials"] - cell[SUCCESS]["count"] for cell in failed)
@@ -129,17 +153,19 @@ def notes_of(
         notes.append(
             f"no failure in a cell does not mean that there are none: the rate may be as low as {low:.0%}"
         )
-    open_pairs = [
-        (difference["parameters"], name, figures["runs_needed"])
-        for difference in differences
-        for name, figures in difference["metrics"].items()
-        if figures["n"] and not figures["conclusive"]
-    ]
-    for cell, name, needed in open_pairs[:_MOST_COLUMNS]:
-        more = "" if needed is None else f"; a difference of the size seen would need about {needed} runs"
-        notes.append(f"{name_of(cell)}: no difference of {name} from the baseline is shown{more}")
-    if len(open_pairs) > _MOST_COLUMNS:
-        notes.append(f"and {len(open_pairs) - _MOST_COLUMNS} more differences are not shown by these runs")
+    for name in metrics:
+        unsure = [
+            name_of(d["parameters"]) + _needed(figures["runs_needed"])
+            for d in differences
+            if (figures := d["metrics"][name])["n"] and not figures["conclusive"] and figures["mean"]
+        ]
+        if unsure:
+            more = f" and {len(unsure) - _MOST_NAMED} more" if len(unsure) > _MOST_NAMED else ""
+            notes.append(
+                f"{name}: no difference from the baseline is shown for "
+                f"{'; '.join(unsure[:_MOST_NAMED])}{more}; in "
+                "brackets, the runs that would show one of the size seen"
+            )
     pairs = sum(len(difference["metrics"]) for difference in differences)
     if pairs >= 20:
         notes.append(f"of {pairs} differences, about {0.05 * pairs:.0f} exclude 0 by chance alone")
@@ -229,24 +255,25 @@ def table_of(summary: Mapping[str, Any]) -> list[str]:
             *(_value(cell["parameters"][name]) for name in names),
             str(cell["trials"]),
             _share(cell[SUCCESS]),
-            *(_interval(cell["metrics"][name], "median", "median_ci95") for name in shown),
+            *(interval_text(cell["metrics"][name], "median", "median_ci95") for name in shown),
         ]
         for cell in cells
     ]
-    lines = [*_aligned([head, *rows]), "Medians with bootstrap intervals; success with Wilson's interval."]
+    lines = aligned([head, *rows])
+    lines.append("Medians with 95 % intervals (bootstrap); success with Wilson's interval.")
     if summary["differences"]:
         base = name_of(summary["differences"][0]["baseline"])
         head = [*names, "success", *shown]
         rows = [
             [
                 *(_value(d["parameters"][name]) for name in names),
-                _interval(d[SUCCESS], "mean", "ci95", mark=True),
-                *(_interval(d["metrics"][name], "mean", "ci95", mark=True) for name in shown),
+                interval_text(d[SUCCESS], "mean", "ci95", mark=True),
+                *(interval_text(d["metrics"][name], "mean", "ci95", mark=True) for name in shown),
             ]
             for d in summary["differences"]
         ]
         lines += ["", f"Difference from {base}, mean over pairs of equal seeds; * excludes 0:"]
-        lines += _aligned([head, *rows])
+        lines += aligned([head, *rows])
     if len(metrics) > len(shown):
         lines += ["", f"Not shown: {', '.join(metrics[_MOST_COLUMNS:])} (summary.json)."]
     if summary["notes"]:
@@ -254,11 +281,16 @@ def table_of(summary: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of texts as lines, each column as wide as its widest text."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
+
+
+def _needed(runs: int | None) -> str:
+    return "" if runs is None else f" ({runs} runs)"
 
 
 def _value(value: Any) -> str:
@@ -272,7 +304,8 @@ def _share(rate: Mapping[str, Any]) -> str:
     return f"{rate['count']}/{rate['n']} [{low:.2f}, {high:.2f}]"
 
 
-def _interval(figures: Mapping[str, Any], key: str, interval: str, *, mark: bool = False) -> str:
+def interval_text(figures: Mapping[str, Any], key: str, interval: str, *, mark: bool = False) -> str:
+    """A figure with its interval, as `1.2 [1.1, 1.3]`; `mark`: with * if the interval excludes 0."""
     if not figures["n"]:
         return "-"
     low, high = figures[interval]
