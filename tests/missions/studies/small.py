@@ -27,10 +27,10 @@ class Row:
 
 
 def trial(parameters: Mapping[str, Any], seed: int) -> Row:
-    """A draw that depends on everything that a trial has; one in ten of kind b fails."""
+    """A draw that depends on everything that a trial has; some of kind b fail."""
     draw = RandomStreams(seed).generator("small")
     error_m = parameters["wind_m_s"] + parameters["gust_m_s"] + draw.standard_normal()
-    if parameters["kind"] == "b" and draw.random() < 0.1:
+    if parameters["kind"] == "b" and seed % 5 == 3:
         raise ValueError(f"no luck with seed {seed}")
     (trial_folder() / "log.txt").write_text(f"{error_m!r}\n")
     return Row(
