@@ -61,7 +61,7 @@ class Job:
         modules = {
             name: Path(str(module.__file__))
             for name, module in sys.modules.items()
-            if name.startswith(_MODULE)
+            if name.startswith(_MODULE) and name.encode() in content
         }
         return PackedJob(content=content, modules=modules)
 
