@@ -106,7 +106,9 @@ class SweepTrial:
 
 
 def _number(value: object) -> str:
-    return repr(value) if isinstance(value, float) else str(value)
+    """A value as a word: a float with all its digits."""
+    short = f"{value:g}" if isinstance(value, float) else str(value)
+    return repr(value) if isinstance(value, float) and float(short) != value else short
 
 
 def _without_wind(words: list[str]) -> list[str]:
@@ -135,6 +137,8 @@ def sweep_study(
     """
     from missions.library import find_mission
     from missions.options import parse_wind
+    from missions.runs.limits_before_flight import check_request
+    from missions.runs.vehicle_opening import VehicleOpener
     from missions.studies.flights import FlightRow
     from missions.studies.study import Study, Trials
 
@@ -174,9 +178,10 @@ def sweep_study(
         command=trial.command,
         files=tuple(trial.files.values()),
     )
-    trials = Trials(study, 1, 0)
+    trials, opener = Trials(study, 1, 0), VehicleOpener()
     for index in range(len(trials)):  # values that fly refuses are reported before anything is flown
-        parsed(trial.line(trials[index].values, trials[index].seed))
+        flight, request = parsed(trial.line(trials[index].values, trials[index].seed))
+        check_request(flight, request, opener)
     return study
 
 

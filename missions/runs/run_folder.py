@@ -8,11 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from missions.errors import PlanError
-from missions.notes import FlightNotes
-from missions.runs.score import FlightScore
+
+if TYPE_CHECKING:
+    from missions.notes import FlightNotes
+    from missions.runs.score import FlightScore
 
 EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights give equal logs."""
@@ -88,7 +90,7 @@ WITHIN: Final = "within the acceptance radius"
 POOR: Final = "poor"
 
 
-def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
+def tracking(notes: "FlightNotes", score: "FlightScore") -> str | None:
     """How a commanded path was followed: everywhere within the acceptance radius, or not; None: not measured.
 
     A waypoint counts as reached within the acceptance radius, so the user accepts this error. A vehicle that
@@ -107,7 +109,7 @@ def how_left(blocks: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(f"vehicle {system_id} {words}" for system_id, words in left.items())
 
 
-def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
+def vehicle_summary(notes: "FlightNotes", score: "FlightScore") -> dict[str, Any]:
     """The figures of one vehicle's flight."""
     block: dict[str, Any] = {
         "system_id": notes.system_id,
@@ -194,6 +196,7 @@ def whole(path: Path) -> Iterator[None]:
 
 
 def finite(value: Any) -> Any:
+    """A value for JSON: numbers that are not finite, also in mappings and sequences, become None."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

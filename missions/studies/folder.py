@@ -36,6 +36,10 @@ _FORMAT: Final = 1
 _OBJECT_STORES: Final = ("s3", "gcs", "abfs")
 
 
+file_system: Final = fs.FileSystem.from_uri
+"""File system and path of a URI."""
+
+
 class StudyFolder:
     """A study's folder. Make it with `created` or `opened`.
 
@@ -88,7 +92,7 @@ class StudyFolder:
         if not _is_uri(place):
             return cls(fs.LocalFileSystem(), str(place), str(place))
         try:
-            system, path = fs.FileSystem.from_uri(str(place))
+            system, path = file_system(str(place))
         except (OSError, ValueError) as error:
             raise PlanError(f"{place} is not a place for results: {error}") from error
         return cls(system, path, str(place))

@@ -25,25 +25,21 @@ class Job:
     """The trials of a study, and how they are run.
 
     Attributes:
-        study: the study.
-        runs: number of runs per cell.
-        seed: seed of the study.
+        trials: the trials, with the values of sampled parameters: a worker does not draw them again.
         keep_logs: which trials' files are kept.
         time_limit_s: wall time after which a trial is terminated; None: no limit.
         attempts: how often a trial is begun whose worker process is killed.
     """
 
-    study: Study[Any, Any]
-    runs: int
-    seed: int
+    trials: Trials
     keep_logs: KeepLogs = KeepLogs.NONE
     time_limit_s: float | None = None
     attempts: int = ATTEMPTS
 
     @property
-    def trials(self) -> Trials:
-        """The trials by number."""
-        return Trials(self.study, self.runs, self.seed)
+    def study(self) -> Study[Any, Any]:
+        """The study."""
+        return self.trials.study
 
     def packed(self, dumps: Callable[[Any], bytes] = pickle.dumps) -> "PackedJob":
         """The job for another process.
@@ -65,7 +61,7 @@ class Job:
         modules = {
             name: Path(str(module.__file__))
             for name, module in sys.modules.items()
-            if name.startswith(_MODULE)
+            if name.startswith(_MODULE) and name.encode() in content
         }
         return PackedJob(content=content, modules=modules)
 

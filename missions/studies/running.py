@@ -126,7 +126,7 @@ def run_study(
     if runs is None:
         runs = study.runs if before is None else int(before["runs"])
     trials = Trials(study, runs, seed)
-    job = Job(study=study, runs=runs, seed=seed, keep_logs=keep, time_limit_s=time_limit_s)
+    job = Job(trials=trials, keep_logs=keep, time_limit_s=time_limit_s)
     if before is not None:
         _require_same(before, trials, str(resume))
     folder = StudyFolder.created(out, study.name) if resumed is None else resumed
@@ -178,7 +178,7 @@ class _Session:
                 by_signal = signal_of(interrupt)
             except MissionError as error:
                 outcome, reason = "failed", str(error)
-                if not self._done and not self._had:
+                if self._folder.tables() is None:
                     raise
         return self._concluded(outcome, reason, by_signal)
 

@@ -1,12 +1,16 @@
 """`flightstack study`: what it writes, and what it says of what can't be."""
 
 import json
+import shlex
+import socket
 from pathlib import Path
 
+import click
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
-from missions.cli.main import run_command_line
+from missions.cli.main import command_line, run_command_line
 from missions.cli.study import study
 
 
@@ -63,3 +67,165 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert run_command_line(arguments) == 2
     assert "is not empty" in capsys.readouterr().err
     assert (tmp_path / "file").read_text() == "kept"
+
+
+OWN = """
+from dataclasses import dataclass
+from missions.studies import Study, grid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    height_m: float
+    good: bool
+
+
+def trial(parameters, seed):
+    if {raises} and seed == 2:
+        raise ValueError("a bird")
+    while {endless} and seed == 1:
+        pass
+    return Row(height_m=10.0 * parameters["share"] + (seed * 37 % 11), good=seed != 3)
+
+
+STUDY = Study(name="own", trial=trial, row=Row, design=grid(share=(0.5, 1.0)), runs=4, success="good")
+"""
+
+
+def own_study(folder: Path, *, raises: bool = False, endless: bool = False) -> str:
+    """A study file of a user."""
+    path = folder / "own_study.py"
+    path.write_text(OWN.format(raises=raises, endless=endless))
+    return str(path)
+
+
+def ran(*arguments: object) -> tuple[int, str, str]:
+    """Exit code, output and error output of `flightstack study`."""
+    result = CliRunner().invoke(command_line, ["study", *map(str, arguments)], standalone_mode=False)
+    if isinstance(result.exception, click.ClickException):
+        return result.exception.exit_code, result.stdout, result.exception.format_message()
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return int(result.return_value or 0), result.stdout, result.stderr
+
+
+def test_a_users_file_is_a_study(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    code, said, err = ran(own_study(tmp_path), "--workers", 1, "--out", out, "--seed", 2)
+    assert code == 0 and err == ""
+    assert "share  trials" in said and f"run: {out}" in said
+    assert {path.name for path in out.iterdir()} == {
+        "rows.parquet", "study.json", "study.png", "summary.json", "table.txt", "timing.parquet",
+    }  # fmt: skip
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["outcome"] == "completed" and summary["seed"] == 2 and summary["trials"] == 8
+    assert [cell["parameters"] for cell in summary["cells"]] == [{"share": 0.5}, {"share": 1.0}]
+    (difference,) = summary["differences"]
+    assert difference["metrics"]["height_m"]["mean"] == 5.0
+    command = pq.read_table(out / "rows.parquet")["command"][5].as_py()
+    code, said, _ = ran(*shlex.split(command)[2:])
+    assert code == 0
+    row = pq.read_table(out / "rows.parquet").to_pylist()[5]
+    assert json.loads(said) == {k: row[k] for k in ("trial", "run", "seed", "share", "height_m", "good")}
+
+
+def test_a_study_is_continued_with_what_it_was_begun_with(tmp_path: Path) -> None:
+    """Options that are not repeated are those of the study; others are refused."""
+    out = tmp_path / "run"
+    arguments = ("lissajous-localization", "--workers", 1, "--no-picture")
+    assert ran(*arguments, "--runs", 1, "--equations", "corrected", "--seed", 4, "--out", out)[0] == 0
+    before = (out / "rows.parquet").read_bytes()
+    assert ran(*arguments, "--resume", out)[0] == 0
+    assert (out / "rows.parquet").read_bytes() == before
+    code, _, err = ran(*arguments, "--resume", out, "--equations", "printed")
+    assert code == 2 and "has another study: its options" in err
+    code, _, err = ran(own_study(tmp_path), "--resume", out)
+    assert code == 2 and "has another study: its study lissajous-localization is not own" in err
+
+
+def test_trials_without_a_row_are_one_line_and_exit_code_1(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    code, said, err = ran(own_study(tmp_path, raises=True), "--workers", 1, "--out", out)
+    assert code == 1 and f"run: {out}" in said
+    assert (
+        err.count("\n") == 1
+        and "2 trials have no row; trial 4: ValueError: a bird (own_study.py, line" in err
+    )
+    assert "--trial 4" in err
+    code, _, err = ran(own_study(tmp_path, raises=True), "--trial", 4)
+    assert code == 1 and "Traceback" in err and "ValueError: a bird" in err and "trial 4 failed" in err
+    code, said, err = ran("show", out, "--failed")
+    assert code == 0 and said.count("a bird") == 2 and said.count("good is False") == 2
+    assert "4 of 8 trials without success" in err
+
+
+def test_a_trial_that_never_ends_is_terminated(tmp_path: Path) -> None:
+    file = own_study(tmp_path, endless=True)
+    code, _, err = ran(file, "--workers", 1, "--time-limit", 1, "--out", tmp_path / "run", "--no-picture")
+    assert code == 1 and "2 trials have no row; trial 2: it did not end within the time limit of 1 s" in err
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("def study(:\n", "line 1: invalid syntax"),
+        ("import no_such_module\n", "can't be loaded: ModuleNotFoundError"),
+        ("x = 1\n", "has neither `STUDY = Study(...)` nor `def study(arguments)`"),
+        ("def study(arguments):\n    return arguments['map']\n", "KeyError: 'map' (file.py, line 2)"),
+        ("STUDY = 3\n", "has neither"),
+    ],
+)
+def test_files_that_are_no_study_are_usage_errors(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "file.py").write_text(content)
+    code, _, err = ran(tmp_path / "file.py", "--out", tmp_path / "run")
+    assert code == 2 and words in err and not (tmp_path / "run").exists()
+
+
+def test_other_usage_errors(tmp_path: Path) -> None:
+    for arguments, words in (
+        ((tmp_path / "none.py",), "does not exist"),
+        ((own_study(tmp_path), "--arg", "a=1"), "takes no arguments"),
+        ((own_study(tmp_path), "--trial", "8"), "trial 8 is not in 0..7"),
+        ((own_study(tmp_path), "--time-limit", "0"), "--time-limit"),
+        ((own_study(tmp_path), "--ray", "here"), "--ray 'here' is not accepted"),
+        (("show", tmp_path), "has no study"),
+        (("compare", tmp_path, tmp_path), "has no study"),
+    ):
+        code, _, err = ran(*arguments)
+        assert code == 2 and words in err, err
+
+
+def test_an_unreachable_cluster_is_one_line_and_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("ray")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+    arguments = ["study", own_study(tmp_path), "--ray", address, "--out", str(tmp_path / "run")]
+    assert run_command_line(arguments) == 1
+    err = capsys.readouterr().err
+    assert err.startswith(f"flightstack: no Ray cluster at {address}: ") and err.count("\n") == 1
+
+
+def test_ctrl_c_leaves_a_study_that_resumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run"
+    path = Path(own_study(tmp_path))
+    plain = path.read_text()
+    path.write_text(plain.replace("    while", "    if seed == 2: raise KeyboardInterrupt\n    while"))
+    assert run_command_line(["study", str(path), "--workers", "1", "--out", str(out)]) == 130
+    said = capsys.readouterr()
+    assert f"interrupted; 4 of 8 trials are in {out}, and --resume {out} continues" in said.err
+    assert "4 of 8 trials are missing" in said.out
+    assert run_command_line(["study", "show", str(out)]) == 0
+    assert "4 of 8 trials are missing" in capsys.readouterr().out
+
+
+def test_studies_are_compared_in_pairs_of_equal_seeds(tmp_path: Path) -> None:
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        assert ran(own_study(tmp_path), "--workers", 1, "--seed", seed, "--out", tmp_path / name)[0] == 0
+    code, said, _ = ran("compare", tmp_path / "a", tmp_path / "b")
+    assert code == 0 and "in pairs of equal seeds" in said
+    code, said, _ = ran("compare", tmp_path / "a", tmp_path / "b", "--json")
+    compared = json.loads(said)
+    assert compared["paired"] and [c["metrics"]["height_m"]["mean"] for c in compared["cells"]] == [0.0, 0.0]
+    code, said, _ = ran("compare", tmp_path / "a", tmp_path / "c")
+    assert code == 0 and "without pairs: the seeds differ" in said
