@@ -13,8 +13,8 @@ from missions.vehicle.telemetry import position
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-SampleListener = Callable[[PlacedReading, bool], None]
-"""Called with each placed reading, and whether it belongs to an anomaly."""
+SampleListener = Callable[[PlacedReading, float, bool], None]
+"""Called with each placed reading, the map's value there, and whether it belongs to an anomaly."""
 
 
 class FieldWatch:
@@ -69,6 +69,6 @@ class FieldWatch:
                 reading.time_us, reading.total_nt, map_nt, reading.north_m, reading.east_m
             )
             self.samples += 1
-            self._on_sample(reading, self.detector.anomalous)
+            self._on_sample(reading, map_nt, self.detector.anomalous)
             if anomaly is not None:
                 self._on_anomaly(anomaly)
