@@ -184,6 +184,19 @@ class Investigation:
         self._assigned[searcher] = None
         return None, flown
 
+    def most_probable(self) -> Suspect | None:
+        """The open suspect that is most probably the target, which it then is; None: none is probable."""
+        likely = [
+            suspect
+            for suspect in self.suspects.values()
+            if suspect.verdict is Verdict.OPEN and suspect.probability >= _ACCEPT
+        ]
+        if not likely:
+            return None
+        chosen = max(likely, key=lambda suspect: suspect.probability)
+        chosen.verdict = Verdict.TARGET
+        return chosen
+
     def leave(self, searcher: int) -> None:
         """A searcher flies home or is lost; its suspect may be taken by another."""
         self._legs[searcher] = []

@@ -230,6 +230,16 @@ class Search:
             goal, _ = self.investigation.next_leg(searcher, done=False)
         return goal
 
+    def finish(self, time_us: int) -> None:
+        """The time of the search is over: name the most probable suspect that is open for its place only, which
+        is not known well enough.
+        """
+        if self.investigation is None or self.found is not None:
+            return
+        suspect = self.investigation.most_probable()
+        if suspect is not None and self.map.layout.contains(*suspect.place_ne_m):
+            self.found, self.found_us = suspect, time_us
+
     def _report_pass(self, searcher: int, anomaly: Identified, time_us: int) -> None:
         """A pass over an anomaly has ended: change the scores by what is decided."""
         assert self.investigation is not None

@@ -205,6 +205,7 @@ class SearchTeam:
                 async with vehicle.link.guard("the end of the search"):
                     async for _ in stream:
                         if self.over:
+                            self.search.finish(self._vehicles[0].clock.time_us)
                             break
                         settled = clock.time_us - searcher.began_us > _MODE_AGE_US
                         if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
