@@ -2,9 +2,9 @@
 
 The paper reads the trace of the confidence by eye (figure 6): for a target it rises and stays, for a false
 anomaly it drops sharply again and again. The features are that level, the drops, the duration, and the
-evidence. A logistic regression and a small network were fitted to simulated encounters by
-the study `magnetic-identification`; their parameters are in `classifier.toml` beside this
-module. Their evaluation needs NumPy only.
+evidence. A logistic regression and a small network were fitted to simulated encounters by the study
+`magnetic-identification`; their parameters are in `classifier.toml` beside this module. Their evaluation
+needs NumPy only.
 """
 
 import math

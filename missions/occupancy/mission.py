@@ -55,7 +55,12 @@ class OccupancyMission(Mission[OccupancyOptions]):
         return options if options.map_file is not None else replace(options, map_file=str(published))
 
     def estimator_settings(self, options: OccupancyOptions) -> Mapping[str, float | str]:
-        known: dict[str, float | str] = {"threshold_nt": options.threshold_nt, "noise_nt": options.noise_nt}
+        known: dict[str, float | str] = {
+            "threshold_nt": options.threshold_nt,
+            "noise_nt": options.noise_nt,
+            "targets": ",".join(options.targets),
+            "false_anomalies": ",".join(options.false_anomalies),
+        }
         if options.map_error_nt is not None:
             known["map_error_nt"] = options.map_error_nt
         if options.map_file is not None:

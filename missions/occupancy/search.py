@@ -231,8 +231,8 @@ class Search:
         return goal
 
     def finish(self, time_us: int) -> None:
-        """The time of the search is over: name the most probable suspect that is open for its place only, which
-        is not known well enough.
+        """The time of the search is over: name the most probable suspect whose place only is not known well
+        enough.
         """
         if self.investigation is None or self.found is not None:
             return
