@@ -112,6 +112,7 @@ def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: He
         },
         "readings": 0 if watch is None else watch.samples,
         "readings_dropped": 0 if watch is None else watch.placer.dropped + watch.detector.dropped,
+        "readings_implausible": 0 if watch is None else watch.check.implausible,
         "anomalies_insignificant": 0 if watch is None else watch.detector.insignificant,
         "anomalies": [_anomaly(anomaly) for anomaly in searcher.anomalies],
     }
