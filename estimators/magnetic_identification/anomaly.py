@@ -244,6 +244,18 @@ class Anomaly:
                 self._place_ne_m = self._in_map(float(forward_m), float(right_m))
         return self._place_ne_m
 
+    @property
+    def place_sigma_m(self) -> float:
+        """Standard deviation of the place of the most probable target, the larger of both axes."""
+        best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
+        hypothesis = self._hypotheses[best]
+        if not isinstance(hypothesis, ParticleHypothesis):
+            return math.inf
+        places, weights = hypothesis.sources()[:, :2], hypothesis.weights
+        off = places - weights @ places
+        covariance = (off * weights[:, None]).T @ off
+        return math.sqrt(float(np.linalg.eigvalsh(covariance)[-1]))
+
     def modes(self) -> list[Mode]:
         """The modes under the most probable target: north and east from the map's home, axis from north."""
         best = self._sought[int(np.argmax(self.probabilities[self._sought]))]

@@ -21,7 +21,7 @@ from estimators.magnetic_identification.estimate import IdentificationEstimate
 from estimators.magnetic_identification.identifier import Identifier, Progress
 from estimators.magnetic_identification.parameters import IdentificationParameters
 from estimators.messages import Message
-from estimators.occupancy.placed_readings import ReadingPlacer
+from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.magnetics import magnetic_field_ned_gauss
@@ -35,8 +35,6 @@ _MAGNETOMETER: Final = 158
 _TOTAL_FIELD: Final = "MAG_NT"
 _POSITION_HZ: Final = 2.0
 _PUBLISHED: Final = b"MAGTGT_P"
-_STRONGEST_NT: Final = 200_000.0
-_STUCK_READINGS: Final = 30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,9 +91,8 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
         p, survey_map = self.parameters, self._map
         self._guard.reset()
         self._placers: dict[int, ReadingPlacer] = {}
-        self._repeats: dict[int, tuple[float, int]] = {}
+        self._checks: dict[int, ReadingCheck] = {}
         self._off_map = 0
-        self.implausible = 0
         self._estimates: tuple[IdentificationEstimate, ...] = ()
         self._reported_us: dict[int, int] = {}
         self.identifier: Identifier | None = None
@@ -105,6 +102,10 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
                 map_error=map_error_of(survey_map, p.map_error_nt),
                 field_ned=field_direction(survey_map.home, p.decimal_year),
             )
+
+    @property
+    def implausible(self) -> int:
+        return sum(check.implausible for check in self._checks.values())
 
     @property
     def unplaced(self) -> int:
@@ -127,13 +128,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
             self.reset()
         elif refused is not None:
             return refused
-        if not 0.0 < total_nt < _STRONGEST_NT:
-            self.implausible += 1
-            return Outcome.IMPLAUSIBLE
-        before, repeats = self._repeats.get(system, (math.nan, 0))
-        self._repeats[system] = total_nt, repeats + 1 if total_nt == before else 0
-        if self._repeats[system][1] >= _STUCK_READINGS:
-            self.implausible += 1
+        if not self._checks.setdefault(system, ReadingCheck()).accepts(total_nt):
             return Outcome.IMPLAUSIBLE
         placer = self._placer(system)
         if placer is None:

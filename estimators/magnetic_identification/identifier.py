@@ -98,6 +98,11 @@ class Identifier:
     def dropped(self) -> int:
         return sum(vehicle.detector.dropped for vehicle in self._vehicles.values())
 
+    def in_pass(self, number: int) -> bool:
+        """Whether a vehicle is at an anomaly."""
+        vehicle = self._vehicles.get(number)
+        return vehicle is not None and vehicle.anomaly is not None
+
     def take(self, number: int, reading: PlacedReading, map_nt: float) -> Progress | None:
         """Process one reading of a vehicle.
 

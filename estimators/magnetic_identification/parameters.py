@@ -2,10 +2,16 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from estimators.magnetic_identification.classes import AnomalyClass, DipoleClass, classes_from
 
-__all__ = ["IdentificationParameters"]
+__all__ = ["FALSE_ANOMALIES", "TARGETS", "IdentificationParameters"]
+
+TARGETS: Final = ("target:gaussian:30:80:60",)
+"""Default classes that are sought."""
+FALSE_ANOMALIES: Final = ("boat:dipole:15:50:150",)
+"""Default known classes that are not sought."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,8 +44,8 @@ class IdentificationParameters:
         ValueError: a value is out of its range.
     """
 
-    targets: tuple[str, ...] = ("target:gaussian:30:80:60",)
-    false_anomalies: tuple[str, ...] = ("boat:dipole:15:30:300",)
+    targets: tuple[str, ...] = TARGETS
+    false_anomalies: tuple[str, ...] = FALSE_ANOMALIES
     target_prior: float = 0.5
     particles: int = 4000
     roulette: bool = False

@@ -68,3 +68,11 @@ class OccupancyMap:
         sigma_m = 0.5 * radius_m
         peak = height / (self.layout.rows * self.layout.columns)
         self.scores += np.where(distance2 <= radius_m**2, peak * np.exp(-0.5 * distance2 / sigma_m**2), 0.0)
+
+    def dismiss(self, north_m: float, east_m: float, model: DetectionModel) -> None:
+        """Lower the scores around a false anomaly, as a pass right over it does (eq. 11)."""
+        north, east = self.layout.centres()
+        distance2 = (north - north_m) ** 2 + (east - east_m) ** 2
+        missed = 1.0 - model.probability_overhead * np.exp(-0.5 * distance2 / model.range_m**2)
+        self.scores *= missed
+        self.belief.update(missed)

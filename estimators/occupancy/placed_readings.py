@@ -11,6 +11,8 @@ from typing import Final
 from flightsim.foundation.geodesy import LocalFrame
 
 _WAITING: Final = 100  # largest number of waiting readings: ten seconds of an ordinary magnetometer
+_STRONGEST_NT: Final = 200_000.0  # three times the Earth's field at its poles
+_STUCK_READINGS: Final = 30  # equal ones in a row: noise makes no two of ten a second equal for so long
 _GAP_US: Final = 2_000_000  # longest time between two positions; longer gaps are not interpolated
 
 
@@ -29,6 +31,28 @@ class PlacedReading:
     east_m: float
     height_m: float
     total_nt: float
+
+
+class ReadingCheck:
+    """Recognizes a magnetometer out of order: stuck at one value, or saturated.
+
+    Attributes:
+        implausible: number of rejected readings.
+    """
+
+    def __init__(self) -> None:
+        self.implausible = 0
+        self._last_nt = 0.0
+        self._repeats = 0
+
+    def accepts(self, total_nt: float) -> bool:
+        """Whether a reading may be the Earth's field; it is counted if not."""
+        self._repeats = self._repeats + 1 if total_nt == self._last_nt else 0
+        self._last_nt = total_nt
+        if 0.0 < total_nt < _STRONGEST_NT and self._repeats < _STUCK_READINGS:
+            return True
+        self.implausible += 1
+        return False
 
 
 class ReadingPlacer:

@@ -52,6 +52,7 @@ from flightsim.payload.target_sensor import (
 )
 from flightsim.payload.targets import NO_TAG, GroundTarget, GroundTargetParameters, GroundTargets
 from flightsim.payload.terrain import Terrain, TerrainSpec
+from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
 
 __all__ = [
     "LEVEL",
@@ -103,6 +104,8 @@ __all__ = [
     "Terrain",
     "TerrainSpec",
     "Trajectory",
+    "VehicleField",
+    "VehicleFieldParameters",
     "camera_from_gimbal",
     "gimbal_from_camera",
     "magnetic_field_of",

@@ -51,6 +51,7 @@ class MagneticSpec:
         map_file: the published map (`MagneticMap.load`); the true field differs from it by the error of a
             survey. None: both are generated from the seed of the world, around home.
         width_m, height_m: size of a generated map, east and north.
+        spacing_m: distance of the grid lines of a generated map; 100 m suit survey size, 60 km x 50 km.
         survey_height_m: height above home at which a generated map is valid.
         signatures: targets in the field; places are local NED of the map's home.
     """
@@ -58,11 +59,12 @@ class MagneticSpec:
     map_file: Path | None = None
     width_m: float = 2000.0
     height_m: float = 2000.0
+    spacing_m: float = _MAP_SPACING_M
     survey_height_m: float = 100.0
     signatures: tuple[SignatureSpec, ...] = ()
 
     def __post_init__(self) -> None:
-        require_positive(width_m=self.width_m, height_m=self.height_m)
+        require_positive(width_m=self.width_m, height_m=self.height_m, spacing_m=self.spacing_m)
         require_finite(survey_height_m=self.survey_height_m)
 
 
@@ -135,7 +137,7 @@ def _generated(spec: MagneticSpec, home: Home, seed: int, decimal_year: float) -
             north_m=half_n_m,
             west_m=-half_e_m,
             east_m=half_e_m,
-            spacing_m=_MAP_SPACING_M,
+            spacing_m=spec.spacing_m,
             height_m=spec.survey_height_m,
         ),
         home=home,

@@ -12,6 +12,8 @@ from flightsim.foundation.checks import require_not_negative, require_positive, 
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
+from flightsim.payload.main_field import NANOTESLA_PER_GAUSS
+from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
 from flightsim.sensors.kernels import gauss_markov
 from flightsim.sensors.schedule import steps_per_sample
 
@@ -32,6 +34,8 @@ class SurveyMagnetometerParameters:
         drift_nt, drift_time_constant_s: Gauss-Markov; what base-station correction leaves of the field's
             daily variation, and the sensor's own wandering.
         quantum_nt: of the digital output.
+        vehicle_field: of the whole aircraft, not compensated; None: compensated, so that only
+            `heading_error_nt` is left.
     """
 
     rate_hz: int = 10
@@ -41,6 +45,7 @@ class SurveyMagnetometerParameters:
     drift_nt: float = 0.2
     drift_time_constant_s: float = 600.0
     quantum_nt: float = 0.001
+    vehicle_field: VehicleFieldParameters | None = None
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
@@ -88,6 +93,7 @@ class SurveyMagnetometer:
         "_permanent_nt",
         "_rng",
         "_truth",
+        "_vehicle_field",
         "_waiting",
         "parameters",
         "reading",
@@ -125,6 +131,8 @@ class SurveyMagnetometer:
         self._permanent_nt: Array = p.heading_error_nt * self._rng.standard_normal(3)
         self._drift_nt = p.drift_nt * float(self._rng.standard_normal())
         self._decay, self._drive_nt = gauss_markov(p.drift_nt, p.drift_time_constant_s, 1.0 / p.rate_hz)
+        # drawn last, so that the other errors are the same with and without it
+        self._vehicle_field = None if p.vehicle_field is None else VehicleField(p.vehicle_field, self._rng)
         self._body_field: Array = np.zeros(3)
         self._waiting: deque[MagneticReading] = deque()
         self.reading: MagneticReading | None = None
@@ -154,6 +162,10 @@ class SurveyMagnetometer:
             + self._drift_nt
             + p.noise_nt * white
         )
+        if self._vehicle_field is not None and strength:
+            value_nt += self._vehicle_field.total_nt(
+                self._body_field / strength, truth[t.RATES_FRD_RAD_S], NANOTESLA_PER_GAUSS * strength
+            )
         self._drift_nt = self._decay * self._drift_nt + self._drive_nt * drive
         if p.quantum_nt > 0.0:
             value_nt = math.floor(value_nt / p.quantum_nt + 0.5) * p.quantum_nt

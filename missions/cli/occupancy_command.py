@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from estimators.magnetic_identification.parameters import FALSE_ANOMALIES, TARGETS
+    from missions.occupancy.investigation import Identify
     from missions.occupancy.options import OccupancyOptions
     from missions.options import parse_pair
 
@@ -42,6 +44,10 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         raise_radius_m=given["raise_radius"],
         search_time_s=given["search_time"],
         speed_m_s=given["speed"],
+        identify=Identify(given["identify"]),
+        targets=tuple(given["class"]) or TARGETS,
+        false_anomalies=tuple(given["false_class"]) or FALSE_ANOMALIES,
+        particles=given["particles"],
         map_file=given["map"],
     )
 
@@ -60,6 +66,7 @@ def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
         sigma_across_m=across_m,
         moment_a_m2=given["moment"],
         depth_m=given["depth"],
+        false_count=given["false_anomalies"],
     )
 
 
@@ -109,6 +116,26 @@ COMMAND: Final = MissionCommand(
         ),
         option("--confirmations", type=int, default=2, help="Passes that must see an anomaly at one place."),
         option("--raise-radius", type=float, default=300.0, help="Scores are raised around anomalies, m."),
+        option(
+            "--identify",
+            type=click.Choice(["threshold", "trace", "bayes"]),
+            default="threshold",
+            help="By passes that see an anomaly, a particle filter's confidence, or the evidence of classes.",
+        ),
+        option(
+            "--class",
+            multiple=True,
+            metavar="NAME:FORM:...",
+            help="Class that is sought, with --identify: NAME:gaussian:NT:ALONG:ACROSS or "
+            "NAME:dipole:NT:LEAST:MOST. [default: target:gaussian:30:80:60]",
+        ),
+        option(
+            "--false-class",
+            multiple=True,
+            metavar="NAME:FORM:...",
+            help="Known class that is not sought. [default: boat:dipole:15:50:150]",
+        ),
+        option("--particles", type=int, default=4000, help="Of each class, with --identify."),
         option("--search-time", type=float, default=900.0, help="Give up after so many seconds."),
         option("--altitude", type=float, default=80.0, help="Of the lowest layer, above home, m."),
         option("--separation", type=float, default=15.0, help="Between the layers of a team, m."),
@@ -150,6 +177,13 @@ COMMAND: Final = MissionCommand(
             help="Of a target with a moment, below home, m.",
         ),
         option(
+            "--false-anomalies",
+            scope=Scope.EMBEDDED,
+            type=click.IntRange(0, 100),
+            default=0,
+            help="Boats and wrecks in the embedded world, drawn from --seed.",
+        ),
+        option(
             "--sigma", scope=Scope.EMBEDDED, default="80x60", help="Its extent, m: one sigma along x across."
         ),
     ),
@@ -166,6 +200,9 @@ COMMAND: Final = MissionCommand(
             "depth": ("depth_m",),
             "rate": ("rate_hz",),
             "map": ("map_file",),
+            "class": ("targets",),
+            "false_class": ("false_anomalies",),
+            "false_anomalies": ("false_count",),
             "target": ("target_ne_m",),
             "amplitude": ("amplitude_nt",),
             "sigma": ("sigma_along_m", "sigma_across_m"),

@@ -19,6 +19,12 @@ def _lissajous_localization(given: Given) -> "Study[Any, Any]":
     return study(given["equations"])
 
 
+def _magnetic_identification(given: Given) -> "Study[Any, Any]":
+    from missions.studies.magnetic_identification import study
+
+    return study(train=given["train"])
+
+
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
     {
         "lissajous-localization": StudyCommand(
@@ -39,6 +45,22 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_lissajous_localization,
+        ),
+        "magnetic-identification": StudyCommand(
+            help=(
+                "Magnetic targets and false anomalies after one and two passes: Lum et al. 2005.\n\n"
+                "Areas under the ROC of the threshold, the paper's confidence, the classifier and the "
+                "evidence of classes, on maps and targets that the classifier was not fitted to, and with "
+                "larger offsets, more noise and deeper targets. The folder gets roc.png."
+            ),
+            options=(
+                click.Option(
+                    ["--train"],
+                    is_flag=True,
+                    help="Fit the classifier to the rows (needs the extra `learn`); writes classifier.toml.",
+                ),
+            ),
+            build=_magnetic_identification,
         ),
     }
 )

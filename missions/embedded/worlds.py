@@ -16,6 +16,7 @@ from flightsim.payload import (
     CameraParameters,
     Circle,
     ConstantVelocity,
+    DipoleSignature,
     GaussianSignature,
     GimbalParameters,
     GroundTargetParameters,
@@ -44,6 +45,11 @@ _LEAST_TAG_M: Final = 4.0
 _MARGIN_CELLS: Final = 2.0  # cells around the searched area in a generated map
 _INSIDE: Final = 0.9  # share of the area in which a target is drawn
 _TARGET_STREAM: Final = 0x7A67
+_FALSE_STREAM: Final = 0xFA15E
+_APART_M: Final = 500.0  # between anomalies
+_PLACE_TRIES: Final = 1000
+_LEAST_MOMENT_A_M2: Final = 3e4
+_MOST_MOMENT_A_M2: Final = 1.2e5
 _LARGEST_DEPTH_M: Final = 1000.0
 
 
@@ -177,6 +183,7 @@ def occupancy_world(
     sigma_across_m: float = 60.0,
     moment_a_m2: float | None = None,
     depth_m: float = 10.0,
+    false_count: int = 0,
 ) -> WorldSpec:
     """The world of a search with an occupancy map: survey magnetometers, and a field with a target in it.
 
@@ -187,6 +194,7 @@ def occupancy_world(
         amplitude_nt, sigma_along_m, sigma_across_m: Gaussian signature of the target.
         moment_a_m2, depth_m: moment of a target that is a dipole along the Earth's field, and its depth below
             home; None: the target is a Gaussian.
+        false_count: number of boats and wrecks besides the target, drawn from the seed.
 
     Raises:
         PlanError: a target that is impossible, outside the area, or too weak to be found.
@@ -215,9 +223,62 @@ def occupancy_world(
         width_m=options.width_m + 2.0 * (abs(centre_e_m) + margin_m),
         height_m=options.height_m + 2.0 * (abs(centre_n_m) + margin_m),
         survey_height_m=options.altitude_m,
-        signatures=(signature,),
+        signatures=(signature, *drawn_false_anomalies(options, world.seed, false_count, (north_m, east_m))),
     )
     return replace(world, magnetic_field=field)
+
+
+def drawn_false_anomalies(
+    options: OccupancyOptions, seed: int, count: int, target_ne_m: tuple[float, float]
+) -> tuple[DipoleSignature | GaussianSignature, ...]:
+    """Boats and wrecks in a searched area, apart from the target and from each other, drawn from the seed.
+
+    Three of four are dipoles of any direction near home's level, magnetised rather along the Earth's field;
+    the fourth is a wreck whose parts make a round, narrow anomaly.
+
+    Raises:
+        PlanError: the area is too small for so many.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_FALSE_STREAM,)))
+    layout = options.layout
+    places = [target_ne_m]
+    found: list[DipoleSignature | GaussianSignature] = []
+    for number in range(count):
+        for _ in range(_PLACE_TRIES):
+            north_m = float(rng.uniform(layout.south_m, layout.north_m))
+            east_m = float(rng.uniform(layout.west_m, layout.east_m))
+            if all(math.dist((north_m, east_m), other) >= _APART_M for other in places):
+                break
+        else:
+            raise PlanError(
+                f"`false_count` {count} does not fit into the area with {_APART_M:g} m between anomalies; "
+                "ask for fewer, or a larger `width_m, height_m`"
+            )
+        places.append((north_m, east_m))
+        size = float(rng.uniform(0.0, 1.0))
+        direction = rng.standard_normal(3) + np.array([0.8, 0.0, 1.8])
+        if number % 4 == 3:
+            found.append(
+                GaussianSignature(
+                    north_m=north_m,
+                    east_m=east_m,
+                    amplitude_nt=10.0 + 40.0 * size,
+                    sigma_along_m=35.0,
+                    sigma_across_m=25.0,
+                )
+            )
+            continue
+        moment = _LEAST_MOMENT_A_M2 * (_MOST_MOMENT_A_M2 / _LEAST_MOMENT_A_M2) ** size
+        along = moment * direction / np.linalg.norm(direction)
+        found.append(
+            DipoleSignature(
+                north_m=north_m,
+                east_m=east_m,
+                height_m=-float(rng.uniform(0.0, 10.0)),
+                moment_ned_a_m2=(float(along[0]), float(along[1]), float(along[2])),
+            )
+        )
+    return tuple(found)
 
 
 def _check_signature(

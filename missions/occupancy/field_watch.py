@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from autopilot_bridge.mavlink import decode
 from estimators.occupancy.detection import Anomaly, AnomalyDetector
-from estimators.occupancy.placed_readings import PlacedReading, ReadingPlacer
+from estimators.occupancy.placed_readings import PlacedReading, ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.telemetry import position
@@ -13,8 +13,8 @@ from missions.vehicle.telemetry import position
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-SampleListener = Callable[[PlacedReading, bool], None]
-"""Called with each placed reading, and whether it belongs to an anomaly."""
+SampleListener = Callable[[PlacedReading, float, bool], None]
+"""Called with each placed reading, the map's value there, and whether it belongs to an anomaly."""
 
 
 class FieldWatch:
@@ -23,6 +23,7 @@ class FieldWatch:
     Attributes:
         detector: threshold on the reading minus the map.
         placer: gives each reading a position.
+        check: recognizes a magnetometer out of order, whose readings are not used.
         samples: number of readings compared with the map.
     """
 
@@ -38,6 +39,7 @@ class FieldWatch:
         """Store the arguments; no message is processed before `start`."""
         self.detector = detector
         self.placer = ReadingPlacer(survey_map.frame())
+        self.check = ReadingCheck()
         self.samples = 0
         self._vehicle = vehicle
         self._map = survey_map
@@ -49,7 +51,7 @@ class FieldWatch:
         """Start to process messages."""
         vehicle = self._vehicle
         self._stops = [
-            vehicle.payload.on_total_field(self.placer.add_reading),
+            vehicle.payload.on_total_field(self._on_reading),
             vehicle.link.connection.listen("GLOBAL_POSITION_INT", self._on_position),
         ]
 
@@ -58,6 +60,10 @@ class FieldWatch:
         for stop in self._stops:
             stop()
         self._stops = []
+
+    def _on_reading(self, time_us: int, total_nt: float) -> None:
+        if self.check.accepts(total_nt):
+            self.placer.add_reading(time_us, total_nt)
 
     def _on_position(self, frame: Any) -> None:
         if frame.system_id != self._vehicle.system_id or frame.component_id != AUTOPILOT_COMPONENT:
@@ -69,6 +75,6 @@ class FieldWatch:
                 reading.time_us, reading.total_nt, map_nt, reading.north_m, reading.east_m
             )
             self.samples += 1
-            self._on_sample(reading, self.detector.anomalous)
+            self._on_sample(reading, map_nt, self.detector.anomalous)
             if anomaly is not None:
                 self._on_anomaly(anomaly)

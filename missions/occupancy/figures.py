@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from missions.occupancy.heading_score import HeadingScore, heading_score
+from missions.occupancy.investigation import Suspect
 from missions.occupancy.separation import least_separation_m
 
 if TYPE_CHECKING:
     from estimators.occupancy.detection import Anomaly
     from missions.mission import Debriefing
+    from missions.occupancy.search import Candidate, Search
     from missions.occupancy.team import Searcher, SearchTeam
     from missions.runs.score import FlightScore
 
@@ -44,9 +46,10 @@ def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str,
         ),
         "map_error_nt": round(team.map_error.sigma_nt, 3),
         "candidates": [
-            {**(_place(candidate.place_ne_m) or {}), "passes": candidate.passes}
+            {**(_place(candidate.place_ne_m) or {}), "passes": candidate.passes, **_judgement(candidate)}
             for candidate in search.candidates
         ],
+        **_identification(search),
         "searchers": [
             _searcher_block(searcher, notes.system_id, notes.kind, heading)
             for searcher, (notes, _), heading in zip(team.searchers, debriefing.flights, scores, strict=False)
@@ -109,9 +112,24 @@ def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: He
         },
         "readings": 0 if watch is None else watch.samples,
         "readings_dropped": 0 if watch is None else watch.placer.dropped + watch.detector.dropped,
+        "readings_implausible": 0 if watch is None else watch.check.implausible,
         "anomalies_insignificant": 0 if watch is None else watch.detector.insignificant,
         "anomalies": [_anomaly(anomaly) for anomaly in searcher.anomalies],
     }
+
+
+def _judgement(candidate: "Candidate | Suspect") -> dict[str, Any]:
+    """What the identification decides about a candidate."""
+    if isinstance(candidate, Suspect):
+        return {"probability": round(candidate.probability, 4), "verdict": str(candidate.verdict)}
+    return {}
+
+
+def _identification(search: "Search") -> dict[str, Any]:
+    investigation = search.investigation
+    if investigation is None:
+        return {}
+    return {"identify": str(investigation.identify), "passes_on_purpose": investigation.passes_flown}
 
 
 def _anomaly(anomaly: "Anomaly") -> dict[str, float]:

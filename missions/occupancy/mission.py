@@ -55,7 +55,12 @@ class OccupancyMission(Mission[OccupancyOptions]):
         return options if options.map_file is not None else replace(options, map_file=str(published))
 
     def estimator_settings(self, options: OccupancyOptions) -> Mapping[str, float | str]:
-        known: dict[str, float | str] = {"threshold_nt": options.threshold_nt, "noise_nt": options.noise_nt}
+        known: dict[str, float | str] = {
+            "threshold_nt": options.threshold_nt,
+            "noise_nt": options.noise_nt,
+            "targets": ",".join(options.targets),
+            "false_anomalies": ",".join(options.false_anomalies),
+        }
         if options.map_error_nt is not None:
             known["map_error_nt"] = options.map_error_nt
         if options.map_file is not None:
@@ -93,12 +98,18 @@ class OccupancyMission(Mission[OccupancyOptions]):
         return search_figures(flown.team, debriefing)
 
     def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        broken = tuple(
+            f"vehicle {searcher['system_id']}: {searcher['readings_implausible']} readings are stuck or no "
+            "field of the Earth, and were not used; check its magnetometer"
+            for searcher in summary.get("searchers", ())
+            if searcher["readings_implausible"]
+        )
         detected = f"probability of detection {summary.get('probability_of_detection', 0.0):.2f}"
         if not summary["target_found"]:
-            return (f"target not found, {detected}",)
+            return (f"target not found, {detected}", *broken)
         error_m = summary["target_error_m"]
         off = "" if error_m is None else f", {error_m:.0f} m off"
-        return (f"target found after {summary['time_to_find_s']:.0f} s{off}, {detected}",)
+        return (f"target found after {summary['time_to_find_s']:.0f} s{off}, {detected}", *broken)
 
     def title(self, options: OccupancyOptions) -> str:
         return f"{self.name}, {options.vehicles} vehicles over {options.width_m:g} m x {options.height_m:g} m"

@@ -6,12 +6,18 @@ from pathlib import Path
 from typing import Final
 
 from estimators.errors import EstimatorError
+from estimators.magnetic_identification.parameters import (
+    FALSE_ANOMALIES,
+    TARGETS,
+    IdentificationParameters,
+)
 from estimators.occupancy.detection import DetectionModel, MapError
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.tracking.grid import GridLayout
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
+from missions.occupancy.investigation import Identify
 from missions.occupancy.search import SearchParameters
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
@@ -46,6 +52,10 @@ class OccupancyOptions(MissionOptions):
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
         speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: the vehicle's default.
+        identify: how an anomaly is found to be the target.
+        targets, false_anomalies: classes of anomalies, for `identify` other than THRESHOLD
+            (`IdentificationParameters`).
+        particles: number of particles of each class.
         map_file: published magnetic map; None: the map that the
             embedded world publishes.
     """
@@ -67,6 +77,10 @@ class OccupancyOptions(MissionOptions):
     raise_radius_m: float = 300.0
     search_time_s: float = 900.0
     speed_m_s: float | None = None
+    identify: Identify = Identify.THRESHOLD
+    targets: tuple[str, ...] = TARGETS
+    false_anomalies: tuple[str, ...] = FALSE_ANOMALIES
+    particles: int = 4000
     map_file: str | None = None
 
     def __post_init__(self) -> None:
@@ -105,6 +119,23 @@ class OccupancyOptions(MissionOptions):
                 MapError(sigma_nt=self.map_error_nt)
         except EstimatorError as error:
             raise PlanError(str(error)) from None
+        if self.identify is not Identify.THRESHOLD:
+            try:
+                _ = self.identification
+            except ValueError as error:
+                raise PlanError(f"`identify={self.identify}`: {error}") from None
+
+    @property
+    def identification(self) -> IdentificationParameters:
+        """Parameters of the identification."""
+        return IdentificationParameters(
+            targets=self.targets,
+            false_anomalies=self.false_anomalies,
+            particles=self.particles,
+            threshold_nt=self.threshold_nt,
+            noise_nt=self.noise_nt,
+            map_error_nt=self.map_error_nt,
+        )
 
     @property
     def layout(self) -> GridLayout:

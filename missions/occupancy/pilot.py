@@ -105,7 +105,11 @@ class Pilot:
         """Process the newest telemetry; returns a command when the next leg begins, else None."""
         if self._goal_ne_m is None:
             return self._fly_to(self._start_ne_m, motion)
-        if not self._done(self._goal_ne_m, motion):
+        done = self._done(self._goal_ne_m, motion)
+        leg_ne_m = self._search.next_leg(self._searcher, motion.time_us, done=done)
+        if leg_ne_m is not None:
+            return self._fly_to(leg_ne_m, motion)
+        if not done:
             return None
         decision = self._search.next_cell(
             self._searcher, motion.north_m, motion.east_m, motion.course_rad % math.tau

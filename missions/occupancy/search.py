@@ -10,12 +10,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.magnetic_identification.anomaly import Anomaly as Identified
 from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.localisation import gaussian_centre
 from estimators.occupancy.occupancy_map import OccupancyMap
+from estimators.occupancy.placed_readings import PlacedReading
 from estimators.tracking.grid import Cell, GridLayout
 from missions.errors import PlanError
 from missions.occupancy.decision import Decision, DecisionParameters, decide
+from missions.occupancy.investigation import Investigation, Suspect, Verdict
 
 Array = NDArray[np.float64]
 
@@ -114,6 +117,7 @@ class Search:
 
     Attributes:
         map: the occupancy map.
+        investigation: identifies anomalies; None: they count by threshold.
         candidates: places at which anomalies were detected.
         found: the candidate that is the target; None while searching.
         found_us: time at which it was found.
@@ -129,6 +133,7 @@ class Search:
         decisions: Sequence[DecisionParameters],
         *,
         prior: Array | None = None,
+        investigation: Investigation | None = None,
         snapshot_interval_s: float = 2.0,
     ) -> None:
         """Begin a search.
@@ -138,12 +143,14 @@ class Search:
             parameters: parameters of the team's search.
             decisions: parameters of each searcher's decisions.
             prior: see `OccupancyMap`.
+            investigation: see the attribute.
             snapshot_interval_s: interval between the maps that are kept for pictures.
         """
         self.map = OccupancyMap(layout, prior)
         self.parameters = parameters
-        self.candidates: list[Candidate] = []
-        self.found: Candidate | None = None
+        self.investigation = investigation
+        self.candidates: list[Candidate | Suspect] = []
+        self.found: Candidate | Suspect | None = None
         self.found_us = -1
         self.detection_curve: list[tuple[int, float]] = []
         self.snapshots: list[Snapshot] = []
@@ -197,6 +204,66 @@ class Search:
         if sum(snapshot.event for snapshot in self.snapshots) < _EVENTS_KEPT:
             self._keep_snapshot(anomaly.time_us if time_us is None else time_us, event=True)
 
+    def report_reading(self, searcher: int, reading: PlacedReading, map_nt: float) -> None:
+        """A reading of a searcher, for a search that identifies (`investigation`)."""
+        investigation = self.investigation
+        if investigation is None:
+            return
+        progress = investigation.take(searcher, reading, map_nt)
+        self.report_place(
+            searcher,
+            reading.time_us,
+            reading.north_m,
+            reading.east_m,
+            anomalous=investigation.in_pass(searcher),
+        )
+        if progress is not None and progress.pass_ended is not None:
+            self._report_pass(searcher, progress.pass_ended, reading.time_us)
+
+    def next_leg(self, searcher: int, time_us: int, *, done: bool) -> tuple[float, float] | None:
+        """The next goal of a searcher that is assigned a pass over a suspect; None: it searches on."""
+        if self.investigation is None:
+            return None
+        goal, flown = self.investigation.next_leg(searcher, done=done)
+        if flown is not None:
+            self._report_pass(searcher, flown.identified, time_us)
+            goal, _ = self.investigation.next_leg(searcher, done=False)
+        return goal
+
+    def finish(self, time_us: int) -> None:
+        """The time of the search is over: name the most probable suspect whose place only is not known well
+        enough.
+        """
+        if self.investigation is None or self.found is not None:
+            return
+        suspect = self.investigation.most_probable()
+        if suspect is not None and self.map.layout.contains(*suspect.place_ne_m):
+            self.found, self.found_us = suspect, time_us
+
+    def _report_pass(self, searcher: int, anomaly: Identified, time_us: int) -> None:
+        """A pass over an anomaly has ended: change the scores by what is decided."""
+        assert self.investigation is not None
+        suspect = self.investigation.conclude(searcher, anomaly)
+        north_m, east_m = suspect.place_ne_m
+        if not self.map.layout.contains(north_m, east_m):
+            return
+        if suspect not in self.candidates:
+            self.candidates.append(suspect)
+        parameters = self.parameters
+        if suspect.verdict is Verdict.DISMISSED:
+            self.map.dismiss(north_m, east_m, parameters.detection)
+        else:
+            self.map.raise_around(
+                north_m,
+                east_m,
+                radius_m=parameters.raise_radius_m,
+                height=parameters.raise_height * suspect.probability,
+            )
+        if suspect.verdict is Verdict.TARGET and self.found is None:
+            self.found, self.found_us = suspect, time_us
+        if sum(snapshot.event for snapshot in self.snapshots) < _EVENTS_KEPT:
+            self._keep_snapshot(time_us, event=True)
+
     def begin(self, time_us: int) -> None:
         """Store the map at the start of the search."""
         self._keep_snapshot(time_us, event=False)
@@ -218,6 +285,8 @@ class Search:
     def leave(self, searcher: int) -> None:
         """Release the cell of a searcher that flies home or is lost."""
         self._targets[searcher] = None
+        if self.investigation is not None:
+            self.investigation.leave(searcher)
 
     def _keep_snapshot(self, time_us: int, *, event: bool) -> None:
         layout = self.map.layout
@@ -232,11 +301,10 @@ class Search:
 
     def _candidate_at(self, anomaly: Anomaly) -> Candidate:
         place = (anomaly.north_m, anomaly.east_m)
-        near = [
-            (math.dist(candidate.place_ne_m, place), index) for index, candidate in enumerate(self.candidates)
-        ]
+        known = [candidate for candidate in self.candidates if isinstance(candidate, Candidate)]
+        near = [(math.dist(candidate.place_ne_m, place), index) for index, candidate in enumerate(known)]
         if near and min(near)[0] <= self.parameters.same_place_m:
-            return self.candidates[min(near)[1]]
+            return known[min(near)[1]]
         candidate = Candidate(anomalies=[], noise_nt=self.parameters.noise_nt)
         self.candidates.append(candidate)
         return candidate

@@ -5,12 +5,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
+from estimators.magnetic_identification.estimator import field_direction
+from estimators.magnetic_identification.identifier import Identifier
 from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
 from estimators.occupancy.placed_readings import PlacedReading
 from estimators.occupancy.survey_map import SurveyMap
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.occupancy.field_watch import FieldWatch
+from missions.occupancy.investigation import Identify, Investigation
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 SEARCH: Final = "search"
 """Name of the phase in which a vehicle searches."""
+
+_FIELD_YEAR: Final = 2026.0  # of the main field, whose direction changes little
 
 _TAKEOFF_S: Final = 300.0  # longest time of one vehicle's takeoff, for the vehicles that wait for it
 _LANDING_S: Final = 900.0
@@ -80,7 +85,10 @@ class SearchTeam:
         first = options[0]
         check_map(first, survey_map)
         self.search = Search(
-            first.layout, first.search_parameters, [own.decision_parameters for own in options]
+            first.layout,
+            first.search_parameters,
+            [own.decision_parameters for own in options],
+            investigation=_investigation(options, survey_map),
         )
         self.searchers = [
             Searcher(pilot=Pilot(self.search, k, start_ne_m=start_place(own)))
@@ -197,6 +205,7 @@ class SearchTeam:
                 async with vehicle.link.guard("the end of the search"):
                     async for _ in stream:
                         if self.over:
+                            self.search.finish(self._vehicles[0].clock.time_us)
                             break
                         settled = clock.time_us - searcher.began_us > _MODE_AGE_US
                         if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
@@ -216,14 +225,19 @@ class SearchTeam:
     def _watch(self, index: int) -> FieldWatch:
         searcher, offset_us = self.searchers[index], self._offsets_us[index]
 
-        def on_sample(reading: PlacedReading, anomalous: bool) -> None:
+        def on_sample(reading: PlacedReading, map_nt: float, anomalous: bool) -> None:
             time_us = reading.time_us + offset_us
             searcher.track.append((time_us, reading.north_m, reading.east_m))
+            if self.search.investigation is not None:
+                self.search.report_reading(index, replace(reading, time_us=time_us), map_nt)
+                return
             self.search.report_place(index, time_us, reading.north_m, reading.east_m, anomalous=anomalous)
 
         def on_anomaly(seen: Anomaly) -> None:
             anomaly = replace(seen, time_us=seen.time_us + offset_us)
             searcher.anomalies.append(anomaly)
+            if self.search.investigation is not None:
+                return  # its own filters report passes
             last_us = searcher.track[-1][0]
             self.search.report_anomaly(index, anomaly, last_us)
 
@@ -257,6 +271,25 @@ class SearchTeam:
             airspeed_m_s=airspeed_m_s if math.isfinite(airspeed_m_s) else 0.0,
             wind_ne_m_s=(0.0, 0.0) if wind is None else wind,
         )
+
+
+def _investigation(options: Sequence[OccupancyOptions], survey_map: SurveyMap) -> Investigation | None:
+    """The identification of a team; None when anomalies count by threshold."""
+    first = options[0]
+    if first.identify is Identify.THRESHOLD:
+        return None
+    map_error = first.map_error(survey_map)
+    return Investigation(
+        first.identify,
+        Identifier(
+            first.identification,
+            map_error=map_error,
+            field_ned=field_direction(survey_map.home, _FIELD_YEAR),
+        ),
+        searchers=len(options),
+        noise_nt=first.noise_nt,
+        map_error=map_error,
+    )
 
 
 def start_place(options: OccupancyOptions) -> tuple[float, float]:

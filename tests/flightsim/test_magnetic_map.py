@@ -24,8 +24,10 @@ from flightsim.payload import (
     MagneticField,
     MagneticMap,
     MagneticMapError,
+    MagneticSpec,
     MainField,
     SyntheticMapParameters,
+    magnetic_field_of,
     synthetic_map,
 )
 from flightsim.payload.survey_grid import map_from_survey
@@ -491,3 +493,15 @@ def test_bad_signatures_are_named(make: object, named: str) -> None:
     assert callable(make)
     with pytest.raises(ValueError, match=named):
         make()
+
+
+def test_a_generated_map_may_be_as_large_as_a_survey():
+    """60 km by 50 km at 100 m, as in Lum et al. 2005, figure 2, with the model's main field."""
+    home = Home()
+    spec = MagneticSpec(width_m=60_000.0, height_m=50_000.0, spacing_m=100.0)
+    _, published = magnetic_field_of(spec, home=home, seed=1, decimal_year=2026.0)
+    assert published.total_field_nt.shape == (501, 601)
+    lat_deg, lon_deg = home.offset(25_000.0, 30_000.0)
+    main_nt = 1e5 * np.linalg.norm(magnetic_field_ned_gauss(lat_deg, lon_deg, home.alt_m, 2026.0))
+    corner = published.total_field_nt[-40:, -40:]
+    assert abs(float(corner.mean()) - main_nt) < 300.0

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimators.occupancy.placed_readings import ReadingPlacer
+from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
@@ -69,3 +69,18 @@ def test_without_positions_readings_do_not_pile_up():
     for k in range(500):
         placer.add_reading(k * 100_000, 1.0)
     assert placer.dropped == 400
+
+
+def test_a_magnetometer_that_is_stuck_or_saturated_is_not_used_until_it_changes():
+    check = ReadingCheck()
+    assert all(check.accepts(48_000.0 + 0.1 * k) for k in range(1, 5))
+    assert [check.accepts(48_000.0) for _ in range(40)] == [True] * 30 + [False] * 10
+    assert check.accepts(48_000.1)
+    assert not any(check.accepts(value) for value in (0.0, -1.0, 3e5))
+    assert check.implausible == 13
+
+
+def test_equal_values_now_and_then_are_accepted():
+    """Readings of 0.004 nT in single precision repeat themselves."""
+    check = ReadingCheck()
+    assert all(check.accepts(48_000.0 + k // 8) for k in range(400))

@@ -7,8 +7,9 @@ import pytest
 
 from flightsim.world_spec import WorldSpec
 from missions.embedded import occupancy_world
-from missions.embedded.worlds import drawn_target
+from missions.embedded.worlds import drawn_false_anomalies, drawn_target
 from missions.errors import PlanError
+from missions.occupancy.investigation import Identify
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions, check_vehicle
 from missions.planning.limits import FixedWingLimits, MulticopterLimits
@@ -127,3 +128,22 @@ def test_a_map_that_is_none_is_refused_before_the_flight(tmp_path):
         OccupancyMission().check(options, WINGS)
     with pytest.raises(PlanError, match="takes none"):
         OccupancyMission().check(replace(options, map_file=None, arguments={"x": "1"}), WINGS)
+
+
+def test_classes_of_an_identification_are_checked_with_the_options():
+    with pytest.raises(PlanError, match=r"`identify=bayes`: targets names no class"):
+        OccupancyOptions(identify=Identify.BAYES, targets=())
+    with pytest.raises(PlanError, match=r"`identify=trace`: class 'x' is not accepted; give NAME:gaussian"):
+        OccupancyOptions(identify=Identify.TRACE, false_anomalies=("x",))
+
+
+def test_false_anomalies_are_apart_and_follow_from_the_seed():
+    options = OccupancyOptions()
+    found = drawn_false_anomalies(options, 3, 5, (0.0, 0.0))
+    again = drawn_false_anomalies(options, 3, 5, (0.0, 0.0))
+    assert found == again != drawn_false_anomalies(options, 4, 5, (0.0, 0.0))
+    places = [(0.0, 0.0), *((s.north_m, s.east_m) for s in found)]
+    assert min(math.dist(a, b) for k, a in enumerate(places) for b in places[:k]) >= 500.0
+    assert all(options.layout.contains(*place) for place in places)
+    with pytest.raises(PlanError, match="`false_count` 60 does not fit into the area"):
+        drawn_false_anomalies(options, 3, 60, (0.0, 0.0))

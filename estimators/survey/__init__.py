@@ -1,0 +1,1 @@
+"""Processing of magnetic surveys: compensation of the aircraft, and lines, levels and grids."""

@@ -1,0 +1,159 @@
+"""Compensation of a survey aircraft's own magnetic field (Tolles and Lawson), from a calibration flight.
+
+Source: Leliak 1961 (IRE Transactions on Aerospace and Navigational Electronics 8); the regression on terms in
+the band of the manoeuvres: Leach 1979, "Automatic aerial magnetometer compensation"; figure of merit: Reeves
+2005, "Aeromagnetic Surveys", chapter 3.
+
+The terms are 3 permanent, 5 induced (the sixth is a constant, as the squares of the direction cosines sum to
+one) and 8 of eddy currents. Their regression is nearly singular on any flight, so a ridge keeps the
+coefficients small.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from estimators.errors import EstimatorError
+
+__all__ = ["TERMS", "Compensation", "direction_cosines", "figure_of_merit_nt", "fit_compensation"]
+
+Array = NDArray[np.float64]
+
+TERMS: Final = 16
+_BAND_HZ: Final = (0.03, 1.0)  # of manoeuvres: above the geology, below the noise
+_ORDER: Final = 3
+_LEAST_SAMPLES: Final = 300
+_RIDGE: Final = 1e-6
+_LEAST_TURN_RAD: Final = math.radians(5.0)
+_HEADINGS: Final = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Compensation:
+    """Coefficients of the terms of an aircraft.
+
+    Attributes:
+        coefficients: (TERMS,) nT of each term.
+        main_nt: magnitude of the Earth's field that the terms are for.
+        improvement: standard deviation of the calibration flight before over after, in the band of the
+            manoeuvres.
+    """
+
+    coefficients: Array
+    main_nt: float
+    improvement: float
+
+    def field_nt(self, cosines: Array, rates_1_s: Array) -> Array:
+        """The aircraft's field (n,), to be subtracted from readings.
+
+        Args:
+            cosines: (n, 3) direction cosines of the Earth's field in the body frame.
+            rates_1_s: (n, 3) their rates.
+        """
+        found: Array = terms_of(cosines, rates_1_s) @ self.coefficients
+        return found
+
+
+def direction_cosines(
+    roll_rad: Array, pitch_rad: Array, yaw_rad: Array, time_s: Array, direction_ned: Array
+) -> tuple[Array, Array]:
+    """Direction cosines (n, 3) of the Earth's field in the body frame, and their rates, from attitudes.
+
+    Args:
+        roll_rad, pitch_rad, yaw_rad: (n,).
+        time_s: (n,) ascending.
+        direction_ned: (3,) direction of the Earth's field.
+    """
+    sr, cr = np.sin(roll_rad), np.cos(roll_rad)
+    sp, cp = np.sin(pitch_rad), np.cos(pitch_rad)
+    sy, cy = np.sin(yaw_rad), np.cos(yaw_rad)
+    n, e, d = direction_ned
+    cosines = np.column_stack(
+        (
+            cp * cy * n + cp * sy * e - sp * d,
+            (sr * sp * cy - cr * sy) * n + (sr * sp * sy + cr * cy) * e + sr * cp * d,
+            (cr * sp * cy + sr * sy) * n + (cr * sp * sy - sr * cy) * e + cr * cp * d,
+        )
+    )
+    return cosines, np.gradient(cosines, time_s, axis=0)
+
+
+def terms_of(cosines: Array, rates_1_s: Array) -> Array:
+    """The terms (n, TERMS), per nT of permanent and per 1e4 nT of induced and eddy-current fields."""
+    x, y, z = cosines.T
+    dx, dy, dz = rates_1_s.T
+    return np.column_stack(
+        (
+            *(x, y, z),
+            *(x * x, x * y, x * z, y * y, y * z),
+            *(x * dx, x * dy, x * dz, y * dx, y * dy, y * dz, z * dx, z * dy),
+        )
+    )
+
+
+def fit_compensation(time_s: Array, total_nt: Array, cosines: Array, rates_1_s: Array) -> Compensation:
+    """Fit the coefficients to a calibration flight: rolls, pitches and yaws on four headings, high up.
+
+    Args:
+        time_s: (n,) evenly spaced.
+        total_nt: (n,) readings.
+        cosines, rates_1_s: (n, 3) of `direction_cosines`.
+
+    Raises:
+        EstimatorError: the flight is too short, or its manoeuvres are too small.
+    """
+    if len(time_s) < _LEAST_SAMPLES:
+        raise EstimatorError(
+            f"the calibration flight has {len(time_s)} readings; {_LEAST_SAMPLES} or more make a compensation"
+        )
+    spread = float(np.max(np.linalg.norm(cosines - cosines.mean(axis=0), axis=1)))
+    if spread < _LEAST_TURN_RAD:
+        raise EstimatorError(
+            f"the aircraft turned by {math.degrees(spread):.1f} degrees against the field on the calibration "
+            "flight; roll, pitch and yaw on four headings"
+        )
+    rate_hz = (len(time_s) - 1) / float(time_s[-1] - time_s[0])
+    band = butter(_ORDER, np.minimum(_BAND_HZ, 0.45 * rate_hz), "bandpass", fs=rate_hz, output="sos")
+    terms = sosfiltfilt(band, terms_of(cosines, rates_1_s), axis=0)
+    measured = sosfiltfilt(band, total_nt - total_nt.mean())
+    scale = np.maximum(terms.std(axis=0), 1e-12)
+    scaled = terms / scale
+    normal = scaled.T @ scaled + _RIDGE * len(time_s) * np.eye(TERMS)
+    coefficients = np.linalg.solve(normal, scaled.T @ measured) / scale
+    left = measured - terms @ coefficients
+    return Compensation(
+        coefficients=coefficients,
+        main_nt=float(total_nt.mean()),
+        improvement=float(measured.std() / max(left.std(), 1e-12)),
+    )
+
+
+def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
+    """Figure of merit: the sum of the peak-to-peak values of the readings during rolls, pitches and yaws on
+    four headings, twelve manoeuvres in all, without their slow change. Survey contracts ask for 1 to 2 nT.
+
+    Args:
+        manoeuvres: (n,) readings of each manoeuvre, evenly spaced.
+        rate_hz: of the readings.
+
+    Raises:
+        EstimatorError: there are not twelve.
+    """
+    if len(manoeuvres) != 3 * _HEADINGS:
+        raise EstimatorError(
+            f"a figure of merit of {len(manoeuvres)} manoeuvres; accepted: 12, three on each of four headings"
+        )
+    found = 0.0
+    for values in manoeuvres:
+        times = np.arange(len(values)) / rate_hz
+        level = np.polynomial.Polynomial.fit(times, values, 1)
+        # a second's mean: the noise of single readings is no manoeuvre
+        width = max(1, round(rate_hz))
+        smooth = np.convolve(values - level(times), np.full(width, 1.0 / width), "valid")
+        found += float(np.ptp(smooth))
+    return found

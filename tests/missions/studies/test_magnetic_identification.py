@@ -1,0 +1,100 @@
+"""The study `magnetic-identification`, and the classifier that it fits."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.stats import mannwhitneyu
+
+from estimators.magnetic_identification.anomaly import TracePoint
+from estimators.magnetic_identification.classifier import (
+    FEATURES,
+    TraceClassifier,
+    shipped_classifier,
+    trace_features,
+)
+from missions.embedded.magnetic_encounters import EncounterConditions, encounters
+from missions.studies import run_trial
+from missions.studies.magnetic_identification import area_under_curve, study
+from missions.studies.magnetic_training import fitted_tables, write_tables
+
+
+def test_a_trial_repeats_itself_and_tells_its_target_from_its_false_anomaly():
+    first, again = (run_trial(study(), 0, runs=2) for _ in range(2))
+    assert first == again
+    assert first["condition"] == "nominal"
+    assert first["detected"] == 2
+    assert first["evidence"][1] > first["evidence"][3]
+    assert len(first["features"]) == 4 * len(FEATURES)
+
+
+def test_encounters_of_another_seed_have_another_map_and_another_target():
+    one, other = (next(encounters(seed, EncounterConditions())) for seed in (1, 2))
+    assert one.is_target and other.is_target
+    assert one.place_ne_m != other.place_ne_m
+    assert not np.allclose(one.survey_map.total_field_nt, other.survey_map.total_field_nt)
+
+
+def test_a_deeper_target_is_weaker():
+    """Its amplitude falls with the cube of the distance."""
+    peaks = []
+    for factor in (1.0, 1.3):
+        encounter = next(encounters(5, EncounterConditions(depth_factor=factor, offset_m=1.0, noise_nt=0.01)))
+        values = np.array(
+            [r.total_nt - encounter.survey_map.total_nt(r.north_m, r.east_m, r.height_m)
+             for r in encounter.passes[0]]
+        )  # fmt: skip
+        peaks.append(float(values.max()))
+    assert peaks[1] < 0.65 * peaks[0]
+
+
+def test_the_area_under_the_curve_is_that_of_mann_and_whitney():
+    rng = np.random.default_rng(1)
+    targets, others = rng.normal(1.0, 1.0, 80).round(1), rng.normal(0.0, 1.0, 60).round(1)
+    expected = mannwhitneyu(targets, others).statistic / (80 * 60)
+    with_gaps = np.append(targets, math.nan)
+    assert area_under_curve(with_gaps, others) == pytest.approx(expected)
+    assert math.isnan(area_under_curve(np.array([math.nan]), others))
+
+
+def point(confidence, evidence=0.0):
+    return TracePoint(
+        time_us=0, number=0, residual_nt=0.0, confidence=confidence, probability=0.5, evidence=evidence
+    )
+
+
+def test_features_of_a_trace():
+    trace = [point(math.nan), point(0.8), point(0.9), point(0.2), point(0.7, evidence=99.0)]
+    mean, low, drops, duration, evidence, rate = trace_features(trace)
+    assert mean == pytest.approx(0.65)
+    assert low == pytest.approx(0.2)
+    assert drops == pytest.approx(1 / 3)
+    assert duration == pytest.approx(math.log(4))
+    assert (evidence, rate) == pytest.approx((20.0, 10.0))
+    assert np.all(trace_features([point(math.nan)]) == 0.0)
+
+
+@pytest.mark.parametrize("name", ["network", "logistic"])
+def test_the_shipped_classifier_takes_figure_6_for_what_it_is(name):
+    """A trace that stays high with evidence for it, and one that drops again and again."""
+    target = [point(math.nan)] + [point(0.7, evidence=8.0)] * 20
+    boat = [point(math.nan)] + [point(0.7, evidence=-12.0), point(0.05, evidence=-12.0)] * 10
+    found = shipped_classifier(name)
+    assert found.probability(trace_features(target)) > 0.9
+    assert found.probability(trace_features(boat)) < 0.2
+
+
+def test_fitted_tables_are_what_scikit_learn_has_fitted(tmp_path):
+    learn = pytest.importorskip("sklearn.linear_model")
+    rng = np.random.default_rng(3)
+    features = rng.standard_normal((300, len(FEATURES)))
+    is_target = features[:, 0] + 0.5 * features[:, 4] > 0.2 * rng.standard_normal(300)
+    path = tmp_path / "classifier.toml"
+    write_tables(path, fitted_tables(features, is_target), made_by="a test")
+    tables = tomllib.loads(path.read_text())
+    scaled = (features - features.mean(axis=0)) / features.std(axis=0)
+    expected = learn.LogisticRegression(C=1.0).fit(scaled, is_target).predict_proba(scaled)[:, 1]
+    assert TraceClassifier.of(tables["logistic"]).probability(features) == pytest.approx(expected, abs=1e-4)
+    network = TraceClassifier.of(tables["network"]).probability(features)
+    assert np.mean((network > 0.5) == is_target) > 0.95
