@@ -13,17 +13,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.random_streams import RandomStreams
-from flightsim.payload import GroundTargetParameters, Static, Terrain, TerrainSpec
 from flightsim.world_spec import WorldSpec
-from missions.embedded import TargetField, multi_target_world
+from missions.embedded import TargetField, multi_target_world, terrain_targets_world
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
-from missions.multi_target.planner import Area
 from missions.runs.request import RunRequest
 from missions.studies.flights import fly_trial
 from missions.studies.study import run_of
 
-__all__ = ["EXPERIMENTS", "MAPS", "PLANNERS", "Cell", "Experiment", "Found", "SearchTrial", "terrain_of"]
+__all__ = ["EXPERIMENTS", "MAPS", "PLANNERS", "Cell", "Experiment", "Found", "SearchTrial"]
 
 Array = NDArray[np.float64]
 
@@ -40,10 +37,6 @@ PLANNERS: Final[Mapping[str, PlannerKind]] = MappingProxyType(
 
 _STEP_S: Final = 2.6  # of the paper
 _POINTS: Final = 61
-_CLUSTER_SIGMA_M: Final = 15.0
-_APART_M: Final = 6.0
-_CLUSTERS_APART_M: Final = 90.0
-_EDGE_M: Final = 35.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,12 +136,9 @@ class SearchTrial:
         number = 0
         if cell.experiment == "E2":
             number = run % MAPS
-            places = terrain_places(number, experiment, options.area, seed)
-            targets = tuple(
-                GroundTargetParameters(motion=Static(north_m=north_m, east_m=east_m))
-                for north_m, east_m in places
+            world = terrain_targets_world(
+                world, options, number, count=experiment.targets, clusters=experiment.clusters
             )
-            world = WorldSpec.of_team(1, seed=seed, targets=targets)
         field = TargetField(count=experiment.targets, clusters=experiment.clusters)
         world = multi_target_world(world, options, field)
         result = fly_trial("multi-target", RunRequest(options=options, world=world))
@@ -175,44 +165,3 @@ def _row(
         step_s=float(summary["step_s_mean"] or math.nan),
         sim_time_s=float(summary["sim_time_s"]),
     )
-
-
-def terrain_of(number: int, area: Area) -> Terrain:
-    """One of the terrains of the second experiment; they are the same in every study."""
-    return TerrainSpec(
-        south_m=area.south_m,
-        west_m=area.west_m,
-        north_m=area.north_m,
-        east_m=area.east_m,
-        spacing_m=5.0,
-        relief_m=25.0,
-        stream=number,
-    ).made(0)
-
-
-def terrain_places(number: int, experiment: Experiment, area: Area, seed: int) -> list[tuple[float, float]]:
-    """Targets around the lowest places of a terrain (even numbers), or around the highest (odd numbers):
-    litter that water carries downhill, or that stays uphill.
-    """
-    terrain = terrain_of(number, area)
-    heights = terrain.height_m if number % 2 == 0 else -terrain.height_m
-    rows, columns = np.indices(heights.shape)
-    north = terrain.south_m + terrain.spacing_m * rows
-    east = terrain.west_m + terrain.spacing_m * columns
-    free = (north >= area.south_m + _EDGE_M) & (north <= area.north_m - _EDGE_M)
-    free &= (east >= area.west_m + _EDGE_M) & (east <= area.east_m - _EDGE_M)
-    centres: list[tuple[float, float]] = []
-    for _ in range(experiment.clusters):
-        lowest = int(np.argmin(np.where(free, heights, np.inf)))
-        centre = float(north.flat[lowest]), float(east.flat[lowest])
-        centres.append(centre)
-        free &= np.hypot(north - centre[0], east - centre[1]) >= _CLUSTERS_APART_M
-    rng = np.random.Generator(np.random.PCG64(RandomStreams(seed).child("study", "multi_target")))
-    found: list[tuple[float, float]] = []
-    while len(found) < experiment.targets:
-        centre = centres[len(found) % len(centres)]
-        off_n, off_e = (_CLUSTER_SIGMA_M * rng.standard_normal(2)).tolist()
-        place = centre[0] + off_n, centre[1] + off_e
-        if area.contains(*place) and all(math.dist(place, other) >= _APART_M for other in found):
-            found.append(place)
-    return found
