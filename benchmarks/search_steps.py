@@ -5,8 +5,8 @@
 The quadrotor flies a square of steps, and the reference jumps to the next corner after 8 s: a piecewise
 constant reference as in Yousuf, Lendek and Busoniu, whose vehicle takes 2.6 s per step. By the truth: time
 from the jump until the vehicle has covered 9 m less 2 m (where the search plans its next step), and less 0.5
-m; overshoot along the step, and deviation across it, from the place at rest. The autopilot's own position controller,
-which gets the jumps as position setpoints, is measured beside them.
+m; overshoot along the step, and deviation across it, from the place at rest. The autopilot's own position
+controller, which gets the jumps as position setpoints, is measured beside them.
 """
 
 import argparse

@@ -55,7 +55,10 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
             ),
             options=(
                 click.Option(
-                    ["--horizon"], type=click.IntRange(1, 8), default=1, help="Steps that are planned."
+                    ["--horizon"],
+                    type=click.IntRange(1, 8),
+                    default=3,
+                    help="Steps that are planned; the paper plans 1.",
                 ),
                 click.Option(
                     ["--alpha"], type=FiniteRange(min=0.0), default=1.0, help="Weight of exploration, nats."

@@ -25,7 +25,7 @@ _FIRST: Final = 0.1  # share of the time in which the planners are not compared
 _COLOURS: Final = {"proposed": "#15803d", "lawnmower": "#c2410c", "information": "#1769aa"}
 
 
-def study(horizon: int = 1, alpha: float = 1.0) -> Study[Cell, Found]:
+def study(horizon: int = 3, alpha: float = 1.0) -> Study[Cell, Found]:
     """The study.
 
     Args:

@@ -35,7 +35,9 @@ PLANNERS: Final[Mapping[str, PlannerKind]] = MappingProxyType(
     }
 )
 
-_STEP_S: Final = 2.6  # of the paper
+STEP_S: Final = 2.6
+"""Time of a step in the paper, which has one scan per step: so is the time between scans."""
+
 _POINTS: Final = 61
 
 
@@ -57,7 +59,7 @@ class Experiment:
     @property
     def time_s(self) -> Array:
         """The times at which found targets are counted: to the end of the paper's steps."""
-        return np.linspace(0.0, _STEP_S * self.steps, _POINTS)
+        return np.linspace(0.0, STEP_S * self.steps, _POINTS)
 
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType(
@@ -116,7 +118,7 @@ class SearchTrial:
         alpha: weight of its exploration, nats.
     """
 
-    horizon: int = 1
+    horizon: int = 3
     alpha: float = 1.0
 
     def __call__(self, cell: Cell, seed: int) -> Found:
@@ -140,7 +142,7 @@ class SearchTrial:
                 world, options, number, count=experiment.targets, clusters=experiment.clusters
             )
         field = TargetField(count=experiment.targets, clusters=experiment.clusters)
-        world = multi_target_world(world, options, field)
+        world = multi_target_world(world, options, field, scan_period_s=STEP_S)
         result = fly_trial("multi-target", RunRequest(options=options, world=world))
         return _row(experiment, result.summary, result.outcome == "completed", result.reason, number)
 
