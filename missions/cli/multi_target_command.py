@@ -105,7 +105,7 @@ COMMAND: Final = MissionCommand(
         ),
         option("--step", type=float, help="To the next scan, m. [default: 9; an aircraft: 2.5 turn radii]"),
         option("--alpha", type=float, default=1.0, help="Weight of exploration against information, nats."),
-        option("--horizon", type=int, default=1, help="Steps that are planned; the first one is flown."),
+        option("--horizon", type=int, default=3, help="Steps that are planned; the paper plans 1."),
         option("--beam", type=int, default=6, help="Sequences of steps that are kept at each depth."),
         option("--spacing", type=float, help="Of the sweep's legs, m. [default: one pass in all steps]"),
         option("--steps", type=int, default=240, help="The search ends after so many."),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli.mission_command import Given
+from missions.cli.options import FiniteRange
 from missions.cli.study_command import StudyCommand
 
 if TYPE_CHECKING:
@@ -23,6 +24,12 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
     from missions.studies.magnetic_identification import study
 
     return study(train=given["train"])
+
+
+def _multi_target(given: Given) -> "Study[Any, Any]":
+    from missions.studies.multi_target_search import study
+
+    return study(horizon=given["horizon"], alpha=given["alpha"])
 
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
@@ -61,6 +68,25 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_magnetic_identification,
+        ),
+        "multi-target": StudyCommand(
+            help=(
+                "Search for an unknown number of targets: the experiments E1 and E2 of Yousuf, Lendek and "
+                "Busoniu, as flights on SITL.\n\n"
+                "The proposed planner beside a lawnmower and information alone. The folder gets found.png."
+            ),
+            options=(
+                click.Option(
+                    ["--horizon"],
+                    type=click.IntRange(1, 8),
+                    default=3,
+                    help="Steps that are planned; the paper plans 1.",
+                ),
+                click.Option(
+                    ["--alpha"], type=FiniteRange(min=0.0), default=1.0, help="Weight of exploration, nats."
+                ),
+            ),
+            build=_multi_target,
         ),
     }
 )

@@ -1,7 +1,7 @@
 """Embedded worlds: a simulated world in this process that missions are flown in."""
 
 from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
-from missions.embedded.target_fields import TargetField, multi_target_world
+from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
 from missions.embedded.worlds import (
     CAMERA,
     MAGNETOMETER,
@@ -26,4 +26,5 @@ __all__ = [
     "multi_target_world",
     "occupancy_world",
     "orbit_world",
+    "terrain_targets_world",
 ]

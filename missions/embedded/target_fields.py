@@ -1,6 +1,7 @@
 """The world of a search for many targets: sensors on the vehicles, and targets drawn from the seed."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,13 +24,17 @@ from missions.errors import PlanError
 from missions.multi_target.options import REACH, MultiTargetOptions
 from missions.multi_target.planner import Area
 
-__all__ = ["TargetField", "multi_target_world"]
+__all__ = ["TargetField", "multi_target_world", "terrain_targets_world"]
 
 MAX_TARGETS: Final = 250
 _APART_M: Final = 6.0  # least distance of two targets of a cluster
 _CENTRES_APART: Final = 0.28  # least distance of two clusters, in shorter sides of the area
 _EDGE: Final = 0.15  # of a side: the centres of clusters keep this distance from the edges
 _TRIES: Final = 10_000
+_TERRAIN_SIGMA_M: Final = 15.0  # standard deviation of a cluster at a high or low place
+_TERRAIN_RELIEF_M: Final = 25.0
+_TERRAIN_APART_M: Final = 90.0
+_TERRAIN_EDGE_M: Final = 35.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,24 +71,7 @@ class TargetField:
         Raises:
             PlanError: the area is too small for them.
         """
-        centres = self._centres(area, rng)
-        found: list[tuple[float, float]] = []
-        for _ in range(_TRIES):
-            if len(found) == self.count:
-                return found
-            if centres:
-                north_m, east_m = centres[len(found) % len(centres)]
-                off_n, off_e = (self.cluster_sigma_m * rng.standard_normal(2)).tolist()
-                place = north_m + off_n, east_m + off_e
-            else:
-                place = rng.uniform(area.south_m, area.north_m), rng.uniform(area.west_m, area.east_m)
-            apart_m = _APART_M if centres else 0.0
-            if area.contains(*place) and all(math.dist(place, other) >= apart_m for other in found):
-                found.append(place)
-        raise PlanError(
-            f"{self.count} targets in {self.clusters} clusters have no room; ask for more `clusters`, or a "
-            "larger `cluster_sigma_m`"
-        )
+        return _around(self._centres(area, rng), self.count, self.cluster_sigma_m, area, rng)
 
     def _centres(self, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
         apart_m = _CENTRES_APART * min(area.height_m, area.width_m)
@@ -178,4 +166,72 @@ def _motion(place_ne_m: tuple[float, float], area: Area, speed_m_s: float) -> Ta
         east_m=area.east_m,
         speed_m_s=speed_m_s,
         start_m=place_ne_m,
+    )
+
+
+def terrain_targets_world(
+    world: WorldSpec, options: MultiTargetOptions, number: int, *, count: int, clusters: int
+) -> WorldSpec:
+    """The world with targets in clusters at the lowest places of a terrain (even numbers), or at the highest
+    (odd numbers): litter that water carries downhill, or that stays uphill (the paper's second experiment).
+
+    The terrain is the same for every seed. It decides where the targets are, and hides none.
+
+    Args:
+        world: the targets are drawn from its seed.
+        options: the search.
+        number: number of the terrain.
+        count, clusters: of the targets.
+    """
+    area = options.area
+    terrain = TerrainSpec(
+        south_m=area.south_m,
+        west_m=area.west_m,
+        north_m=area.north_m,
+        east_m=area.east_m,
+        relief_m=_TERRAIN_RELIEF_M,
+        stream=number,
+    ).made(0)
+    heights = terrain.height_m if number % 2 == 0 else -terrain.height_m
+    rows, columns = np.indices(heights.shape)
+    north = terrain.south_m + terrain.spacing_m * rows
+    east = terrain.west_m + terrain.spacing_m * columns
+    free = (north >= area.south_m + _TERRAIN_EDGE_M) & (north <= area.north_m - _TERRAIN_EDGE_M)
+    free &= (east >= area.west_m + _TERRAIN_EDGE_M) & (east <= area.east_m - _TERRAIN_EDGE_M)
+    centres: list[tuple[float, float]] = []
+    for _ in range(clusters):
+        lowest = int(np.argmin(np.where(free, heights, np.inf)))
+        centre = float(north.flat[lowest]), float(east.flat[lowest])
+        centres.append(centre)
+        free &= np.hypot(north - centre[0], east - centre[1]) >= _TERRAIN_APART_M
+    rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("multi_target", "terrain")))
+    places = _around(centres, count, _TERRAIN_SIGMA_M, area, rng)
+    targets = tuple(GroundTargetParameters(motion=_motion(place, area, 0.0)) for place in places)
+    return replace(world, targets=targets)
+
+
+def _around(
+    centres: Sequence[tuple[float, float]], count: int, sigma_m: float, area: Area, rng: np.random.Generator
+) -> list[tuple[float, float]]:
+    """Places around centres in turn, apart from each other; without centres uniform over the area.
+
+    Raises:
+        PlanError: they have no room.
+    """
+    found: list[tuple[float, float]] = []
+    for _ in range(_TRIES):
+        if len(found) == count:
+            return found
+        if centres:
+            north_m, east_m = centres[len(found) % len(centres)]
+            off_n, off_e = (sigma_m * rng.standard_normal(2)).tolist()
+            place = north_m + off_n, east_m + off_e
+        else:
+            place = rng.uniform(area.south_m, area.north_m), rng.uniform(area.west_m, area.east_m)
+        apart_m = _APART_M if centres else 0.0
+        if area.contains(*place) and all(math.dist(place, other) >= apart_m for other in found):
+            found.append(place)
+    raise PlanError(
+        f"{count} targets in {len(centres)} clusters have no room; ask for more `clusters`, or a larger "
+        "`cluster_sigma_m`"
     )

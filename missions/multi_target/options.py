@@ -82,7 +82,7 @@ class MultiTargetOptions(MissionOptions):
     planner: PlannerKind = PlannerKind.EXPLORING
     step_m: float | None = None
     alpha: float = 1.0
-    horizon: int = 1
+    horizon: int = 3
     beam: int = 6
     turn_limit_rad: float | None = None
     spacing_m: float | None = None

@@ -90,7 +90,7 @@ class TrajectoryLaw:
 class BacksteppingGains:
     """Gains of the backstepping law (docs/multi_target.md).
 
-    With the defaults a small error has a double pole at -1.5 1/s: no overshoot.
+    With the defaults a small error has a double pole at -1.2 1/s: no overshoot.
 
     Attributes:
         position_per_s: K1, of the virtual velocity.
@@ -100,9 +100,9 @@ class BacksteppingGains:
             1 / PSC_VELXY_P of ArduPilot 0.5 s.
     """
 
-    position_per_s: float = 1.0
-    velocity_per_s: float = 2.0
-    coupling_per_s2: float = 0.25
+    position_per_s: float = 0.8
+    velocity_per_s: float = 1.6
+    coupling_per_s2: float = 0.16
     response_s: float = 0.5
 
     def __post_init__(self) -> None:
