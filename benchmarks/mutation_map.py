@@ -33,6 +33,7 @@ PLAIN_TESTS: Final = (
     "tests/estimators/lissajous",
     "tests/estimators/logs",
     "tests/estimators/target_fusion",
+    "tests/estimators/test_vehicle_time.py",
     "tests/estimators/tracking",
     "tests/navigation/test_jacobians.py",
     "tests/navigation/test_mechanisation.py",
