@@ -33,6 +33,8 @@ PLAIN_TESTS: Final = (
     "tests/estimators/lissajous",
     "tests/estimators/logs",
     "tests/estimators/target_fusion",
+    "tests/estimators/test_vehicle_time.py",
+    "tests/estimators/tracking",
     "tests/navigation/test_jacobians.py",
     "tests/navigation/test_mechanisation.py",
     "tests/navigation/test_pitot.py",
@@ -103,16 +105,21 @@ def record(test_folder: str, folder: Path, *, plain: bool) -> None:
         raise SystemExit(f"{test_folder}: pytest ended with {code!r}, no map was made")
     data = coverage.get_data()
     passed_s = recorder.passed_s()
+    executed = {
+        path: data.contexts_by_lineno(str(ROOT / path)) for path in modules() if is_plain(path) is plain
+    }
     lines = {
-        path: {
-            line: sorted(set(contexts) & passed_s.keys())
-            for line, contexts in data.contexts_by_lineno(str(ROOT / path)).items()
-        }
-        for path in modules()
-        if is_plain(path) is plain
+        path: {line: sorted(set(contexts) & passed_s.keys()) for line, contexts in found.items()}
+        for path, found in executed.items()
+    }
+    imported = {
+        path: sorted(line for line, contexts in found.items() if "" in contexts)
+        for path, found in executed.items()
     }
     name = ("plain-" if plain else "compiled-") + test_folder.replace("/", "-")
-    (folder / f"map-{name}.json").write_text(json.dumps({"times_s": passed_s, "lines": lines}))
+    (folder / f"map-{name}.json").write_text(
+        json.dumps({"times_s": passed_s, "lines": lines, "imported": imported})
+    )
 
 
 class TestMap:
@@ -121,6 +128,7 @@ class TestMap:
     def __init__(self, folder: Path) -> None:
         self._times_s: dict[bool, dict[str, float]] = {True: {}, False: {}}
         self._lines: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self._imported: dict[str, set[int]] = defaultdict(set)
         files = sorted(folder.glob("map-*.json"))
         if not files:
             raise SystemExit(
@@ -132,17 +140,22 @@ class TestMap:
             for path, lines in data["lines"].items():
                 for line, tests in lines.items():
                     self._lines[path][int(line)].update(tests)
+            for path, imported in data.get("imported", {}).items():
+                self._imported[path].update(imported)
 
     def tests_of(self, mutant: Mutant, budget_s: float) -> dict[str, float]:
         """The tests of a mutant and how long each takes: first those of the module's package, then the
         others, the quickest first in both, as long as their times fit into the budget.
 
         Inside a function these are the tests that execute the line; in the middle of a long statement, those
-        that execute anything of the statement or of the function. A constant, a field and its default are
-        executed at import, by every test: half of the budget is for the tests that execute a line that names
-        it (where there is none: a function of the module), the rest for the quickest of the package."""
+        that execute anything of the statement or of the function. A constant, a field and its default, and a
+        function that only makes a constant, are executed at import, by every test: half of the budget is for
+        the tests that execute a line that names it (where there is none: a function of the module), the rest
+        for the quickest of the package."""
         if mutant.in_function():
-            return self._quickest(next(filter(None, self._in_function(mutant)), set()), mutant, budget_s)
+            found = next(filter(None, self._in_function(mutant)), set())
+            if found or mutant.line not in self._imported[mutant.path]:
+                return self._quickest(found, mutant, budget_s)
         chosen = self._quickest(next(filter(None, self._at_import(mutant)), set()), mutant, 0.5 * budget_s)
         folder, times_s = self._folder_of_package(mutant), self._times_s[is_plain(mutant.path)]
         package = {test for test in times_s if test.startswith(folder)} - chosen.keys()

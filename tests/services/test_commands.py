@@ -577,3 +577,16 @@ def test_long_commands_carry_their_values_as_they_are() -> None:
 )
 def test_positions_of_commands_are_on_earth_or_not_set(x: float, y: float, valid: bool) -> None:
     assert on_earth(Command(192, 0.0, 0.0, 0.0, 0.0, x, y, 0.0, None)) is valid
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_an_acknowledgement_names_the_command_and_its_client(flavour: str) -> None:
+    """COMMAND_ACK: progress and result_param2 are 0 where the command does not define them."""
+    rig = ServiceRig(flavour)
+    for command in (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 31_999):  # one that is known, one that is not
+        rig.long(command, 0.0)
+        acks = [sent for sent in rig.channel.sent if sent.get_msgId() == mavlink.MAVLINK_MSG_ID_COMMAND_ACK]
+        assert acks
+        for ack in acks:
+            assert (ack.command, ack.progress, ack.result_param2) == (command, 0, 0)
+            assert (ack.target_system, ack.target_component) == (255, 190)

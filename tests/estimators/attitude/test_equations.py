@@ -309,6 +309,12 @@ def rotor_state(**values):
     return x, p
 
 
+def test_the_drag_at_the_start_has_the_weight_of_three_seconds_at_a_metre_per_second():
+    x, p = filter_state(drag_1_s=0.5)
+    rotor.start(x, p)
+    assert (x[at.DRAG], x[at.SPEED_SQUARE], x[at.FORCE_SQUARE]) == (0.5, 3.0, 0.75)
+
+
 def test_rotor_reference():
     """g down = v' + w x v - a with the filter's own v': its prediction, and the correction by the drag."""
     x, p = rotor_state(drag_learning_m_s=math.inf)
@@ -455,14 +461,19 @@ def test_error_of_the_reference():
     x, p = filter_state()
     feed(x, p, RATE, FORCE)
     x[at.FORM] = at.WING  # without airspeed: a turn of 20 m/s may be hidden in the force
-    for rate, blind in ((0.4 * RATE, np.linalg.norm(0.4 * RATE) * 20.0 / G), (RATE, 0.5)):
-        assert reference_error(x, p, rate) == pytest.approx(math.hypot(p[par.FLIGHT_ERROR], blind))
+    for airspeed in (math.nan, 0.0):
+        for rate, blind in ((0.4 * RATE, np.linalg.norm(0.4 * RATE) * 20.0 / G), (RATE, 0.5)):
+            x[at.AIRSPEED] = airspeed
+            assert reference_error(x, p, rate) == pytest.approx(math.hypot(p[par.FLIGHT_ERROR], blind))
     x, p = wing_state()
     feed(x, p, RATE, FORCE)
     x[at.FORM] = at.WING
-    error = reference_error(x, p)
-    load = min(0.5, np.linalg.norm(vector(x, at.REFERENCE) + FORCE) / G)
-    assert error == pytest.approx(math.hypot(p[par.FLIGHT_ERROR], p[par.MANOEUVRE_ERROR] * load))
+    for rate, limited in ((0.2 * RATE, False), (3.0 * RATE, True)):
+        error = reference_error(x, p, rate)
+        load = np.linalg.norm(vector(x, at.REFERENCE) + FORCE) / G
+        assert bool(load > 0.5) is limited
+        load = min(0.5, load)
+        assert error == pytest.approx(math.hypot(p[par.FLIGHT_ERROR], p[par.MANOEUVRE_ERROR] * load))
     x, p = rotor_state()
     feed(x, p, RATE, FORCE)
     x[at.FORM] = at.ROTOR
