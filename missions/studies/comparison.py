@@ -110,5 +110,5 @@ def lines_of(differences: Mapping[str, Any]) -> list[str]:
         for cell in cells
     ]
     how = "in pairs of equal seeds" if differences["paired"] else "without pairs: the seeds differ"
-    told = f"{differences['second']} - {differences['first']}, {how}; mean with 95 % interval, * excludes 0:"
-    return [told, *aligned([head, *rows])]
+    title = f"{differences['second']} - {differences['first']}, {how}; mean with 95 % interval, * excludes 0:"
+    return [title, *aligned([head, *rows])]

@@ -161,13 +161,16 @@ class Connection:
                 return
             if frames[0].message_id in _TIMESTAMPED:
                 self._observe(frames[0])
-        self._newest.put(frames)
         self._record(frames)
-        listeners = self._listeners
-        for frame in frames:
+        listeners, begin = self._listeners, 0
+        for index, frame in enumerate(frames):
             if frame.message_id in listeners:
+                # a listener knows what came before its frame, not what follows in the same packet
+                self._newest.put(frames[begin : index + 1])
+                begin = index + 1
                 for listener in tuple(listeners[frame.message_id]):
                     listener(frame)
+        self._newest.put(frames[begin:])
 
     def _record(self, frames: list[Frame]) -> None:
         if self._recorder is not None:

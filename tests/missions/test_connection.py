@@ -29,7 +29,7 @@ class Recording:
 
 
 def on_memory(script, **arguments):
-    """Run `script(connection, send)` on virtual time; `send` sends as an autopilot."""
+    """Run `script(connection, send)` on virtual time; `send` sends a packet as an autopilot."""
     now = [0]
 
     def advance():
@@ -39,7 +39,7 @@ def on_memory(script, **arguments):
         ours, theirs = memory_pair()
         encoder = FrameEncoder(1, 1)
         async with Connection(ours, LoopClock(), **arguments) as connection:
-            return await script(connection, lambda m: theirs.send(encoder.encode(m)))
+            return await script(connection, lambda *m: theirs.send(b"".join(map(encoder.encode, m))))
 
     return run(main(), VirtualTimeLoop(advance, lambda: now[0], max_time_us=100_000_000))
 
@@ -83,6 +83,19 @@ def test_latest_is_decoded_once_and_only_when_read():
         assert connection.latest("ATTITUDE", 1) is newest
         assert connection.latest("ATTITUDE", 2) is None
         assert connection.latest("ATTITUDE", 1, component_id=2) is None
+
+    on_memory(script)
+
+
+def test_a_listener_does_not_know_what_follows_in_the_same_packet():
+    async def script(connection, send):
+        known = []
+        connection.listen(
+            "ATTITUDE", lambda frame: known.append(connection.latest("ATTITUDE", 1).time_boot_ms)
+        )
+        send(attitude(1), attitude(2), attitude(3))
+        assert known == [1, 2, 3]
+        assert connection.latest("ATTITUDE", 1).time_boot_ms == 3
 
     on_memory(script)
 
