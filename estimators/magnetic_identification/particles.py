@@ -110,9 +110,10 @@ def weigh_gaussian(
     Returns:
         As `_next_weights`.
     """
+    per_along, per_across = 1.0 / signature[1], 1.0 / signature[2]
     for m in range(particles.shape[0]):
-        size = particles[m, SIZE]
-        along, across = particles[m, X] / (signature[1] * size), particles[m, Y] / (signature[2] * size)
+        per_size = 1.0 / particles[m, SIZE]
+        along, across = particles[m, X] * per_along * per_size, particles[m, Y] * per_across * per_size
         term = signature[0] * math.exp(-0.5 * (along * along + across * across))
         map_nt = decay * particles[m, MAP]
         aa, ab, bb = (
@@ -123,12 +124,13 @@ def weigh_gaussian(
         residual_nt = measured_nt - term * particles[m, AMPLITUDE] - map_nt
         gain_a, gain_b = term * aa + ab, term * ab + bb
         total = term * gain_a + gain_b + white_nt2
-        share = residual_nt / total
+        per_total = 1.0 / total
+        share = residual_nt * per_total
         particles[m, AMPLITUDE] += gain_a * share
         particles[m, MAP] = map_nt + gain_b * share
-        particles[m, AMPLITUDE_VAR] = aa - gain_a * gain_a / total
-        particles[m, AMPLITUDE_MAP] = ab - gain_a * gain_b / total
-        particles[m, MAP_VAR] = bb - gain_b * gain_b / total
+        particles[m, AMPLITUDE_VAR] = aa - gain_a * gain_a * per_total
+        particles[m, AMPLITUDE_MAP] = ab - gain_a * gain_b * per_total
+        particles[m, MAP_VAR] = bb - gain_b * gain_b * per_total
         fits[m, 0] = residual_nt * share
         fits[m, 1] = total
     return _next_weights(weights, fits)

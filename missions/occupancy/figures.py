@@ -39,6 +39,7 @@ def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str,
         "target_estimate_m": _place(estimate),
         "target_m": _place(target_ne_m),
         "target_error_m": None if error_m is None else round(error_m, 2),
+        **_naming(found is not None, error_m),
         "probability_of_detection": round(search.map.probability_of_detection, 5),
         "heading_settled_error_95_deg": round(math.degrees(max(known)), 3) if known else None,
         "least_separation_m": _rounded(
@@ -57,6 +58,8 @@ def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str,
     }
 
 
+NAMED_WITHIN_M: Final = 150.0
+"""A place farther from the target is that of something else; false anomalies are 500 m away and more."""
 HEADING_BOUND_RAD: Final = math.radians(30.0)
 """Bound of the heading error after each turn; a searcher must be within it for 95 % of its flight."""
 _LEAST_S: Final = 30.0  # shortest search that is judged, s
@@ -116,6 +119,14 @@ def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: He
         "anomalies_insignificant": 0 if watch is None else watch.detector.insignificant,
         "anomalies": [_anomaly(anomaly) for anomaly in searcher.anomalies],
     }
+
+
+def _naming(named: bool, error_m: float | None) -> dict[str, bool]:
+    """Whether what was named is the target; nothing where the truth is not known."""
+    if named and error_m is None:
+        return {}
+    right = error_m is not None and error_m <= NAMED_WITHIN_M
+    return {"target_named": named and right, "false_anomaly_named": named and not right}
 
 
 def _judgement(candidate: "Candidate | Suspect") -> dict[str, Any]:

@@ -21,6 +21,7 @@ from flightsim.world_spec import WorldSpec
 from missions.cli import main as cli
 from missions.embedded import occupancy_world
 from missions.errors import PlanError
+from missions.occupancy.investigation import Identify
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
@@ -92,6 +93,37 @@ def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_rep
     assert (first.folder / "flight.tlog").read_bytes() != (found.folder / "flight.tlog").read_bytes()
     assert first.summary["target_found"] is True
     assert not (again.folder / MAP_NAME).exists()
+
+
+@pytest.mark.slow
+def test_a_search_that_identifies_names_the_target_and_its_log_gives_the_same_estimates(
+    tmp_path,
+):
+    """Quadrotors; the estimator runs beside the flight, and over its log."""
+    options = replace(SMALL, identify=Identify.BAYES, particles=1000)
+    first, again = (
+        fly(
+            OccupancyMission(),
+            replace(
+                request(tmp_path / name, options, picture=False),
+                estimator="magnetic-identification",
+                estimator_settings=("particles=1000",),
+            ),
+        )
+        for name in ("a", "b")
+    )
+    assert (again.folder / "flight.tlog").read_bytes() == (first.folder / "flight.tlog").read_bytes()
+    assert first.summary["target_found"] is True
+    assert first.summary["target_error_m"] < 40.0
+    verdicts = [candidate["verdict"] for candidate in first.summary["candidates"]]
+    assert verdicts.count("target") == 1
+    arguments = [str(first.folder / "flight.tlog"), "--estimator", "magnetic-identification", "--no-picture"]
+    settings = [f"map_file={first.folder / MAP_NAME}", "particles=1000"]
+    given = [word for setting in settings for word in ("--set", setting)]
+    assert cli.run_command_line(["replay", *arguments, *given, "--out", str(tmp_path / "again")]) == 0
+    flown, replayed = (np.load(folder / "estimates.npz") for folder in (first.folder, tmp_path / "again"))
+    for name in flown.files:
+        assert np.array_equal(flown[name], replayed[name], equal_nan=flown[name].dtype.kind == "f")
 
 
 def true_field(found, *, target=True, moment_a_m2=None):
