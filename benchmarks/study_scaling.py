@@ -4,10 +4,10 @@
     python -m benchmarks.study_scaling --ray            # and on Ray: a head and a worker node on loopback
     python -m benchmarks.study_scaling --ray --flights 0
 
-Engines take turns, so that a change of the machine's speed meets all. A rate is that between the first
-and the last result; starting the workers is given by itself. `gain` is the rate by that of this process. `load` is
-the processor time of the parent process for each trial, the part of a study that is done one trial after the other:
-the model of docs/studies.md predicts larger clusters from it.
+Engines take turns, so that a change of the machine's speed meets all. A rate is that between the first and
+the last result; starting the workers is given by itself. `gain` is the rate by that of this process. `load`
+is the processor time of the parent process for each trial, the part of a study that is done one trial after
+the other: the model of docs/studies.md predicts larger clusters from it.
 """
 
 import argparse
