@@ -163,7 +163,7 @@ def main() -> int:
     arguments = parser.parse_args()
     studies = [
         ("computed trials of about 50 ms", computed(500_000), 80),
-        ("empty trials", computed(1), 5000),
+        ("empty trials", computed(1), 2000),
     ]
     if arguments.flights:
         flights = sweep_study("lissajous", ["wind-speed=0,8"], [], sampling="random")
