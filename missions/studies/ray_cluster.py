@@ -29,7 +29,10 @@ _REACH_S: Final = 5.0
 _LOOK_S: Final = 10.0
 """Time between looks at the cluster for processors that have come."""
 _BATCH_S: Final = 0.2
-"""A call of an actor costs about a millisecond."""
+_SHARE_S: Final = 0.004
+"""Time of a batch at least, and more with each worker: a call costs the parent some two milliseconds, and the
+calls of all workers take half of its time at most.
+"""
 _FILES: Final = "files"
 _MAX_BYTES: Final = 100_000_000
 
@@ -213,7 +216,6 @@ class _Actor(Worker):
 class _Actors(Crew):
     """The actors of a study. Processors that join the cluster are used after some seconds."""
 
-    batch_s = _BATCH_S
     whole_batches = True
 
     def __init__(self, packed: PackedJob, names: Mapping[Path, str], most: int | None) -> None:
@@ -232,6 +234,7 @@ class _Actors(Crew):
         if now_s - self._looked_s >= _LOOK_S:
             self._looked_s = now_s
             self._processors = int(ray.cluster_resources().get("CPU", 0))
+        self.batch_s = max(_BATCH_S, _SHARE_S * len(self.workers))
         return self._processors if self._most is None else min(self._most, self._processors)
 
     def start(self) -> Worker:

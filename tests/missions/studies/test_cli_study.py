@@ -1,8 +1,11 @@
 """`flightstack study`: what it writes, and what it says of what can't be."""
 
 import json
+import re
 import shlex
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -12,6 +15,9 @@ from click.testing import CliRunner
 
 from missions.cli.main import command_line, run_command_line
 from missions.cli.study import study
+from tests.clients.tied_process import tied
+
+ROOT = Path(__file__).parents[3]
 
 
 def test_the_run_folder_has_summary_table_and_figures(tmp_path: Path) -> None:
@@ -229,3 +235,15 @@ def test_studies_are_compared_in_pairs_of_equal_seeds(tmp_path: Path) -> None:
     assert compared["paired"] and [c["metrics"]["height_m"]["mean"] for c in compared["cells"]] == [0.0, 0.0]
     code, said, _ = ran("compare", tmp_path / "a", tmp_path / "c")
     assert code == 0 and "without pairs: the seeds differ" in said
+
+
+def test_the_study_of_the_page_runs(tmp_path: Path) -> None:
+    """As a file of the command line, and as a program in two processes."""
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "studies.md").read_text(), re.DOTALL)
+    file = tmp_path / "throw.py"
+    file.write_text(code)
+    code_of_exit, said, err = ran(file, "--workers", 1, "--runs", 20, "--out", tmp_path / "run")
+    assert code_of_exit == 0 and err == "" and "spread_m  wind_m_s  trials" in said
+    command = tied([sys.executable, str(file)])
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "Medians with 95 % intervals" in done.stdout and (tmp_path / "throw" / "study.png").exists()
