@@ -42,15 +42,16 @@ class LoopClock:
     """
 
     def __init__(self) -> None:
-        self._time_s: Callable[[], float] | None = None
+        self._read_us: Callable[[], int] | None = None
 
     @property
     def time_us(self) -> int:
         """Microseconds of the loop's time."""
-        time_s = self._time_s
-        if time_s is None:  # kept, because to ask for the running loop is a system call
-            time_s = self._time_s = asyncio.get_running_loop().time
-        return round(time_s() * 1e6)
+        read_us = self._read_us
+        if read_us is None:  # kept, because to find the running loop is a system call
+            loop = asyncio.get_running_loop()
+            read_us = self._read_us = getattr(loop, "time_us", lambda: round(loop.time() * 1e6))
+        return read_us()
 
     @property
     def stamp_us(self) -> int:

@@ -36,6 +36,9 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         max_time_us: the run fails with a ClockError when the world reaches this time; None: no limit.
         monotonic: wall clock in seconds, for pacing.
 
+    Attributes:
+        time_us: as passed to the constructor.
+
     An exception in `advance` ends the run with that exception.
     """
 
@@ -48,7 +51,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         max_time_us: int | None = None,
         monotonic: Callable[[], float] = wall_time_s,
     ) -> None:
-        self._time_us = time_us
+        self.time_us = time_us
         self._world_selector = _WorldSelector(advance, time_us, max_time_us)
         if speedup is not None:
             self._world_selector.pacer = Pacer(speedup, monotonic)
@@ -58,7 +61,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
     def time(self) -> float:
         """The world's time in seconds."""
-        return self._time_us() * 1e-6
+        return self.time_us() * 1e-6
 
     def call_at(  # type: ignore[override]
         self, when: float, callback: Callable[..., object], *args: Any, context: Context | None = None

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from typing import Final
 
 import numpy as np
 
@@ -10,8 +9,6 @@ from missions.errors import PlanError
 from missions.patterns.curve import ArcLengthTable, Curve
 from missions.patterns.polyline import Polyline
 from missions.planning.trajectory import Trajectory
-
-_LEG_SAMPLES: Final = 100_000
 
 
 def waypoints_along(
@@ -83,14 +80,14 @@ def leg_speeds(points: list[tuple[float, float]], trajectory: Trajectory) -> lis
     """
     position = trajectory.position_ned_m[:, :2]
     speed = np.hypot(trajectory.velocity_ned_m_s[:, 0], trajectory.velocity_ned_m_s[:, 1])
+    flown_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(position, axis=0).T))))
     where = [0]
     for point in points[1:]:
         start = where[-1]
         leg_m = math.dist(point, position[start])
-        window = position[start : start + _LEG_SAMPLES]
-        flown = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(window, axis=0).T))))
-        near = flown <= 1.5 * leg_m + 2.0
-        distance = np.hypot(*(window[near] - point).T)
+        reach_m = flown_m[start] + 1.5 * leg_m + 2.0
+        end = int(np.searchsorted(flown_m, reach_m, side="right"))
+        distance = np.hypot(*(position[start:end] - point).T)
         where.append(start + int(distance.argmin()))
     speeds = []
     last = len(where) - 1

@@ -161,22 +161,21 @@ class Connection:
                 return
             if frames[0].message_id in _TIMESTAMPED:
                 self._observe(frames[0])
-        self._record(frames)
         listeners, begin = self._listeners, 0
         for index, frame in enumerate(frames):
             if frame.message_id in listeners:
-                # a listener knows what came before its frame, not what follows in the same packet
-                self._newest.put(frames[begin : index + 1])
+                # recorded and newest is then what came before its frame, not what follows in the same packet
+                self._keep(frames[begin : index + 1])
                 begin = index + 1
                 for listener in tuple(listeners[frame.message_id]):
                     listener(frame)
-        self._newest.put(frames[begin:])
+        if begin < len(frames):
+            self._keep(frames[begin:] if begin else frames)
 
-    def _record(self, frames: list[Frame]) -> None:
+    def _keep(self, frames: list[Frame]) -> None:
         if self._recorder is not None:
-            # a log contains no keys
-            logged = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
-            self._recorder.record(logged, self.clock.time_us)
+            self._recorder.record(_without_keys(frames), self.clock.time_us)
+        self._newest.put(frames)
 
     def _observe(self, frame: Frame) -> None:
         """Set the clock from the messages of the vehicle's autopilot."""
@@ -220,7 +219,8 @@ class Connection:
         data = self._encoder.encode(message)
         if self.signing is not None and self.signing.signs:
             data = self.signing.sign(data)
-        self._record([Frame.of(data)])
+        if self._recorder is not None:
+            self._recorder.record(_without_keys([Frame.of(data)]), self.clock.time_us)
         self._link.send(data)
 
     async def _keep_sending_heartbeats(self) -> None:
@@ -287,6 +287,14 @@ class Connection:
         The stream begins with the first message that arrives after this call.
         """
         return MessageStream(self, names, system_id, component_id)
+
+
+def _without_keys(frames: list[Frame]) -> list[Frame]:
+    """The frames that a log may contain."""
+    for frame in frames:
+        if frame.message_id == SETUP_SIGNING:
+            return [other for other in frames if other.message_id != SETUP_SIGNING]
+    return frames
 
 
 class MessageStream:
