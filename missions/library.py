@@ -3,7 +3,7 @@
 import importlib.util
 import inspect
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -11,10 +11,7 @@ from typing import Any, Final
 from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
-from missions.multi_target.mission import MultiTargetMission
-from missions.occupancy.mission import OccupancyMission
 from missions.options import FlightOptions
-from missions.orbit.mission import OrbitMission
 from missions.pattern_search.curves import (
     expanding_square_curve,
     lissajous_curve,
@@ -31,17 +28,58 @@ from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 from missions.planning.limits import Limits
 from missions.vehicle.vehicle import Vehicle
 
-MISSIONS: Final[Mapping[str, Mission[Any]]] = MappingProxyType(
-    {
-        "lissajous": PatternMission("lissajous", lissajous_curve, lissajous_size),
-        "sector": PatternMission("sector", sector_curve, sector_size),
-        "parallel-sweep": PatternMission("parallel-sweep", parallel_sweep_curve, sweep_size),
-        "expanding-square": PatternMission("expanding-square", expanding_square_curve, square_size),
-        "orbit": OrbitMission(),
-        "occupancy": OccupancyMission(),
-        "multi-target": MultiTargetMission(),
-    }
-)
+
+def _orbit() -> Mission[Any]:
+    from missions.orbit.mission import OrbitMission
+
+    return OrbitMission()
+
+
+def _occupancy() -> Mission[Any]:
+    from missions.occupancy.mission import OccupancyMission
+
+    return OccupancyMission()
+
+
+def _multi_target() -> Mission[Any]:
+    from missions.multi_target.mission import MultiTargetMission
+
+    return MultiTargetMission()
+
+
+class _NamedMissions(Mapping[str, Mission[Any]]):
+    """The missions by name; only those that are used are imported."""
+
+    _MAKERS: Final[Mapping[str, Callable[[], Mission[Any]]]] = MappingProxyType(
+        {
+            "lissajous": lambda: PatternMission("lissajous", lissajous_curve, lissajous_size),
+            "sector": lambda: PatternMission("sector", sector_curve, sector_size),
+            "parallel-sweep": lambda: PatternMission("parallel-sweep", parallel_sweep_curve, sweep_size),
+            "expanding-square": lambda: PatternMission(
+                "expanding-square", expanding_square_curve, square_size
+            ),
+            "orbit": _orbit,
+            "occupancy": _occupancy,
+            "multi-target": _multi_target,
+        }
+    )
+
+    def __init__(self) -> None:
+        self._made: dict[str, Mission[Any]] = {}
+
+    def __getitem__(self, name: str) -> Mission[Any]:
+        if name not in self._made:
+            self._made[name] = self._MAKERS[name]()
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._MAKERS)
+
+    def __len__(self) -> int:
+        return len(self._MAKERS)
+
+
+MISSIONS: Final[Mapping[str, Mission[Any]]] = _NamedMissions()
 """The missions with a name on the command line."""
 
 

@@ -1,16 +1,21 @@
 """Embedded worlds: a simulated world in this process that missions are flown in."""
 
-from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
-from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
-from missions.embedded.worlds import (
-    CAMERA,
-    MAGNETOMETER,
-    MotionKind,
-    carrying,
-    motion_of,
-    occupancy_world,
-    orbit_world,
-)
+from typing import TYPE_CHECKING, Final
+
+from flightsim.foundation.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
+    from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
+    from missions.embedded.worlds import (
+        CAMERA,
+        MAGNETOMETER,
+        MotionKind,
+        carrying,
+        motion_of,
+        occupancy_world,
+        orbit_world,
+    )
 
 __all__ = [
     "CAMERA",
@@ -28,3 +33,17 @@ __all__ = [
     "orbit_world",
     "terrain_targets_world",
 ]
+
+_SITL: Final = "missions.embedded.sitl"
+_TARGET_FIELDS: Final = "missions.embedded.target_fields"
+_WORLDS: Final = "missions.embedded.worlds"
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
+        **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
+        **dict.fromkeys(("CAMERA", "MAGNETOMETER", "MotionKind", "carrying", "motion_of"), _WORLDS),
+        **dict.fromkeys(("occupancy_world", "orbit_world"), _WORLDS),
+    },
+)
