@@ -41,6 +41,7 @@ _UNIT: Final = re.compile(r"_(ne_m|m_s|a_m2|nt|hz|rad|deg|m|s)$")
 _NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "arguments": "--arg",
+        "false_count": "--false-anomalies",
         "gps_fault=False": "--no-gps-fault",
         "height_m": "--size",
         "map_file": "--map",

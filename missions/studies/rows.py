@@ -92,7 +92,7 @@ class RowSchema:
             PlanError: it is no dataclass, or a field is of a type that has no column.
         """
         if not (isinstance(row, type) and is_dataclass(row)):
-            raise PlanError(f"`row` {row!r} is not a dataclass; give the class of the trial's result")
+            raise PlanError(f"row {row!r} is not a dataclass; give the class of the trial's result")
         hints = get_type_hints(row)
         kinds = {f.name: _kind_of(row, f.name, hints[f.name]) for f in fields(row)}
         taken = sorted(set(kinds) & {*RESERVED, *TIMING.names})

@@ -82,9 +82,9 @@ class Study(Generic[Parameters, Row]):
     def __post_init__(self) -> None:
         schema = RowSchema.of(self.row)
         if not self.name or not all(c.isalnum() or c in "-_." for c in self.name):
-            raise PlanError(f"`name` {self.name!r} is not accepted; letters, digits, '-', '_' and '.' are")
+            raise PlanError(f"name {self.name!r} is not accepted; letters, digits, '-', '_' and '.' are")
         if not callable(self.trial):
-            raise PlanError(f"`trial` {self.trial!r} is not a function of (parameters, seed)")
+            raise PlanError(f"trial {self.trial!r} is not a function of (parameters, seed)")
         if not 1 <= self.runs <= MAX_RUNS:
             raise PlanError(f"`runs` {self.runs} is not in 1..{MAX_RUNS}")
         double = sorted(self.design.names & schema.names)
@@ -92,13 +92,13 @@ class Study(Generic[Parameters, Row]):
             raise PlanError(f"{', '.join(double)}: a parameter and a field of the row; rename one of them")
         if self.success and schema.kinds.get(self.success) is not bool:
             raise PlanError(
-                f"`success` {self.success!r} is not a field of {self.row.__name__} that is True or False"
+                f"success {self.success!r} is not a field of {self.row.__name__} that is True or False"
             )
         unknown = set(self.metrics or ()) - schema.names
         if unknown:
-            raise PlanError(f"`metrics` {', '.join(sorted(unknown))}: {self.row.__name__} has no such field")
+            raise PlanError(f"metrics {', '.join(sorted(unknown))}: {self.row.__name__} has no such field")
         if not 0 <= self.baseline < len(self.design.cells):
-            raise PlanError(f"`baseline` {self.baseline} is not a cell; there are {len(self.design.cells)}")
+            raise PlanError(f"baseline {self.baseline} is not a cell; there are {len(self.design.cells)}")
         if self.parameters is not None:
             self._check_parameters(self.parameters)
 

@@ -41,7 +41,9 @@ def all_options():
         parameters = command.params if isinstance(command, click.Command) else command.options
         for parameter in parameters:
             found.update(getattr(parameter, "opts", ()))
-        waiting += getattr(command, "commands", {}).values()
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            waiting += [command.get_command(context, name) for name in command.list_commands(context)]
     return found
 
 

@@ -104,13 +104,13 @@ class Clash:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"name": "a b"}, "`name` 'a b'"),
+        ({"name": "a b"}, "name 'a b'"),
         ({"runs": 0}, "`runs` 0"),
         ({"row": dict}, "is not a dataclass"),
         ({"row": Clash}, "wind_m_s: a parameter and a field of the row"),
-        ({"success": "count"}, "`success` 'count' is not a field of Row that is True or False"),
-        ({"metrics": ("speed",)}, "`metrics` speed: Row has no such field"),
-        ({"baseline": 4}, "`baseline` 4 is not a cell; there are 4"),
+        ({"success": "count"}, "success 'count' is not a field of Row that is True or False"),
+        ({"metrics": ("speed",)}, "metrics speed: Row has no such field"),
+        ({"baseline": 4}, "baseline 4 is not a cell; there are 4"),
         ({"parameters": Wind}, r"do not make Wind\(wind_m_s\)"),
     ],
 )
