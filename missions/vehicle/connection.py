@@ -132,6 +132,8 @@ class Connection:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._unwatch()
+        if hasattr(self._link, "on_frames"):
+            self._link.on_frames = None
         self._link.close()
 
     def _unwatch(self) -> None:

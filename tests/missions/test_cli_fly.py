@@ -63,7 +63,10 @@ def test_options_of_the_embedded_sitl_are_refused_with_a_vehicle_elsewhere(optio
         (["own.py", "--pattern", "L2"], "--pattern is for lissajous, not for own.py"),
         (["sector", "--pattern", "L2"], "--pattern is for lissajous, not for sector"),
         (["sector", "--ratio", "3:4"], "--ratio is for lissajous, not for sector"),
-        (["sector", "--spacing", "5"], "--spacing is for parallel-sweep, expanding-square, multi-target, not for sector"),
+        (
+            ["sector", "--spacing", "5"],
+            "--spacing is for parallel-sweep, expanding-square, multi-target, not for sector",
+        ),
         (
             ["lissajous", "--heading", "5"],
             "--heading is for sector, parallel-sweep, expanding-square, not for lissajous",

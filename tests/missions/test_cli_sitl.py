@@ -42,8 +42,8 @@ def test_payload_speaks_on_the_vehicles_links_and_targets_are_in_the_log(tmp_pat
     for component in (100, 154, 158):
         assert received[1, component, "HEARTBEAT"] == 3
     assert received[1, 158, "NAMED_VALUE_FLOAT"] == 30
-    for target in (1, 2):
-        assert received[251, target, "HIL_STATE_QUATERNION"] == 150
+    for target, frames in ((1, 30), (2, 150)):  # at rest 10 Hz, moving 50 Hz
+        assert received[251, target, "HIL_STATE_QUATERNION"] == frames
 
 
 @pytest.mark.parametrize(

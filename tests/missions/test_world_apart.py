@@ -96,6 +96,7 @@ class Spy(Mission[Any]):
         await vehicle.clock.sleep(2.0)
         (sitl,) = (item for item in gc.get_objects() if type(item) is Sitl)
         truths = [simulated.vehicle.truth for simulated in sitl.vehicles]
+        gc.collect()  # instances that were made to read their needs
         running = [item for item in gc.get_objects() if isinstance(item, Estimator)]
         self.estimators = len(running)
         for roots in ((self, vehicle, options, vehicle.notes), running):
