@@ -7,6 +7,7 @@ over its greatest possible value.
 """
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -133,7 +134,7 @@ class ShapelessHypothesis:
         return -0.5 * (fit + math.log(math.tau * total_nt2)), math.exp(-0.5 * fit)
 
 
-class ParticleHypothesis:
+class ParticleHypothesis(ABC):
     """What the filters of both forms share: motion and resampling.
 
     Attributes:
@@ -151,8 +152,9 @@ class ParticleHypothesis:
         self._rng = rng
         self._by_roulette = by_roulette
 
+    @abstractmethod
     def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
-        raise NotImplementedError
+        """Logarithm of the evidence of a measurement, and the mean fit; sets the weights."""
 
     def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
         if effective_count(self.weights) < _RESAMPLED_BELOW * self.weights.size:
@@ -191,8 +193,9 @@ class ParticleHypothesis:
         y = rows[:, p.Y, None] + sine * forward_m + cosine * right_m
         return self._signals(rows, x, y, height_m)
 
+    @abstractmethod
     def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
-        raise NotImplementedError
+        """Signals, nT, that particles predict at places of their target's frame."""
 
     def sources(self) -> Array:
         """(n, 3) forward and right of the vehicle, and axis relative to its course (8)."""
