@@ -26,7 +26,7 @@ from flightsim.payload.magnetic_spec import (
     SignatureSpec,
     magnetic_field_of,
 )
-from flightsim.payload.main_field import MainField
+from flightsim.foundation.main_field import MainField
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind

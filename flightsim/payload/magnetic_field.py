@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.payload.magnetic_map import MagneticMap, bilinear
-from flightsim.payload.main_field import MainField
+from flightsim.foundation.main_field import MainField
 from flightsim.payload.signature import Signature
 
 Array = NDArray[np.float64]

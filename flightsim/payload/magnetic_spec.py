@@ -11,7 +11,7 @@ from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.payload.main_field import MainField
+from flightsim.foundation.main_field import MainField
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.synthetic_map import SyntheticMapParameters, synthetic_map
@@ -53,6 +53,8 @@ class MagneticSpec:
         width_m, height_m: size of a generated map, east and north.
         spacing_m: distance of the grid lines of a generated map; 100 m suit survey size, 60 km x 50 km.
         survey_height_m: height above home at which a generated map is valid.
+        exact_map: the true field is the map of `map_file` itself, or a generated one is published without an
+            error.
         signatures: targets in the field; places are local NED of the map's home.
     """
 
@@ -61,6 +63,7 @@ class MagneticSpec:
     height_m: float = 2000.0
     spacing_m: float = _MAP_SPACING_M
     survey_height_m: float = 100.0
+    exact_map: bool = False
     signatures: tuple[SignatureSpec, ...] = ()
 
     def __post_init__(self) -> None:
@@ -86,10 +89,14 @@ def magnetic_field_of(
     if spec.map_file is not None:
         published = MagneticMap.load(spec.map_file)
         _require_here(published, spec.map_file, home)
-        truth = truth_behind(published, SurveyParameters(), seed=stream)
+        truth = (
+            published
+            if spec.exact_map
+            else truth_behind(published, SurveyParameters(), seed=stream)
+        )
     else:
         truth = _generated(spec, home, seed, decimal_year)
-        published = surveyed(truth, SurveyParameters(), seed=stream)
+        published = truth if spec.exact_map else surveyed(truth, SurveyParameters(), seed=stream)
     signatures = [_resolved(signature, truth, decimal_year) for signature in spec.signatures]
     return MagneticField(truth, signatures, decimal_year=decimal_year), published
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from flightsim.home import Home
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
-from flightsim.payload.main_field import MainField
+from flightsim.foundation.main_field import MainField
 
 Array = NDArray[np.float64]
 

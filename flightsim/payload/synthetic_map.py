@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
 from flightsim.home import Home
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.payload.main_field import MainField
+from flightsim.foundation.main_field import MainField
 
 Array = NDArray[np.float64]
 

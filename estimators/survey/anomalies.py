@@ -1,0 +1,189 @@
+"""Anomalies on survey lines: matched filters along each line, and what neighbouring lines have seen together.
+
+The differential measurement of a line is whitened by the covariance of noise, map error and an unknown level,
+and compared with bumps of several widths, and with their slopes, for sources whose field is one-sided or not
+(Kay, Fundamentals of Statistical Signal Processing II, section 4.4; as `estimators.occupancy.significance`
+does for one pass). Peaks of neighbouring lines are one anomaly.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.survey.gridding import block_means
+
+__all__ = ["LEAST_RATIO", "LinePeak", "SurveyAnomaly", "anomalies_of", "line_peaks"]
+
+Array = NDArray[np.float64]
+
+LEAST_RATIO: Final = 5.5
+"""Smallest signal-to-noise ratio of a peak: the filters of a hundred kilometres of lines make ten thousand
+independent comparisons, and noise exceeds it in one of two thousand such surveys.
+"""
+
+_POINT_M: Final = 10.0  # of track, over which readings are averaged
+_WIDTHS_M: Final = (60.0, 90.0, 130.0, 180.0, 260.0)  # bumps (1 + r^2 / w^2)^(-5/2): a dipole's decay
+_WINDOW: Final = 300  # points whitened together
+_OVERLAP: Final = 100
+_UNKNOWN_LEVEL: Final = 30.0  # standard deviation of the level, in multiples of a point's error
+_DRIFT_M: Final = 10_000.0  # along which the level may change by one point's error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinePeak:
+    """An anomaly on one line.
+
+    Attributes:
+        line: number of the line.
+        time_s: vehicle time.
+        north_m, east_m: place.
+        peak_nt: largest differential measurement near it, with its sign.
+        ratio: signal-to-noise ratio of the matched filter.
+        width_m: width of the bump that fits best.
+    """
+
+    line: int
+    time_s: float
+    north_m: float
+    east_m: float
+    peak_nt: float
+    ratio: float
+    width_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyAnomaly:
+    """An anomaly of a survey, seen on one line or on several.
+
+    Attributes:
+        north_m, east_m: place: mean of its peaks, by their strength.
+        peak_nt, ratio, width_m, time_s: of its strongest peak.
+        lines: numbers of the lines with a peak.
+    """
+
+    north_m: float
+    east_m: float
+    peak_nt: float
+    ratio: float
+    width_m: float
+    time_s: float
+    lines: tuple[int, ...]
+
+
+def line_peaks(
+    line: int,
+    time_s: Array,
+    north_m: Array,
+    east_m: Array,
+    difference_nt: Array,
+    *,
+    noise_nt: float,
+    map_error_nt: float = 0.0,
+    correlation_m: float = 100.0,
+) -> list[LinePeak]:
+    """Peaks of one line.
+
+    Args:
+        line: its number.
+        time_s, north_m, east_m, difference_nt: (n,) readings of the line less the map.
+        noise_nt: standard deviation of a reading, white.
+        map_error_nt, correlation_m: error of the map, and its correlation distance (exponential).
+    """
+    if len(time_s) < 10:
+        return []
+    places = np.column_stack((north_m, east_m))
+    points, values = block_means(places, difference_nt, _POINT_M)
+    _, times = block_means(places, time_s, _POINT_M)
+    per_point = max(1.0, len(time_s) / len(points))
+    error_nt = max(noise_nt, 1e-6) / math.sqrt(per_point)
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    found: list[LinePeak] = []
+    start = 0
+    while start < len(points):
+        part = slice(start, min(len(points), start + _WINDOW))
+        ratios, widths = _ratios(along[part], values[part], error_nt, map_error_nt, correlation_m)
+        for k, ratio, width_m in _peaks(along[part], ratios, widths):
+            near = np.abs(along[part] - along[part][k]) <= width_m
+            level = values[part] - np.median(values[part])
+            strongest = float(level[near][np.argmax(np.abs(level[near]))])
+            found.append(
+                LinePeak(
+                    line=line,
+                    time_s=float(times[part][k]),
+                    north_m=float(points[part][k, 0]),
+                    east_m=float(points[part][k, 1]),
+                    peak_nt=strongest,
+                    ratio=ratio,
+                    width_m=width_m,
+                )
+            )
+        if part.stop == len(points):
+            break
+        start += _WINDOW - _OVERLAP
+    return found
+
+
+def anomalies_of(peaks: Sequence[LinePeak], *, reach_m: float) -> list[SurveyAnomaly]:
+    """Peaks nearer to each other than `reach_m` are one anomaly; the strongest comes first."""
+    left = sorted(peaks, key=lambda peak: -peak.ratio)
+    found = []
+    while left:
+        first = left[0]
+        own = [p for p in left if math.hypot(p.north_m - first.north_m, p.east_m - first.east_m) <= reach_m]
+        left = [p for p in left if p not in own]
+        alike = [p for p in own if p.peak_nt * first.peak_nt > 0.0]
+        weights = np.array([abs(p.peak_nt) for p in alike])
+        places = np.array([(p.north_m, p.east_m) for p in alike])
+        north_m, east_m = (weights @ places / weights.sum()).tolist()
+        found.append(
+            SurveyAnomaly(
+                north_m=north_m,
+                east_m=east_m,
+                peak_nt=first.peak_nt,
+                ratio=first.ratio,
+                width_m=first.width_m,
+                time_s=first.time_s,
+                lines=tuple(sorted({p.line for p in own})),
+            )
+        )
+    return found
+
+
+def _ratios(
+    along_m: Array, values_nt: Array, error_nt: float, map_error_nt: float, correlation_m: float
+) -> tuple[Array, Array]:
+    """Largest signal-to-noise ratio (n,) of a bump at each point, and its width."""
+    apart = np.abs(along_m[:, None] - along_m)
+    level_nt = _UNKNOWN_LEVEL * math.hypot(error_nt, map_error_nt)
+    covariance = (
+        level_nt**2
+        + map_error_nt**2 * np.exp(-apart / correlation_m)
+        + _UNKNOWN_LEVEL * error_nt**2 * np.exp(-apart / _DRIFT_M)
+    )
+    covariance[np.diag_indices_from(covariance)] += error_nt**2
+    root = np.linalg.cholesky(covariance)
+    offset = (along_m[:, None] - along_m[None, :])[None] / np.array(_WIDTHS_M)[:, None, None]
+    bump = (1.0 + offset**2) ** -2.5
+    slope = offset * (1.0 + offset**2) ** -3.5
+    count = len(along_m)
+    templates = np.concatenate((bump, slope)).transpose(1, 0, 2).reshape(count, -1)
+    white = np.linalg.solve(root, np.column_stack((values_nt - values_nt.mean(), templates)))
+    size = np.linalg.norm(white[:, 1:], axis=0)
+    ratio = (np.abs(white[:, 0] @ white[:, 1:]) / np.maximum(size, 1e-12)).reshape(-1, count)
+    best = np.argmax(ratio, axis=0)
+    return ratio[best, np.arange(count)], np.array(_WIDTHS_M)[best % len(_WIDTHS_M)]
+
+
+def _peaks(along_m: Array, ratios: Array, widths_m: Array) -> list[tuple[int, float, float]]:
+    """Index, ratio and width of the points that are the strongest within two widths."""
+    left = ratios.copy()
+    found = []
+    while len(left) and left.max() >= LEAST_RATIO:
+        k = int(np.argmax(left))
+        found.append((k, float(ratios[k]), float(widths_m[k])))
+        left[np.abs(along_m - along_m[k]) <= 3.0 * widths_m[k]] = 0.0
+    return found
