@@ -30,18 +30,19 @@ __all__ = [
     "figure_of_merit_nt",
     "fit_compensation",
     "load_compensation",
-    "without_trend",
+    "mean_cycle",
 ]
 
 Array = NDArray[np.float64]
 
 TERMS: Final = 16
-_BAND_HZ: Final = (0.03, 1.0)  # of manoeuvres: above the geology, below the noise
+_BAND_HZ: Final = (0.08, 1.0)  # of manoeuvres: above the geology, below the noise
 _ORDER: Final = 3
 _LEAST_SAMPLES: Final = 300
 _RIDGE: Final = 1e-6
 _LEAST_TURN_RAD: Final = math.radians(5.0)
 _HEADINGS: Final = 4
+_CYCLES: Final = 3  # of each manoeuvre
 FORMAT: Final = "flightstack-compensation-1"
 
 
@@ -149,8 +150,10 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
     """Figure of merit: the sum of the peak-to-peak values of the readings during rolls, pitches and yaws on
     four headings, twelve manoeuvres in all, without their slow change. Survey contracts ask for 1 to 2 nT.
 
+    The three cycles of a manoeuvre are averaged, so that noise counts less than what the manoeuvre does.
+
     Args:
-        manoeuvres: (n,) readings of each manoeuvre, evenly spaced.
+        manoeuvres: (n,) readings of each manoeuvre of three cycles, evenly spaced.
         rate_hz: of the readings.
 
     Raises:
@@ -160,17 +163,21 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
         raise EstimatorError(
             f"a figure of merit of {len(manoeuvres)} manoeuvres; accepted: 12, three on each of four headings"
         )
-    return math.fsum(float(np.ptp(without_trend(values, rate_hz=rate_hz))) for values in manoeuvres)
+    return math.fsum(float(np.ptp(mean_cycle(values, rate_hz=rate_hz))) for values in manoeuvres)
 
 
-def without_trend(values_nt: Array, *, rate_hz: float) -> Array:
-    """Readings (n,) of one manoeuvre without their straight trend, as means over a second: the noise of single
-    readings is no manoeuvre.
+def mean_cycle(values_nt: Array, *, rate_hz: float) -> Array:
+    """The mean of the three cycles of a manoeuvre (n,), without its straight trend, as means over a second: the
+    noise of single readings is no manoeuvre.
     """
+    length = len(values_nt) // _CYCLES
+    # the filter of a second takes from the ends, so cycles are averaged before it, and repeated for it
     times = np.arange(len(values_nt)) / rate_hz
-    trend = np.polynomial.Polynomial.fit(times, values_nt, 1)
+    level = np.polynomial.Polynomial.fit(times, values_nt, 1)(times)
+    cycle = (values_nt - level)[: _CYCLES * length].reshape(_CYCLES, length).mean(axis=0)
     width = max(1, round(rate_hz))
-    return np.convolve(values_nt - trend(times), np.full(width, 1.0 / width), "valid")
+    around = np.concatenate((cycle[length - width // 2 :], cycle, cycle[: width - width // 2 - 1]))
+    return np.convolve(around, np.full(width, 1.0 / width), "valid")
 
 
 def compensation_bytes(compensation: Compensation) -> bytes:

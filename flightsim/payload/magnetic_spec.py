@@ -53,6 +53,7 @@ class MagneticSpec:
         width_m, height_m: size of a generated map, east and north.
         spacing_m: distance of the grid lines of a generated map; 100 m suit survey size, 60 km x 50 km.
         survey_height_m: height above home at which a generated map is valid.
+        raised_m: height of a generated map above the level of a survey: its geology is continued upwards.
         exact_map: the true field is the map of `map_file` itself, or a generated one is published without an
             error.
         signatures: targets in the field; places are local NED of the map's home.
@@ -63,6 +64,7 @@ class MagneticSpec:
     height_m: float = 2000.0
     spacing_m: float = _MAP_SPACING_M
     survey_height_m: float = 100.0
+    raised_m: float = 0.0
     exact_map: bool = False
     signatures: tuple[SignatureSpec, ...] = ()
 
@@ -146,6 +148,7 @@ def _generated(spec: MagneticSpec, home: Home, seed: int, decimal_year: float) -
             east_m=half_e_m,
             spacing_m=spec.spacing_m,
             height_m=spec.survey_height_m,
+            raised_m=spec.raised_m,
         ),
         home=home,
         seed=RandomStreams(seed).child("magnetic_map"),

@@ -25,7 +25,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         )
     return SurveyOptions(
         **common,
-        altitude_m=given["altitude"],
+        altitude_m=_altitude_m(given),
         width_m=width_m,
         height_m=height_m,
         area_ne_m=(0.0, 0.0) if area is None else parse_pair(area, "--area", ","),
@@ -42,6 +42,14 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         grid_m=given["grid"],
         level=not given["no_levelling"],
     )
+
+
+def _altitude_m(given: Given) -> float:
+    from missions.survey.options import ALTITUDE_M, CALIBRATION_ALTITUDE_M
+
+    if given["altitude"] is not None:
+        return float(given["altitude"])
+    return CALIBRATION_ALTITUDE_M if given["calibrate"] else ALTITUDE_M
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -79,7 +87,9 @@ COMMAND: Final = MissionCommand(
             help="Between the tie lines, m; 0: none. [default: five line spacings]",
         ),
         option(
-            "--altitude", type=float, default=80.0, help="Above home, or above the ground of --terrain, m."
+            "--altitude",
+            type=float,
+            help="Above home, or above the ground of --terrain, m. [default: 80; 800 with --calibrate]",
         ),
         option("--speed", type=float, help="Airspeed, m/s. [default: the aircraft's own]"),
         option(

@@ -25,6 +25,7 @@ _MARGIN_M: Final = 1500.0  # of a generated map around the area: room for turns
 _CALIBRATION_M: Final = 8000.0  # side of a map that is generated for a calibration flight
 _MAP_POINTS_ACROSS: Final = 600.0  # grid spacing of a large generated map: its side over so many
 _LEAST_SPACING_M: Final = 50.0
+_GEOLOGY_LEVEL_M: Final = 100.0  # above home, what anomalies of generated maps are given for
 _STREAM: Final = 0x5EAE
 _APART_M: Final = 400.0
 _INSIDE: Final = 0.9  # share of the area in which targets are drawn
@@ -73,6 +74,7 @@ def survey_world(
         height_m=high_m,
         spacing_m=max(_LEAST_SPACING_M, max(high_m, wide_m) / _MAP_POINTS_ACROSS),
         survey_height_m=options.altitude_m,
+        raised_m=max(0.0, options.altitude_m - _GEOLOGY_LEVEL_M),
         exact_map=exact_map,
         signatures=drawn_targets(options, world.seed, targets),
     )

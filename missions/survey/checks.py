@@ -26,7 +26,7 @@ def check_survey(options: SurveyOptions, limits: Limits) -> None:
     if options.vehicles > 1:
         raise PlanError(f"a survey is flown by one aircraft; `vehicles` {options.vehicles} is not accepted")
     limits.check_airspeed(airspeed_m_s(options, limits))
-    limits.check_altitude(options.own_altitude_m)
+    options.check_altitude(limits)
     options.compensation()  # a file that can't be read is refused before the flight
     survey_map = options.survey_map()
     terrain = options.terrain()

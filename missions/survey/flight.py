@@ -34,6 +34,7 @@ CALIBRATION: Final = "calibration"
 
 LEAD_S: Final = 8.0
 """Straight flight before a line, in which the remaining errors of the turn settle."""
+_TURN_MARGIN: Final = 1.3
 _RUN_OUT_S: Final = 3.0
 _ACCEPTANCE_M: Final = 20.0
 _TURN_IN_MAX_M: Final = 250.0  # ArduPlane accepts at most 255 as a waypoint's radius
@@ -97,7 +98,7 @@ def planned_survey(options: SurveyOptions, limits: FixedWingLimits, home: Geodet
     north_m, east_m, down_m = LocalFrame(home).ned_from_geodetic(origin.lat_deg, origin.lon_deg, origin.alt_m)
     terrain = options.terrain()
     fastest_m_s = limits.true_airspeed_m_s(speed_m_s) + limits.wind_m_s
-    radius_m = limits.path_radius_m(speed_m_s)
+    radius_m = turn_radius_m(options, limits)
     path = survey_path(
         plan,
         Drape(terrain=terrain, altitude_m=options.own_altitude_m, climb=options.climb),
@@ -116,7 +117,12 @@ def planned_survey(options: SurveyOptions, limits: FixedWingLimits, home: Geodet
 
 def planned_lines(options: SurveyOptions, limits: FixedWingLimits) -> LinePlan:
     """The lines of a survey in the order in which an aircraft with these limits flies them."""
-    return line_plan(options, turn_radius_m=limits.path_radius_m(airspeed_m_s(options, limits)))
+    return line_plan(options, turn_radius_m=turn_radius_m(options, limits))
+
+
+def turn_radius_m(options: SurveyOptions, limits: FixedWingLimits) -> float:
+    """Radius of the turns between lines: with room for the time in which the bank is reversed."""
+    return _TURN_MARGIN * limits.path_radius_m(airspeed_m_s(options, limits))
 
 
 def airspeed_m_s(options: SurveyOptions, limits: FixedWingLimits) -> float:
@@ -183,7 +189,7 @@ async def fly_lines(
 ) -> None:
     """Fly the lines, including takeoff and landing."""
     notes, clock = vehicle.notes, vehicle.clock
-    await _prepare(vehicle)
+    await _prepare(vehicle, options, limits)
     acceptance_m = await vehicle.adapter.acceptance_m(_turn_in_m(survey.speed_m_s, limits))
     items = mission_items(vehicle, options, survey, limits)
     notes.commanded = survey.commanded(vehicle, acceptance_m)
@@ -210,7 +216,7 @@ async def fly_lines(
 async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLimits) -> None:
     """Fly the manoeuvres of a compensation, including takeoff and landing."""
     notes, clock = vehicle.notes, vehicle.clock
-    await _prepare(vehicle)
+    await _prepare(vehicle, options, limits)
     pilot = await vehicle.wing.prepare_piloting()
     await pilot.prepare(options.own_altitude_m, airspeed_m_s(options, limits))
     notes.begin("takeoff", clock.stamp_us)
@@ -261,9 +267,14 @@ async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: Fixed
     notes.end(clock.stamp_us)
 
 
-async def _prepare(vehicle: Vehicle) -> None:
+async def _prepare(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLimits) -> None:
     """Check the payload, and request what readings are placed with."""
     vehicle.notes.begin("checks", vehicle.clock.stamp_us)
+    if options.altitude_m > limits.altitude_max_m:
+        vehicle.notes.warn(
+            f"the flight at {options.altitude_m:g} m is above {limits.altitude_max_m:g} m, the ceiling of the "
+            "open category (EU 2019/947): it needs an authorization"
+        )
     await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
     for name, rate_hz in _RATES_HZ.items():
         await vehicle.commands.set_message_rate(name, rate_hz)

@@ -16,6 +16,10 @@ from missions.survey.drape import TerrainModel, load_terrain
 
 LARGEST_SIDE_M: Final = 60_000.0
 MAX_LINES: Final = 1000
+ALTITUDE_M: Final = 80.0
+CALIBRATION_ALTITUDE_M: Final = 800.0
+"""Height of a compensation flight, unless one is given: there the field of the ground changes slowly."""
+HIGHEST_M: Final = 3000.0
 TIE_SPACING: Final = 5.0
 """Distance of tie lines, in line spacings, unless one is given; survey contracts have 5 to 10."""
 
@@ -42,7 +46,7 @@ class SurveyOptions(MissionOptions):
         level: level the lines by the tie lines.
     """
 
-    altitude_m: float = 80.0
+    altitude_m: float = ALTITUDE_M
     separation_m: float = 15.0
     width_m: float = 2000.0
     height_m: float = 2000.0
@@ -112,6 +116,17 @@ class SurveyOptions(MissionOptions):
         if self.speed_m_s is not None or not isinstance(limits, FixedWingLimits):
             return self
         return replace(self, speed_m_s=limits.airspeed_trim_m_s)
+
+    def check_altitude(self, limits: FixedWingLimits) -> None:
+        """Refuse an impossible altitude. Surveys may be higher than `limits` has it, with an authorization.
+
+        Raises:
+            PlanError: the altitude is not possible.
+        """
+        if not limits.altitude_min_m <= self.altitude_m <= HIGHEST_M:
+            raise PlanError(
+                f"`altitude_m` {self.altitude_m:g} m is not in {limits.altitude_min_m:g}..{HIGHEST_M:g} m"
+            )
 
     def survey_map(self) -> SurveyMap | None:
         """The published map; None: there is none.

@@ -96,7 +96,7 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
     if plan is None:
         main = MainField(origin)
         try:
-            made = calibrated(readings, notes, options.direction_rad, survey_map, main)
+            made = calibrated(readings, notes, options.direction_rad, main)
         except EstimatorError as error:
             return Outcome(failure=str(error))
         return Outcome(

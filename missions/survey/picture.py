@@ -159,5 +159,5 @@ def draw_calibration(path: Path, title: str, made: Calibration) -> None:
         axis.grid(True, color=_GRID, linewidth=0.6)
     axes[0, 0].legend(fontsize=8)
     figure.supxlabel("time, s", fontsize=9, color=_INK)
-    figure.supylabel("reading less map and level, nT", fontsize=9, color=_INK)
+    figure.supylabel("reading less main field and level, nT", fontsize=9, color=_INK)
     figure.savefig(path)

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
-from estimators.occupancy.survey_map import SurveyMap
 from estimators.survey.compensation import (
     Compensation,
     direction_cosines,
     figure_of_merit_nt,
     fit_compensation,
-    without_trend,
+    mean_cycle,
 )
 from estimators.survey.processing import aircraft_field_nt
 from estimators.survey.readings import SurveyReadings, placed_readings
@@ -58,7 +57,7 @@ class Calibration:
         figure_of_merit_nt: of the compensated readings: sum of the peak-to-peak values of twelve manoeuvres.
         figure_of_merit_before_nt: of the readings as they were.
         improvement: improvement ratio: standard deviation of the readings during the manoeuvres before
-            compensation over that after it, in means over a second.
+            compensation over that after it, of the mean cycles.
         before_nt, after_nt: readings of the manoeuvres of the second box, less their level, by label.
     """
 
@@ -71,16 +70,15 @@ class Calibration:
 
 
 def calibrated(
-    readings: SurveyReadings, notes: FlightNotes, direction_rad: float, survey_map: SurveyMap | None, main: MainField
+    readings: SurveyReadings, notes: FlightNotes, direction_rad: float, main: MainField
 ) -> Calibration:
     """Fit the first box of a calibration flight, and judge the fit by the second.
 
     Args:
-        readings: of the flight, in the frame of the map.
+        readings: of the flight, in the frame of the main field's home.
         notes: with the phases of the manoeuvres.
         direction_rad: of the first leg.
-        survey_map: whose geology is taken out of the readings, where it has data.
-        main: the main field.
+        main: the main field, which is taken out of the readings. Geology is not: the flight is high above it.
 
     Raises:
         EstimatorError: manoeuvres are missing, or too small.
@@ -91,7 +89,9 @@ def calibrated(
         if phase is None:
             raise EstimatorError(f"the calibration flight has no {manoeuvre.label}")
         times[manoeuvre.box].append((manoeuvre.label, phase.start_us * 1e-6, phase.end_us * 1e-6))
-    residual = _without_geology(readings, survey_map, main)
+    residual = readings.total_nt - (
+        main.total_at_nt(readings.north_m, readings.east_m) + main.gradient_up_nt_m * readings.height_m
+    )
     fitted_from, fitted_to = times[0][0][1] - _MARGIN_S, times[0][-1][2] + _MARGIN_S
     part = (readings.time_s >= fitted_from) & (readings.time_s <= fitted_to)
     cosines, rates = direction_cosines(
@@ -110,7 +110,7 @@ def calibrated(
         for values in (residual, left)
     )
     spreads = [
-        np.concatenate([without_trend(values, rate_hz=rate_hz) for values in parts.values()]).std()
+        np.concatenate([mean_cycle(values, rate_hz=rate_hz) for values in parts.values()]).std()
         for parts in (before, after)
     ]
     return Calibration(
@@ -121,15 +121,6 @@ def calibrated(
         before_nt=before,
         after_nt=after,
     )
-
-
-def _without_geology(readings: SurveyReadings, survey_map: SurveyMap | None, main: MainField) -> Array:
-    """Readings less map, or less the main field if the map does not cover the whole flight."""
-    main_nt = main.total_at_nt(readings.north_m, readings.east_m) + main.gradient_up_nt_m * readings.height_m
-    if survey_map is None:
-        return readings.total_nt - main_nt
-    map_nt = survey_map.totals_nt(readings.north_m, readings.east_m, readings.height_m)
-    return readings.total_nt - (map_nt if np.all(np.isfinite(map_nt)) else main_nt)
 
 
 def _columns(table: NDArray[np.void], *fields: tuple[str, float]) -> Array:
