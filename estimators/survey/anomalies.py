@@ -3,11 +3,11 @@
 The differential measurement of a line is whitened by the covariance of noise, map error and an unknown level,
 and compared with bumps of several widths, and with their slopes, for sources whose field is one-sided or not
 (Kay, Fundamentals of Statistical Signal Processing II, section 4.4; as `estimators.occupancy.significance`
-does for one pass). Peaks of neighbouring lines are one anomaly.
+does for one pass). Peaks of neighbouring lines are one anomaly, explained by one dipole where possible.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.survey.gridding import block_means
+from estimators.survey.sources import DipoleSource, fitted_dipole
 
-__all__ = ["LEAST_RATIO", "LinePeak", "SurveyAnomaly", "anomalies_of", "line_peaks"]
+__all__ = ["LEAST_RATIO", "LinePeak", "Search", "SurveyAnomaly", "line_peaks", "survey_anomalies"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,13 @@ independent comparisons, and noise exceeds it in one of two thousand such survey
 
 _POINT_M: Final = 10.0  # of track, over which readings are averaged
 _WIDTHS_M: Final = (60.0, 90.0, 130.0, 180.0, 260.0)  # bumps (1 + r^2 / w^2)^(-5/2): a dipole's decay
+_MOST: Final = 200  # anomalies of a survey
+_LEAST_REACH_M: Final = 150.0
+_REACH: Final = 1.5  # in widths: peaks of other lines within it are of the same anomaly
+_TOUCHED_M: Final = 1000.0  # from a source: lines within it are searched again without its field
+_REMAINDER: Final = 0.1  # of the ratio of a source, that may be left of it
+_FIT_M: Final = 350.0
+_FIT: Final = 3.0  # in widths: readings that a dipole is fitted to
 _WINDOW: Final = 300  # points whitened together
 _OVERLAP: Final = 100
 _UNKNOWN_LEVEL: Final = 30.0  # standard deviation of the level, in multiples of a point's error
@@ -60,9 +68,10 @@ class SurveyAnomaly:
     """An anomaly of a survey, seen on one line or on several.
 
     Attributes:
-        north_m, east_m: place: mean of its peaks, by their strength.
+        north_m, east_m: place of its source, or of its strongest peak where no dipole explains it.
         peak_nt, ratio, width_m, time_s: of its strongest peak.
         lines: numbers of the lines with a peak.
+        source: the dipole that explains it; None: none does.
     """
 
     north_m: float
@@ -72,6 +81,60 @@ class SurveyAnomaly:
     width_m: float
     time_s: float
     lines: tuple[int, ...]
+    source: DipoleSource | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Search:
+    """The readings that are searched; arrays (n,).
+
+    Attributes:
+        lines: numbers of the lines.
+        line_of: number of each reading's line; -1: none.
+        north_m, east_m, height_m: places.
+        differential_nt: readings less map; NaN off the lines.
+        direction_ned: (3,) direction of the Earth's field.
+    """
+
+    lines: Sequence[int]
+    line_of: NDArray[np.int64]
+    north_m: Array
+    east_m: Array
+    height_m: Array
+    differential_nt: Array
+    direction_ned: Array
+
+    def dipole_at(self, peak: LinePeak, left_nt: Array) -> DipoleSource | None:
+        """The dipole that explains a peak in what is left of the differential measurements."""
+        reach_m = max(_FIT_M, _FIT * peak.width_m)
+        own = (np.hypot(self.north_m - peak.north_m, self.east_m - peak.east_m) <= reach_m) & (
+            self.line_of >= 0
+        )
+        number = self.line_of[own]
+        blocks = [
+            _blocks(
+                np.column_stack((self.north_m, self.east_m, self.height_m, left_nt))[own][number == line],
+                line,
+            )
+            for line in np.unique(number).tolist()
+        ]
+        table = np.concatenate(blocks)
+        return fitted_dipole(
+            table[:, :3],
+            table[:, 3],
+            table[:, 4].astype(np.int64),
+            near_ne_m=(peak.north_m, peak.east_m),
+            direction_ned=self.direction_ned,
+        )
+
+    def field_of(self, source: DipoleSource) -> Array:
+        """Field (n,) of a source at all readings."""
+        return source.field_nt(self.north_m, self.east_m, self.height_m, self.direction_ned)
+
+    def lines_near(self, north_m: float, east_m: float, within_m: float) -> list[int]:
+        """Lines with readings near a place."""
+        near = np.hypot(self.north_m - north_m, self.east_m - east_m) <= within_m
+        return [line for line in np.unique(self.line_of[near]).tolist() if line >= 0]
 
 
 def line_peaks(
@@ -127,30 +190,64 @@ def line_peaks(
     return found
 
 
-def anomalies_of(peaks: Sequence[LinePeak], *, reach_m: float) -> list[SurveyAnomaly]:
-    """Peaks nearer to each other than `reach_m` are one anomaly; the strongest comes first."""
-    left = sorted(peaks, key=lambda peak: -peak.ratio)
-    found = []
-    while left:
-        first = left[0]
-        own = [p for p in left if math.hypot(p.north_m - first.north_m, p.east_m - first.east_m) <= reach_m]
-        left = [p for p in left if p not in own]
-        alike = [p for p in own if p.peak_nt * first.peak_nt > 0.0]
-        weights = np.array([abs(p.peak_nt) for p in alike])
-        places = np.array([(p.north_m, p.east_m) for p in alike])
-        north_m, east_m = (weights @ places / weights.sum()).tolist()
+def survey_anomalies(search: Search, find: Callable[[int, Array], Sequence[LinePeak]]) -> list[SurveyAnomaly]:
+    """The anomalies of all lines, the strongest first.
+
+    The strongest peak is explained by a dipole where one fits, its field is taken out of all readings, and the
+    lines are searched again, until no peak is left. Peaks that remain beside an anomaly are part of it.
+
+    Args:
+        search: the readings.
+        find: the peaks of a line (number, differential measurements of all readings).
+    """
+    left = search.differential_nt.copy()
+    peaks = {line: list(find(line, left)) for line in search.lines}
+    found: list[SurveyAnomaly] = []
+    while len(found) < _MOST:
+        free = [peak for own in peaks.values() for peak in own if not _part_of(peak, found)]
+        if not free:
+            break
+        first = max(free, key=lambda peak: peak.ratio)
+        reach_m = max(_LEAST_REACH_M, _REACH * first.width_m)
+        near = [p for p in free if math.dist((p.north_m, p.east_m), (first.north_m, first.east_m)) <= reach_m]
+        source = search.dipole_at(first, left)
+        if source is not None:
+            left -= search.field_of(source)
+            touched = search.lines_near(source.north_m, source.east_m, _TOUCHED_M)
+            peaks |= {line: list(find(line, left)) for line in touched}
         found.append(
             SurveyAnomaly(
-                north_m=north_m,
-                east_m=east_m,
+                north_m=first.north_m if source is None else source.north_m,
+                east_m=first.east_m if source is None else source.east_m,
                 peak_nt=first.peak_nt,
                 ratio=first.ratio,
                 width_m=first.width_m,
                 time_s=first.time_s,
-                lines=tuple(sorted({p.line for p in own})),
+                lines=tuple(sorted({p.line for p in near})),
+                source=source,
             )
         )
     return found
+
+
+def _part_of(peak: LinePeak, found: Sequence[SurveyAnomaly]) -> bool:
+    """Whether a peak is what is left of a stronger anomaly beside it: no source is exactly a dipole."""
+    return any(
+        math.dist((peak.north_m, peak.east_m), (anomaly.north_m, anomaly.east_m))
+        <= max(_LEAST_REACH_M, _REACH * anomaly.width_m)
+        or (
+            peak.ratio < _REMAINDER * anomaly.ratio
+            and math.dist((peak.north_m, peak.east_m), (anomaly.north_m, anomaly.east_m)) <= _TOUCHED_M
+        )
+        for anomaly in found
+    )
+
+
+def _blocks(table: Array, line: int) -> Array:
+    """Means of successive readings (n, columns) over some metres of track, with the line's number."""
+    columns = [block_means(table[:, :2], values, _POINT_M) for values in table[:, 2:].T]
+    count = len(columns[0][1])
+    return np.column_stack((columns[0][0], *(values for _, values in columns), np.full(count, float(line))))
 
 
 def _ratios(

@@ -100,12 +100,16 @@ def _line_data_xyz(result: SurveyResult) -> bytes:
 
 def _anomalies(result: SurveyResult) -> bytes:
     frame = LocalFrame(result.home)
-    rows = ["number,latitude_deg,longitude_deg,north_m,east_m,peak_nt,signal_to_noise,width_m,time_s,lines"]
+    rows = [
+        "number,latitude_deg,longitude_deg,north_m,east_m,peak_nt,signal_to_noise,width_m,time_s,source_height_m,moment_a_m2,lines"
+    ]
     for number, found in enumerate(result.anomalies, 1):
         lat_deg, lon_deg, _ = frame.geodetic_from_ned(found.north_m, found.east_m, 0.0)
+        dipole = found.source
+        source = "," if dipole is None else f"{dipole.height_m:.1f},{dipole.moment_a_m2:.0f}"
         names = " ".join(result.plan.lines[k].name for k in found.lines)
         rows.append(
             f"{number},{lat_deg:.7f},{lon_deg:.7f},{found.north_m:.1f},{found.east_m:.1f},{found.peak_nt:.2f},"
-            f"{found.ratio:.1f},{found.width_m:g},{found.time_s:.1f},{names}"
+            f"{found.ratio:.1f},{found.width_m:g},{found.time_s:.1f},{source},{names}"
         )
     return ("\n".join(rows) + "\n").encode()

@@ -81,9 +81,7 @@ def crossings(
             at = [_value_at(place, north_m[k], east_m[k], residual_nt[k]) for k in (own[i], own[j])]
             if not any(map(math.isnan, at)):
                 found.append(
-                    Crossing(
-                        line=i, tie=j, north_m=place[0], east_m=place[1], misclosure_nt=at[0] - at[1]
-                    )
+                    Crossing(line=i, tie=j, north_m=place[0], east_m=place[1], misclosure_nt=at[0] - at[1])
                 )
     return found
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
 from estimators.occupancy.survey_map import SurveyMap, map_error_of
-from estimators.survey.anomalies import LinePeak, SurveyAnomaly, anomalies_of, line_peaks
+from estimators.survey.anomalies import LinePeak, Search, SurveyAnomaly, line_peaks, survey_anomalies
 from estimators.survey.compensation import Compensation, direction_cosines
 from estimators.survey.gridding import SurveyGrid, block_means, grid_lines, interpolated
 from estimators.survey.levelling import Levelling, crossings, levelled
@@ -147,13 +147,14 @@ def process_survey(
     found = crossings(plan.lines, line_of, readings.north_m, readings.east_m, residual) if p.level else []
     levelling = levelled(len(plan.lines), found)
     on = line_of >= 0
-    level = np.where(on, levelling.level_nt[line_of], math.nan) if len(plan.lines) else np.full(len(on), math.nan)
+    level = (
+        np.where(on, levelling.level_nt[line_of], math.nan) if len(plan.lines) else np.full(len(on), math.nan)
+    )
     datum_nt = float(np.median((residual - level)[on])) if on.any() and survey_map is not None else 0.0
     levelled_nt = compensated - level - datum_nt
     differential = levelled_nt - reference
     noise_nt = white_noise_nt(differential, line_of)
-    peaks = _peaks(readings, plan, line_of, differential, noise_nt, survey_map, p)
-    anomalies = anomalies_of(peaks, reach_m=max(_LEAST_REACH_M, 1.25 * p.line_spacing_m))
+    anomalies = _anomalies(readings, plan, line_of, differential, noise_nt, main, survey_map, p)
     grid, error_nt = _grid(readings, plan, line_of, levelled_nt - main_nt, main, p)
     return SurveyResult(
         plan=plan,
@@ -200,32 +201,44 @@ def white_noise_nt(values_nt: Array, line_of: NDArray[np.int64]) -> float:
     return _NORMAL * float(np.median(np.abs(np.concatenate(parts)))) / math.sqrt(70.0)
 
 
-def _peaks(
+def _anomalies(
     readings: SurveyReadings,
     plan: LinePlan,
     line_of: NDArray[np.int64],
     differential_nt: Array,
     noise_nt: float,
+    main: MainField,
     survey_map: SurveyMap | None,
     p: ProcessingParameters,
-) -> list[LinePeak]:
+) -> list[SurveyAnomaly]:
+    """What differs from the map; nothing without one."""
     if survey_map is None or not math.isfinite(noise_nt):
         return []
     error = map_error_of(survey_map, p.map_error_nt)
-    found: list[LinePeak] = []
-    for number in range(len(plan.lines)):
-        own = line_of == number
-        found += line_peaks(
-            number,
+
+    def find(line: int, values_nt: Array) -> list[LinePeak]:
+        own = line_of == line
+        return line_peaks(
+            line,
             readings.time_s[own],
             readings.north_m[own],
             readings.east_m[own],
-            differential_nt[own],
+            values_nt[own],
             noise_nt=noise_nt,
             map_error_nt=error.sigma_nt,
             correlation_m=error.correlation_m,
         )
-    return found
+
+    search = Search(
+        lines=range(len(plan.lines)),
+        line_of=line_of,
+        north_m=readings.north_m,
+        east_m=readings.east_m,
+        height_m=readings.height_m,
+        differential_nt=differential_nt,
+        direction_ned=main.direction_ned,
+    )
+    return survey_anomalies(search, find)
 
 
 def _spread_nt(
@@ -272,8 +285,10 @@ def _grid(
         grid = grid_lines(places, values, line_spacing_m=p.line_spacing_m, cell_m=p.grid_m)
     except (EstimatorError, np.linalg.LinAlgError):
         return None, error_nt
-    total = grid.values_nt + main.total_at_nt(grid.north_m[:, None], grid.east_m[None, :]) + (
-        main.gradient_up_nt_m * float(readings.height_m[line_of >= 0].mean())
+    total = (
+        grid.values_nt
+        + main.total_at_nt(grid.north_m[:, None], grid.east_m[None, :])
+        + (main.gradient_up_nt_m * float(readings.height_m[line_of >= 0].mean()))
     )
     return SurveyGrid(north_m=grid.north_m, east_m=grid.east_m, values_nt=total), error_nt
 

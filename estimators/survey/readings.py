@@ -1,5 +1,6 @@
 """The readings of a survey flight with place and attitude, as columns."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import LocalFrame
 
-__all__ = ["SurveyReadings", "placed_readings"]
+__all__ = ["SurveyReadings", "joined", "placed_readings"]
 
 Array = NDArray[np.float64]
 
@@ -44,14 +45,17 @@ class SurveyReadings:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def between(self, from_s: float, to_s: float) -> "SurveyReadings":
-        """The readings between two times."""
-        kept = (self.time_s >= from_s) & (self.time_s <= to_s)
-        columns = {name: getattr(self, name)[kept] for name in _COLUMNS}
-        return SurveyReadings(**columns)
-
 
 _COLUMNS: Final = ("time_s", "north_m", "east_m", "height_m", "roll_rad", "pitch_rad", "yaw_rad", "total_nt")
+
+
+def joined(parts: Sequence[SurveyReadings]) -> SurveyReadings:
+    """The readings of parts of a flight, which follow each other in time."""
+    return SurveyReadings(
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS},
+        unplaced=sum(part.unplaced for part in parts),
+        implausible=sum(part.implausible for part in parts),
+    )
 
 
 def placed_readings(
@@ -81,9 +85,7 @@ def placed_readings(
     times, values = times[kept], values[kept]
     if not len(times):
         nothing = np.zeros(0)
-        return SurveyReadings(
-            **dict.fromkeys(_COLUMNS, nothing), unplaced=unplaced, implausible=implausible
-        )
+        return SurveyReadings(**dict.fromkeys(_COLUMNS, nothing), unplaced=unplaced, implausible=implausible)
     north_per_deg, east_per_deg = frame.metres_per_degree
     origin = frame.origin
     roll, pitch, yaw = (

@@ -48,9 +48,7 @@ class MainField:
         Raises:
             ValueError: date outside the model's validity.
         """
-        frame = LocalFrame(
-            GeodeticPosition(lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt_m=home.alt_m)
-        )
+        frame = LocalFrame(GeodeticPosition(lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt_m=home.alt_m))
         north, east = (axis.ravel() for axis in np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)))
         total = np.array(
             [
@@ -78,8 +76,6 @@ def _terms(north: Array, east: Array) -> Array:
     return np.stack([np.ones_like(north), north, east, north * north, north * east, east * east], axis=-1)
 
 
-def _total_nt(
-    frame: LocalFrame, north_m: float, east_m: float, up_m: float, decimal_year: float
-) -> float:
+def _total_nt(frame: LocalFrame, north_m: float, east_m: float, up_m: float, decimal_year: float) -> float:
     field = magnetic_field_ned_gauss(*frame.geodetic_from_ned(north_m, east_m, -up_m), decimal_year)
     return math.sqrt(float(field @ field)) * NANOTESLA_PER_GAUSS

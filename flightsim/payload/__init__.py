@@ -5,6 +5,7 @@ magnetometer over a magnetic map with targets' signatures in it. All read the ve
 measurements.
 """
 
+from flightsim.foundation.main_field import MainField
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal, gimbal_from_camera
 from flightsim.payload.camera_view import CameraView, TargetView
@@ -26,7 +27,6 @@ from flightsim.payload.magnetic_spec import (
     SignatureSpec,
     magnetic_field_of,
 )
-from flightsim.foundation.main_field import MainField
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.payload.magnetic_map import MagneticMap, bilinear
 from flightsim.foundation.main_field import MainField
+from flightsim.payload.magnetic_map import MagneticMap, bilinear
 from flightsim.payload.signature import Signature
 
 Array = NDArray[np.float64]

@@ -171,9 +171,7 @@ class MagneticMap:
                 total_field_nt=found.total_field_nt,
                 vertical_gradient_nt_m=found.vertical_gradient_nt_m,
                 height_m=found.height_m,
-                home=Home(
-                    lat_deg=found.home.lat_deg, lon_deg=found.home.lon_deg, alt_m=found.home.alt_m
-                ),
+                home=Home(lat_deg=found.home.lat_deg, lon_deg=found.home.lon_deg, alt_m=found.home.alt_m),
                 error_nt=found.error_nt,
                 line_spacing_m=found.line_spacing_m,
             )

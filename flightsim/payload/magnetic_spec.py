@@ -7,11 +7,11 @@ from typing import Final, TypeAlias
 
 from flightsim.foundation.checks import require_finite, require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.main_field import MainField
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.foundation.main_field import MainField
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.synthetic_map import SyntheticMapParameters, synthetic_map
@@ -91,11 +91,7 @@ def magnetic_field_of(
     if spec.map_file is not None:
         published = MagneticMap.load(spec.map_file)
         _require_here(published, spec.map_file, home)
-        truth = (
-            published
-            if spec.exact_map
-            else truth_behind(published, SurveyParameters(), seed=stream)
-        )
+        truth = published if spec.exact_map else truth_behind(published, SurveyParameters(), seed=stream)
     else:
         truth = _generated(spec, home, seed, decimal_year)
         published = truth if spec.exact_map else surveyed(truth, SurveyParameters(), seed=stream)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.main_field import NANOTESLA_PER_GAUSS
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
-from flightsim.foundation.main_field import NANOTESLA_PER_GAUSS
 from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
 from flightsim.sensors.kernels import gauss_markov
 from flightsim.sensors.schedule import steps_per_sample

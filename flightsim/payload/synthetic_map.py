@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.main_field import MainField
 from flightsim.home import Home
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.foundation.main_field import MainField
 
 Array = NDArray[np.float64]
 

@@ -115,9 +115,7 @@ def surface_m(terrain: TerrainModel, altitude_m: float, climb: float) -> Array:
                 drape[:, column], drape[:, column - 1] - climb * east_step[column - 1]
             )
         for column in range(drape.shape[1] - 2, -1, -1):
-            drape[:, column] = np.maximum(
-                drape[:, column], drape[:, column + 1] - climb * east_step[column]
-            )
+            drape[:, column] = np.maximum(drape[:, column], drape[:, column + 1] - climb * east_step[column])
         if not np.any(drape > before + 1e-9):
             return drape
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from estimators.survey.lines import LinePlan
+from estimators.survey.lines import LinePlan, SurveyLine
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.notes import PATTERN, CommandedPath
@@ -68,14 +68,18 @@ class PlannedSurvey:
         return np.column_stack((path.waypoints_m, -path.heights_m)) + np.array(self.offset_ned_m)
 
     def commanded(self, vehicle: Vehicle, acceptance_m: float) -> CommandedPath:
-        """The path with which the flight is compared."""
+        """The path with which the flight is compared: from the first line's start to the last one's end."""
         path = self.path
-        heights = np.interp(path.path.arc_m, path.arcs_m, path.heights_m)
-        points = np.column_stack((path.path.points_m, -heights)) + np.array(self.offset_ned_m)
+        begin_m, end_m = path.arcs_m[path.first_line], path.arcs_m[path.last_line]
+        arc_m = path.path.arc_m
+        inside = (arc_m > begin_m) & (arc_m < end_m)
+        arcs = np.concatenate(([begin_m], arc_m[inside], [end_m]))
+        columns = [np.interp(arcs, arc_m, axis) for axis in path.path.points_m.T]
+        points = np.column_stack((*columns, -np.interp(arcs, path.arcs_m, path.heights_m)))
         return CommandedPath(
             origin=vehicle.home,
-            points_ned_m=points,
-            waypoints_ned_m=self.places_ned_m(),
+            points_ned_m=points + np.array(self.offset_ned_m),
+            waypoints_ned_m=self.places_ned_m()[path.first_line : path.last_line + 1],
             acceptance_m=acceptance_m,
         )
 
@@ -198,19 +202,41 @@ async def fly_lines(
     notes.begin("takeoff", clock.stamp_us)
     await vehicle.start_mission()
     slow_m_s = _SLOW * survey.speed_m_s
-    away_s = (survey.path.path.moved(*survey.offset_ned_m[:2]).reach_m + 10.0 * survey.turn_radius_m) / slow_m_s
-    first = start + FIRST_WAYPOINT
-    await vehicle.plans.wait_item_reached(first, 180.0 + 2.0 * options.own_altitude_m + away_s)
+    away_s = (
+        survey.path.path.moved(*survey.offset_ned_m[:2]).reach_m + 10.0 * survey.turn_radius_m
+    ) / slow_m_s
+    path, lines = survey.path, survey.path.plan.lines
+    first, last = (start + FIRST_WAYPOINT + number for number in (path.first_line, path.last_line))
+    await vehicle.plans.wait_item_reached(first, 240.0 + 2.0 * options.own_altitude_m + away_s)
+    await _passed(vehicle, survey, lines[0], 0.0)
     notes.begin(PATTERN, clock.stamp_us)
-    last = first + len(survey.path.waypoints_m) - 1
 
     def progress(done: int) -> None:
         notes.progress = min(1.0, max(0.0, (done - first) / max(1, last - first)))
 
-    await vehicle.plans.wait_item_reached(last, 60.0 + survey.path.path.length_m / slow_m_s, progress)
+    await vehicle.plans.wait_item_reached(last, 60.0 + path.path.length_m / slow_m_s, progress)
+    await _passed(vehicle, survey, lines[-1], lines[-1].length_m)
     notes.begin("return", clock.stamp_us)
     await vehicle.link.wait_disarmed(600.0 + 2.0 * away_s)
     notes.end(clock.stamp_us)
+
+
+async def _passed(vehicle: Vehicle, survey: PlannedSurvey, line: SurveyLine, along_m: float) -> None:
+    """Wait until the aircraft is abeam of a place on a line; waypoints count as reached before that."""
+    frame = LocalFrame(vehicle.home)
+
+    def there() -> bool:
+        p = vehicle.latest(Position)
+        if p is None:
+            return False
+        north_m, east_m, _ = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+        offset = survey.offset_ned_m
+        along, _ = line.along_across_m(np.array([north_m - offset[0]]), np.array([east_m - offset[1]]))
+        return float(along[0]) >= along_m
+
+    await vehicle.link.wait_until(
+        there, what=f"a place on line {line.name}", on=("GLOBAL_POSITION_INT",), timeout_s=60.0
+    )
 
 
 async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLimits) -> None:
@@ -250,8 +276,9 @@ async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: Fixed
         try:
             if vehicle.firmware.roll_alone:
                 await vehicle.link.wait_until(
-                    lambda: following.done()
-                    or vehicle.link.custom_mode == vehicle.firmware.modes[Mode.GUIDED],
+                    lambda: (
+                        following.done() or vehicle.link.custom_mode == vehicle.firmware.modes[Mode.GUIDED]
+                    ),
                     what="guided mode",
                     on=("HEARTBEAT",),
                     timeout_s=10.0,

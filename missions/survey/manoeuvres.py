@@ -35,7 +35,11 @@ class Axis(StrEnum):
     YAW = "yaw"
 
 
-_AMPLITUDE_RAD: Final = {Axis.ROLL: math.radians(12.0), Axis.PITCH: math.radians(6.0), Axis.YAW: math.radians(12.0)}
+_AMPLITUDE_RAD: Final = {
+    Axis.ROLL: math.radians(12.0),
+    Axis.PITCH: math.radians(6.0),
+    Axis.YAW: math.radians(12.0),
+}
 """Of the commanded bank or pitch."""
 _PERIOD_S: Final = {Axis.ROLL: 4.0, Axis.PITCH: 5.0, Axis.YAW: 8.0}
 
@@ -85,7 +89,9 @@ def manoeuvres(direction_rad: float) -> tuple[Manoeuvre, ...]:
         direction_rad: heading of the first leg: that of the survey's lines.
     """
     return tuple(
-        Manoeuvre(box=box, heading_rad=math.remainder(direction_rad + 0.5 * math.pi * leg, math.tau), axis=axis)
+        Manoeuvre(
+            box=box, heading_rad=math.remainder(direction_rad + 0.5 * math.pi * leg, math.tau), axis=axis
+        )
         for box in range(BOXES)
         for leg in range(HEADINGS)
         for axis in Axis
@@ -94,7 +100,9 @@ def manoeuvres(direction_rad: float) -> tuple[Manoeuvre, ...]:
 
 def box_side_m(speed_m_s: float) -> float:
     """Length of a leg, over ground, at most so long."""
-    return speed_m_s * (_SETTLE_S + _TURN_S + sum(_CYCLES * period + _PAUSE_S for period in _PERIOD_S.values()))
+    return speed_m_s * (
+        _SETTLE_S + _TURN_S + sum(_CYCLES * period + _PAUSE_S for period in _PERIOD_S.values())
+    )
 
 
 class Programme:

@@ -132,9 +132,7 @@ class SurveyMission(Mission[SurveyOptions]):
     def title(self, options: SurveyOptions) -> str:
         if options.calibrate:
             return f"{self.name}, compensation of the aircraft"
-        return (
-            f"{self.name}, {options.width_m:g} m x {options.height_m:g} m, lines {options.spacing_m:g} m apart"
-        )
+        return f"{self.name}, {options.width_m:g} m x {options.height_m:g} m, lines {options.spacing_m:g} m apart"
 
     def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
         outcome = self._outcome(debriefing)

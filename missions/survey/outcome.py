@@ -92,7 +92,9 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
     origin = home if survey_map is None else survey_map.home
     readings = flight_readings(debriefing.records, notes.system_id, LocalFrame(origin))
     if len(readings) < 2:
-        return Outcome(failure=f"vehicle {notes.system_id} sent no readings of the magnetic field with a place")
+        return Outcome(
+            failure=f"vehicle {notes.system_id} sent no readings of the magnetic field with a place"
+        )
     if plan is None:
         main = MainField(origin)
         try:

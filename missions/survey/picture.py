@@ -99,7 +99,11 @@ def _draw_profiles(axes: Any, result: SurveyResult) -> None:
         range(len(result.plan.lines)),
         key=lambda k: (result.plan.lines[k].kind, _number(result.plan.lines[k].name)),
     )
-    spread = [float(np.ptp(result.differential_nt[result.line_of == k])) for k in order if np.any(result.line_of == k)]
+    spread = [
+        float(np.ptp(result.differential_nt[result.line_of == k]))
+        for k in order
+        if np.any(result.line_of == k)
+    ]
     step = max(2.0, float(np.percentile(spread, 60.0)) if spread else 2.0)
     for row, k in enumerate(order):
         line, own = result.plan.lines[k], result.line_of == k
@@ -132,9 +136,10 @@ def _number(name: str) -> int:
 
 
 def _backwards(course_rad: float) -> bool:
-    return bool(np.cos(course_rad) + 1e-6 * np.sin(course_rad) < -1e-6 or (
-        abs(np.cos(course_rad)) <= 1e-6 and np.sin(course_rad) < 0.0
-    ))
+    return bool(
+        np.cos(course_rad) + 1e-6 * np.sin(course_rad) < -1e-6
+        or (abs(np.cos(course_rad)) <= 1e-6 and np.sin(course_rad) < 0.0)
+    )
 
 
 def draw_calibration(path: Path, title: str, made: Calibration) -> None:
