@@ -1,4 +1,4 @@
-"""Magnetic surveys: compensation of the aircraft, lines, levels, anomalies and the map (docs/magnetic_survey.md)."""
+"""Magnetic surveys: compensation, lines, levels, anomalies and the map (docs/magnetic_survey.md)."""
 
 from estimators.survey.estimate import SurveyEstimate
 from estimators.survey.estimator import SurveyEstimator, SurveyEstimatorParameters

@@ -193,8 +193,8 @@ def line_peaks(
 def survey_anomalies(search: Search, find: Callable[[int, Array], Sequence[LinePeak]]) -> list[SurveyAnomaly]:
     """The anomalies of all lines, the strongest first.
 
-    The strongest peak is explained by a dipole where one fits, its field is taken out of all readings, and the
-    lines are searched again, until no peak is left. Peaks that remain beside an anomaly are part of it.
+    The strongest peak is explained by a dipole where one fits, its field is taken out of all readings, and
+    the lines are searched again, until no peak is left. Peaks that remain beside an anomaly are part of it.
 
     Args:
         search: the readings.

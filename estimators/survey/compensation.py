@@ -167,8 +167,8 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
 
 
 def mean_cycle(values_nt: Array, *, rate_hz: float) -> Array:
-    """The mean of the three cycles of a manoeuvre (n,), without its straight trend, as means over a second: the
-    noise of single readings is no manoeuvre.
+    """The mean of the three cycles of a manoeuvre (n,), without its straight trend, as means over a second:
+    the noise of single readings is no manoeuvre.
     """
     length = len(values_nt) // _CYCLES
     # the filter of a second takes from the ends, so cycles are averaged before it, and repeated for it

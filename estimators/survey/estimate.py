@@ -13,8 +13,8 @@ class SurveyEstimate:
     Attributes:
         time_us: vehicle time, the mean of the readings.
         subject: system id of the vehicle.
-        north_m, east_m, height_m: place, from the map's home; without a map from the vehicle's first position.
-        total_nt: total field.
+        north_m, east_m, height_m: place, from the map's home; without a map from the vehicle's first
+        position. total_nt: total field.
         compensated_nt: without the aircraft's field; without coefficients the same.
         reference_nt: of the map, or of the main field without a map; NaN off the map.
         differential_nt: compensated less reference; not levelled.

@@ -1,8 +1,8 @@
 """The estimator `survey`: the differential measurement during a flight, and the processed survey at its end.
 
-Source: Lum, Rysdyk and Pongpunwattana 2005, section II; docs/magnetic_survey.md. Its inputs are the readings of
-a survey magnetometer with positions and attitudes of the vehicle, and, if they exist, the published map, the
-lines that were commanded, and the coefficients of the aircraft.
+Source: Lum, Rysdyk and Pongpunwattana 2005, section II; docs/magnetic_survey.md. Its inputs are the readings
+of a survey magnetometer with positions and attitudes of the vehicle, and, if they exist, the published map,
+the lines that were commanded, and the coefficients of the aircraft.
 """
 
 import math

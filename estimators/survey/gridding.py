@@ -1,7 +1,7 @@
 """From lines to a map: readings between and along lines interpolated onto a regular grid.
 
-Thin-plate splines are the surface of minimum curvature through the data (Briggs 1974, "Machine contouring using
-minimum curvature", Geophysics 39); scipy fits one to the nearest points of each grid point.
+Thin-plate splines are the surface of minimum curvature through the data (Briggs 1974, "Machine contouring
+using minimum curvature", Geophysics 39); scipy fits one to the nearest points of each grid point.
 """
 
 import math

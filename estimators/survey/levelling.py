@@ -2,8 +2,9 @@
 
 Where a tie line crosses a survey line, both measured the same place; the difference of their residuals is the
 difference of their level errors: the daily variation, the sensor's drift, what compensation has left. A level
-for each line is estimated by least squares from all crossings (Luyendyk 1997, "Processing of airborne magnetic
-data", AGSO Journal 17, section on tie-line levelling). The sum of the levels is not observable, and set to 0.
+for each line is estimated by least squares from all crossings (Luyendyk 1997, "Processing of airborne
+magnetic data", AGSO Journal 17, section on tie-line levelling). The sum of the levels is not observable, and
+set to 0.
 """
 
 import math
@@ -21,6 +22,7 @@ __all__ = ["Crossing", "Levelling", "crossings", "levelled"]
 Array = NDArray[np.float64]
 
 _NEAR_M: Final = 100.0  # readings within this distance of a crossing are used
+_END_M: Final = 10.0  # a line may end so far from a crossing
 _LEAST_READINGS: Final = 5
 _DAMPING: Final = 1e-3
 
@@ -137,7 +139,7 @@ def _value_at(place: tuple[float, float], north_m: Array, east_m: Array, residua
     # signed distance along the track
     course = math.atan2(east_m[near][-1] - east_m[near][0], north_m[near][-1] - north_m[near][0])
     along = (north_m[near] - place[0]) * math.cos(course) + (east_m[near] - place[1]) * math.sin(course)
-    if not along.min() <= 0.0 <= along.max():
+    if not along.min() - _END_M <= 0.0 <= along.max() + _END_M:
         return math.nan
     fit = np.polynomial.Polynomial.fit(along, residual_nt[near], 1)
     return float(fit(0.0))

@@ -182,7 +182,7 @@ def _with_ties(lines: list[SurveyLine]) -> tuple[SurveyLine, ...]:
         return ()
     doubled = sum(line.length_m * np.exp(2j * line.course_rad) for line in lines)
     main_rad = 0.5 * float(np.angle(doubled))
-    found = []
+    found: list[SurveyLine] = []
     for line in lines:
         off_rad = abs(math.remainder(line.course_rad - main_rad, math.pi))
         kind = LineKind.TIE if off_rad > _TIE_RAD else LineKind.LINE

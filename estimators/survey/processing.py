@@ -72,8 +72,8 @@ class SurveyResult:
         compensated_nt: readings less the aircraft's field.
         reference_nt: map, or main field, at each reading; NaN off the map.
         levelled_nt: compensated readings less the level of their line; NaN off the lines.
-        differential_nt: levelled readings less the reference, with median 0 over all lines; NaN off the lines.
-        levelling: levels of the lines.
+        differential_nt: levelled readings less the reference, with median 0 over all lines; NaN off the
+        lines. levelling: levels of the lines.
         noise_nt: white noise of a reading, from fourth differences along the lines.
         differential_noise_nt: standard deviation (robust) of the differential measurement along the lines,
             away from anomalies.

@@ -84,8 +84,8 @@ class MapContents:
         gradient = self.vertical_gradient_nt_m
         if not rising or self.total_field_nt.shape != shape:
             raise MagneticMapError(
-                f"its grid of {self.total_field_nt.shape} does not fit {self.north_m.size} rising lines north "
-                f"and {self.east_m.size} east"
+                f"its grid of {self.total_field_nt.shape} does not fit {self.north_m.size} rising lines "
+                f"north and {self.east_m.size} east"
             )
         if gradient is not None and gradient.shape != shape:
             raise MagneticMapError(
@@ -162,12 +162,17 @@ def read_map_file(path: Path) -> MapContents:
 def _contents(found: Mapping[str, NDArray[Any]]) -> MapContents:
     height_m, lat_deg, lon_deg, alt_m = (_number(name, found[name]) for name in _NUMBERS)
     gradient = found.get("vertical_gradient_nt_m")
+    north_m, east_m, total_nt = (_real(name, found[name]) for name in _ARRAYS)
+    stated = {name: _number(name, found[name]) for name in _STATED if name in found}
     return MapContents(
-        **{name: _real(name, found[name]) for name in _ARRAYS},
+        north_m=north_m,
+        east_m=east_m,
+        total_field_nt=total_nt,
         vertical_gradient_nt_m=None if gradient is None else _real("vertical_gradient_nt_m", gradient),
         height_m=height_m,
         home=GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m),
-        **{name: _number(name, found[name]) for name in _STATED if name in found},
+        error_nt=stated.get("error_nt"),
+        line_spacing_m=stated.get("line_spacing_m"),
     )
 
 

@@ -68,8 +68,8 @@ COMMAND: Final = MissionCommand(
     help=(
         "Measure the magnetic field along parallel lines and tie lines with an aircraft.\n\n"
         "Afterwards the lines are levelled, compared with the published map and gridded: line_data.csv and "
-        ".xyz, lines.csv, anomalies.csv, survey_map.npz. With --calibrate it flies rolls, pitches and yaws on "
-        "four headings instead, and writes the compensation of the aircraft. Places are metres from the "
+        ".xyz, lines.csv, anomalies.csv, survey_map.npz. With --calibrate it flies rolls, pitches and yaws "
+        "on four headings instead, and writes the compensation of the aircraft. Places are metres from the "
         "map's home."
     ),
     options=(

@@ -1,4 +1,4 @@
-"""The world of a magnetic survey: a magnetometer on the aircraft, and a field with targets drawn from the seed."""
+"""The world of a magnetic survey: a magnetometer on the aircraft, and a field with targets in it."""
 
 import math
 from dataclasses import replace
@@ -100,8 +100,8 @@ def drawn_targets(options: SurveyOptions, seed: int, count: int) -> tuple[Induce
                 break
         else:
             raise PlanError(
-                f"`targets` {count} do not fit into the area with {_APART_M:g} m between them; ask for fewer, "
-                "or a larger `width_m, height_m`"
+                f"`targets` {count} do not fit into the area with {_APART_M:g} m between them; ask for "
+                "fewer, or a larger `width_m, height_m`"
             )
         size = float(rng.uniform())
         found.append(

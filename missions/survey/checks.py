@@ -56,8 +56,8 @@ def check_survey(options: SurveyOptions, limits: Limits) -> None:
     if terrain is not None and not terrain.covers(places[:, 0], places[:, 1]):
         raise PlanError(
             f"{reach}: the terrain reaches only from north {terrain.north_m[0]:.0f} to "
-            f"{terrain.north_m[-1]:.0f} m, east {terrain.east_m[0]:.0f} to {terrain.east_m[-1]:.0f} m. Give a "
-            "smaller `width_m, height_m` or another `terrain_file`"
+            f"{terrain.north_m[-1]:.0f} m, east {terrain.east_m[0]:.0f} to {terrain.east_m[-1]:.0f} m. Give "
+            "a smaller `width_m, height_m` or another `terrain_file`"
         )
 
 

@@ -1,8 +1,8 @@
 """The height of a survey over terrain: the drape, a surface that an aircraft can follow.
 
 The drape is the lowest surface that is nowhere nearer to the ground than the survey height, and nowhere
-steeper than the aircraft climbs: the upper envelope of cones on the ground's points. As it is a surface, lines
-and tie lines have the same height where they cross, as survey practice demands.
+steeper than the aircraft climbs: the upper envelope of cones on the ground's points. As it is a surface,
+lines and tie lines have the same height where they cross, as survey practice demands.
 """
 
 from dataclasses import dataclass, field
@@ -121,8 +121,8 @@ def surface_m(terrain: TerrainModel, altitude_m: float, climb: float) -> Array:
 
 
 def load_terrain(path: Path) -> TerrainModel:
-    """Read heights of the ground: a table with the header `north_m,east_m,ground_m`, a row for each point of a
-    grid in any order, or an `.npz` with arrays of these names.
+    """Read heights of the ground: a table with the header `north_m,east_m,ground_m`, a row for each point of
+    a grid in any order, or an `.npz` with arrays of these names.
 
     Raises:
         PlanError: no such file, or not such a file.

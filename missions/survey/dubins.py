@@ -2,8 +2,8 @@
 length with a constraint on average curvature", American Journal of Mathematics 79).
 
 The turns between survey lines: a half circle between lines two radii apart, wider where they are farther
-apart, and a bulb where they are nearer. The six words are those of Shkel and Lumelsky 2001 ("Classification of
-the Dubins set", Robotics and Autonomous Systems 34).
+apart, and a bulb where they are nearer. The six words are those of Shkel and Lumelsky 2001 ("Classification
+of the Dubins set", Robotics and Autonomous Systems 34).
 """
 
 import math

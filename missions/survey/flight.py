@@ -43,6 +43,9 @@ _APPROACH_HEIGHT_M: Final = 40.0
 _APPROACH_LAYER_M: Final = 15.0
 _APPROACH_CIRCLE_M: Final = 80.0
 _RATES_HZ: Final = {"GLOBAL_POSITION_INT": 10.0, "ATTITUDE": 25.0}
+_TAKEOFF_M: Final = 80.0  # ArduPlane takes off to 200 m at most
+_CLIMB_S: Final = 120.0
+_SLOWEST_CLIMB_M_S: Final = 0.5
 _SETPOINT_HZ: Final = 25.0
 
 
@@ -246,7 +249,9 @@ async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: Fixed
     pilot = await vehicle.wing.prepare_piloting()
     await pilot.prepare(options.own_altitude_m, airspeed_m_s(options, limits))
     notes.begin("takeoff", clock.stamp_us)
-    await vehicle.takeoff(options.own_altitude_m)
+    await vehicle.takeoff(min(options.own_altitude_m, _TAKEOFF_M))
+    notes.begin("climb", clock.stamp_us)
+    await _climb(vehicle, options.own_altitude_m, limits.turn_radius_m(airspeed_m_s(options, limits)))
     notes.begin(CALIBRATION, clock.stamp_us)
     programme = Programme(manoeuvres(options.direction_rad))
     level_rad: list[float] = []
@@ -294,13 +299,23 @@ async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: Fixed
     notes.end(clock.stamp_us)
 
 
+async def _climb(vehicle: Vehicle, altitude_m: float, radius_m: float) -> None:
+    """Climb in a circle over home, because takeoffs end lower."""
+    home = vehicle.home
+    await vehicle.wing.loiter(
+        replace(home, alt_m=home.alt_m + altitude_m),
+        radius_m=max(_APPROACH_CIRCLE_M, radius_m),
+        timeout_s=_CLIMB_S + altitude_m / _SLOWEST_CLIMB_M_S,
+    )
+
+
 async def _prepare(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLimits) -> None:
     """Check the payload, and request what readings are placed with."""
     vehicle.notes.begin("checks", vehicle.clock.stamp_us)
     if options.altitude_m > limits.altitude_max_m:
         vehicle.notes.warn(
-            f"the flight at {options.altitude_m:g} m is above {limits.altitude_max_m:g} m, the ceiling of the "
-            "open category (EU 2019/947): it needs an authorization"
+            f"the flight at {options.altitude_m:g} m is above {limits.altitude_max_m:g} m, the ceiling of "
+            "the open category (EU 2019/947): it needs an authorization"
         )
     await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
     for name, rate_hz in _RATES_HZ.items():

@@ -1,4 +1,4 @@
-"""The mission `survey`: a fixed wing measures the magnetic field along lines (Lum et al. 2005, section II)."""
+"""The mission `survey`: an aircraft measures the magnetic field along lines (Lum et al. 2005, section II)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -132,7 +132,8 @@ class SurveyMission(Mission[SurveyOptions]):
     def title(self, options: SurveyOptions) -> str:
         if options.calibrate:
             return f"{self.name}, compensation of the aircraft"
-        return f"{self.name}, {options.width_m:g} m x {options.height_m:g} m, lines {options.spacing_m:g} m apart"
+        size = f"{options.width_m:g} m x {options.height_m:g} m"
+        return f"{self.name}, {size}, lines {options.spacing_m:g} m apart"
 
     def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
         outcome = self._outcome(debriefing)

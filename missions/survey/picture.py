@@ -1,4 +1,4 @@
-"""The pictures of a survey: lines, differential measurement, and the map; the manoeuvres of a compensation."""
+"""The pictures of a survey: lines, differential measurement and map; the manoeuvres of a compensation."""
 
 from collections.abc import Sequence
 from pathlib import Path
