@@ -9,6 +9,7 @@ does for one pass). Peaks of neighbouring lines are one anomaly, explained by on
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -37,6 +38,7 @@ _FIT_M: Final = 350.0
 _FIT: Final = 3.0  # in widths: readings that a dipole is fitted to
 _WINDOW: Final = 300  # points whitened together
 _OVERLAP: Final = 100
+_LEAST_POINTS: Final = 10
 _UNKNOWN_LEVEL: Final = 30.0  # standard deviation of the level, in multiples of a point's error
 _DRIFT_M: Final = 10_000.0  # along which the level may change by one point's error
 
@@ -156,38 +158,41 @@ def line_peaks(
         noise_nt: standard deviation of a reading, white.
         map_error_nt, correlation_m: error of the map, and its correlation distance (exponential).
     """
-    if len(time_s) < 10:
+    if len(time_s) < _LEAST_POINTS:
         return []
-    places = np.column_stack((north_m, east_m))
-    points, values = block_means(places, difference_nt, _POINT_M)
-    _, times = block_means(places, time_s, _POINT_M)
-    per_point = max(1.0, len(time_s) / len(points))
-    error_nt = max(noise_nt, 1e-6) / math.sqrt(per_point)
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    points, values = block_means(np.column_stack((north_m, east_m)), difference_nt, _POINT_M)
+    _, times = block_means(np.column_stack((north_m, east_m)), time_s, _POINT_M)
+    flown_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    # at even distances the filters of all lines are the same
+    along = np.arange(0.0, flown_m[-1], _POINT_M)
+    if len(along) < _LEAST_POINTS:
+        return []
+    columns = (*points.T, times, values)
+    north, east, time, value = (np.interp(along, flown_m, column) for column in columns)
+    error_nt = max(noise_nt, 1e-6) / math.sqrt(max(1, round(len(time_s) / len(along))))
     found: list[LinePeak] = []
     start = 0
-    while start < len(points):
-        part = slice(start, min(len(points), start + _WINDOW))
-        ratios, widths = _ratios(along[part], values[part], error_nt, map_error_nt, correlation_m)
+    while True:
+        part = slice(max(0, min(start, len(along) - _WINDOW)), min(len(along), start + _WINDOW))
+        count = part.stop - part.start
+        ratios, widths = _ratios(value[part], _filters(count, error_nt, map_error_nt, correlation_m))
         for k, ratio, width_m in _peaks(along[part], ratios, widths):
             near = np.abs(along[part] - along[part][k]) <= width_m
-            level = values[part] - np.median(values[part])
-            strongest = float(level[near][np.argmax(np.abs(level[near]))])
+            level = value[part] - np.median(value[part])
             found.append(
                 LinePeak(
                     line=line,
-                    time_s=float(times[part][k]),
-                    north_m=float(points[part][k, 0]),
-                    east_m=float(points[part][k, 1]),
-                    peak_nt=strongest,
+                    time_s=float(time[part][k]),
+                    north_m=float(north[part][k]),
+                    east_m=float(east[part][k]),
+                    peak_nt=float(level[near][np.argmax(np.abs(level[near]))]),
                     ratio=ratio,
                     width_m=width_m,
                 )
             )
-        if part.stop == len(points):
-            break
+        if part.stop == len(along):
+            return found
         start += _WINDOW - _OVERLAP
-    return found
 
 
 def survey_anomalies(search: Search, find: Callable[[int, Array], Sequence[LinePeak]]) -> list[SurveyAnomaly]:
@@ -250,10 +255,12 @@ def _blocks(table: Array, line: int) -> Array:
     return np.column_stack((columns[0][0], *(values for _, values in columns), np.full(count, float(line))))
 
 
-def _ratios(
-    along_m: Array, values_nt: Array, error_nt: float, map_error_nt: float, correlation_m: float
-) -> tuple[Array, Array]:
-    """Largest signal-to-noise ratio (n,) of a bump at each point, and its width."""
+@lru_cache(maxsize=16)
+def _filters(count: int, error_nt: float, map_error_nt: float, correlation_m: float) -> Array:
+    """Matched filters (shapes, count, count): each row gives the signal-to-noise ratio of a bump, or of its
+    slope, at one point of so many.
+    """
+    along_m = _POINT_M * np.arange(count)
     apart = np.abs(along_m[:, None] - along_m)
     level_nt = _UNKNOWN_LEVEL * math.hypot(error_nt, map_error_nt)
     covariance = (
@@ -262,17 +269,22 @@ def _ratios(
         + _UNKNOWN_LEVEL * error_nt**2 * np.exp(-apart / _DRIFT_M)
     )
     covariance[np.diag_indices_from(covariance)] += error_nt**2
-    root = np.linalg.cholesky(covariance)
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     offset = (along_m[:, None] - along_m[None, :])[None] / np.array(_WIDTHS_M)[:, None, None]
     bump = (1.0 + offset**2) ** -2.5
     slope = offset * (1.0 + offset**2) ** -3.5
-    count = len(along_m)
-    templates = np.concatenate((bump, slope)).transpose(1, 0, 2).reshape(count, -1)
-    white = np.linalg.solve(root, np.column_stack((values_nt - values_nt.mean(), templates)))
-    size = np.linalg.norm(white[:, 1:], axis=0)
-    ratio = (np.abs(white[:, 0] @ white[:, 1:]) / np.maximum(size, 1e-12)).reshape(-1, count)
+    templates = np.concatenate((bump, slope)).transpose(0, 2, 1).reshape(-1, count)
+    white = templates @ whitener.T
+    size = np.linalg.norm(white, axis=1, keepdims=True)
+    found: Array = (white / np.maximum(size, 1e-12) @ whitener).reshape(-1, count, count)
+    return found
+
+
+def _ratios(values_nt: Array, filters: Array) -> tuple[Array, Array]:
+    """Largest signal-to-noise ratio (n,) of a bump at each point, and its width."""
+    ratio = np.abs(filters @ (values_nt - values_nt.mean()))
     best = np.argmax(ratio, axis=0)
-    return ratio[best, np.arange(count)], np.array(_WIDTHS_M)[best % len(_WIDTHS_M)]
+    return ratio[best, np.arange(len(values_nt))], np.array(_WIDTHS_M)[best % len(_WIDTHS_M)]
 
 
 def _peaks(along_m: Array, ratios: Array, widths_m: Array) -> list[tuple[int, float, float]]:

@@ -27,6 +27,7 @@ HEADER: Final = "name,kind,start_north_m,start_east_m,end_north_m,end_east_m"
 _COURSE_RAD: Final = math.radians(20.0)  # readings on another course are of a turn
 _STRAIGHT_RAD: Final = math.radians(8.0)  # of a detected line's course, either side
 _TIE_RAD: Final = math.radians(45.0)
+_GAP_M: Final = 100.0  # a detected line ends where places are missing
 _CORRIDOR_M: Final = 50.0
 
 
@@ -160,7 +161,11 @@ def detected_lines(north_m: Array, east_m: Array, *, least_length_m: float = 500
         course = np.unwrap(np.arctan2(np.gradient(east_m), np.gradient(north_m)))
         first = 0
         for k in range(1, len(course) + 1):
-            straight = k < len(course) and abs(course[k] - np.median(course[first:k])) < _STRAIGHT_RAD
+            straight = (
+                k < len(course)
+                and abs(course[k] - np.median(course[first:k])) < _STRAIGHT_RAD
+                and math.hypot(north_m[k] - north_m[k - 1], east_m[k] - east_m[k - 1]) < _GAP_M
+            )
             if straight:
                 continue
             start, end = (

@@ -25,6 +25,7 @@ _NEAREST_M: Final = 10.0  # below the readings
 _DEEPEST_M: Final = 800.0
 _FARTHEST_M: Final = 300.0  # of the place from the peak
 _LEAST_POINTS: Final = 30
+_LEVEL_WEIGHT: Final = 1.0
 _LEAST_EXPLAINED: Final = 0.6
 
 
@@ -76,15 +77,19 @@ def fitted_dipole(
     """
     if len(values_nt) < _LEAST_POINTS:
         return None
-    levels = (line_of[:, None] == np.unique(line_of)).astype(np.float64)
+    lines = np.unique(line_of)
+    levels = (line_of[:, None] == lines).astype(np.float64)
     base = values_nt - levels @ np.linalg.lstsq(levels, values_nt, rcond=None)[0]
+    # the lines are levelled, so a level of its own has to be small: as many further equations
+    prior = np.column_stack((np.zeros((len(lines), 3)), _LEVEL_WEIGHT * np.eye(len(lines))))
+    wanted = np.concatenate((values_nt, np.zeros(len(lines))))
     top_m = float(places_m[:, 2].min())
 
     def solved(place: Array) -> tuple[Array, Array]:
-        design = np.column_stack((_kernels(places_m, place, direction_ned), levels))
+        design = np.vstack((np.column_stack((_kernels(places_m, place, direction_ned), levels)), prior))
         scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
-        found = np.linalg.lstsq(design / scale, values_nt, rcond=None)[0]
-        return found / scale, values_nt - design / scale @ found
+        found = np.linalg.lstsq(design / scale, wanted, rcond=None)[0]
+        return found / scale, wanted - design / scale @ found
 
     centre = np.array((*near_ne_m, top_m))
     starts = [centre + np.array((n, e, -below)) for n in _OFFSETS_M for e in _OFFSETS_M for below in _BELOW_M]
