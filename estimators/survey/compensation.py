@@ -43,6 +43,7 @@ _RIDGE: Final = 1e-6
 _LEAST_TURN_RAD: Final = math.radians(5.0)
 _HEADINGS: Final = 4
 _CYCLES: Final = 3  # of each manoeuvre
+_TREND: Final = 2  # degree of what geology does during a manoeuvre
 FORMAT: Final = "flightstack-compensation-1"
 
 
@@ -167,13 +168,13 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
 
 
 def mean_cycle(values_nt: Array, *, rate_hz: float) -> Array:
-    """The mean of the three cycles of a manoeuvre (n,), without its straight trend, as means over a second:
+    """The mean of the three cycles of a manoeuvre (n,), without its slow trend, as means over a second:
     the noise of single readings is no manoeuvre.
     """
     length = len(values_nt) // _CYCLES
     # the filter of a second takes from the ends, so cycles are averaged before it, and repeated for it
     times = np.arange(len(values_nt)) / rate_hz
-    level = np.polynomial.Polynomial.fit(times, values_nt, 1)(times)
+    level = np.polynomial.Polynomial.fit(times, values_nt, _TREND)(times)
     cycle = (values_nt - level)[: _CYCLES * length].reshape(_CYCLES, length).mean(axis=0)
     width = max(1, round(rate_hz))
     around = np.concatenate((cycle[length - width // 2 :], cycle, cycle[: width - width // 2 - 1]))

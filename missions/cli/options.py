@@ -36,7 +36,7 @@ def radians_of(name: str, degrees: float) -> float:
     return math.radians(degrees)
 
 
-_FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:]+))?`")
+_FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:-]+))?`")
 _UNIT: Final = re.compile(r"_(ne_m|m_s|a_m2|nt|hz|rad|deg|m|s)$")
 _NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {
