@@ -5,6 +5,7 @@ the tests and the programs they start, even where the suite runs in the backgrou
 kept, as kernels are.
 """
 
+import gc
 import os
 import signal
 import sys
@@ -13,6 +14,7 @@ from typing import Final
 import pytest
 from hypothesis import settings
 
+from missions.cli.main import YOUNG_OBJECTS
 from tests.clients.compatibility import CompatibilityPlugin
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -50,6 +52,12 @@ ORDER: Final = (
     ("flights",),
 )
 """Files and folders whose tests are begun first."""
+
+
+def pytest_collection_finish() -> None:
+    """The modules and tests stay until the end: the collector need not look through them again and again."""
+    gc.freeze()
+    gc.set_threshold(YOUNG_OBJECTS)
 
 
 @pytest.hookimpl(tryfirst=True)
