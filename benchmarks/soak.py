@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from autopilot_bridge.clock import TelemetryClock
 from autopilot_bridge.links import open_link, parse_address
-from autopilot_bridge.mavlink import Frame, definition, dialect
+from autopilot_bridge.mavlink import Packet, definition, dialect
 from missions.errors import MissionError
 from missions.vehicle.connection import Connection
 from missions.vehicle.setpoint import Setpoint
@@ -133,9 +133,9 @@ class Client:
     first_boot_ms: int = 0
     last_boot_ms: int = 0
 
-    def record(self, frames: Sequence[Frame], _time_us: int) -> None:
+    def record(self, packet: Packet, _time_us: int) -> None:
         """Take frames of either direction."""
-        for frame in frames:
+        for frame in packet:
             if (frame.system_id, frame.component_id) != (self.system_id, 1):
                 continue
             self.counts[frame.message_id] += 1

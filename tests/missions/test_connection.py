@@ -24,8 +24,8 @@ class Recording:
     def __init__(self):
         self.frames = []
 
-    def record(self, frames, time_us):
-        self.frames += [(time_us, frame.raw) for frame in frames]
+    def record(self, packet, time_us):
+        self.frames += [(time_us, frame.raw) for frame in packet]
 
 
 def on_memory(script, **arguments):
