@@ -47,6 +47,11 @@ _POLL_S: Final = 0.002  # for links without a file descriptor
 class Recorder(Protocol):
     """Receives all frames of a connection, in both directions."""
 
+    @property
+    def acts(self) -> bool:
+        """Whether it acts on the frames, so that their order among the calls of listeners counts."""
+        ...
+
     def record(self, packet: Packet, time_us: int) -> None:
         """Process frames that were sent or received together at a vehicle time."""
         ...
@@ -91,6 +96,7 @@ class Connection:
         self._link = link
         self._forget = getattr(link, "forget", None)
         self._recorder = recorder
+        self._recorder_acts = recorder is not None and recorder.acts
         self._encoder = FrameEncoder(*identity)
         self._newest = NewestFrames()
         self._listeners: dict[int, list[Listener]] = {}
@@ -165,7 +171,7 @@ class Connection:
 
     def _on_packet(self, packet: Packet) -> None:
         listeners = self._listeners
-        if self._in_order.keys().isdisjoint(packet.message_ids):
+        if not self._recorder_acts and self._in_order.keys().isdisjoint(packet.message_ids):
             self._keep(packet)
             for index, message_id in enumerate(packet.message_ids):
                 if message_id in listeners:
