@@ -100,7 +100,8 @@ class Connection:
         self._encoder = FrameEncoder(*identity)
         self._newest = NewestFrames()
         self._listeners: dict[int, list[Listener]] = {}
-        self._in_order: Counter[int] = Counter()  # listeners that depend on the order, by message id
+        # listeners that depend on the order, by message id; packets with a key are looked at more closely too
+        self._in_order = Counter([SETUP_SIGNING])
         self._observed = clock if isinstance(clock, TelemetryClock) else None
         self._clock_source = vehicle_system_id
         self._tasks: list[asyncio.Task[None]] = []
@@ -172,7 +173,9 @@ class Connection:
     def _on_packet(self, packet: Packet) -> None:
         listeners = self._listeners
         if not self._recorder_acts and self._in_order.keys().isdisjoint(packet.message_ids):
-            self._keep(packet)
+            if self._recorder is not None:
+                self._recorder.record(packet, self.clock.time_us)
+            self._newest.put(packet)
             for index, message_id in enumerate(packet.message_ids):
                 if message_id in listeners:
                     frame = packet.frame(index)
