@@ -48,7 +48,7 @@ ORDER: Final = (
     ("test_warm_up.py",),
     ("bridge", "logs", "preflight", "storage", "vehicle_client", "test_architecture.py"),
     # These take longest or wait most: begun early, no worker is left alone with them.
-    ("clients",),
+    ("clients", "test_tutorial.py", "test_examples.py"),
     ("system",),
     ("flights",),
 )
