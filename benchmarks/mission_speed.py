@@ -32,7 +32,9 @@ MOST_HELP_S: Final = 0.3
 MOST_START_S: Final = 1.5
 
 _UNTIL_FIRST_STEP: Final = """
-import sys, time
+import gc, sys
+from missions.cli.main import YOUNG_OBJECTS, main
+gc.set_threshold(YOUNG_OBJECTS)  # as `main` does
 from autopilot_bridge.sitl import Sitl
 
 class Begun(BaseException): pass
@@ -41,7 +43,6 @@ def first_step(self):
     raise Begun
 
 Sitl.advance = first_step
-from missions.cli.main import main
 sys.argv = ["flightstack", "fly", "lissajous", "--out", sys.argv[1]]
 try:
     main()

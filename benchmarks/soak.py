@@ -23,13 +23,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from autopilot_bridge.clock import TelemetryClock
 from autopilot_bridge.links import open_link, parse_address
-from autopilot_bridge.mavlink import Frame, definition, dialect
+from autopilot_bridge.mavlink import Packet, definition, dialect
 from missions.errors import MissionError
 from missions.vehicle.connection import Connection
 from missions.vehicle.setpoint import Setpoint
@@ -124,8 +124,9 @@ def urls(index: int, port: int, server: bool) -> tuple[str, str, str]:
 
 @dataclass
 class Client:
-    """What one client hears of its vehicle; a recorder of its connection."""
+    """What one client receives of its vehicle; a recorder of its connection."""
 
+    acts: ClassVar = False
     system_id: int
     wanted_hz: dict[str, float]
     counts: Counter[int] = field(default_factory=Counter)
@@ -133,9 +134,9 @@ class Client:
     first_boot_ms: int = 0
     last_boot_ms: int = 0
 
-    def record(self, frames: Sequence[Frame], _time_us: int) -> None:
+    def record(self, packet: Packet, _time_us: int) -> None:
         """Take frames of either direction."""
-        for frame in frames:
+        for frame in packet:
             if (frame.system_id, frame.component_id) != (self.system_id, 1):
                 continue
             self.counts[frame.message_id] += 1

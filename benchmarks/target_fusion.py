@@ -16,7 +16,6 @@ import math
 import statistics
 import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
-from autopilot_bridge.mavlink import Frame, FrameParser, definition
+from autopilot_bridge.mavlink import Frame, FrameParser, Packet, definition
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from autopilot_bridge.tlog import TlogWriter
@@ -147,11 +146,13 @@ class Ears:
 class Ear:
     """One link's recorder: of several hundred messages a second it keeps what the base station listens to."""
 
+    acts = False
+
     def __init__(self, ears: Ears) -> None:
         self._ears = ears
 
-    def record(self, frames: Sequence[Frame], time_us: int) -> None:
-        for frame in frames:
+    def record(self, packet: Packet, time_us: int) -> None:
+        for frame in packet:
             if frame.message_id in RECEIVED:
                 self._ears.take(frame, time_us)
 

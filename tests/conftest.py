@@ -5,6 +5,7 @@ the tests and the programs they start, even where the suite runs in the backgrou
 kept, as kernels are.
 """
 
+import gc
 import os
 import signal
 import sys
@@ -13,12 +14,14 @@ from typing import Final
 import pytest
 from hypothesis import settings
 
+from missions.cli.main import YOUNG_OBJECTS
 from tests.clients.compatibility import CompatibilityPlugin
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+gc.set_threshold(YOUNG_OBJECTS)  # the collection of tests makes millions of objects that stay
 
 # Workers and programs that are started each would compile every module they import, wherever this is set.
 sys.dont_write_bytecode = False
@@ -45,11 +48,16 @@ ORDER: Final = (
     ("test_warm_up.py",),
     ("bridge", "logs", "preflight", "storage", "vehicle_client", "test_architecture.py"),
     # These take longest or wait most: begun early, no worker is left alone with them.
-    ("clients",),
+    ("clients", "test_tutorial.py", "test_examples.py"),
     ("system",),
     ("flights",),
 )
 """Files and folders whose tests are begun first."""
+
+
+def pytest_collection_finish() -> None:
+    """The modules and tests stay until the end: the collector need not look through them again and again."""
+    gc.freeze()
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -55,7 +55,7 @@ class SpeedTask(Protocol):
 
 def clear_setpoint(setpoint: Array, level: float) -> None:
     """Clear every field (NaN: not controlled) and set the level."""
-    setpoint[:] = math.nan
+    setpoint.fill(math.nan)
     setpoint[sp.LEVEL] = level
 
 

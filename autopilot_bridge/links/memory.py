@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Final
 
 from autopilot_bridge.links.link import LinkCounters, PeerId
-from autopilot_bridge.mavlink.frame import Frame
+from autopilot_bridge.mavlink.packet import Packet
 
 MAX_INBOX: Final = 100_000
 
@@ -19,13 +19,13 @@ class MemoryLink:
     Attributes:
         on_receive: when set, is called with the bytes at the moment the other end sends them; `receive` then
             returns nothing.
-        on_frames: when set, is called instead with frames, if the other end has frames and not bytes.
+        on_packet: when set, is called instead with packets, if the other end sends packets and not bytes.
     """
 
     def __init__(self, name: str, on_receive: Callable[[bytes], None] | None = None) -> None:
         self.name = name
         self.on_receive = on_receive
-        self.on_frames: Callable[[list[Frame]], None] | None = None
+        self.on_packet: Callable[[Packet], None] | None = None
         self._writes = self._bytes_out = self._dropped = self._bytes_dropped = 0
         self.closed = False
         self._inbox: deque[bytes] = deque()
@@ -76,17 +76,17 @@ class MemoryLink:
             other._inbox.append(data)
 
     @property
-    def takes_frames(self) -> bool:
-        """Whether the other end receives frames as they are, so that they need not be parsed."""
+    def takes_packets(self) -> bool:
+        """Whether the other end receives packets with their message ids, which need not be parsed."""
         other = self._other
-        return not self.closed and other is not None and not other.closed and other.on_frames is not None
+        return not self.closed and other is not None and not other.closed and other.on_packet is not None
 
-    def send_frames(self, frames: list[Frame]) -> None:
-        """Pass valid frames to the other end, which must be one that `takes_frames`."""
-        assert self._other is not None and self._other.on_frames is not None
+    def send_packet(self, packet: Packet) -> None:
+        """Pass a packet to the other end, which must be one that `takes_packets`."""
+        assert self._other is not None and self._other.on_packet is not None
         self._writes += 1
-        self._bytes_out += sum([len(frame.raw) for frame in frames])
-        self._other.on_frames(frames)
+        self._bytes_out += len(packet.data)
+        self._other.on_packet(packet)
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
         """The data that the other end has sent since the last call."""

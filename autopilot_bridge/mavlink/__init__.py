@@ -17,6 +17,7 @@ from autopilot_bridge.mavlink.encoder import FrameEncoder
 from autopilot_bridge.mavlink.frame import Frame
 from autopilot_bridge.mavlink.intake import Intake
 from autopilot_bridge.mavlink.names import command_name, enum_name
+from autopilot_bridge.mavlink.packet import Packet
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters, SourceCounters
 from autopilot_bridge.mavlink.signing import LinkSigning, LinkSigningPolicy, SigningState
 from autopilot_bridge.mavlink.signing_key import SigningKey
@@ -31,6 +32,7 @@ __all__ = [
     "LinkSigningPolicy",
     "MAVLinkMessage",
     "MessageDefinition",
+    "Packet",
     "ParserCounters",
     "SigningKey",
     "SigningState",

@@ -52,7 +52,14 @@ def field_reader(name: str, *fields: str) -> Callable[[Frame], tuple[Any, ...]]:
             codes += f"{field.offset - at}x{field.code}"
             at = field.offset + field.size
     unpack_from = struct.Struct(codes).unpack_from
-    return lambda frame: unpack_from(frame.payload)
+
+    def read(frame: Frame) -> tuple[Any, ...]:
+        raw = frame.raw
+        if raw[1] >= at and frame.version == 2:  # no field is truncated
+            return unpack_from(raw, HEADER_SIZE_V2)
+        return unpack_from(frame.payload)
+
+    return read
 
 
 @cache

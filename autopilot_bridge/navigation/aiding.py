@@ -28,6 +28,7 @@ from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.terrain import TerrainEstimator, update_terrain
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.kernels import bound
 from flightsim.interface import SensorReadings
 
 Array = NDArray[np.float64]
@@ -59,6 +60,16 @@ class Aiding:
         self._readings = readings
         self._solution = solution
         self._health = health
+        self._fuse = bound(
+            f.update,
+            solution.p,
+            solution.core,
+            solution.history,
+            solution.work,
+            solution.obs,
+            solution.process,
+            then=(0, 0, 0, 0),
+        )
         self._slow_every = max(1, parameters.covariance_rate_hz // _SLOW_RATE_HZ)
         self._report_every = max(1, parameters.covariance_rate_hz // _REPORT_RATE_HZ)
         self._clocks = Clocks()
@@ -181,18 +192,7 @@ class Aiding:
             mag_row = self._heading.prepare(time_us)
             if mag_row >= 0:
                 has |= f.HAS_MAG
-        accepted = f.update(
-            solution.p,
-            solution.core,
-            solution.history,
-            solution.work,
-            solution.obs,
-            solution.process,
-            has,
-            gps_row,
-            baro_row,
-            mag_row,
-        )
+        accepted: int = self._fuse(has, gps_row, baro_row, mag_row)
         if has & f.HAS_BARO:
             self._height.note_barometer(time_us, accepted=bool(accepted & f.ACCEPTED_BARO))
         if has & f.HAS_MAG:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from autopilot_bridge.links import Link, MemoryLink, PeerId
-from autopilot_bridge.mavlink import Frame, FrameEncoder, Intake, LinkSigning, ParserCounters
-from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE, new_frame
+from autopilot_bridge.mavlink import Frame, FrameEncoder, Intake, LinkSigning, Packet, ParserCounters
+from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE
 from autopilot_bridge.mavlink.signing import is_unsigned_v2
 from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.services.channel import MavlinkMessage
@@ -96,11 +96,11 @@ class LinkChannel:
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Send the payloads that are due together, in packets of at most one datagram."""
-        memory = self._frame_link
+        memory = self._packet_link
         if memory is not None:
             self._hand_over(memory, motion, payloads)
             return
-        packet = self.motion.packet(motion, self._encoder) if motion and self.motion is not None else b""
+        packet, _ = self._motion_packet(motion)
         if payloads:
             most = _MAX_PACKET
             if self._signs is not None and self._signs.signs:
@@ -114,24 +114,27 @@ class LinkChannel:
             self._send(packet)
 
     @property
-    def _frame_link(self) -> MemoryLink | None:
-        """The link, if its other end is in this process and receives frames that need not be parsed."""
+    def _packet_link(self) -> MemoryLink | None:
+        """The link, if its other end is in this process and receives packets that need not be parsed."""
         memory = self._memory
-        if memory is None or not memory.takes_frames or (self._signs is not None and self._signs.signs):
+        if memory is None or not memory.takes_packets or (self._signs is not None and self._signs.signs):
             return None
         return memory
 
     def _hand_over(self, memory: MemoryLink, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Send the payloads that are due together, as frames."""
-        encoder = self._encoder
-        frames = self.motion.frames(motion, encoder) if motion and self.motion is not None else []
-        system_id, component_id = encoder.system_id, encoder.component_id
-        for (message_id, _), raw in zip(payloads, encoder.encode_payloads(payloads), strict=True):
-            frames.append(new_frame((raw, message_id, system_id, component_id, raw[4], 2, False)))
-        if frames:
+        """Send the payloads that are due together, as one packet."""
+        data, message_ids = self._motion_packet(motion)
+        if payloads:
+            data += b"".join(self._encoder.encode_payloads(payloads))
+            message_ids += tuple([message_id for message_id, _ in payloads])
+        if data:
             if self.line is not None:
-                self.line.add(sum(len(frame.raw) for frame in frames))
-            memory.send_frames(frames)
+                self.line.add(len(data))
+            memory.send_packet(Packet(data, message_ids))
+
+    def _motion_packet(self, motion: int) -> tuple[bytes, tuple[int, ...]]:
+        """Frames of the motion messages that are due, and their message ids."""
+        return self.motion.packet(motion, self._encoder) if motion and self.motion is not None else (b"", ())
 
     def send_frame(self, raw: bytes) -> None:
         """Forward a frame of another system unchanged: with its own signature, or without one."""
@@ -161,11 +164,11 @@ class LinkChannel:
         self._put(data)
 
     def _put(self, data: bytes) -> None:
-        memory = self._frame_link
+        memory = self._packet_link
         if memory is None:
             self.link.send(data)
         else:
-            memory.send_frames([Frame.of(data)])
+            memory.send_packet(Packet.of_one(data))
 
     def receive(self) -> list[tuple[PeerId, list[Frame]]]:
         """Valid frames that have arrived, by peer, as many as the time budget allows."""

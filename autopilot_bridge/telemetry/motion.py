@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.mavlink import Frame, FrameEncoder
+from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
-from autopilot_bridge.mavlink.frame import OVERHEAD_V2, new_frame
+from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.navigation import layout as n
 from autopilot_bridge.navigation.states import ATT, POS, VEL
@@ -150,7 +150,6 @@ _PARTS: Final = _parts()
 def _frames(
     record: NDArray[np.uint8],
     out: NDArray[np.uint8],
-    ends: NDArray[np.int64],
     due: int,
     sender: int,
     sequence: int,
@@ -158,11 +157,9 @@ def _frames(
     """MAVLink 2 frames of the parts whose bit is set in `due`, in sequence; returns their length.
 
     Args:
-        ends: (parts,), end of each frame in `out`.
         sender: system id x 256 + component id.
     """
     end = 0
-    count = 0
     for part in range(_PARTS.shape[0]):
         if not due >> part & 1:
             continue
@@ -189,8 +186,6 @@ def _frames(
         out[end] = crc & 0xFF
         out[end + 1] = crc >> 8
         end += 2
-        ends[count] = end
-        count += 1
         sequence += 1
     return end
 
@@ -199,7 +194,7 @@ class MotionMessages:
     """Payloads of the messages in `MESSAGES`.
 
     Attributes:
-        bits: message id -> its bit in `frames`.
+        bits: message id -> its bit in `packet`.
 
     Args:
         view: provides the time of the step.
@@ -236,10 +231,7 @@ class MotionMessages:
         }
         self._packet = np.zeros(self._record.nbytes + len(MESSAGES) * OVERHEAD_V2, np.uint8)
         self._packet_bytes = self._packet.data
-        self._ends = np.zeros(len(MESSAGES), np.int64)
-        self._make_frames = bound(
-            _frames, self._record.view(np.uint8), self._packet, self._ends, then=(0, 0, 0)
-        )
+        self._make_frames = bound(_frames, self._record.view(np.uint8), self._packet, then=(0, 0, 0))
         self._fill = bound(
             _fill,
             navigation.state,
@@ -255,35 +247,24 @@ class MotionMessages:
         self.bits: Mapping[int, int] = {
             message_id: 1 << index for index, (_, _, message_id, _) in enumerate(_PARTS.tolist())
         }
-        self._ids = [
+        self._message_ids = [
             tuple(message_id for message_id, bit in self.bits.items() if due & bit)
             for due in range(1 << len(self.bits))
         ]
 
-    def packet(self, due: int, encoder: FrameEncoder) -> bytes:
+    def packet(self, due: int, encoder: FrameEncoder) -> tuple[bytes, tuple[int, ...]]:
         """Frames of the messages whose `bits` are set and whose values are available, in one piece.
 
         Args:
             due: sum of `bits`.
             encoder: the channel's; provides sender and sequence numbers.
+
+        Returns:
+            The bytes, and the message id of each frame.
         """
         due = self._available(due)
-        return self._packet_bytes[: self._make(due, encoder)].tobytes() if due else b""
-
-    def frames(self, due: int, encoder: FrameEncoder) -> list[Frame]:
-        """The frames of `packet`, one by one."""
-        due = self._available(due)
-        if not due:
-            return []
-        system_id, component_id, sequence = encoder.system_id, encoder.component_id, encoder.sequence
-        packet = self._packet_bytes[: self._make(due, encoder)].tobytes()
-        frames, start = [], 0
-        for message_id, end in zip(self._ids[due], self._ends.tolist(), strict=False):
-            raw = packet[start:end]
-            frames.append(new_frame((raw, message_id, system_id, component_id, sequence, 2, False)))
-            sequence = (sequence + 1) & 0xFF
-            start = end
-        return frames
+        data = self._packet_bytes[: self._make(due, encoder)].tobytes() if due else b""
+        return data, self._message_ids[due]
 
     def _available(self, due: int) -> int:
         """The bits whose values are available."""

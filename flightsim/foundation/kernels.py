@@ -8,12 +8,14 @@ cache file of a kernel is named after everything that went into it.
 import hashlib
 import os
 import pickle
+import sys
 import types
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from enum import Enum
 from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -33,6 +35,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PLAIN: Final = (bool, int, float, complex, str, bytes, type(None), slice, range, np.generic, np.dtype)
 _STAMP_DIGITS: Final = 16
+_BLAS: Final = "scipy.linalg.cython_blas"
 
 
 def kernel(function: Function) -> Function:
@@ -49,8 +52,38 @@ def kernel(function: Function) -> Function:
     folder = getattr(cache, "cache_path", None)
     base = getattr(getattr(cache, "_impl", None), "filename_base", None)
     if cache is not None and dumps and folder and base and hasattr(cache, "_cache_file"):
-        cache._cache_file = _CacheFile(Path(folder), base, function)
+        _keep(dispatcher, _CacheFile(Path(folder), base, function))
     return dispatcher
+
+
+def _keep(dispatcher: Any, file: "_CacheFile") -> None:
+    """Keep the machine code of a function in this file."""
+    cache = dispatcher._cache
+    cache._cache_file = file
+    cache.load_overload = partial(_load, cache.load_overload)
+
+
+def _load(load_overload: Callable[..., Any], *arguments: Any) -> Any:
+    """Machine code from the cache, or None; the first thing that Numba does with a kernel that is used."""
+    _import_array_functions()
+    return load_overload(*arguments)
+
+
+@cache
+def _import_array_functions() -> None:
+    """Import Numba's array functions without SciPy's linear algebra, which takes 0.2 s.
+
+    Numba imports it together with them, only to find out whether it is there. It is: this project depends on
+    it. Code that calls it imports it again when it is compiled.
+    """
+    if _BLAS in sys.modules:
+        return
+    sys.modules[_BLAS] = None  # type: ignore[assignment]  # an import raises an ImportError
+    try:
+        arraymath = import_module("numba.np.arraymath")
+    finally:
+        del sys.modules[_BLAS]
+    arraymath._HAVE_BLAS = True  # type: ignore[attr-defined]
 
 
 def compiled_for(function: Function, *arguments: object) -> Function:
@@ -77,7 +110,7 @@ def bound(function: Callable[..., Any], *arguments: object, then: tuple[object, 
         function: a kernel.
         arguments: its first arguments: arrays, whose elements may change later, and numbers, which do not
             change.
-        then: examples of the other arguments, at most three, which the caller passes; as in `compiled_for`,
+        then: examples of the other arguments, at most four, which the caller passes; as in `compiled_for`,
             their types are not checked.
     """
     typed = tuple(map(numba.typeof, arguments))
@@ -111,10 +144,11 @@ def _entry(function: Any, typed: tuple[Any, ...], more: int) -> Any:
         lambda address, a: function(*take(address, (a,))),
         lambda address, a, b: function(*take(address, (a, b))),
         lambda address, a, b, c: function(*take(address, (a, b, c))),
+        lambda address, a, b, c, d: function(*take(address, (a, b, c, d))),
     )[more]
     dispatcher = numba.njit(cache=True)(entry)
     variant = "".join(_code_parts(_taker.__code__, set())) + repr(typed)
-    dispatcher._cache._cache_file = own.beside(f"bound{more}", entry, variant)
+    _keep(dispatcher, own.beside(f"bound{more}", entry, variant))
     return dispatcher
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, dialect
+from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, Packet, dialect
 from estimators.fleet import Fleet
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import Runner
@@ -177,6 +177,6 @@ class FlightEstimators:
                     self._encoders[system_id] = encoder
                 frame = encoder.encode(message)
                 assert self._tap is not None and self._clock is not None
-                self._tap.record([Frame.of(frame)], self._clock.time_us)
+                self._tap.record(Packet.of_one(frame), self._clock.time_us)
                 link.send(frame)
                 return

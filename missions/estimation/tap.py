@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from autopilot_bridge.mavlink import Frame, MAVLinkMessage
+from autopilot_bridge.mavlink import MAVLinkMessage, Packet
 from estimators.errors import EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
@@ -41,7 +41,10 @@ class EstimatorTap:
             without an error.
         received: number of frames by (system id, message id) that estimators may receive, for rates.
         autopilots: number of frames of autopilots, by system id.
+        acts: estimates are sent when their inputs are recorded.
     """
+
+    acts: Final = True
 
     def __init__(
         self,
@@ -60,10 +63,10 @@ class EstimatorTap:
         self._frames = 0
         self._observations = ObservationWriter(log.with_suffix(SUFFIX))
 
-    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+    def record(self, packet: Packet, time_us: int) -> None:
         """Record valid frames, and pass them to the estimators."""
-        self._record(frames, time_us)
-        for frame in frames:
+        self._record(packet, time_us)
+        for frame in packet:
             self._frames += 1
             if frame.system_id < GROUND_SYSTEM and not why_excluded(
                 frame.definition.name, frame.component_id
@@ -97,7 +100,7 @@ class EstimatorTap:
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Record a frame of truth. It is not passed to estimators, but is placed in the order of the log."""
-        self.record([Frame.of(frame)], time_us)
+        self.record(Packet.of_one(frame), time_us)
 
 
 class Publisher:

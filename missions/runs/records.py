@@ -1,6 +1,6 @@
 """The frames of a flight: its log while it is flown, and columns of it afterwards."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Final, Self
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.errors import TlogError
-from autopilot_bridge.mavlink import DEFINITIONS, Frame, definition
+from autopilot_bridge.mavlink import DEFINITIONS, Packet, definition
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs.columns import decode_records, record_dtype
@@ -83,7 +83,10 @@ class FlightRecorder:
     Attributes:
         failure: reason why the log can no longer be written. The log ends there, and recording continues in
             memory. "" without a failure.
+        acts: it does not act on frames.
     """
+
+    acts: Final = False
 
     def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
         self.failure = ""
@@ -93,9 +96,9 @@ class FlightRecorder:
         self._unix_time_us = unix_time_us
         self._unlogged: tuple[list[int], list[bytes]] = [], []
 
-    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+    def record(self, packet: Packet, time_us: int) -> None:
         """Log frames that were sent or received together at vehicle time `time_us`."""
-        self._keep(b"".join([frame.raw for frame in frames]), time_us)
+        self._keep(packet.data, time_us)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Log one frame of truth."""

@@ -1,13 +1,13 @@
 """A link as a mission sees it: the newest message of each kind, streams of messages, and waiting for one.
 
 Several hundred messages a second arrive, and a mission uses few of them. A frame that no task waits for costs
-two dictionary operations; it is decoded only when it is requested. An autopilot in this process hands over
-its frames with their ids, instead of bytes that would have to be parsed.
+one dictionary entry; it is decoded only when it is requested. An autopilot in this process hands over packets
+with the ids of their messages, which are not parsed, and are taken apart only when one of them is requested.
 """
 
 import asyncio
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Protocol, Self
@@ -19,6 +19,7 @@ from autopilot_bridge.mavlink import (
     Intake,
     LinkSigning,
     MAVLinkMessage,
+    Packet,
     decode,
     definition,
     dialect,
@@ -46,7 +47,12 @@ _POLL_S: Final = 0.002  # for links without a file descriptor
 class Recorder(Protocol):
     """Receives all frames of a connection, in both directions."""
 
-    def record(self, frames: Sequence[Frame], time_us: int) -> None:
+    @property
+    def acts(self) -> bool:
+        """Whether it acts on the frames, so that their order among the calls of listeners counts."""
+        ...
+
+    def record(self, packet: Packet, time_us: int) -> None:
         """Process frames that were sent or received together at a vehicle time."""
         ...
 
@@ -90,9 +96,12 @@ class Connection:
         self._link = link
         self._forget = getattr(link, "forget", None)
         self._recorder = recorder
+        self._recorder_acts = recorder is not None and recorder.acts
         self._encoder = FrameEncoder(*identity)
         self._newest = NewestFrames()
         self._listeners: dict[int, list[Listener]] = {}
+        # listeners that depend on the order, by message id; packets with a key are looked at more closely too
+        self._in_order = Counter([SETUP_SIGNING])
         self._observed = clock if isinstance(clock, TelemetryClock) else None
         self._clock_source = vehicle_system_id
         self._tasks: list[asyncio.Task[None]] = []
@@ -117,8 +126,8 @@ class Connection:
         self._drain()
         if hasattr(self._link, "on_receive"):
             self._link.on_receive = partial(self._on_bytes, None)
-            if hasattr(self._link, "on_frames") and self.signing is None:
-                self._link.on_frames = self._on_frames
+            if hasattr(self._link, "on_packet") and self.signing is None:
+                self._link.on_packet = self._on_packet
         else:
             self._tasks.append(loop.create_task(self._keep_looking_after_link()))
         self._tasks.append(loop.create_task(self._keep_sending_heartbeats()))
@@ -132,8 +141,8 @@ class Connection:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._unwatch()
-        if hasattr(self._link, "on_frames"):
-            self._link.on_frames = None
+        if hasattr(self._link, "on_packet"):
+            self._link.on_packet = None
         self._link.close()
 
     def _unwatch(self) -> None:
@@ -152,32 +161,53 @@ class Connection:
 
     def _on_bytes(self, peer: object, data: bytes) -> None:
         frames = self.parsers.parse(peer, data)
-        if frames:
-            self._on_frames(frames)
+        if self._observed is None:
+            for packet in Packet.by_sender(frames):
+                self._on_packet(packet)
+            return
+        for frame in frames:  # each may set the clock
+            if frame.message_id in _TIMESTAMPED:
+                self._observe(frame)
+            self._on_packet(Packet.of([frame]))
 
-    def _on_frames(self, frames: list[Frame]) -> None:
-        if self._observed is not None:
-            if len(frames) > 1:  # each may set the clock
-                for frame in frames:
-                    self._on_frames([frame])
-                return
-            if frames[0].message_id in _TIMESTAMPED:
-                self._observe(frames[0])
-        listeners, begin = self._listeners, 0
-        for index, frame in enumerate(frames):
-            if frame.message_id in listeners:
+    def _on_packet(self, packet: Packet) -> None:
+        listeners = self._listeners
+        if not self._recorder_acts and self._in_order.keys().isdisjoint(packet.message_ids):
+            if self._recorder is not None:
+                self._recorder.record(packet, self.clock.time_us)
+            self._newest.put(packet)
+            for index, message_id in enumerate(packet.message_ids):
+                if message_id in listeners:
+                    frame = packet.frame(index)
+                    for listener in tuple(listeners[message_id]):
+                        listener(frame)
+            return
+        begin = 0
+        for index, message_id in enumerate(packet.message_ids):
+            if message_id in listeners:
                 # recorded and newest is then what came before its frame, not what follows in the same packet
-                self._keep(frames[begin : index + 1])
+                self._keep(packet.part(begin, index + 1))
                 begin = index + 1
-                for listener in tuple(listeners[frame.message_id]):
+                frame = packet.frame(index)
+                for listener in tuple(listeners[message_id]):
                     listener(frame)
-        if begin < len(frames):
-            self._keep(frames[begin:] if begin else frames)
+        if begin < len(packet):
+            self._keep(packet.part(begin, len(packet)))
 
-    def _keep(self, frames: list[Frame]) -> None:
-        if self._recorder is not None:
-            self._recorder.record(_without_keys(frames), self.clock.time_us)
-        self._newest.put(frames)
+    def _keep(self, packet: Packet) -> None:
+        self._record(packet)
+        self._newest.put(packet)
+
+    def _record(self, packet: Packet) -> None:
+        """Record what a log may contain: no keys."""
+        if self._recorder is None:
+            return
+        if SETUP_SIGNING in packet.message_ids:
+            frames = [frame for frame in packet if frame.message_id != SETUP_SIGNING]
+            if not frames:
+                return
+            packet = Packet.of(frames)
+        self._recorder.record(packet, self.clock.time_us)
 
     def _observe(self, frame: Frame) -> None:
         """Set the clock from the messages of the vehicle's autopilot."""
@@ -221,8 +251,7 @@ class Connection:
         data = self._encoder.encode(message)
         if self.signing is not None and self.signing.signs:
             data = self.signing.sign(data)
-        if self._recorder is not None:
-            self._recorder.record(_without_keys([Frame.of(data)]), self.clock.time_us)
+        self._record(Packet.of_one(data))
         self._link.send(data)
 
     async def _keep_sending_heartbeats(self) -> None:
@@ -257,6 +286,12 @@ class Connection:
         """The present newest frame of each message from one component, by message id."""
         return self._newest.of((system_id, component_id))
 
+    def newest_frame(
+        self, message_id: int, system_id: int, component_id: int = AUTOPILOT_COMPONENT
+    ) -> Frame | None:
+        """Newest frame of a message from one component, or None."""
+        return self._newest.frame((system_id, component_id), message_id)
+
     @property
     def bytes_per_s(self) -> float | None:
         """Capacity of the link in bytes per second; None: not known, or a network."""
@@ -267,17 +302,31 @@ class Connection:
         """Keep this system's autopilot among the newest messages, however many other systems are received."""
         self._newest.keep((system_id, AUTOPILOT_COMPONENT))
 
-    def listen(self, name: str, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with each frame of a message name; returns a function that ends this."""
+    def listen(self, name: str, listener: Listener, *, in_order: bool = True) -> Callable[[], None]:
+        """Call `listener` with each frame of a message name; returns a function that ends this.
+
+        Args:
+            name: of the message.
+            listener: is called when the frame has been recorded and is the newest one.
+            in_order: frames that follow in the same packet are then not recorded yet, nor the newest. Without
+                it, which is faster, the listener must look at its frame only, and send nothing.
+        """
         message_id = definition(name).message_id
         self._listeners.setdefault(message_id, []).append(listener)
+        if in_order:
+            self._in_order[message_id] += 1
 
         def stop() -> None:
             listeners = self._listeners.get(message_id, [])
-            if listener in listeners:
-                listeners.remove(listener)
+            if listener not in listeners:
+                return
+            listeners.remove(listener)
             if not listeners:
-                self._listeners.pop(message_id, None)
+                del self._listeners[message_id]
+            if in_order:
+                self._in_order[message_id] -= 1
+                if not self._in_order[message_id]:
+                    del self._in_order[message_id]
 
         return stop
 
@@ -289,14 +338,6 @@ class Connection:
         The stream begins with the first message that arrives after this call.
         """
         return MessageStream(self, names, system_id, component_id)
-
-
-def _without_keys(frames: list[Frame]) -> list[Frame]:
-    """The frames that a log may contain."""
-    for frame in frames:
-        if frame.message_id == SETUP_SIGNING:
-            return [other for other in frames if other.message_id != SETUP_SIGNING]
-    return frames
 
 
 class MessageStream:
@@ -317,7 +358,7 @@ class MessageStream:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waiting: asyncio.Future[None] | None = None
         self._system_id, self._component_id = system_id, component_id
-        self._stops = [connection.listen(name, self._on_frame) for name in names]
+        self._stops = [connection.listen(name, self._on_frame, in_order=False) for name in names]
         self._at_once = 0
         self.dropped = 0
 

@@ -187,6 +187,7 @@ class ItemTracker:
         self._again_from = again_from
         self._near_us: int | None = None
         self._started = False
+        self._ahead = self._next_flown()
 
     @property
     def current(self) -> int:
@@ -258,13 +259,8 @@ class ItemTracker:
 
     def on_position(self, lat_deg: float, lon_deg: float, alt_m: float, time_us: int) -> None:
         """Process a position."""
-        place = self.behind
-        while place < self._end and not self._step(place).flown:
-            place += 1
-        if place >= self._end:
-            return
-        step = self._step(place)
-        if step.place is None:
+        place, step = self._ahead
+        if step is None or step.place is None:
             return
         if step.contains(lat_deg, lon_deg, alt_m):
             if self._near_us is None:
@@ -275,6 +271,11 @@ class ItemTracker:
             near_us, self._near_us = self._near_us, None
             if step.through:
                 self._go_to(place + 1, near_us)
+
+    def _next_flown(self) -> tuple[int, MissionStep | None]:
+        """The next step that is flown, and its place in the order; None: there is none."""
+        ahead = ((place, self._step(place)) for place in range(self.behind, self._end))
+        return next(((place, step) for place, step in ahead if step.flown), (self._end, None))
 
     @property
     def _end(self) -> int:
@@ -309,6 +310,7 @@ class ItemTracker:
         self.reached += [(self._step(k).index, time_us) for k in range(self.behind, place) if k < self._end]
         self.behind = place
         self._near_us = None
+        self._ahead = self._next_flown()
 
 
 class MissionModeWatch:

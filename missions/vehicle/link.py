@@ -132,7 +132,7 @@ class VehicleLink:
         """Whether the newest heartbeat was signed."""
         if self._system_id is None:
             return False
-        heartbeat = self.connection.newest(self._system_id).get(_HEARTBEAT)
+        heartbeat = self.connection.newest_frame(_HEARTBEAT, self._system_id)
         return heartbeat is not None and heartbeat.signed
 
     @property
@@ -353,9 +353,10 @@ class VehicleLink:
             on: names of messages.
         """
         over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        system_id = self._system_id
 
         def on_frame(frame: Frame) -> None:
-            if (frame.system_id, frame.component_id) != (self._system_id, AUTOPILOT_COMPONENT) or over.done():
+            if frame[2:4] != (system_id, AUTOPILOT_COMPONENT) or over.done():
                 return
             try:
                 if handle(frame):
@@ -363,7 +364,7 @@ class VehicleLink:
             except MissionError as error:
                 over.set_exception(error)
 
-        stops = [self.connection.listen(name, on_frame) for name in on]
+        stops = [self.connection.listen(name, on_frame, in_order=False) for name in on]
         try:
             await over
         finally:
@@ -396,7 +397,7 @@ class VehicleLink:
             await asyncio.sleep(0)  # also lets the clock advance for a caller that polls in a loop
             return value
         changed = asyncio.Event()
-        stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]
+        stops = [self.connection.listen(name, lambda _: changed.set(), in_order=False) for name in on]
         try:
             async with self.deadline(timeout_s, what):
                 while True:

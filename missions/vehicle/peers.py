@@ -3,10 +3,10 @@
 Components come and go, and any sender can use any ids, so only a limited number of components is kept.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
-from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage, Packet, decode
 
 MAX_COMPONENTS: Final = 64
 
@@ -22,49 +22,52 @@ class NewestFrames:
     """
 
     def __init__(self) -> None:
-        self._frames: dict[ComponentId, dict[int, Frame]] = {}
+        self._packets: dict[ComponentId, dict[int, Packet]] = {}
         self._decoded: dict[ComponentId, dict[int, tuple[Frame, MAVLinkMessage]]] = {}
         self._kept: set[ComponentId] = set()
 
     def __len__(self) -> int:
         """Number of components."""
-        return len(self._frames)
+        return len(self._packets)
 
     @property
     def components(self) -> list[ComponentId]:
         """The components that were received and are still kept."""
-        return list(self._frames)
+        return list(self._packets)
 
     def of(self, component: ComponentId) -> Mapping[int, Frame]:
         """The present newest frames of a component, by message id."""
-        return dict(self._frames.get(component, {}))
+        packets = self._packets.get(component, {})
+        return {message_id: packet.newest(message_id) for message_id, packet in packets.items()}
+
+    def frame(self, component: ComponentId, message_id: int) -> Frame | None:
+        """The newest frame with a message id from a component, or None."""
+        packet = self._packets.get(component, {}).get(message_id)
+        return None if packet is None else packet.newest(message_id)
 
     def keep(self, component: ComponentId) -> None:
         """Never remove this component."""
         self._kept.add(component)
 
-    def put(self, frames: Iterable[Frame]) -> None:
-        """Store frames, each as the newest of its message."""
-        system_id = component_id = -1
-        newest: dict[int, Frame] = {}
-        for frame in frames:
-            if frame.component_id != component_id or frame.system_id != system_id:
-                system_id, component_id = component = frame.system_id, frame.component_id
-                known = self._frames.get(component)
-                newest = self._add(component) if known is None else known
-            newest[frame.message_id] = frame
+    def put(self, packet: Packet) -> None:
+        """Store the frames of a packet, each as the newest of its message."""
+        component = packet.sender
+        known = self._packets.get(component)
+        newest = self._add(component) if known is None else known
+        for message_id in packet.message_ids:
+            newest[message_id] = packet
 
-    def _add(self, component: ComponentId) -> dict[int, Frame]:
-        if len(self._frames) >= MAX_COMPONENTS:
-            oldest = next((known for known in self._frames if known not in self._kept), None)
+    def _add(self, component: ComponentId) -> dict[int, Packet]:
+        if len(self._packets) >= MAX_COMPONENTS:
+            oldest = next((known for known in self._packets if known not in self._kept), None)
             if oldest is not None:
-                del self._frames[oldest]
+                del self._packets[oldest]
                 self._decoded.pop(oldest, None)
-        return self._frames.setdefault(component, {})
+        return self._packets.setdefault(component, {})
 
     def latest(self, component: ComponentId, message_id: int) -> MAVLinkMessage | None:
         """The newest message with an id from a component, or None; decoded once."""
-        frame = self._frames.get(component, {}).get(message_id)
+        frame = self.frame(component, message_id)
         if frame is None:
             return None
         messages = self._decoded.setdefault(component, {})

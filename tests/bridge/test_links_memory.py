@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot_bridge.links import Impairment, LossyLink, memory_pair
-from autopilot_bridge.mavlink import Frame, FrameEncoder, dialect
+from autopilot_bridge.mavlink import Frame, FrameEncoder, Packet, dialect
 
 
 class World:
@@ -33,21 +33,22 @@ def payloads(link):
     return [data for _, data in link.receive()]
 
 
-def test_frames_are_handed_over_to_an_end_that_takes_them():
-    frames = [
-        Frame.of(FrameEncoder(1, 1).encode(dialect.MAVLink_system_time_message(7, 8))) for _ in range(2)
-    ]
+def test_packets_are_handed_over_to_an_end_that_takes_them():
+    encoder = FrameEncoder(1, 1)
+    packet = Packet.of(
+        [Frame.of(encoder.encode(dialect.MAVLink_system_time_message(7, 8))) for _ in range(2)]
+    )
     received = []
     a, b = memory_pair()
-    assert not a.takes_frames
-    b.on_frames = received.extend
-    assert a.takes_frames and not b.takes_frames
-    a.send_frames(frames)
-    assert received == frames and b.receive() == []
-    size = sum(len(frame.raw) for frame in frames)
+    assert not a.takes_packets
+    b.on_packet = received.append
+    assert a.takes_packets and not b.takes_packets
+    a.send_packet(packet)
+    assert received == [packet] and b.receive() == []
+    size = len(packet.data)
     assert (a.counters.bytes_out, b.counters.bytes_in, a.counters.writes) == (size, size, 1)
     b.close()
-    assert not a.takes_frames
+    assert not a.takes_packets
 
 
 def test_push_delivery_happens_at_once():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from autopilot_bridge.mavlink import Frame, FrameEncoder, dialect
+from autopilot_bridge.mavlink import FrameEncoder, Packet, dialect
 from autopilot_bridge.tlog import TlogWriter
 from estimators.comparison import comparisons
 from estimators.errors import EstimatorFailure
@@ -50,14 +50,14 @@ class Log:
         self._encoders = {}
         self._us = 0
 
-    def record(self, frames, time_us):
+    def record(self, packet, time_us):
         self._us += 1000
-        for frame in frames:
+        for frame in packet:
             self._log.write(1_700_000_000_000_000 + self._us, frame.raw)
 
     def frame(self, message, system=1, component=1):
         encoder = self._encoders.setdefault((system, component), FrameEncoder(system, component))
-        return [Frame.of(encoder.encode(message))]
+        return Packet.of_one(encoder.encode(message))
 
     def close(self):
         self._log.close()

@@ -126,12 +126,12 @@ def test_a_tag_is_read_by_opencv_where_the_detection_says(place, attitude, targe
 @pytest.mark.parametrize(("attitude", "axis"), [((0.0, -20.0, 0.0), 0), ((25.0, -30.0, 60.0), 1)])
 def test_a_tag_is_read_until_the_edge_of_the_picture_cuts_it_off(attitude, axis):
     """A large, flat tag moves out of the picture: the model loses it where OpenCV does, within a cell."""
-    size_m, read, said = 3.0, [], []
-    beyond = 5  # offsets without the tag, after which it does not come back
+    size_m = 3.0
     heading_rad = math.radians(attitude[2])
     ahead = 10.0 / math.tan(math.radians(-attitude[1]))
-    offsets_m = np.arange(0.0, 30.0, 0.2)
-    for offset_m in offsets_m:
+
+    def seen(offset_m: float) -> tuple[bool, bool]:
+        """Whether OpenCV reads the tag, and whether the model reports it."""
         forward, right = (ahead - offset_m, 0.0) if axis == 0 else (ahead, offset_m)
         north = forward * math.cos(heading_rad) - right * math.sin(heading_rad)
         east = forward * math.sin(heading_rad) + right * math.cos(heading_rad)
@@ -140,12 +140,13 @@ def test_a_tag_is_read_until_the_edge_of_the_picture_cuts_it_off(attitude, axis)
             (0.0, 0.0, -10.0), attitude, [tag], detection=PictureDetection(max_probability=1.0)
         )
         _, ids, _ = tag_detector().detectMarkers(Renderer(MODEL).render(view))
-        read.append(ids is not None)
-        said.append(bool(frame.detections))
-        if any(read) and any(said) and not any(read[-beyond:] + said[-beyond:]):
-            break
-    lost_m = [offsets_m[np.flatnonzero(seen).max()] for seen in (read, said)]
-    assert lost_m[0] > 3.0
+        return ids is not None, bool(frame.detections)
+
+    coarse_m = np.arange(0.0, 30.0, 1.5)
+    last_m = coarse_m[[any(seen(offset_m)) for offset_m in coarse_m]].max()
+    assert 3.0 < last_m < coarse_m.max()
+    offsets_m = np.arange(last_m - 0.8, last_m + 1.6, 0.2)
+    lost_m = [offsets_m[np.flatnonzero(known).max()] for known in zip(*map(seen, offsets_m), strict=True)]
     assert lost_m[1] == pytest.approx(lost_m[0], abs=size_m / 8 + 0.2)
 
 

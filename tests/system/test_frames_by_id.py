@@ -12,11 +12,13 @@ from missions.vehicle.connection import Connection
 
 
 class Recorded:
+    acts = False
+
     def __init__(self):
         self.frames = []
 
-    def record(self, frames, time_us):
-        self.frames += [(time_us, frame) for frame in frames]
+    def record(self, packet, time_us):
+        self.frames += [(time_us, frame) for frame in packet]
 
 
 def recorded(flavour, *, by_id):
@@ -27,7 +29,7 @@ def recorded(flavour, *, by_id):
     async def listen():
         async with Connection(sitl.links[0], LoopClock(), records):
             if not by_id:
-                sitl.links[0].on_frames = None
+                sitl.links[0].on_packet = None
             await asyncio.sleep(6.0)
 
     run(listen(), sitl.loop)

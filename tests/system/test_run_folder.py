@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from autopilot_bridge.clock import LoopClock
-from autopilot_bridge.mavlink import Frame, FrameParser, definition
+from autopilot_bridge.mavlink import FrameParser, Packet, definition
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
 from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT, TruthEncoder
@@ -86,18 +86,18 @@ def received(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, bytes]]:
     from autopilot_bridge.links import MemoryLink
 
     carried: list[tuple[int, bytes]] = []
-    send, send_frames = MemoryLink.send, MemoryLink.send_frames
+    send, send_packet = MemoryLink.send, MemoryLink.send_packet
 
     def spy(self: MemoryLink, data: bytes, to: object = None) -> None:
         carried.append((LoopClock().time_us, data))
         send(self, data)
 
-    def spy_on_frames(self: MemoryLink, frames: list[Frame]) -> None:
-        carried.extend((LoopClock().time_us, frame.raw) for frame in frames)
-        send_frames(self, frames)
+    def spy_on_packets(self: MemoryLink, packet: Packet) -> None:
+        carried.extend((LoopClock().time_us, frame.raw) for frame in packet)
+        send_packet(self, packet)
 
     monkeypatch.setattr(MemoryLink, "send", spy)
-    monkeypatch.setattr(MemoryLink, "send_frames", spy_on_frames)
+    monkeypatch.setattr(MemoryLink, "send_packet", spy_on_packets)
     return carried
 
 

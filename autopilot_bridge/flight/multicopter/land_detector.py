@@ -60,30 +60,18 @@ class LandDetector:
                 return self._store(ctx, False, False)
             self._contact_s = self._maybe_s = self._landed_s = math.inf
             return self._store(ctx, True, True)
-        velocity = ctx.nav[nav_layout.VEL_NED_M_S]
-        rates = ctx.nav[nav_layout.RATES_FRD_RAD_S]
-        setpoint = ctx.setpoint
-        idle = bool(setpoint[sp.LEVEL] <= sp.IDLE)
-        low_thrust = idle or thrust < p.low_thrust * ctx.hover_thrust
-        vertical = abs(float(velocity[2])) > p.vertical_speed_max_m_s
-        wanted_down = float(setpoint[sp.VEL + 2])
-        descending = (
-            bool(setpoint[sp.LEVEL] == sp.TRAJECTORY)
-            and math.isfinite(wanted_down)
-            and wanted_down > 1.1 * p.vertical_speed_max_m_s
-        )
-        horizontal = (
-            ctx.velocity_valid
-            and math.hypot(float(velocity[0]), float(velocity[1])) > p.horizontal_speed_max_m_s
-        )
-        rotating = math.hypot(float(rates[0]), float(rates[1])) > p.rotation_max_rad_s
+        level = float(ctx.setpoint[sp.LEVEL])
+        low_thrust = level <= sp.IDLE or thrust < p.low_thrust * ctx.hover_thrust
+        touching = low_thrust or self._descending(ctx, level)
+        touching = touching and not abs(float(ctx.nav[nav_layout.VEL + 2])) > p.vertical_speed_max_m_s
         # each stage needs the one before and its own time
-        contact = self._count(
-            "_contact_s", (low_thrust or descending) and not vertical, p.contact_time_s, ctx.dt_s
-        )
-        still = contact and low_thrust and not rotating and not horizontal
-        maybe = self._count("_maybe_s", still, 2.0 / 3.0 * p.trigger_time_s, ctx.dt_s)
-        landed = self._count("_landed_s", maybe, p.trigger_time_s / 3.0, ctx.dt_s)
+        self._contact_s = self._contact_s + ctx.dt_s if touching else 0.0
+        contact = self._contact_s >= p.contact_time_s
+        still = contact and low_thrust and self._still(ctx)
+        self._maybe_s = self._maybe_s + ctx.dt_s if still else 0.0
+        maybe = self._maybe_s >= 2.0 / 3.0 * p.trigger_time_s
+        self._landed_s = self._landed_s + ctx.dt_s if maybe else 0.0
+        landed = self._landed_s >= p.trigger_time_s / 3.0
         if landed:
             self.state = LandedState.ON_GROUND
         elif ctx.phase is FlightPhase.TAKEOFF:
@@ -94,10 +82,21 @@ class LandDetector:
             self.state = LandedState.IN_AIR
         return self._store(ctx, contact, maybe)
 
-    def _count(self, timer: str, condition: bool, needed_s: float, dt_s: float) -> bool:
-        time_s: float = getattr(self, timer) + dt_s if condition else 0.0
-        setattr(self, timer, time_s)
-        return time_s >= needed_s
+    def _descending(self, ctx: FlightContext, level: float) -> bool:
+        """The setpoint is well below."""
+        wanted_down = float(ctx.setpoint[sp.VEL + 2])
+        return level == sp.TRAJECTORY and wanted_down > 1.1 * self._parameters.vertical_speed_max_m_s
+
+    def _still(self, ctx: FlightContext) -> bool:
+        """It neither rotates nor moves horizontally, as far as known."""
+        p = self._parameters
+        rates, velocity = ctx.nav[nav_layout.RATES_FRD_RAD_S], ctx.nav[nav_layout.VEL_NED_M_S]
+        if math.hypot(float(rates[0]), float(rates[1])) > p.rotation_max_rad_s:
+            return False
+        return not (
+            ctx.velocity_valid
+            and math.hypot(float(velocity[0]), float(velocity[1])) > p.horizontal_speed_max_m_s
+        )
 
     def _falling(self, ctx: FlightContext) -> bool:
         return abs(float(ctx.nav[nav_layout.VEL_NED_M_S][2])) > 4.0 * self._parameters.vertical_speed_max_m_s

@@ -321,10 +321,10 @@ class MissionTask(PlanTask):
         motion.steer(ctx, self._wanted_yaw(ctx, leg.yaw_rad), leg.target, turn=self._turning)
         motion.write(ctx)
         item = self._store.items[self._seq]
-        vehicle = ctx.nav[nav_layout.POS_NED_M]
-        point = motion.trajectory.position_ned_m
-        away = _flat_distance(vehicle, leg.target)
-        level = abs(float(vehicle[2] - leg.target[2])) < ctx.multicopter.acceptance_altitude_m
+        north, east, down = ctx.nav[nav_layout.POS_NED_M].tolist()
+        target_n, target_e, target_d = leg.target.tolist()
+        away = math.hypot(north - target_n, east - target_e)
+        level = abs(down - target_d) < ctx.multicopter.acceptance_altitude_m
         inside = ctx.position_valid and away <= leg.radius_m and level
         if leg.passing_m_s > 0.0 and not leg.arrived:
             ahead = motion.ahead_m(leg.target)
@@ -334,7 +334,11 @@ class MissionTask(PlanTask):
                 leg.passing_m_s = 0.0  # missed: return to it
                 motion.begin_leg()
             return
-        if not leg.arrived and inside and (motion.stopped or _flat_distance(point, leg.target) < 0.3):
+        if (
+            not leg.arrived
+            and inside
+            and (motion.stopped or _flat_distance(motion.trajectory.position_ned_m, leg.target) < 0.3)
+        ):
             leg.arrived = True
         if leg.arrived:
             leg.waited_s += ctx.dt_s

@@ -129,9 +129,11 @@ class SmoothMotion:
 
     def ahead_m(self, end_ned_m: Array) -> float:
         """Remaining distance along the leg; negative beyond its end."""
-        point, start = self.trajectory.position_ned_m, self._leg_start
-        leg_n, leg_e = float(end_ned_m[0] - start[0]), float(end_ned_m[1] - start[1])
-        north, east = float(end_ned_m[0] - point[0]), float(end_ned_m[1] - point[1])
+        end_n, end_e, _ = end_ned_m.tolist()
+        start_n, start_e, _ = self._leg_start.tolist()
+        point_n, point_e, _ = self.trajectory.position_ned_m.tolist()
+        leg_n, leg_e = end_n - start_n, end_e - start_e
+        north, east = end_n - point_n, end_e - point_e
         length = math.hypot(leg_n, leg_e)
         if length < _SHORTEST_LEG_M:
             return math.hypot(north, east)

@@ -60,7 +60,9 @@ class LogChannel:
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Log the payloads that are due together."""
-        packet = self.motion.packet(motion, self._encoder) if motion and self.motion is not None else b""
+        packet = b""
+        if motion and self.motion is not None:
+            packet, _ = self.motion.packet(motion, self._encoder)
         packet += b"".join(self._encoder.encode_payloads(payloads))
         if packet:
             self._keep(packet)
