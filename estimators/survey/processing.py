@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from estimators.errors import EstimatorError
 from estimators.occupancy.survey_map import SurveyMap, map_error_of
@@ -32,6 +33,7 @@ _FOURTH: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 _AWAY_M: Final = 3.0  # widths of an anomaly within which readings are not "where nothing is"
 _LEAST_REACH_M: Final = 150.0
 _NORMAL: Final = 1.4826  # standard deviation over median absolute deviation
+_CONFIDENCE: Final = 0.9  # that the error of the grid is not larger than stated
 _BLOCKS: Final = 4.0  # of a line spacing, along a line
 
 
@@ -81,8 +83,9 @@ class SurveyResult:
         anomalies: what differs from the map, the strongest first; none without a map.
         grid: levelled total field on a grid; None: too few lines.
         grid_height_m: mean height of the readings on the lines, at which the grid is valid.
-        grid_error_nt: root mean square of the tie lines' readings about a grid of the survey lines alone;
-            NaN without tie lines.
+        grid_error_nt: error of the grid: root mean square of the tie lines' readings about a grid of the
+            survey lines alone, as the upper limit of a confidence of 90 % for as many independent places as
+            there are crossings; NaN without tie lines.
         home: origin of the frame.
     """
 
@@ -155,7 +158,9 @@ def process_survey(
     differential = levelled_nt - reference
     noise_nt = white_noise_nt(differential, line_of)
     anomalies = _anomalies(readings, plan, line_of, differential, noise_nt, main, survey_map, p)
-    grid, error_nt = _grid(readings, plan, line_of, levelled_nt - main_nt, main, p)
+    grid, misfit_nt = _grid(readings, plan, line_of, levelled_nt - main_nt, main, p)
+    count = max(1, levelling.crossings or len(plan.lines))
+    error_nt = misfit_nt * math.sqrt(count / float(chi2.ppf(1.0 - _CONFIDENCE, count)))
     return SurveyResult(
         plan=plan,
         readings=readings,

@@ -9,6 +9,7 @@ from flightsim.foundation.main_field import MainField
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal, gimbal_from_camera
 from flightsim.payload.camera_view import CameraView, TargetView
+from flightsim.payload.daily_variation import DailyVariation, DailyVariationParameters
 from flightsim.payload.detection import (
     CameraFrame,
     Detection,
@@ -63,6 +64,8 @@ __all__ = [
     "CameraView",
     "Circle",
     "ConstantVelocity",
+    "DailyVariation",
+    "DailyVariationParameters",
     "Detection",
     "DetectionModel",
     "DipoleSignature",

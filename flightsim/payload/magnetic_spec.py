@@ -10,9 +10,10 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
+from flightsim.payload.daily_variation import DailyVariation, DailyVariationParameters
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
+from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature, require_velocity
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.synthetic_map import SyntheticMapParameters, synthetic_map
 
@@ -28,14 +29,17 @@ class InducedDipole:
         north_m, east_m: place, local NED of the map's home.
         moment_a_m2: dipole moment.
         depth_m: below home.
+        velocity_ne_m_s: of a target that drifts, north and east.
     """
 
     north_m: float
     east_m: float
     moment_a_m2: float
     depth_m: float = 10.0
+    velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        require_velocity(self.velocity_ne_m_s)
         require_finite(north_m=self.north_m, east_m=self.east_m, depth_m=self.depth_m)
         require_positive(moment_a_m2=self.moment_a_m2)
 
@@ -56,6 +60,7 @@ class MagneticSpec:
         raised_m: height of a generated map above the level of a survey: its geology is continued upwards.
         exact_map: the true field is the map of `map_file` itself, or a generated one is published without an
             error.
+        daily: variation of the field in time; None: there is none but the drift of magnetometers.
         signatures: targets in the field; places are local NED of the map's home.
     """
 
@@ -66,6 +71,7 @@ class MagneticSpec:
     survey_height_m: float = 100.0
     raised_m: float = 0.0
     exact_map: bool = False
+    daily: DailyVariationParameters | None = None
     signatures: tuple[SignatureSpec, ...] = ()
 
     def __post_init__(self) -> None:
@@ -96,7 +102,12 @@ def magnetic_field_of(
         truth = _generated(spec, home, seed, decimal_year)
         published = truth if spec.exact_map else surveyed(truth, SurveyParameters(), seed=stream)
     signatures = [_resolved(signature, truth, decimal_year) for signature in spec.signatures]
-    return MagneticField(truth, signatures, decimal_year=decimal_year), published
+    daily = (
+        None
+        if spec.daily is None
+        else DailyVariation(spec.daily, RandomStreams(seed).child("daily_variation"))
+    )
+    return MagneticField(truth, signatures, decimal_year=decimal_year, daily=daily), published
 
 
 def _resolved(signature: SignatureSpec, truth: MagneticMap, decimal_year: float) -> Signature:
@@ -108,6 +119,7 @@ def _resolved(signature: SignatureSpec, truth: MagneticMap, decimal_year: float)
         east_m=signature.east_m,
         height_m=-signature.depth_m,
         moment_ned_a_m2=tuple(moment.tolist()),
+        velocity_ne_m_s=signature.velocity_ne_m_s,
     )
 
 

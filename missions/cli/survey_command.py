@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
-from missions.cli.options import radians_of
+from missions.cli.options import FiniteRange, radians_of
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
@@ -61,6 +61,7 @@ def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
         targets=given["targets"],
         vehicle_field=given["uncompensated"] or given["calibrate"] or given["compensation"] is not None,
         exact_map=given["exact_map"],
+        daily_nt=given["daily_variation"],
     )
 
 
@@ -132,6 +133,13 @@ COMMAND: Final = MissionCommand(
             "--compensation]",
         ),
         option(
+            "--daily-variation",
+            type=FiniteRange(min=0.0, max=1000.0),
+            scope=Scope.EMBEDDED,
+            metavar="NT",
+            help="Dip of the embedded world's field at noon, nT, with pulsations. [default: none]",
+        ),
+        option(
             "--exact-map",
             is_flag=True,
             scope=Scope.EMBEDDED,
@@ -153,6 +161,7 @@ COMMAND: Final = MissionCommand(
             "grid": ("grid_m",),
             "no_levelling": ("level",),
             "uncompensated": ("vehicle_field",),
+            "daily_variation": ("daily_nt",),
         }
     ),
 )

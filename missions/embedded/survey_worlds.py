@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from flightsim.payload import (
+    DailyVariationParameters,
     InducedDipole,
     MagneticSpec,
     PayloadParameters,
@@ -42,6 +43,7 @@ def survey_world(
     targets: int = 0,
     vehicle_field: bool = False,
     exact_map: bool = False,
+    daily_nt: float | None = None,
 ) -> WorldSpec:
     """The world of a survey.
 
@@ -51,6 +53,7 @@ def survey_world(
         targets: number of dipoles along the Earth's field in the area, drawn from the seed.
         vehicle_field: the magnetometer feels the whole field of its aircraft, which is the same for a seed.
         exact_map: the true field is the map's, without the error of a survey.
+        daily_nt: dip of the daily variation at noon; the flight begins at nine o'clock. None: no variation.
 
     Raises:
         PlanError: the area is too small for so many targets.
@@ -76,6 +79,7 @@ def survey_world(
         survey_height_m=options.altitude_m,
         raised_m=max(0.0, options.altitude_m - _GEOLOGY_LEVEL_M),
         exact_map=exact_map,
+        daily=None if daily_nt is None else DailyVariationParameters(dip_nt=daily_nt),
         signatures=drawn_targets(options, world.seed, targets),
     )
     return replace(world, magnetic_field=field)

@@ -225,8 +225,6 @@ def test_the_measured_survey_is_a_map(tmp_path):
     )
     assert np.isfinite(grid.total_field_nt).mean() > 0.95
     assert np.ptp(grid.north_m) > 50_000.0 and np.ptp(grid.east_m) > 55_000.0
-    # the main field of the survey's time is stated beside the data: 23,834 nT
-    assert np.nanmedian(grid.total_field_nt) == pytest.approx(23_834.0, abs=150.0)
     with lzma.open(SURVEYED, "rt") as file:
         table = np.genfromtxt(file, delimiter=",", names=True, dtype=None, encoding="utf-8")
     per_lat, per_lon = LocalFrame(grid.home).metres_per_degree
@@ -235,6 +233,7 @@ def test_the_measured_survey_is_a_map(tmp_path):
         int
     )
     main = MainField(grid.home, 1978.3, model=FieldModel.IGRF)
+    assert main.total_nt == pytest.approx(23_834.0, abs=200.0)  # as the survey states it for its middle
     expected = table["total_field_anomaly_nt"] + main.total_at_nt(
         grid.north_m[row], grid.east_m[column], 100.0
     )

@@ -1,6 +1,7 @@
 """Surveys with known levels, targets and noise: what processing finds of them."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,14 @@ from estimators.survey.readings import SurveyReadings, placed_readings
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.magnetic_map_file import MagneticMapError, read_map_file
 from flightsim.foundation.main_field import MainField
-from flightsim.payload import DipoleSignature, MagneticMap, SurveyParameters, truth_behind
+from flightsim.payload import (
+    DailyVariation,
+    DailyVariationParameters,
+    DipoleSignature,
+    MagneticMap,
+    SurveyParameters,
+    truth_behind,
+)
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.55, alt_m=480.0)
 MAIN = MainField(HOME)
@@ -100,6 +108,18 @@ def test_levels_of_the_lines_are_found_at_the_crossings(seed):
     assert result.levelling.after_nt < 0.15
     unlevelled = processed(flown(seed, levels_nt=levels_nt), published(), level=False)
     assert unlevelled.grid_error_nt > 5.0 * result.grid_error_nt
+
+
+def test_levelling_takes_out_the_daily_variation():
+    day = DailyVariation(DailyVariationParameters(dip_nt=40.0), np.random.SeedSequence(1))
+    readings = flown(1)
+    varied = replace(
+        readings, total_nt=readings.total_nt + np.array([day.at_nt(t) for t in readings.time_s.tolist()])
+    )
+    result = processed(varied, published(), map_error_nt=0.0)
+    assert result.levelling.before_nt > 1.0
+    assert result.levelling.after_nt < 0.5
+    assert result.grid_error_nt < 0.5 * processed(varied, published(), level=False).grid_error_nt
 
 
 @pytest.mark.parametrize("seed", range(3))
