@@ -2,8 +2,8 @@
 
 On quiet days the total field of middle latitudes dips around local noon by some tens of nT (Sq; Campbell
 1989, "The regular geomagnetic field variations during quiet solar conditions", Geomagnetism 3). Faster
-pulsations of minutes have some tenths of a nT to some nT. Both are the same over a survey's area, so two lines that were
-flown at different times differ by them, and levelling takes them out.
+pulsations of minutes have some tenths of a nT to some nT. Both are the same over a survey's area, so two
+lines that were flown at different times differ by them, and levelling takes them out.
 """
 
 import math

@@ -1,5 +1,6 @@
 """The pictures of a survey: lines, differential measurement and map; the manoeuvres of a compensation."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -20,6 +21,7 @@ _LINE: Final = "#1769aa"
 _TIE: Final = "#c2410c"
 _TARGET: Final = "#dc2626"
 _KILOMETRE: Final = 1e-3
+_MOST_NAMES: Final = 14  # of lines beside the map
 _LIMITS: Final = (2.0, 98.0)  # percentiles of the colours
 
 
@@ -57,7 +59,10 @@ def _draw_lines(
     )  # fmt: skip
     what = "reading - map" if result.against_map else "reading - main field"
     figure.colorbar(shades, ax=axes, shrink=0.8, label=f"{what}, nT")
+    step = math.ceil(len(result.plan.lines) / _MOST_NAMES)
     for line in result.plan.lines:
+        if line.kind is LineKind.LINE and _number(line.name) % step:
+            continue
         end = line.end_ne_m
         axes.annotate(
             line.name, (end[1] * _KILOMETRE, end[0] * _KILOMETRE), fontsize=6, ha="center",
