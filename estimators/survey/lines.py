@@ -127,10 +127,10 @@ def load_lines(path: Path, *, corridor_m: float = _CORRIDOR_M) -> LinePlan:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise EstimatorError(f"`lines_file` {path} can't be read: {error}") from None
+        raise EstimatorError(f"lines_file {path} can't be read: {error}") from None
     first = text.partition("\n")[0].strip()
     if first != HEADER:
-        raise EstimatorError(f"`lines_file` {path} begins with {first[:60]!r}; accepted is {HEADER!r}")
+        raise EstimatorError(f"lines_file {path} begins with {first[:60]!r}; accepted is {HEADER!r}")
     lines = []
     for number, row in enumerate(csv.DictReader(io.StringIO(text)), 2):
         try:
@@ -143,9 +143,9 @@ def load_lines(path: Path, *, corridor_m: float = _CORRIDOR_M) -> LinePlan:
                 )
             )
         except (ValueError, TypeError) as error:
-            raise EstimatorError(f"`lines_file` {path}, line {number}: {error}") from None
+            raise EstimatorError(f"lines_file {path}, line {number}: {error}") from None
     if not lines:
-        raise EstimatorError(f"`lines_file` {path} has a header and no lines")
+        raise EstimatorError(f"lines_file {path} has a header and no lines")
     return LinePlan(lines=tuple(lines), corridor_m=corridor_m)
 
 

@@ -279,17 +279,17 @@ def _grid(
         places = np.column_stack((readings.north_m[own], readings.east_m[own]))
         blocks[line.kind].append(block_means(places, anomaly_nt[own], p.line_spacing_m / _BLOCKS))
     lines, ties = (_joined(blocks[kind]) for kind in (LineKind.LINE, LineKind.TIE))
-    error_nt = math.nan
-    if len(lines[0]) >= 3 and len(ties[0]):
-        error_nt = float(np.sqrt(np.mean((interpolated(*lines, ties[0]) - ties[1]) ** 2)))
     places, values = (np.concatenate(parts) for parts in zip(lines, ties, strict=True))
     if len(places):
         # a tie line's block beside a line's has the same place and another value: the spline would bend
         places, values = _apart(places, values, 0.5 * p.line_spacing_m / _BLOCKS)
+    error_nt = math.nan
     try:
+        if len(ties[0]):
+            error_nt = float(np.sqrt(np.mean((interpolated(*lines, ties[0]) - ties[1]) ** 2)))
         grid = grid_lines(places, values, line_spacing_m=p.line_spacing_m, cell_m=p.grid_m)
-    except (EstimatorError, np.linalg.LinAlgError):
-        return None, error_nt
+    except (EstimatorError, ValueError, np.linalg.LinAlgError):
+        return None, error_nt  # too few places, or all of them on one line
     total = (
         grid.values_nt
         + main.total_at_nt(grid.north_m[:, None], grid.east_m[None, :])

@@ -3,13 +3,11 @@ compensation by attitude setpoints.
 """
 
 import asyncio
-import math
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from estimators.survey.lines import LinePlan, SurveyLine
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -17,6 +15,8 @@ from missions.errors import MissionError
 from missions.notes import PATTERN, CommandedPath
 from missions.outline import Outline
 from missions.pattern_search.wings.entry import Entry
+from missions.pattern_search.wings.flight import runway_approach
+from missions.pattern_search.wings.waypoints import way_in_items, waypoint_item
 from missions.planning.limits import FixedWingLimits
 from missions.survey.drape import Drape
 from missions.survey.manoeuvres import Programme, manoeuvres
@@ -27,7 +27,6 @@ from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 from missions.vehicle.vehicle import Vehicle
-from missions.vehicle.wing import Approach
 
 CALIBRATION: Final = "calibration"
 """Name of the phase between the takeoff and the first manoeuvre, and of those between two."""
@@ -39,9 +38,7 @@ _RUN_OUT_S: Final = 3.0
 _ACCEPTANCE_M: Final = 20.0
 _TURN_IN_MAX_M: Final = 250.0  # ArduPlane accepts at most 255 as a waypoint's radius
 _SLOW: Final = 0.5  # share of the airspeed: slowest ground speed that deadlines allow for
-_APPROACH_HEIGHT_M: Final = 40.0
-_APPROACH_LAYER_M: Final = 15.0
-_APPROACH_CIRCLE_M: Final = 80.0
+_LEAST_CIRCLE_M: Final = 80.0
 _RATES_HZ: Final = {"GLOBAL_POSITION_INT": 10.0, "ATTITUDE": 25.0}
 _TAKEOFF_M: Final = 80.0  # ArduPlane takes off to 200 m at most
 _CLIMB_S: Final = 120.0
@@ -147,44 +144,17 @@ def mission_items(
     vehicle: Vehicle, options: SurveyOptions, survey: PlannedSurvey, limits: FixedWingLimits
 ) -> list[MissionItem]:
     """The items of the whole flight: takeoff, airspeed, a circle, the waypoints, the landing."""
-    frame = LocalFrame(vehicle.home)
-    moved = survey.path.path.moved(*survey.offset_ned_m[:2])
-    entry = Entry.to(moved, survey.turn_radius_m)
-    lat, lon, _ = frame.geodetic_from_ned(*entry.centre_m, 0.0)
-    places = survey.places_ned_m()
+    places = survey.places_ned_m().tolist()
     radius_m = _turn_in_m(survey.speed_m_s, limits)
-    items = [
-        vehicle.firmware.takeoff_item(vehicle.home, options.own_altitude_m),
-        MissionItem(
-            command=dialect.MAV_CMD_DO_CHANGE_SPEED,
-            frame=dialect.MAV_FRAME_MISSION,
-            param1=0.0,  # airspeed
-            param2=survey.speed_m_s,
-            param3=-1.0,
-        ),
-        MissionItem(
-            command=dialect.MAV_CMD_NAV_LOITER_TO_ALT,
-            param1=1.0,  # leave the circle only in the direction of the next item
-            param2=math.copysign(entry.radius_m, 1.0 if entry.clockwise else -1.0),
-            param4=1.0,  # the leg begins where the circle is left
-            x=lat,
-            y=lon,
-            z=-float(places[0, 2]),
-        ),
-    ]
-    for north_m, east_m, down_m in places.tolist():
-        lat, lon, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
-        items.append(
-            MissionItem(
-                command=dialect.MAV_CMD_NAV_WAYPOINT,
-                param2=radius_m,
-                param4=vehicle.firmware.unset,
-                x=lat,
-                y=lon,
-                z=-down_m,
-            )
-        )
-    return items + _approach(vehicle, options, survey.turn_radius_m).items()
+    items = way_in_items(
+        vehicle,
+        Entry.to(survey.path.path.moved(*survey.offset_ned_m[:2]), survey.turn_radius_m),
+        airspeed_m_s=survey.speed_m_s,
+        takeoff_m=options.own_altitude_m,
+        height_m=-places[0][2],
+    )
+    items += [waypoint_item(vehicle, radius_m, north, east, -down) for north, east, down in places]
+    return items + runway_approach(vehicle, options.index, survey.turn_radius_m).items()
 
 
 FIRST_WAYPOINT: Final = 3
@@ -295,7 +265,7 @@ async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: Fixed
             await asyncio.gather(following, return_exceptions=True)
     notes.begin("return", clock.stamp_us)
     radius_m = limits.turn_radius_m(airspeed_m_s(options, limits))
-    await vehicle.wing.land_along(_approach(vehicle, options, radius_m))
+    await vehicle.wing.land_along(runway_approach(vehicle, options.index, radius_m))
     notes.end(clock.stamp_us)
 
 
@@ -304,7 +274,7 @@ async def _climb(vehicle: Vehicle, altitude_m: float, radius_m: float) -> None:
     home = vehicle.home
     await vehicle.wing.loiter(
         replace(home, alt_m=home.alt_m + altitude_m),
-        radius_m=max(_APPROACH_CIRCLE_M, radius_m),
+        radius_m=max(_LEAST_CIRCLE_M, radius_m),
         timeout_s=_CLIMB_S + altitude_m / _SLOWEST_CLIMB_M_S,
     )
 
@@ -333,13 +303,3 @@ def _turn_in_m(speed_m_s: float, limits: FixedWingLimits) -> float:
     """Distance before a waypoint at which the aircraft turns to the next leg."""
     lead_m = limits.true_airspeed_m_s(speed_m_s) * limits.waypoint_lead_s
     return min(_TURN_IN_MAX_M, max(_ACCEPTANCE_M, lead_m))
-
-
-def _approach(vehicle: Vehicle, options: SurveyOptions, turn_radius_m: float) -> Approach:
-    """Approach to the runway of the takeoff; the circles of a team are in layers."""
-    return Approach(
-        place=vehicle.home,
-        heading_rad=vehicle.wing.landing_heading_rad(),
-        height_m=_APPROACH_HEIGHT_M + _APPROACH_LAYER_M * options.index,
-        circle_radius_m=max(_APPROACH_CIRCLE_M, turn_radius_m),
-    )

@@ -259,3 +259,20 @@ def test_a_damaged_map_is_refused(tmp_path):
     (tmp_path / "map.npz").write_bytes(survey_files(processed(flown(1)))[MAP][:-40])
     with pytest.raises(MagneticMapError, match=r"map\.npz is not a magnetic map"):
         read_map_file(tmp_path / "map.npz")
+
+
+def test_a_survey_that_ends_after_one_line_has_no_map_and_no_error():
+    readings = flown(1)
+    short = SurveyReadings(
+        **{
+            name: getattr(readings, name)[:600]
+            for name in (
+                *("time_s", "north_m", "east_m", "height_m"),
+                *("roll_rad", "pitch_rad", "yaw_rad", "total_nt"),
+            )
+        }
+    )
+    result = processed(short, published())
+    assert result.grid is None
+    assert MAP not in survey_files(result)
+    assert result.on_lines.sum() > 500
