@@ -60,10 +60,21 @@ class PatternFlight:
         )
 
     def approach(self, vehicle: Vehicle) -> Approach:
-        """Approach to the runway of the takeoff; the circles of a team are in layers."""
-        return Approach(
-            place=vehicle.home,
-            heading_rad=vehicle.wing.landing_heading_rad(),
-            height_m=_APPROACH_HEIGHT_M + _APPROACH_LAYER_M * self.options.index,
-            circle_radius_m=max(_APPROACH_CIRCLE_M, self.turn_radius_m),
-        )
+        """Approach to the runway of the takeoff."""
+        return runway_approach(vehicle, self.options.index, self.turn_radius_m)
+
+
+def runway_approach(vehicle: Vehicle, index: int, turn_radius_m: float) -> Approach:
+    """Approach to the runway of the takeoff; the circles of a team are in layers.
+
+    Args:
+        vehicle: the aircraft.
+        index: its number in the team.
+        turn_radius_m: of its turns over ground.
+    """
+    return Approach(
+        place=vehicle.home,
+        heading_rad=vehicle.wing.landing_heading_rad(),
+        height_m=_APPROACH_HEIGHT_M + _APPROACH_LAYER_M * index,
+        circle_radius_m=max(_APPROACH_CIRCLE_M, turn_radius_m),
+    )
