@@ -12,12 +12,11 @@ Defaults and limits are those of the parameter table (`parameters.toml`).
 """
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
-from importlib.resources import files
 from typing import Any, Final, NamedTuple, TypeVar
 
 from autopilot_bridge.commander.events import FailsafeAction
+from autopilot_bridge.firmware.data import load_data
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 
 T = TypeVar("T")
@@ -82,8 +81,8 @@ class Tables(NamedTuple):
 
 
 def load_tables(package: str) -> Tables:
-    """The tables in the `mapping.toml` of a package."""
-    data = tomllib.loads(files(package).joinpath("mapping.toml").read_text(encoding="utf-8"))
+    """The tables in the `mapping.toml` of a package of this one: `load_tables("px4.copter")`."""
+    data = load_data(package, "mapping.toml")
     return Tables(
         fields={
             group: tuple(_field_map(field, source) for field, source in table.items())

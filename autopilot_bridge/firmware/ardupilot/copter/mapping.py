@@ -26,7 +26,7 @@ from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, YawB
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 
-_TABLES: Final = load_tables("autopilot_bridge.firmware.ardupilot.copter")
+_TABLES: Final = load_tables("ardupilot.copter")
 _CM: Final = 0.01
 _CENTIDEGREE: Final = math.radians(0.01)
 _DEG: Final = math.radians(1.0)

@@ -43,7 +43,7 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope
 
-_TABLES: Final = load_tables("autopilot_bridge.firmware.ardupilot.plane")
+_TABLES: Final = load_tables("ardupilot.plane")
 _DEG: Final = math.radians(1.0)
 _PERCENT: Final = 0.01
 _NEVER_S: Final = 1e6

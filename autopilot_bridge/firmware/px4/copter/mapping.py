@@ -20,7 +20,7 @@ from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, Retu
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 
-_TABLES: Final = load_tables("autopilot_bridge.firmware.px4.copter")
+_TABLES: Final = load_tables("px4.copter")
 _OFFBOARD_LOSS: Final = _TABLES.actions["COM_OBL_RC_ACT"]
 _LINK_LOSS: Final = _TABLES.actions["NAV_DLL_ACT"]  # NAV_DLL_ACT, NAV_RCL_ACT
 _FENCE: Final = _TABLES.actions["GF_ACTION"]

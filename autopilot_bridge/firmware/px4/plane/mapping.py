@@ -39,7 +39,7 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope
 
-_TABLES: Final = load_tables("autopilot_bridge.firmware.px4.plane")
+_TABLES: Final = load_tables("px4.plane")
 _DEG: Final = math.radians(1.0)
 _TERMINATION_OFF: Final = 121212  # CBRK_FLIGHTTERM
 _DATA_CHECKS: Final = 1 | 2 | 4  # ASPD_DO_CHECKS: missing, stuck, innovation
