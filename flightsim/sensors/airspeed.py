@@ -22,8 +22,7 @@ from flightsim.foundation.checks import check_fields, require_not_negative, requ
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import AIRSPEED_DIFFERENTIAL_PRESSURE_PA, AIRSPEED_SIZE, AIRSPEED_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ from flightsim.foundation.checks import check_fields, require_not_negative, requ
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
 
 Array = NDArray[np.float64]
 

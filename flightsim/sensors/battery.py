@@ -12,8 +12,7 @@ from flightsim import truth as t
 from flightsim.foundation.checks import check_fields, require_not_negative, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,7 @@ from flightsim import truth as t
 from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import VANE_ANGLE_OF_ATTACK_RAD, VANE_SIDESLIP_RAD, VANE_SIZE
-from flightsim.sensors.kernels import quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise, saturate
 
 Array = NDArray[np.float64]
 

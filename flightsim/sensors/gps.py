@@ -14,8 +14,7 @@ from flightsim.foundation.geodesy import curvature_radii_m
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_180
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,7 @@ from flightsim.foundation.checks import check_fields, require_not_negative, requ
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
 from flightsim.sensors.vibration import CONSTANTS, ROTORS, RotorVibrationParameters, add_vibration
 
 Array = NDArray[np.float64]

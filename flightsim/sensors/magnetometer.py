@@ -12,8 +12,7 @@ from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.interface import MAG_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise, saturate
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from flightsim.foundation.checks import check_fields, require_not_negative, requ
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise
 
 Array = NDArray[np.float64]
 

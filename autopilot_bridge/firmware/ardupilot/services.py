@@ -11,8 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.ardupilot import messages, packed_parameters
-from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration
-from autopilot_bridge.firmware.ardupilot.compass_calibration import CompassCalibration
+from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration, CompassCalibration
 from autopilot_bridge.firmware.ardupilot.copter import modes as copter_modes
 from autopilot_bridge.firmware.ardupilot.copter.commands import ArduCopterCommands
 from autopilot_bridge.firmware.ardupilot.copter.setpoints import ArduCopterSetpoints
