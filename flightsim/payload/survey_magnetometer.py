@@ -14,8 +14,8 @@ from flightsim.foundation.rotations import rotate_inverse
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
-from flightsim.sensors.kernels import gauss_markov
-from flightsim.sensors.schedule import steps_per_sample
+from flightsim.sensors.sensor import gauss_markov
+from flightsim.sensors.suite import steps_per_sample
 
 Array = NDArray[np.float64]
 

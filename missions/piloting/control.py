@@ -5,6 +5,8 @@ Total energy control (Lambregts, AIAA 83-2239): throttle controls the sum of the
 kinetic energy, pitch controls their difference. Rates are expressed as climb rates: V dV/dt / g is the climb
 rate that is equivalent to an acceleration. The controller runs at the end of a telemetry link, so it is slow:
 its time constants are those of PX4's own TECS or longer.
+
+Heading control by bank.
 """
 
 import math
@@ -151,3 +153,27 @@ class EnergyController:
         step = share * (airspeed_m_s - self._airspeed_m_s)
         self._airspeed_m_s += step
         self._acceleration_m_s2 = step / dt_s if dt_s > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeadingController:
+    """Commands a turn rate proportional to the heading error, and the bank that gives this rate.
+
+    Attributes:
+        gain_per_s: turn rate per heading error.
+        bank_max_rad: largest commanded bank.
+    """
+
+    gain_per_s: float = 0.6
+    bank_max_rad: float = math.radians(40.0)
+
+    def roll_rad(self, *, heading_rad: float, wanted_rad: float, airspeed_m_s: float) -> float:
+        """Bank angle for turning to a heading, the short way round."""
+        error = math.remainder(wanted_rad - heading_rad, math.tau)
+        bank = math.atan(self.gain_per_s * error * max(3.0, airspeed_m_s) / GRAVITY_M_S2)
+        return max(-self.bank_max_rad, min(self.bank_max_rad, bank))
+
+
+def heading_deg(heading_rad: float) -> float:
+    """A heading for use in commands, in degrees: at least 0 and less than 360, also in single precision."""
+    return round(math.degrees(heading_rad), 3) % 360.0

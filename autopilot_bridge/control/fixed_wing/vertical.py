@@ -6,6 +6,8 @@ accelerometers show: angle of attack that the pitch over the path has and the li
 round, is a gust from below or above (or a wing that differs from its model), and the pitch makes up for it.
 Incremental inversion does the same with differences (Sieberling, Chu and Mulder 2010). Airspeed is no concern
 of the pitch here; the task's throttle sees to it.
+
+Height trajectory of a fixed wing: what the energy control follows instead of height steps.
 """
 
 import math
@@ -65,3 +67,38 @@ def pitch_for_climb(
     wanted = pitch + s[c.LIFTLESS_PITCH]
     wanted += _HASTE * (wanted - nav[n.PITCH])
     return min(highest, max(lowest, wanted))
+
+
+_CLOSING_1_S: Final = 0.8  # the last metres are closed in proportion to what is left
+_LEASH: Final = 1.2  # the reference runs no further ahead than what would ask for the greatest climb
+
+
+@kernel
+def reset_height(height: float, climb: float, s: Array) -> None:
+    """Start the trajectory from the present height and climb rate, both up."""
+    s[c.HEIGHT_REFERENCE] = height if math.isfinite(height) else 0.0
+    s[c.HEIGHT_RATE_REFERENCE] = climb if math.isfinite(climb) else 0.0
+    s[c.HEIGHT_CONTROLLED] = 0.0
+
+
+@kernel
+def follow_height(wanted: float, slope: float, height: float, p: Array, s: Array, dt: float) -> None:
+    """Move the reference towards `wanted`, which itself climbs with `slope`, within the rates for steps.
+
+    Heights up, m; rates m/s. The reference's rate, HEIGHT_RATE_REFERENCE, is that over the slope.
+    """
+    acceleration = p[c.HEIGHT_ACCELERATION]
+    left = wanted - s[c.HEIGHT_REFERENCE]
+    size = abs(left)
+    linear = acceleration / (_CLOSING_1_S * _CLOSING_1_S)
+    speed = size * _CLOSING_1_S if size <= linear else math.sqrt(acceleration * (2.0 * size - linear))
+    rate = math.copysign(speed, left)
+    rate = min(min(p[c.CLIMB_TARGET], p[c.CLIMB_MAX]), max(-min(p[c.SINK_TARGET], p[c.SINK_MAX]), rate))
+    change = acceleration * dt
+    s[c.HEIGHT_RATE_REFERENCE] += min(change, max(-change, rate - s[c.HEIGHT_RATE_REFERENCE]))
+    reference = s[c.HEIGHT_REFERENCE] + (s[c.HEIGHT_RATE_REFERENCE] + slope) * dt
+    # where the vehicle can't follow (a glider, a stopped motor), the reference waits for it
+    ahead = _LEASH * p[c.CLIMB_MAX] * p[c.HEIGHT_TC]
+    behind = _LEASH * p[c.SINK_MAX] * p[c.HEIGHT_TC]
+    s[c.HEIGHT_REFERENCE] = min(height + ahead, max(height - behind, reference))
+    s[c.HEIGHT_CONTROLLED] = 1.0
