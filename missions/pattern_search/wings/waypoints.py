@@ -10,8 +10,7 @@ from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import VehicleTimeout
 from missions.notes import PATTERN
 from missions.options import FlightOptions
-from missions.pattern_search.wings.entry import Entry
-from missions.pattern_search.wings.flight import PatternFlight
+from missions.pattern_search.wings.flight import Entry, PatternFlight
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.planning.flyable import FlyablePath
 from missions.planning.limits import FixedWingLimits
