@@ -14,8 +14,7 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.notes import PATTERN, CommandedPath
 from missions.outline import Outline
-from missions.pattern_search.wings.entry import Entry
-from missions.pattern_search.wings.flight import runway_approach
+from missions.pattern_search.wings.flight import Entry, runway_approach
 from missions.pattern_search.wings.waypoints import way_in_items, waypoint_item
 from missions.planning.limits import FixedWingLimits
 from missions.survey.drape import Drape

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from missions.piloting.heading import HeadingController
+from missions.piloting.control import HeadingController
 
 __all__ = ["BOXES", "HEADINGS", "AttitudeCommand", "Manoeuvre", "Programme", "box_side_m", "manoeuvres"]
 
