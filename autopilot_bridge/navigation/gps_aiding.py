@@ -24,28 +24,16 @@ from autopilot_bridge.navigation.height_aiding import HeightAiding
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
 from autopilot_bridge.navigation.states import X_POS
+from flightsim import interface as interface
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import wrap_180
-from flightsim.interface import (
-    GPS_ALT_M,
-    GPS_EPH_M,
-    GPS_EPV_M,
-    GPS_FIX_TYPE,
-    GPS_HDOP,
-    GPS_LAT_DEG,
-    GPS_LON_DEG,
-    GPS_SATELLITES,
-    GPS_SIZE,
-    GPS_SPEED_ACCURACY_M_S,
-    GPS_VEL_NED_M_S,
-)
 
 _M_PER_DEG: Final = 111_200.0
 _WINDOW_US: Final = 2_000_000
 _ALLOWED_M: Final = 1.5
 _ALLOWED_SIGMAS: Final = 4.0
 _FROZEN_SAMPLES: Final = 5  # equal ones in a row: a second of a usual receiver
-_MEASURED: Final = slice(GPS_LAT_DEG, GPS_VEL_NED_M_S.stop)
+_MEASURED: Final = slice(interface.GPS_LAT_DEG, interface.GPS_VEL_NED_M_S.stop)
 
 
 class GpsQuality:
@@ -58,7 +46,7 @@ class GpsQuality:
 
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
-        self._last = self._anchor = self._previous = [0.0] * GPS_SIZE
+        self._last = self._anchor = self._previous = [0.0] * interface.GPS_SIZE
         self._travelled = [0.0] * 3
         self.restart()
 
@@ -82,17 +70,17 @@ class GpsQuality:
         if self._newest_us >= 0 and time_us - self._newest_us > 2_000_000:
             self.good_since_us = -1  # silence ends a series
         self._newest_us = time_us
-        north, east, down = values[GPS_VEL_NED_M_S]
+        north, east, down = values[interface.GPS_VEL_NED_M_S]
         self.good = (
-            values[GPS_FIX_TYPE] >= 3.0
-            and values[GPS_SATELLITES] >= p.gps_required_satellites
-            and 0.0 <= values[GPS_EPH_M] <= p.gps_required_eph_m
-            and 0.0 <= values[GPS_EPV_M] <= p.gps_required_epv_m
-            and 0.0 <= values[GPS_SPEED_ACCURACY_M_S] <= p.gps_required_speed_accuracy_m_s
-            and 0.0 <= values[GPS_HDOP] <= p.gps_required_hdop
-            and abs(values[GPS_LAT_DEG]) <= 90.0
-            and abs(values[GPS_LON_DEG]) <= 180.0
-            and abs(values[GPS_ALT_M]) <= 1.0e5
+            values[interface.GPS_FIX_TYPE] >= 3.0
+            and values[interface.GPS_SATELLITES] >= p.gps_required_satellites
+            and 0.0 <= values[interface.GPS_EPH_M] <= p.gps_required_eph_m
+            and 0.0 <= values[interface.GPS_EPV_M] <= p.gps_required_epv_m
+            and 0.0 <= values[interface.GPS_SPEED_ACCURACY_M_S] <= p.gps_required_speed_accuracy_m_s
+            and 0.0 <= values[interface.GPS_HDOP] <= p.gps_required_hdop
+            and abs(values[interface.GPS_LAT_DEG]) <= 90.0
+            and abs(values[interface.GPS_LON_DEG]) <= 180.0
+            and abs(values[interface.GPS_ALT_M]) <= 1.0e5
             and math.hypot(*_known((north, east, down))) <= 1.0e3
         )
         if self._repeats_itself(values) and not p.gps_may_repeat:
@@ -129,15 +117,18 @@ class GpsQuality:
             return True
         half_s = 0.5e-6 * elapsed_us
         for i, (now, before) in enumerate(
-            zip(values[GPS_VEL_NED_M_S], self._last[GPS_VEL_NED_M_S], strict=True)
+            zip(values[interface.GPS_VEL_NED_M_S], self._last[interface.GPS_VEL_NED_M_S], strict=True)
         ):
             travelled[i] += half_s * (now + before)
-        north_m = (values[GPS_LAT_DEG] - anchor[GPS_LAT_DEG]) * _M_PER_DEG
-        dlon = wrap_180(values[GPS_LON_DEG] - anchor[GPS_LON_DEG])
-        east_m = dlon * _M_PER_DEG * math.cos(math.radians(values[GPS_LAT_DEG]))
-        down_m = anchor[GPS_ALT_M] - values[GPS_ALT_M]
+        north_m = (values[interface.GPS_LAT_DEG] - anchor[interface.GPS_LAT_DEG]) * _M_PER_DEG
+        dlon = wrap_180(values[interface.GPS_LON_DEG] - anchor[interface.GPS_LON_DEG])
+        east_m = dlon * _M_PER_DEG * math.cos(math.radians(values[interface.GPS_LAT_DEG]))
+        down_m = anchor[interface.GPS_ALT_M] - values[interface.GPS_ALT_M]
         north, east, down = travelled
-        allowed_m = _ALLOWED_SIGMAS * math.hypot(values[GPS_EPH_M], values[GPS_EPV_M]) + _ALLOWED_M
+        allowed_m = (
+            _ALLOWED_SIGMAS * math.hypot(values[interface.GPS_EPH_M], values[interface.GPS_EPV_M])
+            + _ALLOWED_M
+        )
         apart_m = _known((north_m - north, east_m - east, down_m - down))
         coherent = math.hypot(*apart_m) <= allowed_m
         if measured_us - self._anchor_us >= _WINDOW_US:
@@ -220,7 +211,7 @@ class GpsAiding:
         row = solution.row_at(reading.time_us, time_us)
         if not (usable and p.use_gps) or row < 0:
             return -1
-        north, east, _ = values[GPS_VEL_NED_M_S]
+        north, east, _ = values[interface.GPS_VEL_NED_M_S]
         if not self._health.yaw_aligned and not (
             p.fixed_wing and self._heading.align_with_course(north, east)
         ):
@@ -266,25 +257,29 @@ class GpsAiding:
 
     def _write(self, values: Array, delay_s: float, row: int) -> None:
         p, solution, obs = self._parameters, self._solution, self._solution.obs
-        lat, lon, alt = float(values[GPS_LAT_DEG]), float(values[GPS_LON_DEG]), float(values[GPS_ALT_M])
+        lat, lon, alt = (
+            float(values[interface.GPS_LAT_DEG]),
+            float(values[interface.GPS_LON_DEG]),
+            float(values[interface.GPS_ALT_M]),
+        )
         if self.frame is None:
             down = float(solution.past_position(row)[2])
             self.set_origin(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt + down))
         assert self.frame is not None
         obs[f.GPS_POS : f.GPS_POS + 3] = self.frame.ned_from_geodetic(lat, lon, alt)
-        obs[f.GPS_VEL : f.GPS_VEL + 3] = values[GPS_VEL_NED_M_S]
+        obs[f.GPS_VEL : f.GPS_VEL + 3] = values[interface.GPS_VEL_NED_M_S]
         obs[f.GPS_DELAY_S] = delay_s
         horizontal, vertical = p.gps_position_noise_m
         obs[f.GPS_POS_VAR] = obs[f.GPS_POS_VAR + 1] = horizontal * horizontal
         obs[f.GPS_POS_VAR + 2] = vertical * vertical
         horizontal, vertical = p.gps_velocity_noise_m_s
-        scale = max(1.0, float(values[GPS_SPEED_ACCURACY_M_S]) / horizontal) ** 2
+        scale = max(1.0, float(values[interface.GPS_SPEED_ACCURACY_M_S]) / horizontal) ** 2
         for i, noise in enumerate((horizontal, horizontal, vertical)):
             obs[f.GPS_VEL_VAR + i] = scale * noise * noise
             if obs[f.GPS_VEL + i] != obs[f.GPS_VEL + i]:  # not measured: it adds no information
                 obs[f.GPS_VEL + i] = solution.past_velocity(row)[i]
                 obs[f.GPS_VEL_VAR + i] = _UNKNOWN_VARIANCE_M2_S2
-        solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))
+        solution.set_gps_accuracy(float(values[interface.GPS_EPH_M]), float(values[interface.GPS_EPV_M]))
 
     def _reset(self, row: int, time_us: int) -> None:
         """Horizontal position and velocity jump to the GPS; the update that follows gives them their

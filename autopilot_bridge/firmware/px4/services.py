@@ -109,6 +109,7 @@ PAYLOAD: Final = PayloadPolicy(
     kinds_of_roi=True,
     bad_place=Result.DENIED,
 )
+_SWITCH_MODES: Final = load_data("px4.copter", "modes.toml")["switch"]
 MANUAL: Final = ManualRules(
     at_rest=(),
     axes=("RC_MAP_ROLL", "RC_MAP_PITCH", "RC_MAP_THROTTLE", "RC_MAP_YAW"),
@@ -120,21 +121,7 @@ MANUAL: Final = ManualRules(
         channel="RC_MAP_FLTMODE",
         slot="COM_FLTMODE{}",
         limits_us=(1167, 1333, 1500, 1667, 1833),
-        modes={
-            0: FlightMode.MANUAL,
-            1: FlightMode.ALTITUDE,
-            2: FlightMode.POSITION,
-            3: FlightMode.MISSION,
-            4: FlightMode.HOLD,
-            5: FlightMode.RETURN,
-            6: FlightMode.ACRO,
-            7: FlightMode.OFFBOARD,
-            8: FlightMode.STABILIZED,
-            10: FlightMode.TAKEOFF,
-            11: FlightMode.LAND,
-            12: FlightMode.FOLLOW,
-            13: FlightMode.PRECISION_LAND,
-        },
+        modes={int(number): FlightMode[mode] for number, mode in _SWITCH_MODES.items()},
     ),
     gesture=GestureRules(
         switch="MAN_ARM_GESTURE",

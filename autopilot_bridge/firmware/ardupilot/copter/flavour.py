@@ -35,17 +35,7 @@ POLICY: Final = CommanderPolicy(
     armable_s=23.4,
     position_ready_s=41.5,
     home_s=19.9,
-    armable_modes=frozenset(
-        {
-            FlightMode.STABILIZED,
-            FlightMode.ACRO,
-            FlightMode.ALTITUDE,
-            FlightMode.GUIDED,
-            FlightMode.HOLD,
-            FlightMode.POSHOLD,
-            FlightMode.GUIDED_NOGPS,
-        }
-    ),
+    armable_modes=modes(_MODES["armable"]),
     ground_modes=_FLOWN | _GROUND_ONLY,
     flown_modes=_FLOWN,
     kept_after_disarm=frozenset(),

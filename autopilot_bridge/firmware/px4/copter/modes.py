@@ -7,7 +7,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
-from autopilot_bridge.firmware.data import by_member, load_data
+from autopilot_bridge.firmware.data import by_member, load_data, modes
 from autopilot_bridge.firmware.flavour import ModeDisplay
 from autopilot_bridge.services.commands.available_modes import ListedMode
 
@@ -76,25 +76,10 @@ LISTED_MODES: Final = (
 )
 """AVAILABLE_MODES of a multicopter, as PX4 1.16.1 sends it; the last eight are for external modes."""
 
-_AUTO_SUB_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
+_COMMANDED: Final[Mapping[tuple[int, int], FlightMode]] = MappingProxyType(
     {
-        0: FlightMode.MISSION,
-        2: FlightMode.TAKEOFF,
-        3: FlightMode.HOLD,
-        4: FlightMode.MISSION,
-        5: FlightMode.RETURN,
-        6: FlightMode.LAND,
-        8: FlightMode.FOLLOW,
-        9: FlightMode.PRECISION_LAND,
-    }
-)
-_MAIN_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
-    {
-        MAIN_MANUAL: FlightMode.MANUAL,
-        MAIN_ALTITUDE: FlightMode.ALTITUDE,
-        MAIN_ACRO: FlightMode.ACRO,
-        MAIN_OFFBOARD: FlightMode.OFFBOARD,
-        MAIN_STABILIZED: FlightMode.STABILIZED,
+        (_DATA["modes"][mode.name]["main"], _DATA["modes"][mode.name]["sub"]): mode
+        for mode in modes(_DATA["selectable"])
     }
 )
 
@@ -105,10 +90,10 @@ def commanded_mode(main: int, sub: int) -> FlightMode | None:
     Orbit is entered by DO_ORBIT only: its sub mode selects plain Position. Termination can't be commanded.
     """
     if main == MAIN_AUTO:
-        return _AUTO_SUB_MODES.get(sub)
+        return FlightMode.MISSION if sub == 0 else _COMMANDED.get((main, sub))
     if main == MAIN_POSITION:
         return FlightMode.POSITION_SLOW if sub == 2 else FlightMode.POSITION
-    return _MAIN_MODES.get(main)
+    return _COMMANDED.get((main, 0))
 
 
 def base_mode(display: ModeDisplay) -> int:
