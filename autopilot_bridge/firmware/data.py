@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from enum import Enum
+from functools import cache
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -15,8 +16,9 @@ E = TypeVar("E", bound=Enum)
 T = TypeVar("T")
 
 
+@cache
 def load_data(package: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML file in a package of this one: `load_data("px4.copter", "modes.toml")`."""
+    """The tables of a TOML file in a package of this one, read once: "px4.copter", "modes.toml"."""
     file = files(f"autopilot_bridge.firmware.{package}").joinpath(name)
     return tomllib.loads(file.read_text(encoding="utf-8"))
 

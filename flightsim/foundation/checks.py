@@ -47,6 +47,13 @@ def require_rate(rate_hz: int) -> None:
         raise ValueError(f"rate_hz = {rate_hz!r} is not accepted: a positive whole number of hertz is")
 
 
+def check_amounts(record: Any, *positive: str) -> None:
+    """Check the float fields of a dataclass: those named must be above zero, the others at least zero."""
+    values = {field.name: getattr(record, field.name) for field in fields(record) if field.type is float}
+    require_positive(**{name: values.pop(name) for name in positive})
+    require_not_negative(**values)
+
+
 def check_fields(
     record: Any,
     usually: Check,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import ICE_POINT_K
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import AIRSPEED_DIFFERENTIAL_PRESSURE_PA, AIRSPEED_SIZE, AIRSPEED_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -82,11 +82,7 @@ class AirspeedParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(
-            self,
-            require_not_negative,
-            but=dict.fromkeys(("drift_time_constant_s", "range_pa"), require_positive),
-        )
+        check_amounts(self, "drift_time_constant_s", "range_pa")
         if self.insensitive_angle_rad >= 0.5 * math.pi:
             raise ValueError(
                 f"insensitive_angle_rad = {self.insensitive_angle_rad} is not accepted: less than pi/2 is"

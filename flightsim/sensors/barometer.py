@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import ICE_POINT_K
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -64,7 +64,7 @@ class BarometerParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(self, require_not_negative, but={"drift_time_constant_s": require_positive})
+        check_amounts(self, "drift_time_constant_s")
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its offset and where its drift starts."""

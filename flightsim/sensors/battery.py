@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.foundation.checks import check_fields, require_not_negative, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, quantise
@@ -56,7 +56,7 @@ class BatteryMonitorParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(self, require_not_negative)
+        check_amounts(self)
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its scale errors. The charge used before the first sample is taken as known."""

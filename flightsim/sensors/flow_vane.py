@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import VANE_ANGLE_OF_ATTACK_RAD, VANE_SIDESLIP_RAD, VANE_SIZE
 from flightsim.sensors.sensor import SensorModel, quantise, saturate
@@ -54,7 +54,7 @@ class FlowVaneParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(self, require_not_negative, but={"limit_rad": require_positive})
+        check_amounts(self, "limit_rad")
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its misalignments. Both vanes stand at zero before the first flow."""

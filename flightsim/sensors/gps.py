@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.geodesy import curvature_radii_m
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_180
@@ -63,9 +63,7 @@ class GpsFixStage:
     error_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        require_not_negative(
-            start_s=self.start_s, hdop=self.hdop, vdop=self.vdop, error_scale=self.error_scale
-        )
+        check_amounts(self)
         if not 0 <= self.fix_type <= 6:
             raise ValueError(f"fix_type = {self.fix_type!r} is not accepted: GPS_FIX_TYPE 0 to 6 is")
         if not 0 <= self.satellites <= 254:
@@ -125,12 +123,7 @@ class GpsParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(
-            self,
-            require_not_negative,
-            but=dict.fromkeys(("wander_time_constant_s", "reported_accuracy_scale"), require_positive),
-            unchecked=("fix_timeline",),
-        )
+        check_amounts(self, "wander_time_constant_s", "reported_accuracy_scale")
         starts = [stage.start_s for stage in self.fix_timeline]
         if starts != sorted(starts):
             raise ValueError(f"fix_timeline starts at {starts} s: accepted are stages in order of time")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, ICE_POINT_K
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -102,19 +102,13 @@ class ImuParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(
+        check_amounts(
             self,
-            require_not_negative,
-            but=dict.fromkeys(
-                (
-                    "gyro_bias_time_constant_s",
-                    "gyro_range_rad_s",
-                    "accel_bias_time_constant_s",
-                    "accel_range_m_s2",
-                    "warm_up_s",
-                ),
-                require_positive,
-            ),
+            "gyro_bias_time_constant_s",
+            "gyro_range_rad_s",
+            "accel_bias_time_constant_s",
+            "accel_range_m_s2",
+            "warm_up_s",
         )
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:

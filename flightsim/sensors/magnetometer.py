@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.interface import MAG_SIZE
@@ -47,7 +47,7 @@ class MagnetometerParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(self, require_not_negative, but={"range_gauss": require_positive})
+        check_amounts(self, "range_gauss")
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its hard iron and scale errors."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_amounts, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -55,9 +55,7 @@ class RangefinderParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        check_fields(
-            self, require_not_negative, but=dict.fromkeys(("max_range_m", "max_tilt_rad"), require_positive)
-        )
+        check_amounts(self, "max_range_m", "max_tilt_rad")
         if self.max_range_m <= self.min_range_m:
             raise ValueError(
                 f"max_range_m = {self.max_range_m} is not accepted: "

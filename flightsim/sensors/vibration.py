@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative
+from flightsim.foundation.checks import check_amounts
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -60,9 +60,7 @@ class RotorVibrationParameters:
     axis: int = 2
 
     def __post_init__(self) -> None:
-        require_not_negative(
-            imbalance_m=self.imbalance_m, blade_passage_m=self.blade_passage_m, lever_1_m=self.lever_1_m
-        )
+        check_amounts(self)
         if self.axis not in (0, 1, 2):
             raise ValueError(f"axis = {self.axis!r} is not accepted: 0 (forward), 1 (right) or 2 (down) is")
 

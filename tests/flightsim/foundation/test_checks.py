@@ -6,7 +6,13 @@ from enum import IntEnum
 
 import pytest
 
-from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import (
+    check_amounts,
+    check_fields,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
 
 
 class Kind(IntEnum):
@@ -56,3 +62,17 @@ def test_everything_else_than_numbers_is_passed_over() -> None:
 def test_what_is_refused(given: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Parameters(**given)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amounts:
+    rate_hz: int = 5
+    noise_m: float = 0.0
+    time_constant_s: float = 1.0
+
+
+@pytest.mark.parametrize("values", [{"noise_m": -0.1}, {"noise_m": math.nan}, {"time_constant_s": 0.0}])
+def test_amounts_are_named_by_field(values: dict[str, float]) -> None:
+    check_amounts(Amounts(rate_hz=-1), "time_constant_s")
+    with pytest.raises(ValueError, match=f"{next(iter(values))} = .* is not accepted"):
+        check_amounts(Amounts(**values), "time_constant_s")  # type: ignore[arg-type]
