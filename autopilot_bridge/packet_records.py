@@ -5,14 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink.frame import (
-    INCOMPAT_SIGNED,
-    MAGIC_V1,
-    MAGIC_V2,
-    OVERHEAD_V1,
-    OVERHEAD_V2,
-    SIGNATURE_SIZE,
-)
+from autopilot_bridge.mavlink import frame as frames
 from flightsim.foundation.kernels import kernel
 
 Bytes = NDArray[np.uint8]
@@ -26,13 +19,13 @@ _WHOLE: Final = -1
 def _frame_size(data: Bytes, start: int, end: int) -> int:
     """Size of the frame that begins at `start`; 0 if there is none, or if it does not end by `end`."""
     size = 0
-    if end - start >= OVERHEAD_V1:
-        if data[start] == MAGIC_V2:
-            size = OVERHEAD_V2 + int(data[start + 1])
-            if data[start + 2] & INCOMPAT_SIGNED:
-                size += SIGNATURE_SIZE
-        elif data[start] == MAGIC_V1:
-            size = OVERHEAD_V1 + int(data[start + 1])
+    if end - start >= frames.OVERHEAD_V1:
+        if data[start] == frames.MAGIC_V2:
+            size = frames.OVERHEAD_V2 + int(data[start + 1])
+            if data[start + 2] & frames.INCOMPAT_SIGNED:
+                size += frames.SIGNATURE_SIZE
+        elif data[start] == frames.MAGIC_V1:
+            size = frames.OVERHEAD_V1 + int(data[start + 1])
     return size if start + size <= end else 0
 
 
@@ -86,7 +79,7 @@ def packet_records(times_us: list[int], packets: list[bytes]) -> tuple[bytes, in
         frame (empty: all do); the whole frames of such a packet are included.
     """
     data = np.frombuffer(b"".join(packets), dtype=np.uint8)
-    out = np.empty(data.size + TIME_SIZE * (data.size // OVERHEAD_V1), dtype=np.uint8)
+    out = np.empty(data.size + TIME_SIZE * (data.size // frames.OVERHEAD_V1), dtype=np.uint8)
     sizes = np.array([len(packet) for packet in packets], dtype=np.int64)
     written, records, torn, at = _split(data, np.array(times_us, dtype=np.int64), sizes, out)
     wrong = "" if torn == _WHOLE else f"a packet of {sizes[torn]} bytes has no whole frame at byte {at}"

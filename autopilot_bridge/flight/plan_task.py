@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import replace
 from typing import Final
 
+from autopilot_bridge.flight import plan_reading as plans
 from autopilot_bridge.flight.context import (
     Array,
     FlightContext,
@@ -19,18 +20,6 @@ from autopilot_bridge.flight.context import (
     WaypointReached,
     WaypointStarted,
 )
-from autopilot_bridge.flight.plan_reading import (
-    CONDITIONS,
-    JUMPS,
-    MARKERS,
-    PX4_PLANS,
-    Command,
-    PlanRules,
-    is_navigation,
-    is_waypoint,
-    jump_target,
-    target_of,
-)
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, roi_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
@@ -38,7 +27,9 @@ from autopilot_bridge.navigation import layout as nav_layout
 
 _MAX_INSTANT_ITEMS: Final = 200  # per update: breaks loops of DO_JUMP without anything to fly in between
 _DEFAULT_SPEED: Final = -2.0
-_WAITS: Final = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME})
+_WAITS: Final = frozenset(
+    {plans.Command.NAV_LOITER_UNLIM, plans.Command.NAV_LOITER_TURNS, plans.Command.NAV_LOITER_TIME}
+)
 
 
 class PlanTask(ABC):
@@ -56,7 +47,9 @@ class PlanTask(ABC):
         rules: how the firmware flies a plan.
     """
 
-    def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
+    def __init__(
+        self, store: MissionStore, *, first_item: int = 0, rules: plans.PlanRules = plans.PX4_PLANS
+    ) -> None:
         self._store = store
         self._first_item = first_item
         self._rules = rules
@@ -139,7 +132,7 @@ class PlanTask(ABC):
                 self._finish(ctx)
                 return
             item = items[seq]
-            if is_navigation(item):
+            if plans.is_navigation(item):
                 self._seq = self._store.current = seq
                 self._emit(ctx, WaypointStarted(seq))
                 if self._begin_timed(ctx, item, came_from):
@@ -148,7 +141,7 @@ class PlanTask(ABC):
                 self._do_the_rest(ctx)
                 seq += 1
                 continue
-            if item.command in JUMPS:
+            if item.command in plans.JUMPS:
                 seq = self._jump(item, seq)
                 continue
             if self._rules.conditions:
@@ -176,7 +169,7 @@ class PlanTask(ABC):
 
     def _jump(self, item: MissionItem, seq: int) -> int:
         """DO_JUMP, DO_JUMP_TAG: the next sequence number."""
-        target = jump_target(item, self._store.items)
+        target = plans.jump_target(item, self._store.items)
         left = self._jumps.get(seq, round(item.param2) if math.isfinite(item.param2) else 0)
         if target is not None and target >= self._first_item and left != 0:
             self._jumps[seq] = left - 1 if left > 0 else left
@@ -185,17 +178,17 @@ class PlanTask(ABC):
 
     def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> None:
         """Execute a DO_ item."""
-        if item.command == Command.DO_CHANGE_SPEED:
+        if item.command == plans.Command.DO_CHANGE_SPEED:
             self._change_by_item(ctx, item)
-        elif item.command == Command.DO_SET_HOME:
+        elif item.command == plans.Command.DO_SET_HOME:
             here = item.param1 == 1.0
-            place = ctx.nav[nav_layout.POS_NED_M] if here else target_of(item, ctx)
+            place = ctx.nav[nav_layout.POS_NED_M] if here else plans.target_of(item, ctx)
             if place is not None:
                 ctx.events.append(HomeChangeRequested(float(place[0]), float(place[1]), float(place[2])))
         elif item.command in ROI_COMMANDS:
             ctx.look_at(roi_of(item, ctx))
             ctx.events.append(ItemCommanded(seq))
-        elif item.command not in MARKERS and item.command not in CONDITIONS:
+        elif item.command not in plans.MARKERS and item.command not in plans.CONDITIONS:
             ctx.events.append(ItemCommanded(seq))
         self._emit(ctx, WaypointReached(seq, navigation=False))
 
@@ -217,7 +210,7 @@ class PlanTask(ABC):
         while self._beside:
             seq = self._beside[0]
             item = self._store.items[seq]
-            if item.command in CONDITIONS:
+            if item.command in plans.CONDITIONS:
                 if not self._is_met(ctx, item):
                     return
                 self._condition_left_s = math.nan
@@ -231,22 +224,22 @@ class PlanTask(ABC):
         while self._beside:
             seq = self._beside.popleft()
             item = self._store.items[seq]
-            if item.command in CONDITIONS:
+            if item.command in plans.CONDITIONS:
                 self._beside.clear()
                 return
             self._act(ctx, item, seq)
 
     def _is_met(self, ctx: FlightContext, item: MissionItem) -> bool:
         """One update of a CONDITION_ item; true when it lets the next one pass."""
-        if item.command == Command.CONDITION_DISTANCE:
-            target = target_of(self._store.items[self._seq], ctx)
+        if item.command == plans.Command.CONDITION_DISTANCE:
+            target = plans.target_of(self._store.items[self._seq], ctx)
             if target is None:
                 return True
             here = ctx.nav[nav_layout.POS_NED_M]
             away_m = math.hypot(float(target[0] - here[0]), float(target[1] - here[1]))
             return away_m <= item.param1
         first = math.isnan(self._condition_left_s)
-        if item.command == Command.CONDITION_YAW:
+        if item.command == plans.Command.CONDITION_YAW:
             if first:
                 self._condition_left_s = 0.0
                 self._turn(ctx, item)
@@ -268,23 +261,23 @@ class PlanTask(ABC):
             return roi.place_ned_m
         seq = roi.index if roi.mode is RoiMode.WAYPOINT else self._seq
         items = self._store.items
-        if not self._first_item <= seq < len(items) or not is_waypoint(items[seq]):
+        if not self._first_item <= seq < len(items) or not plans.is_waypoint(items[seq]):
             return None
-        return target_of(items[seq], ctx)
+        return plans.target_of(items[seq], ctx)
 
     # items that take time
 
     def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         """Begin an item that takes time; False when there is nothing to fly."""
         if self._rules.hurries and item.command in _WAITS:
-            item = replace(item, command=Command.NAV_WAYPOINT, param1=0.0, param2=0.0, param3=0.0)
-        if item.command == Command.NAV_DELAY:
+            item = replace(item, command=plans.Command.NAV_WAYPOINT, param1=0.0, param2=0.0, param3=0.0)
+        if item.command == plans.Command.NAV_DELAY:
             self._wait_left_s = item.param1 if math.isfinite(item.param1) else 0.0
             if not self._wait_left_s > 0.0 or self._rules.hurries:
                 return False
             self._set_sub(ctx, self._hold_task())
             return True
-        if item.command == Command.NAV_RETURN_TO_LAUNCH:
+        if item.command == plans.Command.NAV_RETURN_TO_LAUNCH:
             ctx.events.append(MissionModeRequested(item.command))
             self._set_sub(ctx, self._return_task())
             return True
@@ -308,7 +301,7 @@ class PlanTask(ABC):
         if self._finished:
             return
         item = self._store.items[self._seq]
-        if item.command == Command.NAV_DELAY:
+        if item.command == plans.Command.NAV_DELAY:
             self._wait_left_s -= ctx.dt_s
             done = self._wait_left_s <= 0.0
         else:
@@ -326,7 +319,7 @@ class PlanTask(ABC):
 
     def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
         """The current item is finished: report it, and continue."""
-        self._emit(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
+        self._emit(ctx, WaypointReached(self._seq, navigation=plans.is_navigation(item)))
         last = self._seq + 1 >= len(self._store.items)
         if last or not item.autocontinue:
             self._finish(ctx)

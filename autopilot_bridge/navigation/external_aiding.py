@@ -13,18 +13,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.navigation import external as external
 from autopilot_bridge.navigation import external_fusion as e
 from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.delayed_fusion import body_axis_in_ned
-from autopilot_bridge.navigation.external import (
-    POSITION_M,
-    Q_LOCAL_FROM_FRD,
-    VELOCITY_M_S,
-    ExternalCounts,
-    ExternalFrame,
-    ExternalSample,
-    variance_of,
-)
 from autopilot_bridge.navigation.external_heading import ExternalHeading
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
@@ -57,12 +49,12 @@ class ExternalAiding:
         self._parameters = parameters
         self._solution, self._health, self._clocks = parts.solution, parts.health, parts.clocks
         self._standby = parts.standby
-        self._queue: deque[ExternalSample] = deque(maxlen=_QUEUE)
+        self._queue: deque[external.ExternalSample] = deque(maxlen=_QUEUE)
         self._obs: Array = np.zeros(e.EXT_SIZE)
         self._offset: Array = np.zeros(3)
         self._mapped: Array = np.zeros(3)
         self._gap: Array = np.zeros(3)
-        self.counts = ExternalCounts()
+        self.counts = external.ExternalCounts()
         self.heading = ExternalHeading(solution=parts.solution, health=parts.health, obs=self._obs)
         self.restart()
 
@@ -80,7 +72,7 @@ class ExternalAiding:
         """New tuning for the samples to come."""
         self._parameters = parameters
 
-    def take(self, sample: ExternalSample) -> None:
+    def take(self, sample: external.ExternalSample) -> None:
         """A sample for the next update; the oldest waiting one gives way."""
         self.counts.taken += 1
         if len(self._queue) == _QUEUE:
@@ -124,7 +116,7 @@ class ExternalAiding:
             health.position_horizontal_test_ratio = float(self._obs[e.EXT_RATIO_POS])
             health.velocity_test_ratio = float(self._obs[e.EXT_RATIO_VEL])
 
-    def _fuse(self, sample: ExternalSample, time_us: int, *, at_rest: bool) -> bool:
+    def _fuse(self, sample: external.ExternalSample, time_us: int, *, at_rest: bool) -> bool:
         p, solution, counts = self._parameters, self._solution, self.counts
         if sample.quality < p.least_quality:
             counts.poor += 1
@@ -181,7 +173,7 @@ class ExternalAiding:
     def _map_position(self, values: Array, turn_rad: float, row: int) -> None:
         """The vehicle's position as the sample gives it, in the filter's axes."""
         p = self._parameters
-        x, y, z = (p.scale * float(part) for part in values[POSITION_M])
+        x, y, z = (p.scale * float(part) for part in values[external.POSITION_M])
         self._mapped[:] = _turned(x, y, z, turn_rad)
         if any(p.offset_frd_m):
             self._mapped -= self._rotation(row) @ np.array(p.offset_frd_m)
@@ -196,7 +188,9 @@ class ExternalAiding:
         self._gap[:] = gap
         self._gap_us = measured_us
 
-    def _prepare_position(self, sample: ExternalSample, row: int, time_us: int, *, jumped: bool) -> int:
+    def _prepare_position(
+        self, sample: external.ExternalSample, row: int, time_us: int, *, jumped: bool
+    ) -> int:
         """Which parts of the position to fuse, after the jumps that go before it."""
         p, obs, gap = self._parameters, self._obs, self._gap
         coherent = self._coherent >= _COHERENT_SAMPLES or (jumped and self.in_use)
@@ -211,7 +205,7 @@ class ExternalAiding:
             has |= e.EXT_HAS_HEIGHT
         for i in range(3):
             obs[e.EXT_POS + i] = self._mapped[i] + self._offset[i]
-            obs[e.EXT_POS_VAR + i] = variance_of(
+            obs[e.EXT_POS_VAR + i] = external.variance_of(
                 sample.position_variance_m2[i], p.position_noise_m, own=p.own_noise
             )
         return has
@@ -259,12 +253,14 @@ class ExternalAiding:
 
     # velocity
 
-    def _prepare_velocity(self, sample: ExternalSample, turn_rad: float, row: int, time_us: int) -> int:
+    def _prepare_velocity(
+        self, sample: external.ExternalSample, turn_rad: float, row: int, time_us: int
+    ) -> int:
         p, obs, solution = self._parameters, self._obs, self._solution
-        velocity: Array = sample.values[VELOCITY_M_S] * p.scale
-        if sample.velocity_frame is ExternalFrame.BODY_FRD:
+        velocity: Array = sample.values[external.VELOCITY_M_S] * p.scale
+        if sample.velocity_frame is external.ExternalFrame.BODY_FRD:
             velocity = self._rotation(row) @ velocity
-        elif sample.velocity_frame is ExternalFrame.LOCAL_FRD:
+        elif sample.velocity_frame is external.ExternalFrame.LOCAL_FRD:
             if not math.isfinite(turn_rad):
                 return 0
             x, y, z = velocity.tolist()
@@ -275,7 +271,7 @@ class ExternalAiding:
             velocity = velocity - self._rotation(row) @ np.cross(rates, p.offset_frd_m)
         obs[e.EXT_VEL : e.EXT_VEL + 3] = velocity
         for i in range(3):
-            obs[e.EXT_VEL_VAR + i] = variance_of(
+            obs[e.EXT_VEL_VAR + i] = external.variance_of(
                 sample.velocity_variance_m2_s2[i], p.velocity_noise_m_s, own=p.own_noise
             )
         if self._clocks.horizontal_aid_us < 0 or self._standby.held:
@@ -318,7 +314,11 @@ def _turned(x: float, y: float, z: float, angle_rad: float) -> tuple[float, floa
 
 def _usable(values: Array) -> tuple[bool, bool, float]:
     """(there is a position, there is a velocity, heading of the attitude or NaN)."""
-    position, velocity, q = values[POSITION_M], values[VELOCITY_M_S], values[Q_LOCAL_FROM_FRD]
+    position, velocity, q = (
+        values[external.POSITION_M],
+        values[external.VELOCITY_M_S],
+        values[external.Q_LOCAL_FROM_FRD],
+    )
     has_position = bool(np.abs(position).max() <= _MAX_POSITION_M)  # False for NaN
     has_velocity = bool(np.abs(velocity).max() <= _MAX_SPEED_M_S)
     norm = math.sqrt(float(q @ q)) if float(np.abs(q).max()) < 10.0 else math.nan

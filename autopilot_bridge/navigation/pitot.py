@@ -4,18 +4,13 @@ import math
 from typing import Final
 
 from autopilot_bridge.navigation.parameters import NavigationParameters
+from flightsim import interface as interface
 from flightsim.foundation.atmosphere import (
     ICE_POINT_K,
     SEA_LEVEL_PRESSURE_PA,
     SEA_LEVEL_TEMPERATURE_K,
     air_density_kg_m3,
     standard_temperature_k,
-)
-from flightsim.interface import (
-    AIRSPEED_DIFFERENTIAL_PRESSURE_PA,
-    AIRSPEED_TEMPERATURE_C,
-    BARO_PRESSURE_PA,
-    SensorReadings,
 )
 
 _SEA_LEVEL_KG_M3: Final = air_density_kg_m3(SEA_LEVEL_PRESSURE_PA, SEA_LEVEL_TEMPERATURE_K)
@@ -35,7 +30,7 @@ class Pitot:
         sample_us: when the newest usable sample was measured; -1 before the first.
     """
 
-    def __init__(self, parameters: NavigationParameters, *, readings: SensorReadings) -> None:
+    def __init__(self, parameters: NavigationParameters, *, readings: interface.SensorReadings) -> None:
         self._parameters = parameters
         self._readings = readings
         self.restart()
@@ -61,7 +56,7 @@ class Pitot:
     def look(self, time_us: int) -> None:
         """Take the reading's sample at `time_us` if it is new and makes sense."""
         reading = self._readings.airspeed
-        pressure_pa = float(reading.values[AIRSPEED_DIFFERENTIAL_PRESSURE_PA])
+        pressure_pa = float(reading.values[interface.AIRSPEED_DIFFERENTIAL_PRESSURE_PA])
         if reading.time_us == self.sample_us or not abs(pressure_pa) <= _MAX_DIFFERENTIAL_PA:
             return
         self._newest_us = time_us
@@ -82,10 +77,10 @@ class Pitot:
 
     def update_density(self, *, trusted: bool) -> None:
         """Air density from the barometer, and from the sensor's own temperature if that is valid."""
-        static_pa = float(self._readings.barometer.values[BARO_PRESSURE_PA])
+        static_pa = float(self._readings.barometer.values[interface.BARO_PRESSURE_PA])
         if not _PRESSURE_PA[0] <= static_pa <= _PRESSURE_PA[1]:
             return
-        sensed_c = float(self._readings.airspeed.values[AIRSPEED_TEMPERATURE_C])
+        sensed_c = float(self._readings.airspeed.values[interface.AIRSPEED_TEMPERATURE_C])
         if trusted and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
             temperature_k = sensed_c + ICE_POINT_K - self._parameters.airspeed_sensor_heating_k
         else:

@@ -7,41 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import covariance as cov
+from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.fusion import OBS_SIZE
 from autopilot_bridge.navigation.mechanisation import refresh_rotation
 from autopilot_bridge.navigation.parameters import NavigationParameters
-from autopilot_bridge.navigation.states import (
-    ACCEL,
-    ACCEL_BIAS,
-    ATT,
-    BARO_OFFSET,
-    CORE_SIZE,
-    CORRECTION_POS,
-    CORRECTION_VEL,
-    EARTH_RATE,
-    ERROR_SIZE,
-    ERROR_SIZE_WITH_WIND,
-    FORCE_NED,
-    GPS_ERROR,
-    GRAVITY,
-    GYRO_BIAS,
-    HISTORY_COLUMNS,
-    HISTORY_POS,
-    HISTORY_Q,
-    HISTORY_VEL,
-    MAG_BIAS,
-    POS,
-    TERRAIN_DOWN,
-    VEL,
-    WIND,
-    WORK_SIZE,
-    X_BARO_OFFSET,
-    X_GPS_ERROR,
-    X_MAG_BIAS,
-    X_POS,
-    Q,
-    R,
-)
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.geodesy import earth_rate_ned_rad_s, normal_gravity_m_s2
 from flightsim.foundation.rotations import multiply, quaternion_from_euler
@@ -71,14 +40,14 @@ class Solution:
             math.ceil(parameters.history_s * physics_rate_hz)
             + physics_rate_hz // parameters.covariance_rate_hz
         )
-        self.core: Array = np.zeros(CORE_SIZE)
-        size = ERROR_SIZE_WITH_WIND if parameters.fixed_wing else ERROR_SIZE
+        self.core: Array = np.zeros(s.CORE_SIZE)
+        size = s.ERROR_SIZE_WITH_WIND if parameters.fixed_wing else s.ERROR_SIZE
         self.p: Array = np.zeros((size, size))
-        self.history: Array = np.zeros((self.rows, HISTORY_COLUMNS))
-        self.work: Array = np.zeros(WORK_SIZE)
+        self.history: Array = np.zeros((self.rows, s.HISTORY_COLUMNS))
+        self.work: Array = np.zeros(s.WORK_SIZE)
         self.obs: Array = np.zeros(OBS_SIZE)
         self.process: Array = process_from(parameters)
-        self.core[GRAVITY] = GRAVITY_M_S2
+        self.core[s.GRAVITY] = GRAVITY_M_S2
         horizontal, vertical = parameters.gps_position_walk_m
         self.gps_error_var = (horizontal**2, horizontal**2, vertical**2)
         self.clear()
@@ -93,12 +62,12 @@ class Solution:
 
     def clear(self) -> None:
         """Nothing is known, except where on Earth gravity and rotation were found."""
-        gravity, rate = self.core[GRAVITY], self.core[EARTH_RATE : EARTH_RATE + 3].copy()
+        gravity, rate = self.core[s.GRAVITY], self.core[s.EARTH_RATE : s.EARTH_RATE + 3].copy()
         self.core[:] = 0.0
-        self.core[Q] = 1.0
-        self.core[GRAVITY] = gravity
-        self.core[EARTH_RATE : EARTH_RATE + 3] = rate
-        self.core[TERRAIN_DOWN] = math.nan
+        self.core[s.Q] = 1.0
+        self.core[s.GRAVITY] = gravity
+        self.core[s.EARTH_RATE : s.EARTH_RATE + 3] = rate
+        self.core[s.TERRAIN_DOWN] = math.nan
         refresh_rotation(self.core)
         self.p[:] = 0.0
         self.history[:] = 0.0
@@ -109,8 +78,8 @@ class Solution:
 
     def set_latitude(self, lat_deg: float, alt_m: float) -> None:
         """Gravity and Earth's rotation of the place."""
-        self.core[GRAVITY] = normal_gravity_m_s2(lat_deg, alt_m)
-        self.core[EARTH_RATE : EARTH_RATE + 3] = earth_rate_ned_rad_s(lat_deg)
+        self.core[s.GRAVITY] = normal_gravity_m_s2(lat_deg, alt_m)
+        self.core[s.EARTH_RATE : s.EARTH_RATE + 3] = earth_rate_ned_rad_s(lat_deg)
 
     def set_gps_accuracy(self, eph_m: float, epv_m: float) -> None:
         """What the receiver reports beyond its white noise is the slow error's standard deviation.
@@ -133,7 +102,7 @@ class Solution:
             old = self.gps_error_var[axes[0]]
             if new >= old:
                 for axis in axes:
-                    self.p[GPS_ERROR + axis, GPS_ERROR + axis] += new - old
+                    self.p[s.GPS_ERROR + axis, s.GPS_ERROR + axis] += new - old
             elif new * _BETTER_SOLUTION**2 < old:
                 for axis in axes:
                     self._shrink_gps_error(axis, math.sqrt(new / old))
@@ -146,9 +115,9 @@ class Solution:
         self.process[cov.GPS_VAR_VERTICAL] = vertical
 
     def _shrink_gps_error(self, axis: int, factor: float) -> None:
-        self.core[X_GPS_ERROR + axis] *= factor
-        self.p[GPS_ERROR + axis, :] *= factor
-        self.p[:, GPS_ERROR + axis] *= factor
+        self.core[s.X_GPS_ERROR + axis] *= factor
+        self.p[s.GPS_ERROR + axis, :] *= factor
+        self.p[:, s.GPS_ERROR + axis] *= factor
 
     def row_at(self, measured_us: int, time_us: int) -> int:
         """History row of a past time; -1 when it's older than the history."""
@@ -160,28 +129,30 @@ class Solution:
     def past_position(self, row: int) -> Array:
         """Position at a row of the history, as seen now."""
         return (
-            self.history[row, HISTORY_POS : HISTORY_POS + 3] + self.core[CORRECTION_POS : CORRECTION_POS + 3]
+            self.history[row, s.HISTORY_POS : s.HISTORY_POS + 3]
+            + self.core[s.CORRECTION_POS : s.CORRECTION_POS + 3]
         )
 
     def past_velocity(self, row: int) -> Array:
         """Velocity at a row of the history, as seen now."""
         return (
-            self.history[row, HISTORY_VEL : HISTORY_VEL + 3] + self.core[CORRECTION_VEL : CORRECTION_VEL + 3]
+            self.history[row, s.HISTORY_VEL : s.HISTORY_VEL + 3]
+            + self.core[s.CORRECTION_VEL : s.CORRECTION_VEL + 3]
         )
 
     def align(self, roll_rad: float, pitch_rad: float, yaw_rad: float, *, yaw_sigma_rad: float) -> None:
         """Start at rest at the frame's origin with this attitude. Tilt and biases get their correlation from
         the updates that follow, so their priors are wide and independent here."""
-        quaternion_from_euler(roll_rad, pitch_rad, yaw_rad, self.core[Q : Q + 4])
+        quaternion_from_euler(roll_rad, pitch_rad, yaw_rad, self.core[s.Q : s.Q + 4])
         self.refresh()
         p = self._parameters
         for i in range(3):
-            cov.forget(self.p, VEL + i, 0.5**2)
-            cov.forget(self.p, GYRO_BIAS + i, p.gyro_bias_rad_s**2)
-            cov.forget(self.p, GPS_ERROR + i, self.gps_error_var[i])
-            cov.forget(self.p, POS + i, p.at_rest_noise_m**2 if i < 2 else 0.1**2)
-        cov.forget(self.p, BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
-        for i in range(WIND, len(self.p)):
+            cov.forget(self.p, s.VEL + i, 0.5**2)
+            cov.forget(self.p, s.GYRO_BIAS + i, p.gyro_bias_rad_s**2)
+            cov.forget(self.p, s.GPS_ERROR + i, self.gps_error_var[i])
+            cov.forget(self.p, s.POS + i, p.at_rest_noise_m**2 if i < 2 else 0.1**2)
+        cov.forget(self.p, s.BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
+        for i in range(s.WIND, len(self.p)):
             cov.forget(self.p, i, p.wind_prior_m_s**2)
         self.widen_attitude(yaw_sigma_rad)
 
@@ -189,86 +160,86 @@ class Solution:
         """Attitude, accelerometer and magnetometer bias are as uncertain again as at alignment."""
         p = self._parameters
         for i in range(3):
-            cov.forget(self.p, ATT + i, p.alignment_tilt_rad**2 if i < 2 else yaw_sigma_rad**2)
-            cov.forget(self.p, ACCEL_BIAS + i, p.accel_bias_m_s2**2)
+            cov.forget(self.p, s.ATT + i, p.alignment_tilt_rad**2 if i < 2 else yaw_sigma_rad**2)
+            cov.forget(self.p, s.ACCEL_BIAS + i, p.accel_bias_m_s2**2)
         self.forget_mag_bias()
 
     def forget_mag_bias(self) -> None:
         """The magnetometer's bias is as uncertain as at alignment."""
-        self.core[X_MAG_BIAS : X_MAG_BIAS + 3] = 0.0
+        self.core[s.X_MAG_BIAS : s.X_MAG_BIAS + 3] = 0.0
         for i in range(3):
-            cov.forget(self.p, MAG_BIAS + i, self._parameters.magnetometer_bias_gauss**2)
+            cov.forget(self.p, s.MAG_BIAS + i, self._parameters.magnetometer_bias_gauss**2)
 
     def refresh(self) -> None:
         """Bring what follows from the quaternion up to date."""
         core = self.core
         refresh_rotation(core)
-        rotation = core[R : R + 9].reshape(3, 3)
-        core[FORCE_NED : FORCE_NED + 3] = rotation @ (
-            core[ACCEL : ACCEL + 3] - core[ACCEL_BIAS + 1 : ACCEL_BIAS + 4]
+        rotation = core[s.R : s.R + 9].reshape(3, 3)
+        core[s.FORCE_NED : s.FORCE_NED + 3] = rotation @ (
+            core[s.ACCEL : s.ACCEL + 3] - core[s.ACCEL_BIAS + 1 : s.ACCEL_BIAS + 4]
         )
 
     def turn_yaw(self, angle_rad: float, *, yaw_sigma_rad: float) -> None:
         """Rotate the attitude, present and past, about the vertical; widen the attitude."""
         turn: Array = np.array([math.cos(0.5 * angle_rad), 0.0, 0.0, math.sin(0.5 * angle_rad)])
         turned: Array = np.zeros(4)
-        multiply(turn, self.core[Q : Q + 4], turned)
-        self.core[Q : Q + 4] = turned
+        multiply(turn, self.core[s.Q : s.Q + 4], turned)
+        self.core[s.Q : s.Q + 4] = turned
         for row in range(self.rows):
-            multiply(turn, self.history[row, HISTORY_Q : HISTORY_Q + 4], turned)
-            self.history[row, HISTORY_Q : HISTORY_Q + 4] = turned
+            multiply(turn, self.history[row, s.HISTORY_Q : s.HISTORY_Q + 4], turned)
+            self.history[row, s.HISTORY_Q : s.HISTORY_Q + 4] = turned
         self.refresh()
         self.widen_attitude(yaw_sigma_rad)
 
     def move_horizontally(self, north_m: float, east_m: float) -> None:
         """Position jumps and is unknown around its new value, as is the GPS error."""
-        cov.shift(self.core, POS, north_m, east_m, 0.0)
+        cov.shift(self.core, s.POS, north_m, east_m, 0.0)
         for i in range(2):
-            cov.forget(self.p, POS + i, UNKNOWN_POSITION_M**2)
-            cov.forget(self.p, GPS_ERROR + i, self.gps_error_var[i])
-            self.core[X_GPS_ERROR + i] = 0.0
+            cov.forget(self.p, s.POS + i, UNKNOWN_POSITION_M**2)
+            cov.forget(self.p, s.GPS_ERROR + i, self.gps_error_var[i])
+            self.core[s.X_GPS_ERROR + i] = 0.0
 
     def change_velocity(self, north_m_s: float, east_m_s: float, *, sigma_m_s: float) -> None:
         """Horizontal velocity jumps, with a new variance."""
-        cov.shift(self.core, VEL, north_m_s, east_m_s, 0.0)
-        cov.forget(self.p, VEL, sigma_m_s**2)
-        cov.forget(self.p, VEL + 1, sigma_m_s**2)
+        cov.shift(self.core, s.VEL, north_m_s, east_m_s, 0.0)
+        cov.forget(self.p, s.VEL, sigma_m_s**2)
+        cov.forget(self.p, s.VEL + 1, sigma_m_s**2)
 
     def move_vertically(self, down_m: float, *, with_baro: bool) -> None:
         """Height jumps and is unknown; `with_baro`: the barometer's offset jumps along and stays known to
         it."""
         p = self.p
-        cov.shift(self.core, POS, 0.0, 0.0, down_m)
+        cov.shift(self.core, s.POS, 0.0, 0.0, down_m)
         if with_baro:
-            self.core[X_BARO_OFFSET] += down_m
-            for i in (POS + 2, BARO_OFFSET):
-                for j in (POS + 2, BARO_OFFSET):
+            self.core[s.X_BARO_OFFSET] += down_m
+            for i in (s.POS + 2, s.BARO_OFFSET):
+                for j in (s.POS + 2, s.BARO_OFFSET):
                     p[i, j] += UNKNOWN_HEIGHT_M**2
         else:
-            cov.forget(p, POS + 2, UNKNOWN_HEIGHT_M**2)
+            cov.forget(p, s.POS + 2, UNKNOWN_HEIGHT_M**2)
 
     def change_vertical_velocity(self, down_m_s: float) -> None:
         """Vertical velocity jumps and is unknown around its new value."""
-        cov.shift(self.core, VEL, 0.0, 0.0, down_m_s)
-        cov.forget(self.p, VEL + 2, UNKNOWN_VERTICAL_VELOCITY_M_S**2)
+        cov.shift(self.core, s.VEL, 0.0, 0.0, down_m_s)
+        cov.forget(self.p, s.VEL + 2, UNKNOWN_VERTICAL_VELOCITY_M_S**2)
 
     def forget_gps_height_error(self) -> None:
         """The slow error of GPS heights is unknown."""
-        cov.forget(self.p, GPS_ERROR + 2, self.gps_error_var[2])
-        self.core[X_GPS_ERROR + 2] = 0.0
+        cov.forget(self.p, s.GPS_ERROR + 2, self.gps_error_var[2])
+        self.core[s.X_GPS_ERROR + 2] = 0.0
 
     def set_baro_offset(self, offset_m: float) -> None:
         """The barometer's offset is unknown around this value."""
-        self.core[X_BARO_OFFSET] = offset_m
-        cov.forget(self.p, BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
+        self.core[s.X_BARO_OFFSET] = offset_m
+        cov.forget(self.p, s.BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
 
     def widen_baro_offset(self, variance_m2: float) -> None:
         """The barometer's offset may have changed by so much."""
-        self.p[BARO_OFFSET, BARO_OFFSET] += variance_m2
+        self.p[s.BARO_OFFSET, s.BARO_OFFSET] += variance_m2
 
     def position(self) -> tuple[float, float, float]:
         """Present position, NED, m."""
-        return (float(self.core[X_POS]), float(self.core[X_POS + 1]), float(self.core[X_POS + 2]))
+        return (float(self.core[s.X_POS]), float(self.core[s.X_POS + 1]), float(self.core[s.X_POS + 2]))
 
 
 def _correlation_s(sigma: float, walk: float) -> float:

@@ -8,17 +8,10 @@ import math
 from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.clocks import Clocks
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
-from autopilot_bridge.navigation.states import (
-    GYRO_BIAS,
-    SUM_GYRO,
-    SUM_GYRO_TIME,
-    X_GYRO_BIAS,
-    X_POS,
-    X_VEL,
-)
 
 _TURN_GATE: Final = 5.0  # standard deviations of the gyro's mean beyond which the vehicle itself turns
 _STEADY_US: Final = 10_000_000  # no wind turns a parked vehicle this long at one rate: that is a bias
@@ -88,7 +81,7 @@ class Standby:
             has |= f.HAS_HOLD
         if time_us - clocks.height_us > p.height_timeout_s * 1e6:
             if not clocks.height_held:
-                obs[f.HOLD + 2] = solution.core[X_POS + 2]
+                obs[f.HOLD + 2] = solution.core[s.X_POS + 2]
             clocks.height_held = True
             obs[f.HOLD_HEIGHT_VAR] = sigma * sigma
             has |= f.HAS_HOLD_HEIGHT
@@ -103,13 +96,13 @@ class Standby:
         would turn the heading in flight. The vehicle's centre does not stand still in such a turn either.
         """
         core, p = self._solution.core, self._solution.p
-        span_s = core[SUM_GYRO_TIME]
+        span_s = core[s.SUM_GYRO_TIME]
         if not span_s > 0.0:
             return False
-        rate = [float(core[SUM_GYRO + a] / span_s) for a in range(3)]
+        rate = [float(core[s.SUM_GYRO + a] / span_s) for a in range(3)]
         floor = parameters.zero_rate_noise_rad_s**2
-        gate = [_TURN_GATE * math.sqrt(float(p[GYRO_BIAS + a, GYRO_BIAS + a]) + floor) for a in range(3)]
-        turned = any(abs(rate[a] - float(core[X_GYRO_BIAS + a])) > gate[a] for a in range(3))
+        gate = [_TURN_GATE * math.sqrt(float(p[s.GYRO_BIAS + a, s.GYRO_BIAS + a]) + floor) for a in range(3)]
+        turned = any(abs(rate[a] - float(core[s.X_GYRO_BIAS + a])) > gate[a] for a in range(3))
         if not turned:
             self._turning_since_us = -1
             return False
@@ -122,7 +115,7 @@ class Standby:
     def _hold(self, *, flying: bool) -> None:
         """Hold the present position from now on, and assume a velocity near zero."""
         solution, core = self._solution, self._solution.core
-        solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
+        solution.obs[f.HOLD : f.HOLD + 2] = core[s.X_POS : s.X_POS + 2]
         self.held = True
         self._adrift = flying
         if not flying:
@@ -132,5 +125,5 @@ class Standby:
         """About zero is the best guess of a horizontal velocity that nothing has measured lately."""
         solution, core = self._solution, self._solution.core
         if self._clocks.horizontal_aid_us >= 0:
-            north, east = float(core[X_VEL]), float(core[X_VEL + 1])
+            north, east = float(core[s.X_VEL]), float(core[s.X_VEL + 1])
             solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)

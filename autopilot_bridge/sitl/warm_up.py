@@ -14,12 +14,7 @@ import numpy as np
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.mavlink import FrameEncoder, dialect
-from autopilot_bridge.navigation.external import (
-    SAMPLE_SIZE,
-    VELOCITY_M_S,
-    ExternalFrame,
-    ExternalSample,
-)
+from autopilot_bridge.navigation import external as external
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.sitl.sitl import Sitl
 from flightsim.airframe import AirframeKind, load_airframe
@@ -86,15 +81,15 @@ def _send_odometry(sitl: Sitl) -> None:
     """Send a velocity as visual odometry does."""
     autopilot = sitl.vehicles[0].autopilot
     autopilot.parameters.set("EKF2_EV_CTRL", 4)
-    values = np.full(SAMPLE_SIZE, math.nan)
-    values[VELOCITY_M_S] = 0.0
+    values = np.full(external.SAMPLE_SIZE, math.nan)
+    values[external.VELOCITY_M_S] = 0.0
     unknown = (math.nan, math.nan, math.nan)
     autopilot.navigation.take_external(
-        ExternalSample(
+        external.ExternalSample(
             time_us=sitl.time_us,
             values=values,
-            frame=ExternalFrame.NED,
-            velocity_frame=ExternalFrame.NED,
+            frame=external.ExternalFrame.NED,
+            velocity_frame=external.ExternalFrame.NED,
             position_variance_m2=unknown,
             velocity_variance_m2_s2=unknown,
             yaw_variance_rad2=math.nan,

@@ -11,12 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from autopilot_bridge.mission_plan import MissionItem
-from missions.plan_files.document import (
-    DO_LAND_START,
-    NAV_LAND,
-    NAV_LOITER_TO_ALT,
-    NAV_WAYPOINT,
-)
+from missions.plan_files import document as document
 from missions.plan_files.json_values import Refuse, entries, flag, mapping, number, numbers
 
 _RELATIVE: Final = 6
@@ -51,13 +46,13 @@ def landing_items(entry: Mapping[str, Any], where: str, refuse: Refuse) -> list[
     )
     approach = numbers(entry.get(approach_name), 3, f"{where}, {approach_name}", refuse)
     land = numbers(entry.get("landCoordinate"), 3, f"{where}, landCoordinate", refuse)
-    items = [MissionItem(command=DO_LAND_START, frame=2)]
+    items = [MissionItem(command=document.DO_LAND_START, frame=2)]
     if flag(entry, "useLoiterToAlt", True, where, refuse):
         radius_m = number(entry, "loiterRadius", where, refuse)
         clockwise = flag(entry, "loiterClockwise", True, where, refuse)
         items.append(
             MissionItem(
-                command=NAV_LOITER_TO_ALT,
+                command=document.NAV_LOITER_TO_ALT,
                 frame=frame,
                 param1=1.0,  # leave the circle only in the direction of the landing
                 param2=radius_m if clockwise else -radius_m,
@@ -70,7 +65,7 @@ def landing_items(entry: Mapping[str, Any], where: str, refuse: Refuse) -> list[
     else:
         items.append(
             MissionItem(
-                command=NAV_WAYPOINT,
+                command=document.NAV_WAYPOINT,
                 frame=frame,
                 param4=math.nan,
                 x=approach[0],
@@ -82,5 +77,7 @@ def landing_items(entry: Mapping[str, Any], where: str, refuse: Refuse) -> list[
         items.append(MissionItem(command=_STOP_PHOTOS, frame=2))
     if flag(entry, "stopVideoPhotos", False, where, refuse):
         items.append(MissionItem(command=_STOP_VIDEO, frame=2))
-    items.append(MissionItem(command=NAV_LAND, frame=frame, param4=math.nan, x=land[0], y=land[1], z=land[2]))
+    items.append(
+        MissionItem(command=document.NAV_LAND, frame=frame, param4=math.nan, x=land[0], y=land[1], z=land[2])
+    )
     return items

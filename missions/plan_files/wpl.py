@@ -10,18 +10,12 @@ from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
-from missions.plan_files.document import (
-    DO_JUMP,
-    INT_FRAMES,
-    NAV_WAYPOINT,
-    PLAIN_FRAMES,
-    MissionDocument,
-)
+from missions.plan_files import document as document
 
 HEADER: Final = "QGC WPL 110"
 
 
-def read_wpl(path: Path) -> MissionDocument:
+def read_wpl(path: Path) -> document.MissionDocument:
     """Read a waypoint file. If the first row is an absolute waypoint, as ArduPilot's tools write it, it is
     the home.
 
@@ -51,7 +45,7 @@ def read_wpl(path: Path) -> MissionDocument:
             )
     home = _home(rows[0]) if rows else None
     first = 0 if home is None else 1
-    return MissionDocument(
+    return document.MissionDocument(
         path=path,
         items=tuple(_item(row, first) for row in rows[first:]),
         home=home,
@@ -59,7 +53,7 @@ def read_wpl(path: Path) -> MissionDocument:
 
 
 def _home(row: Any) -> GeodeticPosition | None:
-    if row.command != NAV_WAYPOINT or row.frame not in GLOBAL_FRAMES:
+    if row.command != document.NAV_WAYPOINT or row.frame not in GLOBAL_FRAMES:
         return None
     if not (abs(row.x) <= 90.0 and abs(row.y) <= 180.0 and math.isfinite(row.z)) or row.x == row.y == 0.0:
         return None
@@ -69,7 +63,7 @@ def _home(row: Any) -> GeodeticPosition | None:
 def _item(row: Any, first: int) -> MissionItem:
     item = MissionItem(
         command=row.command,
-        frame=INT_FRAMES.get(row.frame, row.frame),
+        frame=document.INT_FRAMES.get(row.frame, row.frame),
         param1=row.param1,
         param2=row.param2,
         param3=row.param3,
@@ -79,19 +73,19 @@ def _item(row: Any, first: int) -> MissionItem:
         z=row.z,
         autocontinue=bool(row.autocontinue),
     )
-    return replace(item, param1=item.param1 - first) if item.command == DO_JUMP else item
+    return replace(item, param1=item.param1 - first) if item.command == document.DO_JUMP else item
 
 
 def format_wpl(items: Iterable[MissionItem], home: GeodeticPosition) -> str:
     """A mission as the text of a waypoint file: home is the first row, and values that are not set (NaN) are
     0.
     """
-    marker = MissionItem(command=NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m)
+    marker = MissionItem(command=document.NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m)
     lines = [HEADER]
     for index, item in enumerate((marker, *items)):
-        if item.command == DO_JUMP:
+        if item.command == document.DO_JUMP:
             item = replace(item, param1=item.param1 + 1)
-        frame = PLAIN_FRAMES.get(item.frame, item.frame)
+        frame = document.PLAIN_FRAMES.get(item.frame, item.frame)
         numbers = (item.param1, item.param2, item.param3, item.param4, item.x, item.y, item.z)
         texts = [f"{0.0 if math.isnan(number) else number:.8f}" for number in numbers]
         lines.append("\t".join([str(index), str(int(index == 0)), str(frame), str(item.command), *texts,

@@ -7,7 +7,7 @@ import pytest
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.inputs import setpoint_frames as frames
+from autopilot_bridge.services.inputs import setpoints as frames
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.commander.rig import ORIGIN
 from tests.services.command_rig import ServiceRig

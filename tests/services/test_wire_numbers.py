@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.services.channel import NO_CLIENT
 from autopilot_bridge.services.files.ftp_protocol import FtpError, Opcode
-from autopilot_bridge.services.inputs import setpoint_frames as frames
+from autopilot_bridge.services.inputs import setpoints as frames
 from autopilot_bridge.services.inputs.transmitter import CHANNELS, Radio
 
 OPCODES = {

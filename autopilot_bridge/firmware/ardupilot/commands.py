@@ -12,15 +12,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import (
-    FORCE_NUMBER,
-    Command,
-    CommandHandlers,
-    CommandHooks,
-    flags,
-    on_earth,
-    whole,
-)
+from autopilot_bridge.services.commands import handlers as handlers
 
 _CUSTOM_MODE_FLAG = 1
 _SERVO_CHANNELS = 32
@@ -28,7 +20,7 @@ _FIRST_FREE_SERVO = 5  # 1 to 4 are motors or surfaces
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 
 
-class ArduPilotCommands(CommandHandlers):
+class ArduPilotCommands(handlers.CommandHandlers):
     """ArduPilot's commands; a vehicle adds its own. Everything not in the table is UNSUPPORTED, as in the
     firmware.
 
@@ -38,7 +30,7 @@ class ArduPilotCommands(CommandHandlers):
 
     reposition_denied: ClassVar[Result]
 
-    def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
+    def __init__(self, commander: Commander, hooks: handlers.CommandHooks) -> None:
         super().__init__(commander, hooks)
         self.table = {
             **self.table,
@@ -63,9 +55,9 @@ class ArduPilotCommands(CommandHandlers):
         """SET_MODE: works, never acknowledged."""
         self._set_mode(base_mode, custom_mode)
 
-    def set_mode(self, command: Command, source: Source) -> Result:
+    def set_mode(self, command: handlers.Command, source: Source) -> Result:
         """DO_SET_MODE: p1 base mode, p2 mode number."""
-        return self._set_mode(flags(command.p1), flags(command.p2))
+        return self._set_mode(handlers.flags(command.p1), handlers.flags(command.p2))
 
     def _set_mode(self, base_mode: int, number: int) -> Result:
         if not base_mode & _CUSTOM_MODE_FLAG:
@@ -88,11 +80,11 @@ class ArduPilotCommands(CommandHandlers):
         return self.commander.set_mode(mode).result
 
     @staticmethod
-    def is_forced(command: Command) -> bool:
+    def is_forced(command: handlers.Command) -> bool:
         """COMPONENT_ARM_DISARM: p2 holds the number that overrides the checks."""
-        return command.p2 == FORCE_NUMBER
+        return command.p2 == handlers.FORCE_NUMBER
 
-    def arm_disarm(self, command: Command, source: Source) -> Result:
+    def arm_disarm(self, command: handlers.Command, source: Source) -> Result:
         """COMPONENT_ARM_DISARM: p1 exactly 1 or 0."""
         forced = self.is_forced(command)
         if command.p1 == 1.0:
@@ -101,11 +93,11 @@ class ArduPilotCommands(CommandHandlers):
             return self.commander.disarm(forced=forced).result
         return Result.UNSUPPORTED
 
-    def loiter(self, command: Command, source: Source) -> Result:
+    def loiter(self, command: handlers.Command, source: Source) -> Result:
         """NAV_LOITER_UNLIM: mode LOITER."""
         return self.commander.set_mode(FlightMode.HOLD).result
 
-    def reposition(self, command: Command, source: Source) -> Result:
+    def reposition(self, command: handlers.Command, source: Source) -> Result:
         """DO_REPOSITION, COMMAND_INT only: p2 bit 0 changes to GUIDED."""
         if not command.is_int:
             return Result.UNSUPPORTED
@@ -113,9 +105,9 @@ class ArduPilotCommands(CommandHandlers):
             self.hooks.announce(_WARNING, f"Unknown mavlink coordinate frame {command.frame}")
             return Result.DENIED
         unset = not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z))
-        if unset or not on_earth(command):
+        if unset or not handlers.on_earth(command):
             return Result.DENIED
-        change = flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+        change = handlers.flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if not change and self.commander.mode is not FlightMode.GUIDED:
             return self.reposition_denied
         north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
@@ -128,35 +120,35 @@ class ArduPilotCommands(CommandHandlers):
         )
         return Result.ACCEPTED if verdict.accepted else Result.FAILED
 
-    def radius_of(self, command: Command) -> float:
+    def radius_of(self, command: handlers.Command) -> float:
         """Radius of DO_REPOSITION's circle, positive clockwise; NaN: there is none."""
         return math.nan
 
     @abstractmethod
-    def change_speed(self, command: Command, source: Source) -> Result:
+    def change_speed(self, command: handlers.Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed."""
 
-    def start_mission(self, command: Command, source: Source) -> Result:
+    def start_mission(self, command: handlers.Command, source: Source) -> Result:
         """MISSION_START: whole missions only."""
-        if (whole(command.p1, 0) or 0) != 0 or (whole(command.p2, 0) or 0) != 0:
+        if (handlers.whole(command.p1, 0) or 0) != 0 or (handlers.whole(command.p2, 0) or 0) != 0:
             return Result.DENIED
         return self.commander.guidance.start_mission().result
 
-    def set_mission_current(self, command: Command, source: Source) -> Result:
+    def set_mission_current(self, command: handlers.Command, source: Source) -> Result:
         """DO_SET_MISSION_CURRENT: p1 item."""
-        item = whole(command.p1)
+        item = handlers.whole(command.p1)
         if item is None or not 0 <= item < self.hooks.mission_item_count():
             return Result.DENIED
         return Result.ACCEPTED if self.hooks.set_current_item(item) else Result.FAILED
 
-    def set_home(self, command: Command, source: Source) -> Result:
+    def set_home(self, command: handlers.Command, source: Source) -> Result:
         """DO_SET_HOME: p1 = 1, or no position given: the current position."""
         nowhere = command.x == 0.0 and command.y == 0.0
         if command.p1 == 1.0 or nowhere:
             return Result.ACCEPTED if self.commander.set_home_here() else Result.FAILED
         if not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z)):
             return Result.DENIED
-        if not on_earth(command):
+        if not handlers.on_earth(command):
             return Result.DENIED
         altitude_m = command.z
         home = self.commander.home.position
@@ -165,25 +157,25 @@ class ArduPilotCommands(CommandHandlers):
         placed = self.commander.home.command(command.x, command.y, altitude_m)
         return Result.ACCEPTED if placed else Result.FAILED
 
-    def terminate(self, command: Command, source: Source) -> Result:
+    def terminate(self, command: handlers.Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors permanently."""
         if not command.p1 > 0.5:
             return Result.FAILED
         self.commander.terminate()
         return Result.ACCEPTED
 
-    def set_servo(self, command: Command, source: Source) -> Result:
+    def set_servo(self, command: handlers.Command, source: Source) -> Result:
         """DO_SET_SERVO: outputs without a function can be set (and drive nothing here)."""
-        channel = whole(command.p1)
+        channel = handlers.whole(command.p1)
         if channel is None or not _FIRST_FREE_SERVO <= channel <= _SERVO_CHANNELS:
             return Result.FAILED
         return Result.ACCEPTED
 
-    def send_banner(self, command: Command, source: Source) -> Result:
+    def send_banner(self, command: handlers.Command, source: Source) -> Result:
         """DO_SEND_BANNER: send the texts of the firmware's version on the requesting channel."""
         self.hooks.banner(source.channel)
         return Result.ACCEPTED
 
-    def fail(self, command: Command, source: Source) -> Result:
+    def fail(self, command: handlers.Command, source: Source) -> Result:
         """FAILED: the vehicle has no such device."""
         return Result.FAILED

@@ -7,24 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.services.channel import MavlinkMessage
-from autopilot_bridge.services.inputs.setpoint_frames import (
-    ATTITUDE_BIT,
-    FORCE_BIT,
-    POSITION_BITS,
-    THROTTLE_BIT,
-    UNSET,
-    Target,
-    Triple,
-    acceleration_of,
-    heading_of,
-    local_from_global,
-    position_of,
-    rates_of,
-    rotated_by_heading,
-    unit_quaternion,
-    velocity_of,
-    yaw_of,
-)
+from autopilot_bridge.services.inputs import setpoints as wire
 
 _GLOBAL_FRAMES: Final = {
     mavlink.MAV_FRAME_GLOBAL_INT: False,
@@ -42,15 +25,15 @@ class Px4Setpoints:
     def on_local(self, message: MavlinkMessage, time_us: int) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         mask = message.type_mask
-        position = position_of((message.x, message.y, message.z), mask)
-        velocity = velocity_of((message.vx, message.vy, message.vz), mask)
-        acceleration = acceleration_of((message.afx, message.afy, message.afz), mask)
+        position = wire.position_of((message.x, message.y, message.z), mask)
+        velocity = wire.velocity_of((message.vx, message.vy, message.vz), mask)
+        acceleration = wire.acceleration_of((message.afx, message.afy, message.afz), mask)
         if message.coordinate_frame == mavlink.MAV_FRAME_BODY_NED:
-            if any(not mask & bit for bit in POSITION_BITS):
+            if any(not mask & bit for bit in wire.POSITION_BITS):
                 return
-            heading = heading_of(self.commander.context)
-            velocity = rotated_by_heading(velocity, heading)
-            acceleration = rotated_by_heading(acceleration, heading)
+            heading = wire.heading_of(self.commander.context)
+            velocity = wire.rotated_by_heading(velocity, heading)
+            acceleration = wire.rotated_by_heading(acceleration, heading)
         elif message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
             return
         self._take(message, position, velocity, acceleration, time_us)
@@ -61,25 +44,30 @@ class Px4Setpoints:
         relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
         if relative is None:
             return
-        position = UNSET
-        if not all(mask & bit for bit in POSITION_BITS):
-            place = local_from_global(
+        position = wire.UNSET
+        if not all(mask & bit for bit in wire.POSITION_BITS):
+            place = wire.local_from_global(
                 self.commander.context, message.lat_int, message.lon_int, message.alt, relative=relative
             )
             if place is None:
                 return
-            position = position_of(place, mask)
-        velocity = velocity_of((message.vx, message.vy, message.vz), mask)
-        acceleration = acceleration_of((message.afx, message.afy, message.afz), mask)
+            position = wire.position_of(place, mask)
+        velocity = wire.velocity_of((message.vx, message.vy, message.vz), mask)
+        acceleration = wire.acceleration_of((message.afx, message.afy, message.afz), mask)
         self._take(message, position, velocity, acceleration, time_us)
 
     def _take(
-        self, message: MavlinkMessage, position: Triple, velocity: Triple, acceleration: Triple, time_us: int
+        self,
+        message: MavlinkMessage,
+        position: wire.Triple,
+        velocity: wire.Triple,
+        acceleration: wire.Triple,
+        time_us: int,
     ) -> None:
-        if message.type_mask & FORCE_BIT:
+        if message.type_mask & wire.FORCE_BIT:
             return
-        target = Target(
-            position, velocity, acceleration, *yaw_of(message.yaw, message.yaw_rate, message.type_mask)
+        target = wire.Target(
+            position, velocity, acceleration, *wire.yaw_of(message.yaw, message.yaw_rate, message.type_mask)
         )
         if not (target.has_position or target.has_velocity or target.has_acceleration):
             return
@@ -91,13 +79,13 @@ class Px4Setpoints:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         thrust = message.thrust
-        if mask & THROTTLE_BIT or not math.isfinite(thrust):
+        if mask & wire.THROTTLE_BIT or not math.isfinite(thrust):
             return
         thrust = min(1.0, max(0.0, thrust))
-        rates = rates_of(message)
+        rates = wire.rates_of(message)
         stream = self.commander.setpoints
-        if not mask & ATTITUDE_BIT:
-            q = unit_quaternion(list(message.q), tolerance=0.1)
+        if not mask & wire.ATTITUDE_BIT:
+            q = wire.unit_quaternion(list(message.q), tolerance=0.1)
             if q is None:
                 return
             stream.offboard.set_attitude(q, thrust, rates)

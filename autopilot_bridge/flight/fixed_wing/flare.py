@@ -3,7 +3,7 @@
 The flare is a path in height over the distance to go: from the slope's sink to that of the touch, falling
 linearly with the height. Height errors are flown out along it, so that turbulence moves the touch little;
 without a position the sink follows the height alone. The pitch has nothing to do with the airspeed here
-(`control.fixed_wing.vertical_speed`), so the throttle holds it until the wheels touch: with the throttle
+(`control.fixed_wing.vertical`), so the throttle holds it until the wheels touch: with the throttle
 closed a head wind that dies at the last moment would let the aircraft fall. Which airspeed counts, in a wind
 that fades towards the ground, is in `surface_wind`.
 """
@@ -11,9 +11,8 @@ that fades towards the ground, is in `surface_wind`.
 import math
 
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 
 

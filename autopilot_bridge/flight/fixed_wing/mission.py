@@ -6,42 +6,33 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.control.fixed_wing import setpoint as sp
+from autopilot_bridge.flight import plan_reading as plans
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing.base import GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle_item import CircleItem
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.descend import PositionLost
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.leg import Leg, Place
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffTask
 from autopilot_bridge.flight.heading import turn_angle
-from autopilot_bridge.flight.plan_reading import (
-    JUMPS,
-    PX4_PLANS,
-    Command,
-    PlanRules,
-    is_navigation,
-    is_waypoint,
-    target_of,
-)
 from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus, clear_setpoint
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 _CIRCLES: Final = frozenset(
     {
-        Command.NAV_LOITER_UNLIM,
-        Command.NAV_LOITER_TURNS,
-        Command.NAV_LOITER_TIME,
-        Command.NAV_LOITER_TO_ALT,
+        plans.Command.NAV_LOITER_UNLIM,
+        plans.Command.NAV_LOITER_TURNS,
+        plans.Command.NAV_LOITER_TIME,
+        plans.Command.NAV_LOITER_TO_ALT,
     }
 )
-_TAKEOFFS: Final = frozenset({Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF})
-_LANDINGS: Final = frozenset({Command.NAV_LAND, Command.NAV_VTOL_LAND})
+_TAKEOFFS: Final = frozenset({plans.Command.NAV_TAKEOFF, plans.Command.NAV_VTOL_TAKEOFF})
+_LANDINGS: Final = frozenset({plans.Command.NAV_LAND, plans.Command.NAV_VTOL_LAND})
 _MISSED_RADII: Final = 2.0  # a waypoint passed within so many acceptance radii is taken as reached
 
 
@@ -57,7 +48,9 @@ class MissionTask(PlanTask):
         rules: how the firmware goes through a plan.
     """
 
-    def __init__(self, store: MissionStore, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
+    def __init__(
+        self, store: MissionStore, first_item: int = 0, rules: plans.PlanRules = plans.PX4_PLANS
+    ) -> None:
         super().__init__(store, first_item=first_item, rules=rules)
         self._state = AircraftState()
         self._command = FlightCommand()
@@ -126,7 +119,7 @@ class MissionTask(PlanTask):
 
     def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         command, p = item.command, ctx.fixed_wing
-        target = target_of(item, ctx)
+        target = plans.target_of(item, ctx)
         if target is None:
             return False
         if command in _TAKEOFFS:
@@ -140,7 +133,7 @@ class MissionTask(PlanTask):
         elif command in _CIRCLES:
             self._circle = CircleItem(item, target, self._airspeed_m_s, p)
             self._set_sub(ctx, self._circle.task)
-        elif command == Command.NAV_CONTINUE_AND_CHANGE_ALT:
+        elif command == plans.Command.NAV_CONTINUE_AND_CHANGE_ALT:
             self._track = Line()
             self._track.begin(self._state, self._state.course_rad)
             self._track_down_m = float(target[2])
@@ -153,17 +146,17 @@ class MissionTask(PlanTask):
     def _place_before(self, ctx: FlightContext) -> Array | None:
         """Place of the last waypoint or circle before the current item."""
         for item in reversed(self._store.items[self._first_item : self._seq]):
-            if is_waypoint(item) or item.command in _CIRCLES:
-                return target_of(item, ctx)
+            if plans.is_waypoint(item) or item.command in _CIRCLES:
+                return plans.target_of(item, ctx)
         return None
 
     def _place_after(self, ctx: FlightContext) -> Array | None:
         """Place of the next item that has one; None when there is none, or a jump before it."""
         for item in self._store.items[self._seq + 1 :]:
-            if is_navigation(item):
-                has = is_waypoint(item) or item.command in _CIRCLES or item.command in _LANDINGS
-                return target_of(item, ctx) if has else None
-            if item.command in JUMPS:
+            if plans.is_navigation(item):
+                has = plans.is_waypoint(item) or item.command in _CIRCLES or item.command in _LANDINGS
+                return plans.target_of(item, ctx) if has else None
+            if item.command in plans.JUMPS:
                 return None
         return None
 
@@ -257,7 +250,7 @@ class MissionTask(PlanTask):
         if passed and away > max(near, _MISSED_RADII * leg.radius_m) and not leg.too_short:
             leg.start_again(state)
         elif self._hold_s > 0.0:
-            wait = MissionItem(command=Command.NAV_LOITER_TIME, param1=self._hold_s)
+            wait = MissionItem(command=plans.Command.NAV_LOITER_TIME, param1=self._hold_s)
             self._circle = CircleItem(wait, np.array(leg.target), self._airspeed_m_s, p)
             self._set_sub(ctx, self._circle.task)
         elif abs(state.down_m - leg.target[2]) < p.acceptance_altitude_m:

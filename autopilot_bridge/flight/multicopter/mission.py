@@ -7,30 +7,20 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.flight import plan_reading as plans
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.heading import Point, Turn
 from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_in_distance
-from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
 from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.spline import SplineCurve, SplineFlight
-from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp, TakeoffTask
 from autopilot_bridge.flight.multicopter.trajectory import SPEED
 from autopilot_bridge.flight.multicopter.yaw import Nose
 from autopilot_bridge.flight.parameters import YawBehaviour
-from autopilot_bridge.flight.plan_reading import (
-    JUMPS,
-    PX4_PLANS,
-    Command,
-    PlanRules,
-    is_navigation,
-    is_passed_through,
-    is_waypoint,
-    target_of,
-)
 from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.region_of_interest import heading_to
 from autopilot_bridge.flight.surroundings_parameters import Precision
@@ -76,7 +66,9 @@ class MissionTask(PlanTask):
         rules: how the firmware flies a plan.
     """
 
-    def __init__(self, store: MissionStore, *, first_item: int = 0, rules: PlanRules = PX4_PLANS) -> None:
+    def __init__(
+        self, store: MissionStore, *, first_item: int = 0, rules: plans.PlanRules = plans.PX4_PLANS
+    ) -> None:
         super().__init__(store, first_item=first_item, rules=rules)
         self._leg: _Leg | None = None
         self._motion: SmoothMotion | None = None
@@ -116,21 +108,21 @@ class MissionTask(PlanTask):
     def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         """Begin an item that is flown; False when there is nothing to fly."""
         command = item.command
-        target = target_of(item, ctx)
+        target = plans.target_of(item, ctx)
         if target is None:
             return False
         self._turning = None  # CONDITION_YAW lasts until the next position
-        if command in (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF):
+        if command in (plans.Command.NAV_TAKEOFF, plans.Command.NAV_VTOL_TAKEOFF):
             base = float(ctx.home_ned_m[2])
             base = float(ctx.nav[nav_layout.POS_NED_M][2]) if math.isnan(base) else base
             self._set_sub(ctx, TakeoffTask(base - float(target[2])))
             return True
-        if command in (Command.NAV_LAND, Command.NAV_VTOL_LAND):
+        if command in (plans.Command.NAV_LAND, plans.Command.NAV_VTOL_LAND):
             precision = int(item.param2) if item.param2 in tuple(Precision) else Precision.NONE
             yaw_rad = self._item_yaw(ctx, item)
             self._set_sub(ctx, landing_task(ctx, target, yaw_rad, precision=Precision(precision)))
             return True
-        if command == Command.NAV_LOITER_TURNS:
+        if command == plans.Command.NAV_LOITER_TURNS:
             turns = item.param1 if math.isfinite(item.param1) and item.param1 > 0.0 else 1.0
             radius = item.param3 if math.isfinite(item.param3) else 0.0
             speed = self._speed_m_s or ctx.multicopter.orbit_speed_m_s
@@ -163,7 +155,7 @@ class MissionTask(PlanTask):
     def _radius(self, ctx: FlightContext, item: MissionItem) -> float:
         """Acceptance radius of a waypoint."""
         own = item.param2 if math.isfinite(item.param2) and self._rules.item_radius else 0.0
-        return own if own > 0.0 and is_waypoint(item) else ctx.multicopter.acceptance_radius_m
+        return own if own > 0.0 and plans.is_waypoint(item) else ctx.multicopter.acceptance_radius_m
 
     def _cruise(self, ctx: FlightContext) -> float:
         return min(self._speed_m_s or ctx.multicopter.cruise_speed_m_s, ctx.multicopter.max_speed_m_s)
@@ -177,9 +169,9 @@ class MissionTask(PlanTask):
             return False
         radius = self._radius(ctx, item)
         hold_s = 0.0
-        if is_waypoint(item) or item.command == Command.NAV_LOITER_TIME:
+        if plans.is_waypoint(item) or item.command == plans.Command.NAV_LOITER_TIME:
             hold_s = item.param1 if math.isfinite(item.param1) else 0.0
-        elif item.command == Command.NAV_LOITER_UNLIM:
+        elif item.command == plans.Command.NAV_LOITER_UNLIM:
             hold_s = math.inf
         yaw = self._item_yaw(ctx, item)
         if self._sub is not None or came_from is None:
@@ -187,7 +179,7 @@ class MissionTask(PlanTask):
         motion.trajectory.limits[SPEED] = self._cruise(ctx)
         start = motion.trajectory.position_ned_m if came_from is None else came_from
         leg = _Leg(start.copy(), target, radius, math.nan if yaw is None else yaw, 0.0, 0.0, hold_s)
-        if item.command == Command.NAV_SPLINE_WAYPOINT:
+        if item.command == plans.Command.NAV_SPLINE_WAYPOINT:
             velocity = motion.trajectory.velocity_ned_m_s
             curve = self._curve(ctx, self._seq, motion.trajectory.position_ned_m, velocity)
             leg.spline = SplineFlight(curve, float(np.linalg.norm(velocity)), ctx.multicopter)
@@ -209,7 +201,7 @@ class MissionTask(PlanTask):
             ends: as if the plan ended there (the look-ahead stops there).
         """
         items = self._store.items
-        target = target_of(items[seq], ctx)
+        target = plans.target_of(items[seq], ctx)
         assert target is not None  # checked by the caller
         speed = self._cruise(ctx)
         distance = float(np.linalg.norm(target - start))
@@ -217,9 +209,9 @@ class MissionTask(PlanTask):
         first = velocity * (distance / moving) if moving > 0.1 else np.zeros(3)
         last, end_speed = np.zeros(3), 0.0
         after = None if ends else self._next_place(ctx, seq)
-        if after is not None and is_passed_through(items[seq]):
+        if after is not None and plans.is_passed_through(items[seq]):
             following, place = after
-            if items[following].command == Command.NAV_SPLINE_WAYPOINT:
+            if items[following].command == plans.Command.NAV_SPLINE_WAYPOINT:
                 last = place - start
                 heading = last * (speed / max(float(np.linalg.norm(last)), 0.1))
                 end_speed = self._curve(ctx, following, target, heading, ends=True).entry_speed_m_s
@@ -239,10 +231,10 @@ class MissionTask(PlanTask):
         """The waypoint flown after an item, if it follows without a jump or a wait."""
         for later in range(seq + 1, len(self._store.items)):
             item = self._store.items[later]
-            if is_navigation(item):
-                place = target_of(item, ctx) if is_waypoint(item) else None
+            if plans.is_navigation(item):
+                place = plans.target_of(item, ctx) if plans.is_waypoint(item) else None
                 return None if place is None else (later, place)
-            if item.command in JUMPS:
+            if item.command in plans.JUMPS:
                 return None
         return None
 
@@ -250,26 +242,26 @@ class MissionTask(PlanTask):
         self, ctx: FlightContext, seq: int, start: Array, target: Array, radius: float
     ) -> tuple[float, float]:
         """(speed at which the waypoint may be passed, distance before it at which the turn begins)."""
-        if not is_passed_through(self._store.items[seq]):
+        if not plans.is_passed_through(self._store.items[seq]):
             return 0.0, 0.0
         path: list[Point] = [_point(start), _point(target)]
         radii = [radius, radius]
         length_m = 0.0
         for number, later in enumerate(self._store.items[seq + 1 : seq + 1 + _LOOK_AHEAD_ITEMS], seq + 1):
-            if not is_navigation(later):
-                if later.command in JUMPS:
+            if not plans.is_navigation(later):
+                if later.command in plans.JUMPS:
                     break
                 continue
-            if later.command == Command.NAV_SPLINE_WAYPOINT and len(path) == 2:
+            if later.command == plans.Command.NAV_SPLINE_WAYPOINT and len(path) == 2:
                 return self._into_spline(ctx, number, start, target)
-            place = target_of(later, ctx) if is_waypoint(later) else None
+            place = plans.target_of(later, ctx) if plans.is_waypoint(later) else None
             if place is None:
                 break
             path.append(_point(place))
             radii.append(self._radius(ctx, later))
             length_m += math.dist(path[-2], path[-1])
-            curved = later.command == Command.NAV_SPLINE_WAYPOINT
-            if curved or not is_passed_through(later) or length_m > _LOOK_AHEAD_M:
+            curved = later.command == plans.Command.NAV_SPLINE_WAYPOINT
+            if curved or not plans.is_passed_through(later) or length_m > _LOOK_AHEAD_M:
                 break
         speed = min(passing_speed(path, radii, ctx.multicopter), ctx.multicopter.max_speed_m_s)
         if speed <= 0.0:
@@ -281,7 +273,7 @@ class MissionTask(PlanTask):
         """Speed at the end of a straight leg before a curve; no turn begins before it."""
         leg = target - start
         length = float(np.linalg.norm(leg))
-        if target_of(self._store.items[seq], ctx) is None or length < _SAME_PLACE_M:
+        if plans.target_of(self._store.items[seq], ctx) is None or length < _SAME_PLACE_M:
             return 0.0, 0.0
         curve = self._curve(ctx, seq, target, leg * (self._cruise(ctx) / length), ends=True)
         return min(self._cruise(ctx), curve.entry_speed_m_s), 0.0

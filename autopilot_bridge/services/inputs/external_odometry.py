@@ -17,14 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.navigation.external import (
-    POSITION_M,
-    Q_LOCAL_FROM_FRD,
-    SAMPLE_SIZE,
-    VELOCITY_M_S,
-    ExternalFrame,
-    ExternalSample,
-)
+from autopilot_bridge.navigation import external as external
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
@@ -46,22 +39,22 @@ _NED_FROM_ENU: Final = (0.0, _HALF, _HALF, 0.0)
 _FRD_FROM_FLU: Final = (0.0, 1.0, 0.0, 0.0)
 _SAME: Final = (1.0, 0.0, 0.0, 0.0)
 
-POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] = {
-    mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME, _SAME),
-    mavlink.MAV_FRAME_LOCAL_ENU: (ExternalFrame.NED, _NED_FROM_ENU, _FRD_FROM_FLU),
-    mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME, _SAME),
-    mavlink.MAV_FRAME_LOCAL_FLU: (ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU, _FRD_FROM_FLU),
+POSE_FRAMES: Final[Mapping[int, tuple[external.ExternalFrame, Quaternion, Quaternion]]] = {
+    mavlink.MAV_FRAME_LOCAL_NED: (external.ExternalFrame.NED, _SAME, _SAME),
+    mavlink.MAV_FRAME_LOCAL_ENU: (external.ExternalFrame.NED, _NED_FROM_ENU, _FRD_FROM_FLU),
+    mavlink.MAV_FRAME_LOCAL_FRD: (external.ExternalFrame.LOCAL_FRD, _SAME, _SAME),
+    mavlink.MAV_FRAME_LOCAL_FLU: (external.ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU, _FRD_FROM_FLU),
 }
 """By ODOMETRY.frame_id: our frame, our axes from the message's axes, and our body axes from the message's."""
 
-VELOCITY_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion]]] = {
-    mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME),
-    mavlink.MAV_FRAME_LOCAL_ENU: (ExternalFrame.NED, _NED_FROM_ENU),
-    mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME),
-    mavlink.MAV_FRAME_LOCAL_FLU: (ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU),
-    mavlink.MAV_FRAME_BODY_NED: (ExternalFrame.BODY_FRD, _SAME),
-    mavlink.MAV_FRAME_BODY_FRD: (ExternalFrame.BODY_FRD, _SAME),
-    mavlink.MAV_FRAME_BODY_OFFSET_NED: (ExternalFrame.BODY_FRD, _SAME),
+VELOCITY_FRAMES: Final[Mapping[int, tuple[external.ExternalFrame, Quaternion]]] = {
+    mavlink.MAV_FRAME_LOCAL_NED: (external.ExternalFrame.NED, _SAME),
+    mavlink.MAV_FRAME_LOCAL_ENU: (external.ExternalFrame.NED, _NED_FROM_ENU),
+    mavlink.MAV_FRAME_LOCAL_FRD: (external.ExternalFrame.LOCAL_FRD, _SAME),
+    mavlink.MAV_FRAME_LOCAL_FLU: (external.ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU),
+    mavlink.MAV_FRAME_BODY_NED: (external.ExternalFrame.BODY_FRD, _SAME),
+    mavlink.MAV_FRAME_BODY_FRD: (external.ExternalFrame.BODY_FRD, _SAME),
+    mavlink.MAV_FRAME_BODY_OFFSET_NED: (external.ExternalFrame.BODY_FRD, _SAME),
 }
 """The same by ODOMETRY.child_frame_id."""
 
@@ -82,7 +75,7 @@ class ExternalPolicy:
     pose_frames: frozenset[int]
     velocity_frames: frozenset[int]
     enabled: Callable[[ParameterStore], bool]
-    local_frame: Callable[[ParameterStore], ExternalFrame]
+    local_frame: Callable[[ParameterStore], external.ExternalFrame]
     one_frame: bool
 
 
@@ -143,7 +136,7 @@ class ExternalOdometryService(Microservice):
 
     # messages
 
-    def _odometry(self, message: MavlinkMessage, time_us: int) -> ExternalSample | None:
+    def _odometry(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample | None:
         """ODOMETRY (331)."""
         policy = self._policy
         pose, twist = int(message.frame_id), int(message.child_frame_id)
@@ -151,11 +144,11 @@ class ExternalOdometryService(Microservice):
             return None
         frame, local, body = POSE_FRAMES[pose]
         velocity_frame, velocity_local = VELOCITY_FRAMES[twist]
-        values = np.full(SAMPLE_SIZE, math.nan)
-        values[POSITION_M] = _rotated(local, (message.x, message.y, message.z))
-        values[Q_LOCAL_FROM_FRD] = _changed(local, message.q, body)
-        values[VELOCITY_M_S] = _rotated(velocity_local, (message.vx, message.vy, message.vz))
-        return ExternalSample(
+        values = np.full(external.SAMPLE_SIZE, math.nan)
+        values[external.POSITION_M] = _rotated(local, (message.x, message.y, message.z))
+        values[external.Q_LOCAL_FROM_FRD] = _changed(local, message.q, body)
+        values[external.VELOCITY_M_S] = _rotated(velocity_local, (message.vx, message.vy, message.vz))
+        return external.ExternalSample(
             time_us=in_vehicle_time(int(message.time_usec), time_us),
             values=values,
             frame=policy.local_frame(self._parameters) if policy.one_frame else frame,
@@ -167,13 +160,13 @@ class ExternalOdometryService(Microservice):
             quality=int(message.quality),
         )
 
-    def _pose(self, message: MavlinkMessage, time_us: int) -> ExternalSample:
+    def _pose(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample:
         """VISION_POSITION_ESTIMATE (102), GLOBAL_VISION_POSITION_ESTIMATE (101), VICON_... (104)."""
-        values = np.full(SAMPLE_SIZE, math.nan)
-        values[POSITION_M] = (message.x, message.y, message.z)
+        values = np.full(external.SAMPLE_SIZE, math.nan)
+        values[external.POSITION_M] = (message.x, message.y, message.z)
         angles = (message.roll, message.pitch, message.yaw)
         if all(abs(angle) < 100.0 for angle in angles):
-            values[Q_LOCAL_FROM_FRD] = from_euler(*angles)
+            values[external.Q_LOCAL_FROM_FRD] = from_euler(*angles)
         return self._local(
             values,
             in_vehicle_time(int(message.usec), time_us),
@@ -182,11 +175,11 @@ class ExternalOdometryService(Microservice):
             int(getattr(message, "reset_counter", 0)),
         )
 
-    def _mocap(self, message: MavlinkMessage, time_us: int) -> ExternalSample:
+    def _mocap(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample:
         """ATT_POS_MOCAP (138)."""
-        values = np.full(SAMPLE_SIZE, math.nan)
-        values[POSITION_M] = (message.x, message.y, message.z)
-        values[Q_LOCAL_FROM_FRD] = message.q
+        values = np.full(external.SAMPLE_SIZE, math.nan)
+        values[external.POSITION_M] = (message.x, message.y, message.z)
+        values[external.Q_LOCAL_FROM_FRD] = message.q
         return self._local(
             values,
             in_vehicle_time(int(message.time_usec), time_us),
@@ -195,12 +188,12 @@ class ExternalOdometryService(Microservice):
             0,
         )
 
-    def _speed(self, message: MavlinkMessage, time_us: int) -> ExternalSample:
+    def _speed(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample:
         """VISION_SPEED_ESTIMATE (103)."""
         frame = self._policy.local_frame(self._parameters)
-        values = np.full(SAMPLE_SIZE, math.nan)
-        values[VELOCITY_M_S] = (message.x, message.y, message.z)
-        return ExternalSample(
+        values = np.full(external.SAMPLE_SIZE, math.nan)
+        values[external.VELOCITY_M_S] = (message.x, message.y, message.z)
+        return external.ExternalSample(
             time_us=in_vehicle_time(int(message.usec), time_us),
             values=values,
             frame=frame,
@@ -218,9 +211,9 @@ class ExternalOdometryService(Microservice):
         position_variance_m2: tuple[float, float, float],
         yaw_variance_rad2: float,
         reset_counter: int,
-    ) -> ExternalSample:
+    ) -> external.ExternalSample:
         frame = self._policy.local_frame(self._parameters)
-        return ExternalSample(
+        return external.ExternalSample(
             time_us=time_us,
             values=values,
             frame=frame,
@@ -232,7 +225,7 @@ class ExternalOdometryService(Microservice):
         )
 
 
-_Reader = Callable[[ExternalOdometryService, MavlinkMessage, int], ExternalSample | None]
+_Reader = Callable[[ExternalOdometryService, MavlinkMessage, int], external.ExternalSample | None]
 _READERS: Final[Mapping[int, _Reader]] = {
     mavlink.MAVLINK_MSG_ID_ODOMETRY: ExternalOdometryService._odometry,
     mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: ExternalOdometryService._pose,

@@ -9,27 +9,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
 from autopilot_bridge.services.channel import MavlinkMessage
-from autopilot_bridge.services.inputs.setpoint_frames import (
-    ACCELERATION_BITS,
-    ATTITUDE_BIT,
-    FORCE_BIT,
-    POSITION_BITS,
-    THROTTLE_BIT,
-    UNSET,
-    VELOCITY_BITS,
-    Target,
-    Triple,
-    acceleration_of,
-    heading_of,
-    local_from_global,
-    place_of,
-    position_of,
-    rates_of,
-    rotated_by_heading,
-    unit_quaternion,
-    velocity_of,
-    yaw_of,
-)
+from autopilot_bridge.services.inputs import setpoints as wire
 
 _GLOBAL_FRAMES: Final = {
     mavlink.MAV_FRAME_GLOBAL_INT: False,
@@ -59,24 +39,24 @@ class ArduCopterSetpoints:
         if frame != mavlink.MAV_FRAME_LOCAL_NED and frame not in _OFFSET_FRAMES:
             guided.set_hold(context)
             return
-        position = _whole(POSITION_BITS, mask, position_of((message.x, message.y, message.z), 0))
-        velocity = _whole(VELOCITY_BITS, mask, velocity_of((message.vx, message.vy, message.vz), 0))
+        position = _whole(wire.POSITION_BITS, mask, wire.position_of((message.x, message.y, message.z), 0))
+        velocity = _whole(wire.VELOCITY_BITS, mask, wire.velocity_of((message.vx, message.vy, message.vz), 0))
         acceleration = _whole(
-            ACCELERATION_BITS, mask, acceleration_of((message.afx, message.afy, message.afz), 0)
+            wire.ACCELERATION_BITS, mask, wire.acceleration_of((message.afx, message.afy, message.afz), 0)
         )
         if position is None or velocity is None or acceleration is None:
             return
-        yaw, yaw_rate = yaw_of(message.yaw, message.yaw_rate, mask)
+        yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
         if frame in _BODY_FRAMES:
-            heading = heading_of(context)
-            position = rotated_by_heading(position, heading)
-            velocity = rotated_by_heading(velocity, heading)
-            acceleration = rotated_by_heading(acceleration, heading)
+            heading = wire.heading_of(context)
+            position = wire.rotated_by_heading(position, heading)
+            velocity = wire.rotated_by_heading(velocity, heading)
+            acceleration = wire.rotated_by_heading(acceleration, heading)
             yaw += heading if frame == mavlink.MAV_FRAME_BODY_OFFSET_NED else 0.0
         if frame in _OFFSET_FRAMES:
-            north_m, east_m, down_m = place_of(context)
+            north_m, east_m, down_m = wire.place_of(context)
             position = (position[0] + north_m, position[1] + east_m, position[2] + down_m)
-        self._follow(guided, Target(position, velocity, acceleration, yaw, yaw_rate), mask)
+        self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate), mask)
 
     def on_global(self, message: MavlinkMessage, time_us: int) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
@@ -88,24 +68,24 @@ class ArduCopterSetpoints:
         if relative is None:
             guided.set_hold(context)
             return
-        position: Triple | None = UNSET
-        if not any(mask & bit for bit in POSITION_BITS):
-            position = local_from_global(
+        position: wire.Triple | None = wire.UNSET
+        if not any(mask & bit for bit in wire.POSITION_BITS):
+            position = wire.local_from_global(
                 context, message.lat_int, message.lon_int, message.alt, relative=relative
             )
-        velocity = _whole(VELOCITY_BITS, mask, velocity_of((message.vx, message.vy, message.vz), 0))
+        velocity = _whole(wire.VELOCITY_BITS, mask, wire.velocity_of((message.vx, message.vy, message.vz), 0))
         acceleration = _whole(
-            ACCELERATION_BITS, mask, acceleration_of((message.afx, message.afy, message.afz), 0)
+            wire.ACCELERATION_BITS, mask, wire.acceleration_of((message.afx, message.afy, message.afz), 0)
         )
         if position is None or velocity is None or acceleration is None:
             return
-        yaw, yaw_rate = yaw_of(message.yaw, message.yaw_rate, mask)
-        self._follow(guided, Target(position, velocity, acceleration, yaw, yaw_rate), mask)
+        yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
+        self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate), mask)
 
-    def _follow(self, guided: GuidedTask, target: Target, type_mask: int) -> None:
+    def _follow(self, guided: GuidedTask, target: wire.Target, type_mask: int) -> None:
         context = self.commander.context
         yaw, yaw_rate = target.yaw_rad, target.yaw_rate_rad_s
-        if type_mask & FORCE_BIT:
+        if type_mask & wire.FORCE_BIT:
             guided.set_hold(context)
         elif target.has_position and target.has_velocity:
             guided.set_trajectory(
@@ -135,19 +115,19 @@ class ArduCopterSetpoints:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         guided = self._guided()
-        if guided is None or mask & THROTTLE_BIT or not math.isfinite(message.thrust):
+        if guided is None or mask & wire.THROTTLE_BIT or not math.isfinite(message.thrust):
             return
-        if mask & ATTITUDE_BIT:
+        if mask & wire.ATTITUDE_BIT:
             return  # body rates alone are not flown here
-        q = unit_quaternion(list(message.q), tolerance=0.01)
+        q = wire.unit_quaternion(list(message.q), tolerance=0.01)
         if q is None:
             return
-        rates = rates_of(message)
+        rates = wire.rates_of(message)
         guided.set_attitude(
             self.commander.context,
             q,
             min(1.0, max(0.0, message.thrust)),
-            rates if all(math.isfinite(rate) for rate in rates) else UNSET,
+            rates if all(math.isfinite(rate) for rate in rates) else wire.UNSET,
             yaw_rate_rad_s=rates[2],
         )
 
@@ -158,8 +138,10 @@ class ArduCopterSetpoints:
         return commander.guidance.guided()
 
 
-def _whole(bits: Triple | tuple[int, int, int], type_mask: int, values: Triple) -> Triple | None:
+def _whole(
+    bits: wire.Triple | tuple[int, int, int], type_mask: int, values: wire.Triple
+) -> wire.Triple | None:
     """A vector that is used whole: ignored when any of its bits is set; None when a component is invalid."""
     if any(type_mask & int(bit) for bit in bits):
-        return UNSET
+        return wire.UNSET
     return values if all(math.isfinite(value) for value in values) else None

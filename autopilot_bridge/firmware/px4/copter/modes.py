@@ -7,6 +7,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
+from autopilot_bridge.firmware.data import by_member, load_data, modes
 from autopilot_bridge.firmware.flavour import ModeDisplay
 from autopilot_bridge.services.commands.available_modes import ListedMode
 
@@ -32,48 +33,13 @@ def custom_mode(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
-CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: custom_mode(MAIN_MANUAL),
-        FlightMode.ALTITUDE: custom_mode(MAIN_ALTITUDE),
-        FlightMode.POSITION: custom_mode(MAIN_POSITION),
-        FlightMode.ORBIT: custom_mode(MAIN_POSITION, 1),
-        FlightMode.POSITION_SLOW: custom_mode(MAIN_POSITION, 2),
-        FlightMode.TAKEOFF: custom_mode(MAIN_AUTO, 2),
-        FlightMode.HOLD: custom_mode(MAIN_AUTO, 3),
-        FlightMode.MISSION: custom_mode(MAIN_AUTO, 4),
-        FlightMode.RETURN: custom_mode(MAIN_AUTO, 5),
-        FlightMode.LAND: custom_mode(MAIN_AUTO, 6),
-        FlightMode.DESCEND: custom_mode(MAIN_AUTO, 6),  # shown as AUTO.LAND
-        FlightMode.FOLLOW: custom_mode(MAIN_AUTO, 8),
-        FlightMode.PRECISION_LAND: custom_mode(MAIN_AUTO, 9),
-        FlightMode.ACRO: custom_mode(MAIN_ACRO),
-        FlightMode.OFFBOARD: custom_mode(MAIN_OFFBOARD),
-        FlightMode.STABILIZED: custom_mode(MAIN_STABILIZED),
-        FlightMode.TERMINATION: custom_mode(MAIN_TERMINATION),
-    }
+_DATA: Final = load_data("px4.copter", "modes.toml")
+CUSTOM_MODES: Final[Mapping[FlightMode, int]] = by_member(
+    FlightMode, {name: custom_mode(mode["main"], mode["sub"]) for name, mode in _DATA["modes"].items()}
 )
 
-MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: "Manual",
-        FlightMode.ALTITUDE: "Altitude",
-        FlightMode.POSITION: "Position",
-        FlightMode.ORBIT: "Orbit",
-        FlightMode.POSITION_SLOW: "Position Slow",
-        FlightMode.TAKEOFF: "Takeoff",
-        FlightMode.HOLD: "Hold",
-        FlightMode.MISSION: "Mission",
-        FlightMode.RETURN: "Return",
-        FlightMode.LAND: "Land",
-        FlightMode.DESCEND: "Descend",
-        FlightMode.FOLLOW: "Follow Target",
-        FlightMode.PRECISION_LAND: "Precision Landing",
-        FlightMode.ACRO: "Acro",
-        FlightMode.OFFBOARD: "Offboard",
-        FlightMode.STABILIZED: "Stabilized",
-        FlightMode.TERMINATION: "Termination",
-    }
+MODE_NAMES: Final[Mapping[FlightMode, str]] = by_member(
+    FlightMode, {name: mode["name"] for name, mode in _DATA["modes"].items()}
 )
 
 _ADVANCED: Final = mavlink.MAV_MODE_PROPERTY_ADVANCED
@@ -110,25 +76,10 @@ LISTED_MODES: Final = (
 )
 """AVAILABLE_MODES of a multicopter, as PX4 1.16.1 sends it; the last eight are for external modes."""
 
-_AUTO_SUB_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
+_COMMANDED: Final[Mapping[tuple[int, int], FlightMode]] = MappingProxyType(
     {
-        0: FlightMode.MISSION,
-        2: FlightMode.TAKEOFF,
-        3: FlightMode.HOLD,
-        4: FlightMode.MISSION,
-        5: FlightMode.RETURN,
-        6: FlightMode.LAND,
-        8: FlightMode.FOLLOW,
-        9: FlightMode.PRECISION_LAND,
-    }
-)
-_MAIN_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
-    {
-        MAIN_MANUAL: FlightMode.MANUAL,
-        MAIN_ALTITUDE: FlightMode.ALTITUDE,
-        MAIN_ACRO: FlightMode.ACRO,
-        MAIN_OFFBOARD: FlightMode.OFFBOARD,
-        MAIN_STABILIZED: FlightMode.STABILIZED,
+        (_DATA["modes"][mode.name]["main"], _DATA["modes"][mode.name]["sub"]): mode
+        for mode in modes(_DATA["selectable"])
     }
 )
 
@@ -139,10 +90,10 @@ def commanded_mode(main: int, sub: int) -> FlightMode | None:
     Orbit is entered by DO_ORBIT only: its sub mode selects plain Position. Termination can't be commanded.
     """
     if main == MAIN_AUTO:
-        return _AUTO_SUB_MODES.get(sub)
+        return FlightMode.MISSION if sub == 0 else _COMMANDED.get((main, sub))
     if main == MAIN_POSITION:
         return FlightMode.POSITION_SLOW if sub == 2 else FlightMode.POSITION
-    return _MAIN_MODES.get(main)
+    return _COMMANDED.get((main, 0))
 
 
 def base_mode(display: ModeDisplay) -> int:
