@@ -180,7 +180,7 @@ def main() -> int:
     say(f"NumPy  {numpy_ms:8.3f} ms, {numpy_ms / kernel_ms:5.1f} times the kernel")
     say(f"largest relative difference of a weight: {off:.1e}")
 
-    flat = RangeBearingSensor(gain=0.9, forward_scale_m=1e12, right_scale_m=1e12, reach_m=1e6)
+    flat = RangeBearingSensor(gain=0.9, forward_scale_m=1e20, right_scale_m=1e20, reach_m=1e6)
     same = Problem(given.particles, 0, given.detections, flat)
     try:
         by_peer = stone_soup(same)

@@ -190,7 +190,9 @@ class GaussianPhd:
 
     def remove(self, cluster: Cluster) -> None:
         away = np.hypot(self.means[:, 0] - cluster.north_m, self.means[:, 1] - cluster.east_m)
-        kept = away > max(3.0 * cluster.width_m, 1e-9)
+        own = away <= max(3.0 * cluster.width_m, 1e-9)
+        self.weights[own] *= max(0.0, 1.0 - 1.0 / max(float(self.weights[own].sum()), 1e-9))
+        kept = self.weights >= self.parameters.least_weight
         self.weights, self.means, self.covariances = (
             self.weights[kept],
             self.means[kept],

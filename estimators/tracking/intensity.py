@@ -109,7 +109,9 @@ class TargetIntensity(Protocol):
         ...
 
     def remove(self, cluster: Cluster) -> None:
-        """Remove the part of the intensity that belongs to a cluster."""
+        """Take one target out of a cluster. Mass above 1 stays: it belongs to other targets at the same
+        place, and without it the expected number would be too small.
+        """
         ...
 
     def points(self) -> tuple[Array, Array, Array]:

@@ -200,8 +200,12 @@ class SmcPhd:
 
     def remove(self, cluster: Cluster) -> None:
         particles = self._particles
-        gone = inside(particles[NORTH], particles[EAST], cluster, self.parameters.cluster_radius_m)
-        self._particles = np.ascontiguousarray(particles[:, ~gone])
+        own = inside(particles[NORTH], particles[EAST], cluster, self.parameters.cluster_radius_m)
+        mass = float(particles[WEIGHT, own].sum())
+        if mass > 1.0:
+            particles[WEIGHT, own] *= 1.0 - 1.0 / mass
+        else:
+            self._particles = np.ascontiguousarray(particles[:, ~own])
 
     def points(self) -> tuple[Array, Array, Array]:
         return self._particles[NORTH], self._particles[EAST], self._particles[WEIGHT]

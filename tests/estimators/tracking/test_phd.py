@@ -160,5 +160,7 @@ def test_points_carry_the_mass_and_removal_takes_a_target_out(kind):
     assert float(north @ mass) / mass.sum() == pytest.approx(10.0 * (1.0 + math.cos(1.5)), abs=0.5)
     before, cluster = belief.expected_targets, belief.clusters()[0]
     belief.remove(cluster)
+    assert belief.expected_targets == pytest.approx(before - 1.0, abs=0.01)
+    belief.remove(cluster)  # the rest is less than one target
     assert belief.expected_targets == pytest.approx(before - cluster.mass, abs=0.01)
     assert cluster.mass > 1.0
