@@ -6,6 +6,7 @@ from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
+    from missions.embedded.survey_worlds import survey_world
     from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
     from missions.embedded.worlds import (
         CAMERA,
@@ -31,6 +32,7 @@ __all__ = [
     "multi_target_world",
     "occupancy_world",
     "orbit_world",
+    "survey_world",
     "terrain_targets_world",
 ]
 
@@ -44,6 +46,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
         **dict.fromkeys(("CAMERA", "MAGNETOMETER", "MotionKind", "carrying", "motion_of"), _WORLDS),
+        "survey_world": "missions.embedded.survey_worlds",
         **dict.fromkeys(("occupancy_world", "orbit_world"), _WORLDS),
     },
 )
