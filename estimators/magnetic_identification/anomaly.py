@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from estimators.magnetic_identification.classes import AnomalyClass, GaussianClass
 from estimators.magnetic_identification.hypotheses import (
+    Before,
     Control,
     DipoleHypothesis,
     GaussianHypothesis,
@@ -109,6 +110,7 @@ class Anomaly:
         threshold_nt: float,
         field_ned: Array,
         rng: np.random.Generator,
+        last: Sample | None = None,
     ) -> None:
         """Start every hypothesis with the first measurement beyond the threshold.
 
@@ -120,6 +122,7 @@ class Anomaly:
             threshold_nt: threshold that the measurement exceeds.
             field_ned: (3,) direction of the Earth's field.
             rng: random numbers of the filters.
+            last: the measurement before, by the same vehicle; None: there is none.
         """
         q = parameters
         self.number = number
@@ -153,8 +156,9 @@ class Anomaly:
             exact = replace(gaussian, amplitude_spread=0.0, size_spread=0.0)
             self._paper = GaussianHypothesis(exact, q.particles, rng, by_roulette=q.roulette)
         seen = self._measurement(first)
+        before = self._before(first, last, threshold_nt)
         for k, hypothesis in enumerate(hypotheses):
-            self.log_evidence[k] = hypothesis.start(seen, map_error.sigma_nt**2, threshold_nt)
+            self.log_evidence[k] = hypothesis.start(seen, map_error.sigma_nt**2, threshold_nt, before)
         if self._paper is not None:
             self._paper.start(self._white(seen), 0.0)
         self._place_ne_m: tuple[float, float] | None = None
@@ -162,25 +166,8 @@ class Anomaly:
 
     def take(self, sample: Sample) -> None:
         """One more measurement of any vehicle."""
-        last, q, map_error = self._last, self._parameters, self._map_error
-        north_m, east_m = sample.north_m - last.north_m, sample.east_m - last.east_m
-        cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
-        forward_m, right_m = cosine * north_m + sine * east_m, cosine * east_m - sine * north_m
-        turn_rad = math.remainder(sample.course_rad - last.course_rad, math.tau)
-        distance_m = math.hypot(north_m, east_m)
-        elapsed_s = abs(sample.time_us - last.time_us) * 1e-6
-        decay = math.exp(-distance_m / map_error.correlation_m)
-        walked_m = q.target_speed_m_s * min(elapsed_s, 60.0)
-        control = Control(
-            forward_m=forward_m,
-            right_m=right_m,
-            turn_rad=turn_rad,
-            forward_sigma_m=math.hypot(q.forward_noise * min(distance_m, _LONGEST_STEP_M), walked_m),
-            turn_sigma_rad=math.hypot(q.turn_noise * turn_rad, q.course_noise_rad),
-            decay=decay,
-            drive_nt2=(1.0 - decay * decay) * map_error.sigma_nt**2,
-        )
         seen = self._measurement(sample)
+        control = self._control(self._last, sample)
         for k, hypothesis in enumerate(self._hypotheses):
             self.log_evidence[k] += hypothesis.step(control, seen)[0]
         confidence = math.nan
@@ -191,6 +178,40 @@ class Anomaly:
         if abs(sample.residual_nt) > abs(self._loudest.residual_nt):
             self._loudest = sample
         self._note(sample, confidence)
+
+    def _before(self, first: Sample, last: Sample | None, threshold_nt: float) -> Before | None:
+        """The measurement before the first one beyond the threshold, if the track entered the anomaly
+        between them.
+        """
+        if last is None or abs(last.residual_nt) > threshold_nt:
+            return None
+        step_m = math.hypot(first.north_m - last.north_m, first.east_m - last.east_m)
+        if not 0.0 < step_m <= _LONGEST_STEP_M:
+            return None
+        # particles start at the first measurement, on its course
+        along = replace(last, course_rad=first.course_rad)
+        return Before(seen=self._measurement(along), control=self._control(along, first))
+
+    def _control(self, last: Sample, sample: Sample) -> Control:
+        """The motion between two measurements."""
+        q, map_error = self._parameters, self._map_error
+        north_m, east_m = sample.north_m - last.north_m, sample.east_m - last.east_m
+        cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
+        forward_m, right_m = cosine * north_m + sine * east_m, cosine * east_m - sine * north_m
+        turn_rad = math.remainder(sample.course_rad - last.course_rad, math.tau)
+        distance_m = math.hypot(north_m, east_m)
+        elapsed_s = abs(sample.time_us - last.time_us) * 1e-6
+        decay = math.exp(-distance_m / map_error.correlation_m)
+        walked_m = q.target_speed_m_s * min(elapsed_s, 60.0)
+        return Control(
+            forward_m=forward_m,
+            right_m=right_m,
+            turn_rad=turn_rad,
+            forward_sigma_m=math.hypot(q.forward_noise * min(distance_m, _LONGEST_STEP_M), walked_m),
+            turn_sigma_rad=math.hypot(q.turn_noise * turn_rad, q.course_noise_rad),
+            decay=decay,
+            drive_nt2=(1.0 - decay * decay) * map_error.sigma_nt**2,
+        )
 
     def _measurement(self, sample: Sample) -> Measurement:
         q = self._parameters

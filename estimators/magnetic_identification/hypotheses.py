@@ -19,6 +19,7 @@ from estimators.magnetic_identification.classes import DipoleClass, GaussianClas
 from estimators.tracking.resampling import effective_count, roulette, systematic
 
 __all__ = [
+    "Before",
     "Control",
     "DipoleHypothesis",
     "GaussianHypothesis",
@@ -33,6 +34,8 @@ Array = NDArray[np.float64]
 _FARTHEST: Final = 3.5  # standard deviations at which an anomaly of a Gaussian class can begin
 _RESAMPLED_BELOW: Final = 0.5  # of the particles: effective number
 _LEAST_INSIDE: Final = 0.01  # share of that ellipse beyond the threshold, for a class that hardly exceeds it
+_DRAWS: Final = 4096  # simulated passes for the probability of a beginning
+_LEAST_BEGINNINGS: Final = 1e-4  # share of those that begin an anomaly, for a class that hardly does
 _SPREAD_EVERY: Final = 4  # one particle of so many starts anywhere in that ellipse
 
 
@@ -73,19 +76,38 @@ class Control:
     drive_nt2: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Before:
+    """The last measurement within the threshold, before the first one beyond it.
+
+    An anomaly begins where a track enters it: a vehicle that flies outwards, or along the edge, crosses the
+    threshold seldom or never.
+
+    Attributes:
+        seen: the measurement.
+        control: the motion from it to the first one beyond.
+    """
+
+    seen: Measurement
+    control: Control
+
+
 class Hypothesis(Protocol):
     """One explanation of an anomaly."""
 
-    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+    def start(
+        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
+    ) -> float:
         """Begin with the first measurement beyond a threshold.
 
         Args:
             seen: the measurement.
             map_nt2: variance of the error of the map.
             threshold_nt: there is an anomaly because the measurement is beyond it.
+            before: the measurement before; None: there is none, or it was beyond the threshold too.
 
         Returns:
-            Logarithm of the density of the measurement, given that it is beyond the threshold.
+            Logarithm of the density of the measurements, given that they begin an anomaly.
         """
 
     def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
@@ -110,19 +132,31 @@ class ShapelessHypothesis:
         self._mean_nt = 0.0
         self._variance_nt2 = 0.0
 
-    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
-        self._mean_nt, self._variance_nt2 = 0.0, map_nt2 if self._correlation_m is None else self._sigma_nt2
-        beyond = _beyond(threshold_nt, np.array([math.sqrt(self._variance_nt2 + seen.white_nt2)]))
-        return self._update(seen)[0] - beyond
+    def start(
+        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
+    ) -> float:
+        variance_nt2 = map_nt2 if self._correlation_m is None else self._sigma_nt2
+        self._mean_nt, self._variance_nt2 = 0.0, variance_nt2
+        if before is None:
+            beyond = _beyond(threshold_nt, np.array([math.sqrt(variance_nt2 + seen.white_nt2)]))
+            return self._update(seen)[0] - beyond
+        total_nt2 = variance_nt2 + before.seen.white_nt2
+        correlation = self._decay(before.control)[0] * variance_nt2 / total_nt2
+        beginning = _entering(threshold_nt / math.sqrt(total_nt2), correlation)
+        return self._update(before.seen)[0] + self.step(before.control, seen)[0] - beginning
 
     def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
-        decay, drive_nt2 = control.decay, control.drive_nt2
-        if self._correlation_m is not None:
-            decay = math.exp(-math.hypot(control.forward_m, control.right_m) / self._correlation_m)
-            drive_nt2 = (1.0 - decay * decay) * self._sigma_nt2
+        decay, drive_nt2 = self._decay(control)
         self._mean_nt *= decay
         self._variance_nt2 = decay * decay * self._variance_nt2 + drive_nt2
         return self._update(seen)
+
+    def _decay(self, control: Control) -> tuple[float, float]:
+        """Factor of the process since the last measurement, and the variance that is added."""
+        if self._correlation_m is None:
+            return control.decay, control.drive_nt2
+        decay = math.exp(-math.hypot(control.forward_m, control.right_m) / self._correlation_m)
+        return decay, (1.0 - decay * decay) * self._sigma_nt2
 
     def _update(self, seen: Measurement) -> tuple[float, float]:
         total_nt2 = self._variance_nt2 + seen.white_nt2
@@ -155,6 +189,34 @@ class ParticleHypothesis(ABC):
     @abstractmethod
     def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
         """Logarithm of the evidence of a measurement, and the mean fit; sets the weights."""
+
+    def _weigh_beginning(self, seen: Measurement, before: Before) -> float:
+        """Weigh by the last measurement within the threshold and by the first one beyond it, where the
+        particles are now; logarithm of the density of both.
+        """
+        control, still = before.control, np.zeros_like(self._noise)
+        p.move(self.particles, -control.forward_m, -control.right_m, 0.0, still, 0.0, 0.0)
+        density = self._weigh(before.seen, 1.0, 0.0)[0]
+        p.move(self.particles, control.forward_m, control.right_m, 0.0, still, 0.0, 0.0)
+        return density + self._weigh(seen, control.decay, control.drive_nt2)[0]
+
+    def _log_beginnings(
+        self, signals: tuple[Array, Array], map_nt2: float, threshold_nt: float, before: Before
+    ) -> float:
+        """Logarithm of the share of simulated places at which an anomaly begins.
+
+        Args:
+            signals: (n,) each: signals at the place of the measurement before, and here.
+            map_nt2, threshold_nt, before: as of `start`.
+        """
+        errors = self._rng.standard_normal((4, signals[0].size))
+        map_then = math.sqrt(map_nt2) * errors[0]
+        map_now = before.control.decay * map_then + math.sqrt(before.control.drive_nt2) * errors[1]
+        white_nt = math.sqrt(before.seen.white_nt2)
+        then_nt = signals[0] + map_then + white_nt * errors[2]
+        now_nt = signals[1] + map_now + white_nt * errors[3]
+        begins = (np.abs(then_nt) <= threshold_nt) & (np.abs(now_nt) > threshold_nt)
+        return math.log(max(float(np.mean(begins)), _LEAST_BEGINNINGS))
 
     def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
         if effective_count(self.weights) < _RESAMPLED_BELOW * self.weights.size:
@@ -214,7 +276,9 @@ class GaussianHypothesis(ParticleHypothesis):
         self._class = of
         self._signature = np.array([of.amplitude_nt, of.sigma_along_m, of.sigma_across_m])
 
-    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+    def start(
+        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
+    ) -> float:
         """Put the particles on the level curves of the first measurement (section III-C).
 
         Before the measurement every place is as probable within the ellipse of 3.5 standard deviations. The
@@ -257,8 +321,32 @@ class GaussianHypothesis(ParticleHypothesis):
         particles[:, p.AMPLITUDE] = 1.0
         particles[:, p.AMPLITUDE_VAR] = of.amplitude_spread**2
         particles[:, p.MAP_VAR] = map_nt2
+        if before is not None:
+            signals = self._simulated(before.control)
+            return self._weigh_beginning(seen, before) - self._log_beginnings(
+                signals, map_nt2, threshold_nt, before
+            )
         inside = -2.0 * math.log(min(1.0, max(threshold_nt, lowest_nt) / amplitude_nt)) / _FARTHEST**2
         return self._weigh(seen, 1.0, 0.0)[0] - math.log(max(inside, _LEAST_INSIDE))
+
+    def _simulated(self, control: Control) -> tuple[Array, Array]:
+        """Signals before a step and after it, for steps that end anywhere in the ellipse."""
+        of, rng = self._class, self._rng
+        size = np.exp(of.size_spread * rng.standard_normal(_DRAWS))
+        along_m, across_m = of.sigma_along_m * size, of.sigma_across_m * size
+        distance, angle = _FARTHEST * np.sqrt(rng.random(_DRAWS)), rng.uniform(-math.pi, math.pi, _DRAWS)
+        x, y = distance * np.cos(angle) * along_m, distance * np.sin(angle) * across_m
+        course, step_m = (
+            rng.uniform(-math.pi, math.pi, _DRAWS),
+            math.hypot(control.forward_m, control.right_m),
+        )
+        amplitude_nt = of.amplitude_nt * (1.0 + of.amplitude_spread * rng.standard_normal(_DRAWS))
+        then_x, then_y = x - step_m * np.cos(course), y - step_m * np.sin(course)
+        then_nt, now_nt = (
+            amplitude_nt * np.exp(-0.5 * ((a / along_m) ** 2 + (b / across_m) ** 2))
+            for a, b in ((then_x, then_y), (x, y))
+        )
+        return then_nt, now_nt
 
     def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
         amplitude_nt, along_m, across_m = self._signature
@@ -296,7 +384,9 @@ class DipoleHypothesis(ParticleHypothesis):
         self._class = of
         self._field_ned = field_ned
 
-    def start(self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0) -> float:
+    def start(
+        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
+    ) -> float:
         """Spread the particles over the places from which an anomaly of the class can begin."""
         of, rng, count = self._class, self._rng, self.weights.size
         depth_m = of.least_m * (of.most_m / of.least_m) ** rng.random(count)
@@ -312,8 +402,27 @@ class DipoleHypothesis(ParticleHypothesis):
             particles[:, p.COVARIANCE + (p.TERMS + 1) * k] = of.strength_nt**2
         particles[:, p.COVARIANCE + p.TERMS * p.TERMS - 1] = map_nt2
         self.weights[:] = 1.0 / count
+        if before is not None:
+            signals = self._simulated(seen, before.control)
+            return self._weigh_beginning(seen, before) - self._log_beginnings(
+                signals, map_nt2, threshold_nt, before
+            )
         density = self._weigh(seen, 1.0, 0.0)[0]
         return density - _beyond(threshold_nt, np.sqrt(self._fits[:, 1]))
+
+    def _simulated(self, seen: Measurement, control: Control) -> tuple[Array, Array]:
+        """Signals before a step and after it, of dipoles with strengths of the class at the particles'
+        places.
+        """
+        rows = self.particles.copy()
+        rows[:, p.MEANS : p.MEANS + p.TERMS - 1] = self._class.strength_nt * self._rng.standard_normal(
+            (len(rows), p.TERMS - 1)
+        )
+        x, y, cosine, sine = (rows[:, k, None] for k in (p.X, p.Y, p.COS, p.SIN))
+        then_x = x - cosine * control.forward_m + sine * control.right_m
+        then_y = y - sine * control.forward_m - cosine * control.right_m
+        then_nt = self._signals(rows, then_x, then_y, seen.height_m)[:, 0]
+        return then_nt, self._signals(rows, x, y, seen.height_m)[:, 0]
 
     def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
         up = np.maximum(1.0, height_m - rows[:, p.HEIGHT, None])
@@ -350,3 +459,23 @@ def _beyond(threshold_nt: float, sigmas_nt: Array) -> float:
     scaled = threshold_nt / math.sqrt(2.0) / sigmas_nt
     shares = [math.erfc(value) for value in scaled.tolist()]
     return math.log(max(sum(shares) / len(shares), 1e-300))
+
+
+def _entering(threshold: float, correlation: float) -> float:
+    """Logarithm of the probability that the first of two standard normal numbers is within a threshold and
+    the second one beyond it.
+    """
+    second = threshold + np.linspace(0.0, 8.0, 161)
+    apart = math.sqrt(max(1e-12, 1.0 - correlation * correlation)) * math.sqrt(2.0)
+    within = np.array(
+        [
+            0.5
+            * (
+                math.erf((threshold - correlation * value) / apart)
+                - math.erf((-threshold - correlation * value) / apart)
+            )
+            for value in second.tolist()
+        ]
+    )
+    density = np.exp(-0.5 * second * second) / math.sqrt(math.tau) * within
+    return math.log(max(2.0 * float(np.trapezoid(density, second)), 1e-300))

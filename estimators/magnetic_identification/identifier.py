@@ -176,7 +176,7 @@ class Identifier:
                 vehicle.anomaly, vehicle.small_m = near, 0.0
             near.take(sample)
         elif loud and last is not None:
-            anomaly = vehicle.anomaly = self._start(sample)
+            anomaly = vehicle.anomaly = self._start(sample, last)
             vehicle.small_m = 0.0
         ended = self._ended(vehicle, sample, last, near if near is not None else anomaly)
         return Progress(sample=sample, anomaly=anomaly, pass_ended=ended)
@@ -206,7 +206,7 @@ class Identifier:
         near = [entry for entry in found if entry[0] <= reach_m]
         return min(near)[2] if near else None
 
-    def _start(self, sample: Sample) -> Anomaly:
+    def _start(self, sample: Sample, last: Sample) -> Anomaly:
         if len(self.anomalies) >= self._parameters.most_anomalies:
             idle = [anomaly for anomaly in self.anomalies if not anomaly.under_way] or self.anomalies
             self.anomalies.remove(min(idle, key=lambda anomaly: anomaly.probability))
@@ -221,6 +221,7 @@ class Identifier:
             field_ned=self._field_ned,
             # as fast as PCG64 is, and faster for normal numbers, most of the cost of a step
             rng=np.random.Generator(np.random.SFC64(seed)),
+            last=last,
         )
         self.started += 1
         self.anomalies.append(anomaly)

@@ -157,8 +157,7 @@ class Investigation:
         if suspect.verdict is Verdict.OPEN:
             self._decide(suspect)
         self._release(suspect)
-        if suspect.verdict is Verdict.OPEN:
-            self._assign(suspect)
+        self._assign_waiting()
         return suspect
 
     def next_leg(self, searcher: int, *, done: bool) -> tuple[tuple[float, float] | None, Suspect | None]:
@@ -201,10 +200,9 @@ class Investigation:
         """A searcher flies home or is lost; its suspect may be taken by another."""
         self._legs[searcher] = []
         self._fresh[searcher] = False
-        suspect, self._assigned[searcher] = self._assigned[searcher], None
+        self._assigned[searcher] = None
         self._samples[searcher] = None
-        if suspect is not None and suspect.verdict is Verdict.OPEN:
-            self._assign(suspect)
+        self._assign_waiting()
 
     def _decide(self, suspect: Suspect) -> None:
         anomaly = suspect.identified
@@ -226,6 +224,18 @@ class Investigation:
             if assigned is suspect:
                 self._assigned[k], self._legs[k], self._fresh[k] = None, [], False
 
+    def _assign_waiting(self) -> None:
+        """Assign a pass over each open suspect that has none, the more probable target first: when a suspect
+        was found, all searchers may have been on passes over others.
+        """
+        waiting = [
+            suspect
+            for suspect in self.suspects.values()
+            if suspect.verdict is Verdict.OPEN and all(suspect is not other for other in self._assigned)
+        ]
+        for suspect in sorted(waiting, key=lambda suspect: -suspect.probability):
+            self._assign(suspect)
+
     def _assign(self, suspect: Suspect) -> None:
         """Give the pass that is worth most for its time to a searcher that has none."""
         anomaly = suspect.identified
@@ -242,7 +252,9 @@ class Investigation:
                 worth = flown.gain_nats / (_ELSEWHERE_S + self._duration_s(searcher, flown))
                 if best is None or worth > best[0]:
                     best = (worth, searcher, flown)
-        if best is None or best[2].gain_nats < _LEAST_GAIN_NATS:
+        # a probable target is open because its place is not known: every pass near it is worth its time
+        unplaced = suspect.probability >= _ACCEPT
+        if best is None or (best[2].gain_nats < _LEAST_GAIN_NATS and not unplaced):
             return
         _, searcher, chosen = best
         self._assigned[searcher] = suspect

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 from estimators.magnetic_identification import particles as p
 from estimators.magnetic_identification.classes import DipoleClass, GaussianClass
 from estimators.magnetic_identification.hypotheses import (
+    Before,
     Control,
     DipoleHypothesis,
     GaussianHypothesis,
@@ -114,6 +115,50 @@ def test_the_first_evidence_is_the_mean_density_over_the_ellipse():
     variance = NOISE_NT**2 + MAP_NT**2 + (0.15 * level) ** 2
     plain = np.mean(np.exp(-0.5 * (4.0 - level) ** 2 / variance) / np.sqrt(2.0 * math.pi * variance))
     assert found == pytest.approx([math.log(plain)] * 4, abs=0.03)
+
+
+def test_an_anomaly_begins_where_the_track_enters_it():
+    """The evidence of the first measurement beyond the threshold and of the one before, against plain
+    sampling of tracks.
+    """
+    of = GaussianClass(name="target", amplitude_spread=0.0, size_spread=0.0)
+    threshold_nt, then, now, control = 3.0, 1.5, 6.0, straight(STEP_M)
+    before = Before(seen=measurement(then), control=control)
+    found = []
+    for seed in range(4):
+        hypothesis = GaussianHypothesis(of, 20_000, np.random.default_rng(seed))
+        found.append(hypothesis.start(measurement(now), MAP_NT**2, threshold_nt, before))
+        outwards = hypothesis.particles[:, p.X] * hypothesis.particles[:, p.COS] / of.sigma_along_m**2
+        outwards += hypothesis.particles[:, p.Y] * hypothesis.particles[:, p.SIN] / of.sigma_across_m**2
+        assert hypothesis.weights[outwards > 0.0].sum() < 0.05
+    rng = np.random.default_rng(9)
+    count = 1_000_000
+    distance, angle, course = 3.5 * np.sqrt(rng.random(count)), *rng.uniform(-math.pi, math.pi, (2, count))
+    x, y = distance * np.cos(angle) * of.sigma_along_m, distance * np.sin(angle) * of.sigma_across_m
+    ends = np.array([(x - STEP_M * np.cos(course), y - STEP_M * np.sin(course)), (x, y)])
+    square = (ends[:, 0] / of.sigma_along_m) ** 2 + (ends[:, 1] / of.sigma_across_m) ** 2
+    signal = of.amplitude_nt * np.exp(-0.5 * square)
+    errors = multivariate_normal(
+        np.zeros(2),
+        MAP_NT**2 * np.array([[1.0, control.decay], [control.decay, 1.0]]) + NOISE_NT**2 * np.eye(2),
+    )
+    density = np.mean(errors.pdf(np.array([then, now]) - signal.T))
+    seen = np.abs(signal.T + errors.rvs(count, random_state=rng))
+    begins = np.mean((seen[:, 0] <= threshold_nt) & (seen[:, 1] > threshold_nt))
+    assert found == pytest.approx([math.log(density / begins)] * 4, abs=0.15)
+
+
+def test_without_a_signature_a_beginning_counts_given_that_it_is_one():
+    then, now, threshold_nt = 1.0, 4.0, 3.0
+    found = ShapelessHypothesis(MAP_NT).start(
+        measurement(now), MAP_NT**2, threshold_nt, Before(seen=measurement(then), control=straight(STEP_M))
+    )
+    variance, shared = MAP_NT**2 + NOISE_NT**2, MAP_NT**2 * straight(STEP_M).decay
+    pair = multivariate_normal(np.zeros(2), [[variance, shared], [shared, variance]])
+    upper = [threshold_nt, -threshold_nt]
+    # the second below, the first between the bounds; twice, for the other sign
+    begins = 2.0 * (pair.cdf(upper) - pair.cdf([-threshold_nt, -threshold_nt]))
+    assert found == pytest.approx(pair.logpdf([then, now]) - math.log(begins), abs=5e-3)
 
 
 def test_equation_8_puts_the_source_where_it_is_seen_from_the_vehicle():

@@ -107,6 +107,26 @@ def test_an_open_suspect_gets_a_pass_by_one_searcher_and_the_other_searches_on()
     assert suspect.verdict is not Verdict.OPEN or found.investigation.passes_flown == 2
 
 
+def test_a_suspect_found_while_every_searcher_was_on_a_pass_gets_one_later():
+    rng = np.random.default_rng(3)
+    found = search(searchers=1)
+    fly(found, rng, target(rng), offset_m=60.0)
+    first = found.next_leg(0, 100_000_000, done=False)
+    assert first is not None
+    other = target(rng, (-600.0, 600.0))
+    places = track(rng, offset_m=60.0, course_rad=0.2) + np.array([-600.0, 600.0])
+    for reading in readings(rng, places, [other], start_us=110_000_000):
+        found.report_reading(0, reading, 0.0)
+    waiting = [s for s in found.investigation.suspects.values() if s.verdict is Verdict.OPEN]
+    assert len(waiting) == 2
+    # the passes over the first come to its decision, or to one more pass
+    for start_us, course_rad in ((200_000_000, 1.7), (320_000_000, 0.9)):
+        fly(found, rng, target(rng), start_us=start_us, course_rad=course_rad, offset_m=10.0)
+    leg = found.next_leg(0, 500_000_000, done=False)
+    assert leg is not None
+    assert math.dist(leg, waiting[1].place_ne_m) < 400.0
+
+
 def test_a_boat_is_dismissed_and_its_cell_lowered():
     rng = np.random.default_rng(5)
     found, source = search(), boat(rng)
