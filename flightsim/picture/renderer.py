@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
-from flightsim.foundation.rotations import rotate
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
 from flightsim.payload.camera_view import CameraView
+from flightsim.payload.imager import ImagerParameters
 from flightsim.picture import landscape_kernel as k
+from flightsim.picture.exposure import Exposure
 from flightsim.picture.ground_texture import ground_texture
+from flightsim.picture.pose import rotation_of
 from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag
 
 Picture = NDArray[np.uint8]
@@ -57,16 +59,31 @@ class Renderer:
         aperture_px_m: blur of what is far off when focused near: diameter in pixels times distance in metres
             at zoom 1 (thin lens). 0: all is sharp always.
         scenery: of the world.
+        imager: lens and sensor; ideal by default.
+        seed: of the noise.
+
+    Raises:
+        ValueError: the distortion folds the picture.
     """
 
     def __init__(
-        self, model: PinholeModel, *, aperture_px_m: float = 0.0, scenery: Scenery | None = None
+        self,
+        model: PinholeModel,
+        *,
+        aperture_px_m: float = 0.0,
+        scenery: Scenery | None = None,
+        imager: ImagerParameters | None = None,
+        seed: int = 0,
     ) -> None:
         require_not_negative(aperture_px_m=aperture_px_m)
         self.model = model
         self.scenery = scenery or Scenery()
         self._aperture_px_m = aperture_px_m
         self._texture = ground_texture()
+        self._imager = imager or ImagerParameters()
+        self._seed = seed
+        self._exposures: dict[tuple[int, float], Exposure] = {}
+        self._exposure(model.width_px, 1.0)
         numbers = self._numbers = np.zeros(k.SCENERY)
         s = self.scenery
         numbers[k.RUNWAY_LENGTH_M] = s.runway_length_m
@@ -86,13 +103,14 @@ class Renderer:
         model = self.model
         width = model.width_px if width_px is None else width_px
         height = max(1, round(model.height_px * width / model.width_px))
-        picture: Picture = np.empty((height, width, 3), np.uint8)
         if view.covered:
-            picture[:] = _COVERED
-            return picture
+            return np.full((height, width, 3), _COVERED, np.uint8)
+        exposure = self._exposure(width, view.zoom)
+        ideal_width, ideal_height = exposure.ideal_px
+        picture: Picture = np.empty((ideal_height, ideal_width, 3), np.uint8)
         scale = width / model.width_px
         focal_px = model.focal_px * view.zoom * scale
-        r_ned_from_mount = _matrix(view.q_ned_from_mount)
+        r_ned_from_mount = rotation_of(view.q_ned_from_mount)
         eye = np.array(view.eye_ned_m)
         k.paint_landscape(r_ned_from_mount, eye, focal_px, self._numbers, self._texture, picture)
         camera_from_ned = camera_from_gimbal(r_ned_from_mount).T
@@ -107,7 +125,22 @@ class Renderer:
                 draw_tag(picture, target, camera_from_ned, eye, focal_px)
             else:
                 draw_ball(picture, target, camera_from_ned, eye, focal_px, sun)
-        return self._defocused(picture, view, r_ned_from_mount, scale)
+        return exposure.expose(self._defocused(picture, view, r_ned_from_mount, scale), view)
+
+    def _exposure(self, width_px: int, zoom: float) -> Exposure:
+        """Lens and sensor for a size and a zoom; the newest is kept."""
+        key = (width_px, zoom)
+        if key not in self._exposures:
+            model = self.model
+            made = Exposure(
+                self._imager,
+                width_px=width_px,
+                height_px=max(1, round(model.height_px * width_px / model.width_px)),
+                focal_px=model.focal_px * zoom * width_px / model.width_px,
+                seed=self._seed,
+            )
+            self._exposures = {key: made}
+        return self._exposures[key]
 
     def _defocused(
         self, picture: Picture, view: CameraView, r_ned_from_mount: NDArray[np.float64], scale: float
@@ -124,11 +157,3 @@ class Renderer:
         blurred: Picture = cv2.GaussianBlur(picture, (0, 0), sigma).astype(np.uint8, copy=False)
         return blurred
 
-
-def _matrix(q: tuple[float, float, float, float]) -> NDArray[np.float64]:
-    """Rotation matrix of a quaternion."""
-    columns = np.empty((3, 3))
-    quaternion = np.array(q)
-    for axis in range(3):
-        rotate(quaternion, np.eye(3)[axis], columns[axis])
-    return np.ascontiguousarray(columns.T)
