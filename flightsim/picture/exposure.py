@@ -61,7 +61,7 @@ class Exposure:
             ideal = [2 * (math.ceil(float(value)) + _EDGE_PX) for value in half]
             self.ideal_px = (ideal[0], ideal[1])
             # OpenCV counts from the middle of the first pixel
-            self._map = (rays + (0.5 * ideal[0] - 0.5, 0.5 * ideal[1] - 0.5)).astype(np.float32)
+            self._map = (rays + (0.5 * np.array(ideal) - 0.5)).astype(np.float32)
         elif imager.rolling_shutter_s > 0.0:
             columns, rows = np.meshgrid(np.arange(width_px), np.arange(height_px))
             self._map = np.stack((columns, rows), -1).astype(np.float32)
@@ -74,7 +74,7 @@ class Exposure:
             if self._imager.rolling_shutter_s > 0.0 and view.moves:
                 points = self._rolled(points, view)
             picture = cv2.remap(
-                picture, points, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+                picture, points, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
             ).astype(np.uint8, copy=False)
         return self._noisy(picture, view)
 
@@ -85,7 +85,9 @@ class Exposure:
         turn, turned = np.array([1.0, *angle.tolist()]), np.zeros(4)
         multiply(q, turn / np.linalg.norm(turn), turned)
         r = camera_from_gimbal(rotation_of(turned))
-        north, east, down = (p + after_s * v for p, v in zip(view.eye_ned_m, view.velocity_ned_m_s, strict=True))
+        north, east, down = (
+            p + after_s * v for p, v in zip(view.eye_ned_m, view.velocity_ned_m_s, strict=True)
+        )
         height = max(0.05, -down)
         plane = np.stack((height * r[0] + north * r[2], height * r[1] + east * r[2], r[2]))
         width, tall = self.ideal_px
@@ -144,7 +146,14 @@ class Exposure:
         rng = np.random.Generator(np.random.Philox(key=(self._seed & (2**64 - 1)) << 64 | view.time_us))
         out = np.empty_like(picture)
         sigma = np.array([imager.noise_sigma(level) for level in range(256)], np.float32)
-        _add_noise(picture.reshape(-1), sigma, _pool(), int(rng.integers(_POOL)), int(rng.integers(_POOL)) | 1, out.reshape(-1))
+        _add_noise(
+            picture.reshape(-1),
+            sigma,
+            _pool(),
+            int(rng.integers(_POOL)),
+            int(rng.integers(_POOL)) | 1,
+            out.reshape(-1),
+        )
         return out
 
 

@@ -16,10 +16,11 @@ from flightsim.picture import landscape_kernel as k
 from flightsim.picture.exposure import Exposure
 from flightsim.picture.ground_texture import ground_texture
 from flightsim.picture.pose import rotation_of
-from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag
+from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag, tag_may_show
 
 Picture = NDArray[np.uint8]
 
+_KEPT: Final = 4  # sizes and zooms at a time
 _COVERED: Final = 12  # grey of a camera that is put away
 
 
@@ -127,8 +128,19 @@ class Renderer:
                 draw_ball(picture, target, camera_from_ned, eye, focal_px, sun)
         return exposure.expose(self._defocused(picture, view, r_ned_from_mount, scale), view)
 
+    def may_show_tag(self, view: CameraView, margin: float = 0.05) -> bool:
+        """Whether a tag, or a part of one, may lie in the picture of a view; False is certain.
+
+        Args:
+            view: camera and targets.
+            margin: around the picture, in focal lengths.
+        """
+        width, height = self._exposure(self.model.width_px, 1.0).ideal_px
+        focal_px = self.model.focal_px
+        return tag_may_show(view, 0.5 * width / focal_px + margin, 0.5 * height / focal_px + margin)
+
     def _exposure(self, width_px: int, zoom: float) -> Exposure:
-        """Lens and sensor for a size and a zoom; the newest is kept."""
+        """Lens and sensor for a size and a zoom; a few are kept."""
         key = (width_px, zoom)
         if key not in self._exposures:
             model = self.model
@@ -139,7 +151,9 @@ class Renderer:
                 focal_px=model.focal_px * zoom * width_px / model.width_px,
                 seed=self._seed,
             )
-            self._exposures = {key: made}
+            if len(self._exposures) == _KEPT:
+                del self._exposures[next(iter(self._exposures))]
+            self._exposures[key] = made
         return self._exposures[key]
 
     def _defocused(
@@ -156,4 +170,3 @@ class Renderer:
         sigma = min(40.0, 0.35 * circle_px)
         blurred: Picture = cv2.GaussianBlur(picture, (0, 0), sigma).astype(np.uint8, copy=False)
         return blurred
-

@@ -13,7 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.payload.camera_view import TargetView
+from flightsim.payload.camera_model import camera_from_gimbal
+from flightsim.payload.camera_view import CameraView, TargetView
+from flightsim.picture.pose import rotation_of
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -47,13 +49,11 @@ def tag_plate(tag_id: int) -> Picture:
     return plate
 
 
-def draw_tag(
-    picture: Picture, target: TargetView, camera_from_ned: Array, eye: Array, focal_px: float
-) -> None:
-    """Lay a tag's plate on the ground."""
+def _plate_corners(target: TargetView) -> Array:
+    """Corners (4, 3) of a tag's plate with its margin, from north-west clockwise, local NED."""
     half = 0.5 * target.size_m * (_CELLS + 2) / _CELLS
     north, east, down = target.position_ned_m
-    corners = np.array(
+    return np.array(
         [
             (north + half, east - half, down),
             (north + half, east + half, down),
@@ -61,7 +61,13 @@ def draw_tag(
             (north - half, east - half, down),
         ]
     )
-    seen = (corners - eye) @ camera_from_ned.T
+
+
+def draw_tag(
+    picture: Picture, target: TargetView, camera_from_ned: Array, eye: Array, focal_px: float
+) -> None:
+    """Lay a tag's plate on the ground."""
+    seen = (_plate_corners(target) - eye) @ camera_from_ned.T
     if seen[:, 2].min() < _NEAREST_M:
         return
     height, width = picture.shape[:2]
@@ -135,3 +141,34 @@ def _box(low: Array, high: Array, width: int, height: int) -> tuple[int, int, in
 def _blend(part: Picture, colour: NDArray[Any], cover: Array) -> None:
     share = cover[:, :, None]
     part[:] = np.round(part * (1.0 - share) + colour * share).astype(np.uint8)
+
+
+def tag_may_show(view: CameraView, half_width: float, half_height: float) -> bool:
+    """Whether a plate of a tag, or a part of one, may lie in a picture; False is certain.
+
+    A plate whose corners are all beyond the same side of the view cannot.
+
+    Args:
+        view: camera and targets.
+        half_width, half_height: half of the picture at zoom 1, with its margin, in focal lengths.
+    """
+    if view.covered:
+        return False
+    camera_from_ned = None
+    blur = view.exposure_s * (
+        math.hypot(*view.rotation_mount_rad_s)
+        + math.hypot(*view.velocity_ned_m_s) / max(0.05, -view.eye_ned_m[2])
+    )
+    for target in view.targets:
+        if not shows_tag(target):
+            continue
+        if camera_from_ned is None:
+            camera_from_ned = camera_from_gimbal(rotation_of(view.q_ned_from_mount)).T
+        seen = (_plate_corners(target) - view.eye_ned_m) @ camera_from_ned.T
+        right, down, ahead = seen.T
+        wide = ahead * (half_width / view.zoom + blur)
+        tall = ahead * (half_height / view.zoom + blur)
+        sides = (ahead <= 0.0, right > wide, -right > wide, down > tall, -down > tall)
+        if not any(side.all() for side in sides):
+            return True
+    return False
