@@ -5,9 +5,7 @@ solution for squares of Collins and Bartoli (2014, IPPE).
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -32,7 +30,7 @@ class TagDetectorParameters:
 
     Attributes:
         size_m: side of the black square.
-        sizes_m: sides of single tags, by number, that differ from `size_m`.
+        sizes_m: (number, side) of single tags whose side is not `size_m`.
         tag_ids: the tags that are reported; empty: all of the family.
         corrected_bits: at most this many wrong bits of a tag are corrected. The family's codes differ in 11
             bits; each bit that is corrected lets more of what is no tag pass.
@@ -42,18 +40,18 @@ class TagDetectorParameters:
     """
 
     size_m: float = 1.0
-    sizes_m: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}))
+    sizes_m: tuple[tuple[int, float], ...] = ()
     tag_ids: tuple[int, ...] = ()
     corrected_bits: int = 1
 
     def __post_init__(self) -> None:
         for name, size_m in (
             ("size_m", self.size_m),
-            *((f"sizes_m[{i}]", s) for i, s in self.sizes_m.items()),
+            *(("sizes_m", size_m) for _, size_m in self.sizes_m),
         ):
             if not (math.isfinite(size_m) and size_m > 0.0):
                 raise EstimatorError(f"`{name}` {size_m:g} m is not possible; give more than 0")
-        for tag_id in (*self.tag_ids, *self.sizes_m):
+        for tag_id in (*self.tag_ids, *(number for number, _ in self.sizes_m)):
             if not 0 <= tag_id < TAGS:
                 raise EstimatorError(f"tag {tag_id} is not in 0..{TAGS - 1}, the family 36h11")
         if not 0 <= self.corrected_bits <= 5:
@@ -112,6 +110,7 @@ class TagDetector:
         settings.errorCorrectionRate = p.corrected_bits / most_corrected
         self._detector = cv2.aruco.ArucoDetector(dictionary, settings)
         self._wanted = frozenset(p.tag_ids)
+        self._sizes_m = dict(p.sizes_m)
 
     def detect(self, picture: Picture) -> tuple[TagDetection, ...]:
         """The tags in a picture (height, width) or (height, width, 3) BGR, from left to right.
@@ -141,7 +140,7 @@ class TagDetector:
 
     def _measured(self, tag_id: int, corners_px: Array) -> TagDetection | None:
         """A tag's angles and pose; None: no pose before the camera has such corners."""
-        half_m = 0.5 * self.parameters.sizes_m.get(tag_id, self.parameters.size_m)
+        half_m = 0.5 * self._sizes_m.get(tag_id, self.parameters.size_m)
         square = half_m * np.array([(-1.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (-1.0, -1.0, 0.0)])
         rays = self.camera.rays(corners_px)
         solved, turn, place = cv2.solvePnP(square, rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE)

@@ -4,9 +4,10 @@ import bisect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from autopilot_bridge.mavlink.camera_scan import CameraScan
+from estimators.messages import Message
 from flightsim.foundation.vectors import Quaternion, Vector, between, from_euler, product, rotate
 
 T = TypeVar("T")
@@ -71,9 +72,11 @@ class VehicleTrack:
         self._attitudes: _Samples[Quaternion] = _Samples()
         self._places: _Samples[Vector] = _Samples()
 
-    def handle(self, message: Any) -> None:
-        """Take a message of the autopilot; others, and values that are not finite, are ignored."""
-        name = message.get_type()
+    def handle(self, message: Message) -> None:
+        """Take a message (`estimators.messages`) of the autopilot. Others are ignored, and so are values that
+        are not finite.
+        """
+        name = message.name
         if name == "ATTITUDE":
             angles = (message.roll, message.pitch, message.yaw)
             if all(map(math.isfinite, angles)):

@@ -22,6 +22,7 @@ from flightsim.payload.detection import (
     CameraFrame,
     Detection,
     DetectionModel,
+    FrameReader,
     FrameReaderParameters,
     PictureDetection,
     SeenTargets,
@@ -128,6 +129,7 @@ class Camera:
         parameters: as given.
         frame: newest delivered frame; None before the first.
         focus_distance_m: distance in focus; None: that of the centre of the picture (autofocus).
+        reader: detects targets in its pictures; None: detections come from the models.
     """
 
     __slots__ = (
@@ -146,7 +148,6 @@ class Camera:
         "_number",
         "_q_before",
         "_q_frd_from_mount",
-        "_reader",
         "_row",
         "_step_s",
         "_targets",
@@ -161,6 +162,7 @@ class Camera:
         "focus_distance_m",
         "frame",
         "parameters",
+        "reader",
     )
 
     def __init__(
@@ -229,9 +231,9 @@ class Camera:
         self._uniforms: Array = np.empty((_BLOCK, len(targets)))
         self._normals: Array = np.empty((_BLOCK, len(targets), 3))
         self._row = _BLOCK
-        self._reader = None
+        self.reader: FrameReader | None = None
         if p.reader is not None:
-            self._reader = p.reader.start(p, int(seeds("camera").generate_state(1, np.uint64)[0]))
+            self.reader = p.reader.start(p, int(seeds("camera").generate_state(1, np.uint64)[0]))
         self._waiting: deque[CameraFrame] = deque()
         self.frame: CameraFrame | None = None
 
@@ -345,8 +347,8 @@ class Camera:
         uniforms, normals = self._uniforms[self._row], self._normals[self._row]
         self._row += 1
         found: list[Detection] = []
-        if self._reader is not None:
-            found = list(self._reader.read(self.view(time_us)))
+        if self.reader is not None:
+            found = list(self.reader.read(self.view(time_us)))
         elif self._gimbal is None or not self._gimbal.retracted:
             found = self._detections(time_us, uniforms, normals) + self._false_detections(time_us)
             found.sort(key=lambda detection: (detection.u_px, detection.v_px))

@@ -73,8 +73,9 @@ class Exposure:
             points = self._map
             if self._imager.rolling_shutter_s > 0.0 and view.moves:
                 points = self._rolled(points, view)
+            columns, rows = cv2.split(points)
             picture = cv2.remap(
-                picture, points, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+                picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
             ).astype(np.uint8, copy=False)
         return self._noisy(picture, view)
 

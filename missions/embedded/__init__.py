@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
+    from missions.embedded.tag_search import TagTarget, search_camera, tag_search_world
     from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
     from missions.embedded.worlds import (
         CAMERA,
@@ -23,6 +25,8 @@ __all__ = [
     "MAX_FLIGHT_S",
     "EmbeddedSitl",
     "MotionKind",
+    "RenderedTags",
+    "TagTarget",
     "TargetField",
     "alone",
     "carrying",
@@ -31,10 +35,14 @@ __all__ = [
     "multi_target_world",
     "occupancy_world",
     "orbit_world",
+    "search_camera",
+    "tag_search_world",
     "terrain_targets_world",
 ]
 
 _SITL: Final = "missions.embedded.sitl"
+_RENDERED_TAGS: Final = "missions.embedded.rendered_tags"
+_TAG_SEARCH: Final = "missions.embedded.tag_search"
 _TARGET_FIELDS: Final = "missions.embedded.target_fields"
 _WORLDS: Final = "missions.embedded.worlds"
 
@@ -42,6 +50,8 @@ __getattr__ = lazy_exports(
     __name__,
     {
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
+        "RenderedTags": _RENDERED_TAGS,
+        **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
         **dict.fromkeys(("CAMERA", "MAGNETOMETER", "MotionKind", "carrying", "motion_of"), _WORLDS),
         **dict.fromkeys(("occupancy_world", "orbit_world"), _WORLDS),
