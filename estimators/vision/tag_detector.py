@@ -105,34 +105,44 @@ class TagDetector:
         settings = cv2.aruco.DetectorParameters()
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         settings.cornerRefinementWinSize = _REFINE_PX
-        settings.minMarkerPerimeterRate = 4.0 * _LEAST_SIDE_PX / max(camera.width_px, camera.height_px)
         most_corrected = (11 - 1) // 2
         settings.errorCorrectionRate = p.corrected_bits / most_corrected
         self._detector = cv2.aruco.ArucoDetector(dictionary, settings)
         self._wanted = frozenset(p.tag_ids)
         self._sizes_m = dict(p.sizes_m)
 
-    def detect(self, picture: Picture) -> tuple[TagDetection, ...]:
+    def detect(
+        self, picture: Picture, *, corner_px: tuple[int, int] | None = None
+    ) -> tuple[TagDetection, ...]:
         """The tags in a picture (height, width) or (height, width, 3) BGR, from left to right.
 
+        Args:
+            picture: the whole picture, or a part of it.
+            corner_px: column and row of the camera's picture at which the part begins; None: it is the whole.
+
         Raises:
-            EstimatorError: the picture has another size than the camera's.
+            EstimatorError: the whole picture has another size than the camera's.
         """
         height, width = picture.shape[:2]
-        if (width, height) != (self.camera.width_px, self.camera.height_px):
+        if corner_px is None and (width, height) != (self.camera.width_px, self.camera.height_px):
             raise EstimatorError(
                 f"a picture of {width} x {height} pixels is not of the camera of {self.camera.width_px} x "
                 f"{self.camera.height_px}; calibrate the camera for this size"
             )
         grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
+        settings = self._detector.getDetectorParameters()
+        settings.minMarkerPerimeterRate = 4.0 * _LEAST_SIDE_PX / max(width, height)
+        settings.maxMarkerPerimeterRate = 4.0
+        self._detector.setDetectorParameters(settings)
         corners, numbers, _ = self._detector.detectMarkers(grey)
+        left_top = np.array(corner_px or (0, 0)) + 0.5  # OpenCV counts from the middle of the first pixel
         found = []
         for tag_corners, tag_id in zip(
             corners, () if numbers is None else numbers.ravel().tolist(), strict=True
         ):
             if self._wanted and tag_id not in self._wanted:
                 continue
-            detection = self._measured(int(tag_id), tag_corners.reshape(4, 2).astype(np.float64) + 0.5)
+            detection = self._measured(int(tag_id), tag_corners.reshape(4, 2).astype(np.float64) + left_top)
             if detection is not None:
                 found.append(detection)
         found.sort(key=lambda detection: detection.centre_px)

@@ -18,6 +18,7 @@ from flightsim.payload.camera_model import camera_from_gimbal
 from flightsim.payload.camera_view import CameraView
 from flightsim.payload.imager import ImagerParameters
 from flightsim.picture.pose import rotation_of
+from flightsim.picture.window import Window
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -27,6 +28,7 @@ _MOST_SAMPLES: Final = 24
 _POOL: Final = 1 << 21
 _NOISE_SEED: Final = 0x5EED
 _EDGE_PX: Final = 2
+_AROUND_PX: Final = 12  # around a part of the ideal picture, for motion
 
 
 class Exposure:
@@ -51,6 +53,8 @@ class Exposure:
         self._imager = imager
         self._focal_px = focal_px
         self._seed = seed
+        self._size_px = (width_px, height_px)
+        self._sigma = np.array([imager.noise_sigma(level) for level in range(256)], np.float32)
         self._map: NDArray[np.float32] | None = None
         self.ideal_px = (width_px, height_px)
         if not imager.distortion.none:
@@ -66,18 +70,40 @@ class Exposure:
             columns, rows = np.meshgrid(np.arange(width_px), np.arange(height_px))
             self._map = np.stack((columns, rows), -1).astype(np.float32)
 
-    def expose(self, ideal: Picture, view: CameraView) -> Picture:
-        """The finished picture of a view, from its ideal picture."""
-        picture = self._blurred(ideal, view)
+    def ideal_window(self, window: Window) -> Window:
+        """The part of the ideal picture that a part of the finished one needs."""
+        low, high = (window.left, window.top), (window.right, window.bottom)
         if self._map is not None:
-            points = self._map
+            seen = self._map[window.top : window.bottom, window.left : window.right].reshape(-1, 2)
+            low, high = tuple(seen.min(axis=0).tolist()), tuple(seen.max(axis=0).tolist())
+        found = Window.around(low, high, _AROUND_PX, self.ideal_px)
+        assert found is not None
+        return found
+
+    def expose(self, ideal: Picture, view: CameraView, window: Window, ideal_window: Window) -> Picture:
+        """A part of the finished picture of a view.
+
+        Args:
+            ideal: the part `ideal_window` of the ideal picture.
+            view: the view.
+            window: the part.
+            ideal_window: of `ideal_window(window)`.
+        """
+        picture = self._blurred(ideal, view, ideal_window)
+        rows_of, columns_of = slice(window.top, window.bottom), slice(window.left, window.right)
+        if self._map is None:
+            top, left = window.top - ideal_window.top, window.left - ideal_window.left
+            picture = picture[top : top + window.height, left : left + window.width]
+        else:
+            points = self._map[rows_of, columns_of]
             if self._imager.rolling_shutter_s > 0.0 and view.moves:
-                points = self._rolled(points, view)
-            columns, rows = cv2.split(points)
+                points = self._rolled(points, view, window)
+            corner = np.array((ideal_window.left, ideal_window.top), np.float32)
+            columns, rows = cv2.split(points - corner)
             picture = cv2.remap(
                 picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
             ).astype(np.uint8, copy=False)
-        return self._noisy(picture, view)
+        return self._noisy(picture, view, window)
 
     def _ground(self, view: CameraView, after_s: float) -> Array:
         """The ground's (north, east, 1) from pixels of the ideal picture, at a time after the view's."""
@@ -97,7 +123,7 @@ class Exposure:
         homography: Array = plane @ np.linalg.inv(pixels)
         return homography
 
-    def _blurred(self, ideal: Picture, view: CameraView) -> Picture:
+    def _blurred(self, ideal: Picture, view: CameraView, part: Window) -> Picture:
         if not view.moves or view.exposure_s == 0.0:
             return ideal
         to_pixels = np.linalg.inv(self._ground(view, 0.0))
@@ -114,13 +140,15 @@ class Exposure:
             return ideal
         samples = min(_MOST_SAMPLES, 2 + math.ceil(way_px))
         total = np.zeros(ideal.shape, np.float32)
+        from_part = np.array([[1.0, 0.0, part.left], [0.0, 1.0, part.top], [0.0, 0.0, 1.0]])
+        to_part = np.linalg.inv(from_part)
         for index in range(samples):
             after_s = half_s * (2.0 * (index + 0.5) / samples - 1.0)
-            warp = to_pixels @ self._ground(view, after_s)
+            warp = to_part @ to_pixels @ self._ground(view, after_s) @ from_part
             moved = cv2.warpPerspective(
                 ideal,
                 warp,
-                self.ideal_px,
+                (part.width, part.height),
                 flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
                 borderMode=cv2.BORDER_REPLICATE,
             )
@@ -128,33 +156,28 @@ class Exposure:
         blurred: Picture = (total * np.float32(1.0 / samples) + np.float32(0.5)).astype(np.uint8)
         return blurred
 
-    def _rolled(self, points: NDArray[np.float32], view: CameraView) -> NDArray[np.float32]:
+    def _rolled(self, points: NDArray[np.float32], view: CameraView, window: Window) -> NDArray[np.float32]:
         """Places in the picture of the middle row's time, from those that each row sees at its own."""
         to_pixels = np.linalg.inv(self._ground(view, 0.0))
         rolled = np.empty_like(points)
-        rows = len(points)
-        for row in range(rows):
-            after_s = self._imager.rolling_shutter_s * ((row + 0.5) / rows - 0.5)
+        for row in range(len(points)):
+            share = (window.top + row + 0.5) / self._size_px[1] - 0.5
+            after_s = self._imager.rolling_shutter_s * share
             warp = to_pixels @ self._ground(view, after_s)
             rolled[row] = cv2.perspectiveTransform(points[row][None], warp)[0]
         return rolled
 
-    def _noisy(self, picture: Picture, view: CameraView) -> Picture:
+    def _noisy(self, picture: Picture, view: CameraView, window: Window) -> Picture:
         imager = self._imager
         if not imager.noisy:
             return picture
         # each frame has its own generator: a frame that was not rendered changes no other
         rng = np.random.Generator(np.random.Philox(key=(self._seed & (2**64 - 1)) << 64 | view.time_us))
         out = np.empty_like(picture)
-        sigma = np.array([imager.noise_sigma(level) for level in range(256)], np.float32)
-        _add_noise(
-            picture.reshape(-1),
-            sigma,
-            _pool(),
-            int(rng.integers(_POOL)),
-            int(rng.integers(_POOL)) | 1,
-            out.reshape(-1),
-        )
+        start, stride = rng.integers(_POOL, size=2).tolist()
+        width = self._size_px[0]
+        first = window.top * width + window.left
+        _add_noise(picture, self._sigma, _pool(), start, stride | 1, first, width, out)
         return out
 
 
@@ -176,14 +199,20 @@ def _add_noise(
     pool: NDArray[np.float32],
     start: int,
     stride: int,
+    first: int,
+    width: int,
     out: NDArray[np.uint8],
 ) -> None:
-    """Add noise by level; the pool is left in runs of 64, whose places are `stride` apart."""
+    """Add noise by level to a part of a picture of a width, whose first pixel is `first`.
+
+    The pool is left in runs of 64 pixels of the whole picture, whose places are `stride` apart.
+    """
     mask = pool.shape[0] - 1
-    place = start
-    for i in range(picture.shape[0]):
-        if i & 63 == 0:
-            place = (place + stride) & mask
-        level = picture[i]
-        value = level + sigma[level] * pool[(place + (i & 63)) & mask] + 0.5
-        out[i] = np.uint8(min(255.0, max(0.0, value)))
+    for row in range(picture.shape[0]):
+        for column in range(picture.shape[1]):
+            pixel = first + row * width + column
+            place = start + (pixel >> 6) * stride + 3 * (pixel & 63)
+            for c in range(picture.shape[2]):
+                level = picture[row, column, c]
+                value = level + sigma[level] * pool[(place + c) & mask] + 0.5
+                out[row, column, c] = np.uint8(min(255.0, max(0.0, value)))

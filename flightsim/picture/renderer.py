@@ -16,7 +16,8 @@ from flightsim.picture import landscape_kernel as k
 from flightsim.picture.exposure import Exposure
 from flightsim.picture.ground_texture import ground_texture
 from flightsim.picture.pose import rotation_of
-from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag, tag_may_show
+from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag, tag_box, tag_may_show
+from flightsim.picture.window import Window
 
 Picture = NDArray[np.uint8]
 
@@ -99,21 +100,44 @@ class Renderer:
             -math.sin(s.sun_elevation_rad),
         )
 
-    def render(self, view: CameraView, *, width_px: int | None = None) -> Picture:
-        """The picture (height, width, 3), BGR, at the model's size or scaled to another width."""
+    def render(
+        self, view: CameraView, *, width_px: int | None = None, window: Window | None = None
+    ) -> Picture:
+        """The picture (height, width, 3), BGR, at the model's size or scaled to another width.
+
+        Args:
+            view: the view.
+            width_px: width of the picture; None: the model's.
+            window: a part of the picture; None: all of it.
+        """
         model = self.model
         width = model.width_px if width_px is None else width_px
         height = max(1, round(model.height_px * width / model.width_px))
         if view.covered:
-            return np.full((height, width, 3), _COVERED, np.uint8)
+            shape = (height, width) if window is None else (window.height, window.width)
+            return np.full((*shape, 3), _COVERED, np.uint8)
         exposure = self._exposure(width, view.zoom)
-        ideal_width, ideal_height = exposure.ideal_px
-        picture: Picture = np.empty((ideal_height, ideal_width, 3), np.uint8)
+        size_px = exposure.ideal_px
+        if window is None:
+            window = Window(left=0, top=0, width=width, height=height)
+            part = Window(left=0, top=0, width=size_px[0], height=size_px[1])
+        else:
+            part = exposure.ideal_window(window)
+        picture: Picture = np.empty((part.height, part.width, 3), np.uint8)
         scale = width / model.width_px
         focal_px = model.focal_px * view.zoom * scale
         r_ned_from_mount = rotation_of(view.q_ned_from_mount)
         eye = np.array(view.eye_ned_m)
-        k.paint_landscape(r_ned_from_mount, eye, focal_px, self._numbers, self._texture, picture)
+        k.paint_landscape(
+            r_ned_from_mount,
+            eye,
+            focal_px,
+            0.5 * size_px[0] - part.left,
+            0.5 * size_px[1] - part.top,
+            self._numbers,
+            self._texture,
+            picture,
+        )
         camera_from_ned = camera_from_gimbal(r_ned_from_mount).T
         sun = self._numbers[k.SUN_NED]
 
@@ -123,10 +147,30 @@ class Renderer:
         for index in sorted(range(len(view.targets)), key=distance_m, reverse=True):
             target = view.targets[index]
             if shows_tag(target):
-                draw_tag(picture, target, camera_from_ned, eye, focal_px)
+                draw_tag(picture, part, size_px, target, camera_from_ned, eye, focal_px)
             else:
-                draw_ball(picture, target, camera_from_ned, eye, focal_px, sun)
-        return exposure.expose(self._defocused(picture, view, r_ned_from_mount, scale), view)
+                draw_ball(picture, part, size_px, target, camera_from_ned, eye, focal_px, sun)
+        sharp = self._defocused(picture, view, r_ned_from_mount, scale)
+        return exposure.expose(sharp, view, window, part)
+
+    def tag_window(self, view: CameraView, margin_px: int) -> Window | None:
+        """The part of the picture around the tags of a view; None: all of it, or nothing, may be needed."""
+        model = self.model
+        focal_px = model.focal_px * view.zoom
+        box = tag_box(view, focal_px)
+        if box is None:
+            return None
+        centre = np.array(model.centre_px)
+        distortion = self._imager.distortion
+        corners = np.array([(x, y) for x in (box[0][0], box[1][0]) for y in (box[0][1], box[1][1])])
+        reach = np.hypot(*self._exposure(model.width_px, view.zoom).ideal_px)
+        if np.hypot(*corners.T).max() > reach:  # beyond what the model of the distortion is for
+            return None
+        seen = distortion.distorted(corners / focal_px) * focal_px + centre
+        low, high = seen.min(axis=0).tolist(), seen.max(axis=0).tolist()
+        return Window.around(
+            (low[0], low[1]), (high[0], high[1]), margin_px, (model.width_px, model.height_px)
+        )
 
     def may_show_tag(self, view: CameraView, margin: float = 0.05) -> bool:
         """Whether a tag, or a part of one, may lie in the picture of a view; False is certain.

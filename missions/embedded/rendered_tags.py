@@ -3,6 +3,7 @@
 """
 
 from dataclasses import dataclass, field
+from typing import Final
 
 import cv2
 import numpy as np
@@ -21,6 +22,8 @@ from flightsim.picture import Renderer, Scenery
 __all__ = ["RenderedTags", "RenderedTagsReader", "TagPicture"]
 
 Picture = NDArray[np.uint8]
+
+_MARGIN_PX: Final = 40  # more than the windows of the detector's thresholds and corners
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,8 +53,8 @@ class RenderedTags:
     Attributes:
         detector: parameters of the detector.
         scenery: of the world.
-        skip: don't render a frame in whose view no tag can lie. The detections are the same: the detector
-            finds no tag in pictures without one.
+        skip: render only the part of a frame around the tags, and no frame in whose view no tag can lie. The
+            detections are the same: the detector finds no tag where there is none.
     """
 
     detector: TagDetectorParameters = field(default_factory=TagDetectorParameters)
@@ -112,10 +115,13 @@ class RenderedTagsReader:
             self.skipped += 1
             return ()
         self.rendered += 1
-        picture = self._renderer.render(view)
-        found = self._detector_at(view.zoom).detect(picture)
+        window = self._renderer.tag_window(view, _MARGIN_PX) if self._parameters.skip else None
+        picture = self._renderer.render(view, window=window)
+        corner = (0, 0) if window is None else (window.left, window.top)
+        found = self._detector_at(view.zoom).detect(picture, corner_px=corner)
         if found and self.kept is None:
-            self.kept = TagPicture(time_us=view.time_us, pixels=picture, detections=found)
+            whole = picture if window is None else self._renderer.render(view)
+            self.kept = TagPicture(time_us=view.time_us, pixels=whole, detections=found)
         return tuple(
             Detection(
                 view.time_us,

@@ -373,7 +373,11 @@ async def _fly_waypoints(
     )
     notes.begin(PATTERN, clock.stamp_us)
 
+    reached = 0
+
     def progress(done: int) -> None:
+        nonlocal reached
+        reached = done - start
         notes.progress = min(1.0, max(0.0, (done - first) / max(1, last - first)))
 
     limit_s = 60.0 + 4.0 * route_m / options.speed_m_s
@@ -387,6 +391,10 @@ async def _fly_waypoints(
         over = True  # the search time has ended
     if over:
         notes.cut_short = True
+        flown = [item.command for item in plan.items[: reached + 1]].count(dialect.MAV_CMD_NAV_WAYPOINT)
+        notes.commanded = replace(
+            notes.commanded, waypoints_ned_m=notes.commanded.waypoints_ned_m[:flown]
+        )  # the way home may pass others
         await vehicle.return_to_launch(wait=False)
     notes.begin("return", clock.stamp_us)
     await vehicle.link.wait_disarmed(300.0 + 2.0 * reach_m)
