@@ -65,12 +65,14 @@ class BrownDistortion:
             ValueError: the lens folds the picture there: no ray, or more than one, is seen at a place.
         """
         rays = np.array(seen, dtype=np.float64)
-        for _ in range(_ITERATIONS):
-            step = seen - self.distorted(rays)
-            rays += step
-            if float(np.abs(step).max(initial=0.0)) < _CONVERGED:
-                return rays
-        if not float(np.abs(seen - self.distorted(rays)).max(initial=0.0)) < 1e-6:
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(_ITERATIONS):
+                step = seen - self.distorted(rays)
+                rays += step
+                if float(np.abs(step).max(initial=0.0)) < _CONVERGED:
+                    return rays
+            left = float(np.abs(seen - self.distorted(rays)).max(initial=0.0))
+        if not left < 1e-6:
             raise ValueError(
                 f"the distortion {self.coefficients} is not accepted: it folds the picture at its edges; "
                 "smaller coefficients, or a smaller field of view, are"

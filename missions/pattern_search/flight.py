@@ -194,6 +194,11 @@ async def _fly_setpoints(
             setpoint = setpoint_at(trajectory.at(t), centre)
             if search is not None and search.over:
                 last, notes.cut_short = setpoint, True
+                assert notes.commanded is not None
+                path = notes.commanded.points_ned_m
+                notes.commanded = replace(
+                    notes.commanded, points_ned_m=path[: max(2, math.floor(notes.progress * len(path)))]
+                )
                 return None
             return setpoint
 
