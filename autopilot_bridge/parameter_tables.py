@@ -7,6 +7,9 @@
 `used = [low, high]` is the range that the vehicle acts on where it differs (`ParameterDefinition.used`). With
 `instances`, `#` in the name stands for each number from the first to the last; `default` may be a list with
 one value for each. `reboot = true`: a change waits for the next boot.
+
+A table of another vehicle class than the one that has the shared rows begins with `without`, the names (or
+beginnings of names, which end in `_`) that it does not have. Its rows replace those of the same name.
 """
 
 import tomllib
@@ -25,14 +28,25 @@ _TYPES: Final = {
 _KEYS: Final = frozenset(("type", "default", "min", "max", "used", "unit", "reboot", "instances", "text"))
 
 
-def load_table(file: Traversable) -> tuple[ParameterDefinition, ...]:
+def load_table(
+    file: Traversable, *, base: Iterable[ParameterDefinition] = ()
+) -> tuple[ParameterDefinition, ...]:
     """The definitions in a TOML table, in the order of the file.
+
+    Args:
+        base: the table of the class that has the shared rows, which come first.
 
     Raises:
         ValueError: an entry is not as described above; the message names it.
     """
     table = tomllib.loads(file.read_text(encoding="utf-8"))
-    return tuple(definition for name, entry in table.items() for definition in _definitions(name, entry))
+    without = frozenset(table.pop("without", ()))
+    prefixes = tuple(name for name in without if name.endswith("_"))
+    own = {row.name: row for name, entry in table.items() for row in _definitions(name, entry)}
+    shared = [
+        own.pop(row.name, row) for row in base if not (row.name in without or row.name.startswith(prefixes))
+    ]
+    return (*shared, *own.values())
 
 
 def _definitions(name: str, entry: dict[str, Any]) -> Iterator[ParameterDefinition]:
@@ -68,23 +82,3 @@ def _definition(name: str, entry: dict[str, Any], default: float) -> ParameterDe
         description=entry.get("text", ""),
         reboot_required=entry.get("reboot", False),
     )
-
-
-def combined(
-    base: Iterable[ParameterDefinition], own: Iterable[ParameterDefinition], *, without: tuple[str, ...]
-) -> tuple[ParameterDefinition, ...]:
-    """The table of another vehicle class: `base` with `own` rows in place of those of the same name.
-
-    Args:
-        base: the table of the class that has the shared rows.
-        own: the additional and different rows of the other class; additional rows come last.
-        without: names, or beginnings of names that end in `_`, that the other class does not have.
-    """
-    replaced = {definition.name: definition for definition in own}
-    prefixes = tuple(name for name in without if name.endswith("_"))
-    shared = [
-        replaced.pop(definition.name, definition)
-        for definition in base
-        if not (definition.name in without or definition.name.startswith(prefixes))
-    ]
-    return (*shared, *replaced.values())

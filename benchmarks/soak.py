@@ -23,7 +23,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -124,8 +124,9 @@ def urls(index: int, port: int, server: bool) -> tuple[str, str, str]:
 
 @dataclass
 class Client:
-    """What one client hears of its vehicle; a recorder of its connection."""
+    """What one client receives of its vehicle; a recorder of its connection."""
 
+    acts: ClassVar = False
     system_id: int
     wanted_hz: dict[str, float]
     counts: Counter[int] = field(default_factory=Counter)

@@ -146,6 +146,8 @@ class Ears:
 class Ear:
     """One link's recorder: of several hundred messages a second it keeps what the base station listens to."""
 
+    acts = False
+
     def __init__(self, ears: Ears) -> None:
         self._ears = ears
 

@@ -182,6 +182,10 @@ class Estimator(ABC, Generic[P]):
         """Messages with the newest estimates, to be sent from the estimator's own component id."""
         return ()
 
+    def files(self) -> Mapping[str, bytes]:
+        """Further files of the run, made at its end: contents by name."""
+        return {}
+
     def remarks(self) -> Mapping[str, float | str]:
         """Additional figures for the summary: innovations, biases, numbers of rejected messages.
 

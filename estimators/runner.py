@@ -214,6 +214,14 @@ class Runner:
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             return {"remarks_failed": described(error)}
 
+    @property
+    def files(self) -> Mapping[str, bytes]:
+        """The estimator's own files; none when it fails to make them, which `remarks` report."""
+        try:
+            return dict(self.estimator.files())
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+            return {}
+
     def publish(self) -> tuple[MAVLinkMessage, ...]:
         """Messages with the newest estimates.
 

@@ -202,12 +202,10 @@ class WorldSpec:
         return HOMES.get(self.vehicles[0].autopilot, HOMES["px4"])
 
     @property
-    def magnetic_target_ne_m(self) -> tuple[float, float] | None:
-        """True place of the first magnetic target, north and east of the map's home; None: there is none."""
+    def magnetic_targets_ne_m(self) -> tuple[tuple[float, float], ...]:
+        """True places of the magnetic targets, north and east of the map's home."""
         field = self.magnetic_field
-        if field is None or not field.signatures:
-            return None
-        return field.signatures[0].north_m, field.signatures[0].east_m
+        return () if field is None else tuple((s.north_m, s.east_m) for s in field.signatures)
 
     @classmethod
     def of_team(

@@ -47,6 +47,12 @@ def _multi_target() -> Mission[Any]:
     return MultiTargetMission()
 
 
+def _survey() -> Mission[Any]:
+    from missions.survey.mission import SurveyMission
+
+    return SurveyMission()
+
+
 class _NamedMissions(Mapping[str, Mission[Any]]):
     """The missions by name; only those that are used are imported."""
 
@@ -61,6 +67,7 @@ class _NamedMissions(Mapping[str, Mission[Any]]):
             "orbit": _orbit,
             "occupancy": _occupancy,
             "multi-target": _multi_target,
+            "survey": _survey,
         }
     )
 

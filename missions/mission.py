@@ -52,12 +52,14 @@ class Debriefing:
         options: options of the first vehicle.
         target_ne_m: true place of the first magnetic target of an embedded world, north and east of the map's
             home; None: not known.
+        targets_ne_m: the same of all magnetic targets.
     """
 
     records: "FlightRecords"
     flights: "Sequence[tuple[FlightNotes, FlightScore]]"
     options: MissionOptions
     target_ne_m: tuple[float, float] | None = None
+    targets_ne_m: tuple[tuple[float, float], ...] = ()
 
 
 def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
@@ -154,6 +156,10 @@ class Mission(Generic[AnyOptions]):
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         """What `summary.json` has beside the figures of every flight."""
+        return {}
+
+    def files(self, debriefing: Debriefing) -> Mapping[str, bytes]:
+        """Further files of the run folder: contents by name."""
         return {}
 
     def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:

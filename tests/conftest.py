@@ -21,6 +21,7 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+gc.set_threshold(YOUNG_OBJECTS)  # the collection of tests makes millions of objects that stay
 
 # Workers and programs that are started each would compile every module they import, wherever this is set.
 sys.dont_write_bytecode = False
@@ -47,7 +48,7 @@ ORDER: Final = (
     ("test_warm_up.py",),
     ("bridge", "logs", "preflight", "storage", "vehicle_client", "test_architecture.py"),
     # These take longest or wait most: begun early, no worker is left alone with them.
-    ("clients",),
+    ("clients", "test_tutorial.py", "test_examples.py"),
     ("system",),
     ("flights",),
 )
@@ -57,7 +58,6 @@ ORDER: Final = (
 def pytest_collection_finish() -> None:
     """The modules and tests stay until the end: the collector need not look through them again and again."""
     gc.freeze()
-    gc.set_threshold(YOUNG_OBJECTS)
 
 
 @pytest.hookimpl(tryfirst=True)

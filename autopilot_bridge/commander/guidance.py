@@ -11,8 +11,7 @@ from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
 from autopilot_bridge.flight.heading import Turn
-from autopilot_bridge.flight.streamed import Vector
-from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask
+from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, Vector
 
 _DO_REPOSITION: Final = 192
 _MAX_DISTANCE_M: Final = 1e6

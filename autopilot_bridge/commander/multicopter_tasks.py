@@ -15,9 +15,8 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.follow import FollowTask
-from autopilot_bridge.flight.multicopter.goto import RepositionTask
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
-from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask
+from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask, RepositionTask
 from autopilot_bridge.flight.multicopter.land import LandTask
 from autopilot_bridge.flight.multicopter.manual import LoiterTask, ManualMode, ManualTask
 from autopilot_bridge.flight.multicopter.mission import MissionTask
@@ -27,8 +26,7 @@ from autopilot_bridge.flight.multicopter.precision_land import PrecisionLandTask
 from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
-from autopilot_bridge.flight.task import FlightTask, IdleTask, SpeedKind
+from autopilot_bridge.flight.task import FlightTask, GuidedKind, IdleTask, OffboardKind, SpeedKind
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 _MANUAL: Final = {

@@ -1,18 +1,43 @@
-"""Typed parameters from a firmware's named ones: tables of (field, name, factor).
+"""Typed parameters from a firmware's named ones: tables of (field, name, factor) in a `mapping.toml`.
+
+    [fields.flight]                              # of one parameter class
+    cruise_speed_m_s = "MPC_XY_CRUISE"           # the field and the firmware's parameter that sets it
+    yaw_rate_max_rad_s = "MPC_YAWRAUTO_MAX deg"  # with its unit, where it is not that of the field
+    [ratios.navigation]
+    EKF2_REQ_GPS_H = ["gps_check_time_s"]        # fields that are scaled with the parameter
+    [actions]
+    GF_ACTION = { 0 = "NONE", 1 = "WARN" }       # the failsafe action of each value
 
 Defaults and limits are those of the parameter table (`parameters.toml`).
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple, TypeVar
 
+from autopilot_bridge.commander.events import FailsafeAction
+from autopilot_bridge.firmware.data import load_data
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 
 T = TypeVar("T")
 
 _LEAST_RATIO: Final = 0.05  # a filter with too small sensor noise diverges
 _GREATEST_RATIO: Final = 100.0
+
+_FACTORS: Final[Mapping[str, float]] = {
+    "": 1.0,
+    "percent": 0.01,
+    "deg": math.radians(1.0),
+    "-deg": -math.radians(1.0),
+    "cdeg": math.radians(0.01),
+    "cm": 0.01,
+    "ds": 0.1,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "surface_angle": 4.0 / math.pi,  # ArduPlane's rate loops give the surface as an angle, 45 deg being full
+    "load_factor": 2.2,  # energy rate per load factor: n^2 - 1 = 2.2 (n - 1), about n = 1.2
+}
+"""Field / parameter, by the unit of the parameter (centimetres also of cm/s and cm/s^2)."""
 
 
 class FieldMap(NamedTuple):
@@ -39,6 +64,44 @@ class RatioMap(NamedTuple):
 
     fields: tuple[str, ...]
     name: str
+
+
+class Tables(NamedTuple):
+    """The tables of one class of vehicle of a firmware.
+
+    Attributes:
+        fields: fields of a parameter class, by a name of the class.
+        ratios: fields that follow parameters relative to their defaults, by a name of the class.
+        actions: failsafe actions by the value of a parameter, by its name.
+    """
+
+    fields: Mapping[str, tuple[FieldMap, ...]]
+    ratios: Mapping[str, tuple[RatioMap, ...]]
+    actions: Mapping[str, Mapping[int, FailsafeAction]]
+
+
+def load_tables(package: str) -> Tables:
+    """The tables in the `mapping.toml` of a package of this one: `load_tables("px4.copter")`."""
+    data = load_data(package, "mapping.toml")
+    return Tables(
+        fields={
+            group: tuple(_field_map(field, source) for field, source in table.items())
+            for group, table in data["fields"].items()
+        },
+        ratios={
+            group: tuple(RatioMap(tuple(names), name) for name, names in table.items())
+            for group, table in data["ratios"].items()
+        },
+        actions={
+            name: {int(value): FailsafeAction[action] for value, action in table.items()}
+            for name, table in data["actions"].items()
+        },
+    )
+
+
+def _field_map(field: str, source: str) -> FieldMap:
+    name, _, unit = source.partition(" ")
+    return FieldMap(field, name, _FACTORS[unit])
 
 
 def scaled_values(tuned: object, store: ParameterStore, table: Iterable[RatioMap]) -> dict[str, float]:

@@ -19,8 +19,7 @@ from autopilot_bridge.mavlink.intake import Intake
 from autopilot_bridge.mavlink.names import command_name, enum_name
 from autopilot_bridge.mavlink.packet import Packet
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters, SourceCounters
-from autopilot_bridge.mavlink.signing import LinkSigning, LinkSigningPolicy, SigningState
-from autopilot_bridge.mavlink.signing_key import SigningKey
+from autopilot_bridge.mavlink.signing import LinkSigning, LinkSigningPolicy, SigningKey, SigningState
 
 __all__ = [
     "DEFINITIONS",

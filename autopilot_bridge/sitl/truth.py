@@ -97,7 +97,7 @@ class TargetTruthEncoder:
         home: origin of their frame.
     """
 
-    __slots__ = ("_calls", "_encoders", "_home", "_moving", "_targets")
+    __slots__ = ("_calls", "_encoders", "_home", "_moving", "_records", "_targets")
 
     def __init__(self, targets: GroundTargets, home: Home) -> None:
         if len(targets) > MAX_TARGETS:
@@ -106,41 +106,33 @@ class TargetTruthEncoder:
         self._home = home
         self._encoders = [FrameEncoder(TARGET_SYSTEM, number + 1) for number in range(len(targets))]
         self._moving = [not isinstance(target.parameters.motion, Static) for target in targets.targets]
+        self._records = np.zeros(len(targets), record_type(definition(_MESSAGE_ID)))
+        self._records["attitude_quaternion"][:, 0] = 1.0
         self._calls = 0
 
     def encode(self, time_us: int) -> list[bytes]:
         """HIL_STATE_QUATERNION frames of the targets, with their state at a vehicle time."""
-        everyone = self._calls % _STATIC_EVERY == 0
+        first, everyone = self._calls == 0, self._calls % _STATIC_EVERY == 0
         self._calls += 1
         if not (everyone or any(self._moving)):
             return []
         self._targets.step(time_us)
+        records = self._records
+        records["time_usec"] = time_us
         frames = []
-        for encoder, moving, position, velocity in zip(
-            self._encoders,
-            self._moving,
-            self._targets.positions_ned_m.tolist(),
-            self._targets.velocities_ned_m_s.tolist(),
-            strict=True,
-        ):
-            if not (moving or everyone):
-                continue
-            lat_deg, lon_deg = self._home.offset(position[0], position[1])
-            message = mavlink.MAVLink_hil_state_quaternion_message(
-                time_us,
-                [1.0, 0.0, 0.0, 0.0],
-                0.0,
-                0.0,
-                0.0,
-                round(lat_deg * 1e7),
-                round(lon_deg * 1e7),
-                round((self._home.alt_m - position[2]) * 1e3),
-                *(round(speed * 100.0) for speed in velocity),
-                0,
-                0,
-                0,
-                0,
-                0,
-            )
-            frames.append(encoder.encode(message))
+        for index, (encoder, moving) in enumerate(zip(self._encoders, self._moving, strict=True)):
+            if moving or first:
+                self._write(index)
+            if moving or everyone:
+                frames.append(encoder.encode_payload(_MESSAGE_ID, records[index].tobytes()))
         return frames
+
+    def _write(self, index: int) -> None:
+        """Write where a target is, and its velocity."""
+        record, targets = self._records[index], self._targets
+        north_m, east_m, down_m = targets.positions_ned_m[index].tolist()
+        lat_deg, lon_deg = self._home.offset(north_m, east_m)
+        record["lat"], record["lon"] = round(lat_deg * 1e7), round(lon_deg * 1e7)
+        record["alt"] = round((self._home.alt_m - down_m) * 1e3)
+        velocity_cm_s = (round(speed * 100.0) for speed in targets.velocities_ned_m_s[index].tolist())
+        record["vx"], record["vy"], record["vz"] = velocity_cm_s

@@ -10,7 +10,6 @@ import numpy as np
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.attitude import layout as at
 from estimators.attitude.air import AirData
-from estimators.attitude.board_trim import BoardTrim
 from estimators.attitude.estimate import AttitudeEstimate
 from estimators.attitude.forms import FORM_NAMES, FORM_OF_KIND, FORM_OF_TYPE
 from estimators.attitude.parameters import (
@@ -20,7 +19,7 @@ from estimators.attitude.parameters import (
     VehicleKind,
     coefficients,
 )
-from estimators.attitude.samples import DIFFERENTIAL_PRESSURE, INERTIAL_FIELDS, SAMPLES
+from estimators.attitude.samples import DIFFERENTIAL_PRESSURE, INERTIAL_FIELDS, SAMPLES, BoardTrim
 from estimators.attitude.step import start, step
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome

@@ -14,8 +14,7 @@ from estimators.lissajous.estimate import LissajousEstimate
 from estimators.lissajous.model import MOTION, course, course_variance
 from estimators.lissajous.motion_filter import off_pattern_remarks
 from estimators.lissajous.parameters import Form, LissajousParameters
-from estimators.lissajous.pattern_frame import PatternFrame, Track
-from estimators.lissajous.positions import PositionReader, values_of
+from estimators.lissajous.pattern_frame import PatternFrame, PositionReader, Track, values_of
 from estimators.messages import Message
 from flightsim.foundation.geodesy import GeodeticPosition
 

@@ -1,17 +1,6 @@
-"""The published magnetic map of a survey, read from a file.
-
-The file is a numpy `.npz` archive, in the format "flightstack-magnetic-map-1": grid lines `north_m` (rows,)
-and `east_m` (columns,) from the map's home, `total_field_nt` (rows, columns) with NaN where there is no data,
-`height_m`, the height above home at which the map is valid, its home (`home_lat_deg`, `home_lon_deg`,
-`home_alt_m`), and, if they are known, `vertical_gradient_nt_m` (rows, columns), the change with height,
-`error_nt`, the standard deviation of the field stated by the survey, and `line_spacing_m`, the distance
-between its lines.
-"""
+"""The published magnetic map of a survey, read from a file (`flightsim.foundation.magnetic_map_file`)."""
 
 import math
-import tokenize
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -22,26 +11,10 @@ from numpy.typing import NDArray
 from estimators.errors import EstimatorError
 from estimators.occupancy.detection import MapError
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.magnetic_map_file import MagneticMapError, read_map_file
 
 Array = NDArray[np.float64]
 
-FORMAT: Final = "flightstack-magnetic-map-1"
-# errors that zipfile, zlib and numpy's reader of array headers raise for damaged files
-_UNREADABLE: Final = (
-    *(EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
-    *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
-)
-_NEEDED: Final = (
-    "format",
-    "north_m",
-    "east_m",
-    "total_field_nt",
-    "height_m",
-    "home_lat_deg",
-    "home_lon_deg",
-    "home_alt_m",
-)
-_STATED: Final = ("error_nt", "line_spacing_m")
 _USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
 _USUAL_LINES_M: Final = 200.0
 _SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
@@ -83,6 +56,27 @@ class SurveyMap:
         corners = np.s_[i : i + 2, j : j + 2]
         gradient = float(np.sum(weights * self.vertical_gradient_nt_m[corners]))
         return float(np.sum(weights * self.total_field_nt[corners])) + gradient * (height_m - self.height_m)
+
+    def totals_nt(self, north_m: Array, east_m: Array, height_m: Array) -> Array:
+        """Field (n,) at places and heights (n,) from the map's home, bilinear; NaN without data."""
+        row, column = (
+            np.interp(place, lines, np.arange(lines.size), left=np.nan, right=np.nan)
+            for place, lines in ((north_m, self.north_m), (east_m, self.east_m))
+        )
+        inside = np.isfinite(row + column)
+        i = np.minimum(np.where(inside, row, 0.0).astype(np.int64), self.north_m.size - 2)
+        j = np.minimum(np.where(inside, column, 0.0).astype(np.int64), self.east_m.size - 2)
+        v, u = row - i, column - j
+
+        def between(grid: Array) -> Array:
+            south = (1.0 - u) * grid[i, j] + u * grid[i, j + 1]
+            north = (1.0 - u) * grid[i + 1, j] + u * grid[i + 1, j + 1]
+            found: Array = (1.0 - v) * south + v * north
+            return found
+
+        return between(self.total_field_nt) + between(self.vertical_gradient_nt_m) * (
+            height_m - self.height_m
+        )
 
     def frame(self) -> LocalFrame:
         """The map's local frame."""
@@ -144,80 +138,17 @@ def load_survey_map(path: Path) -> SurveyMap:
         EstimatorError: the file does not exist or is not a map, or the map has no data.
     """
     try:
-        # not np.load, which treats a file that is not an archive as a pickle, and advises to trust it
-        with zipfile.ZipFile(path) as archive:
-            found = {}
-            for name in archive.namelist():
-                with archive.open(name) as file:
-                    found[name.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
-    except OSError as error:
-        raise EstimatorError(f"`map_file` {path} can't be read: {error.strerror or error}") from None
-    except _UNREADABLE as error:
-        why = str(error) or type(error).__name__
-        raise EstimatorError(
-            f"`map_file` {path} is not a magnetic map (a numpy .npz archive): {why}"
-        ) from None
-    missing = [name for name in _NEEDED if name not in found]
-    if missing:
-        raise EstimatorError(f"`map_file` {path} is not a magnetic map: it has no {', '.join(missing)}")
-    if str(found["format"]) != FORMAT:
-        raise EstimatorError(f"`map_file` {path} has the format {found['format']}; accepted is {FORMAT}")
-    north_m, east_m, total_nt = (
-        _numbers(path, name, found[name]) for name in ("north_m", "east_m", "total_field_nt")
-    )
-    gradient = _numbers(
-        path, "vertical_gradient_nt_m", found.get("vertical_gradient_nt_m", np.zeros(total_nt.shape))
-    )
-    height_m, lat_deg, lon_deg, alt_m = (_number(path, name, found[name]) for name in _NEEDED[4:])
-    stated = {name: _number(path, name, found[name]) for name in _STATED if name in found}
-    for name, value in stated.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise EstimatorError(f"`map_file` {path}: {name} {value:g} is not accepted; more than 0 is")
-    shape = (north_m.size, east_m.size)
-    rising = all(
-        lines.ndim == 1 and lines.size >= 2 and bool(np.all(np.diff(lines) > 0.0))
-        for lines in (north_m, east_m)
-    )
-    if not rising or total_nt.shape != shape or gradient.shape != shape:
-        raise EstimatorError(
-            f"`map_file` {path}: its grid of {total_nt.shape} does not fit {north_m.size} rising lines "
-            "north and "
-            f"{east_m.size} east"
-        )
-    if not np.any(np.isfinite(total_nt)) or np.any(np.isinf(total_nt)):
-        raise EstimatorError(f"`map_file` {path} has no data: total_field_nt needs finite numbers")
-    if not np.all(np.isfinite(gradient[np.isfinite(total_nt)])):
-        raise EstimatorError(
-            f"`map_file` {path}: vertical_gradient_nt_m has no number at places where total_field_nt has "
-            "one; "
-            "leave it out, or fill it"
-        )
-    if not (math.isfinite(height_m + alt_m) and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
-        raise EstimatorError(
-            f"`map_file` {path}: height {height_m}, home {lat_deg}, {lon_deg}, {alt_m} are not a place"
-        )
+        found = read_map_file(path)
+    except MagneticMapError as error:
+        raise EstimatorError(f"`map_file` {error}") from None
+    gradient = found.vertical_gradient_nt_m
     return SurveyMap(
-        north_m=north_m,
-        east_m=east_m,
-        total_field_nt=total_nt,
-        vertical_gradient_nt_m=gradient,
-        height_m=height_m,
-        home=GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m),
-        **stated,
+        north_m=found.north_m,
+        east_m=found.east_m,
+        total_field_nt=found.total_field_nt,
+        vertical_gradient_nt_m=np.zeros(found.total_field_nt.shape) if gradient is None else gradient,
+        height_m=found.height_m,
+        home=found.home,
+        error_nt=found.error_nt,
+        line_spacing_m=found.line_spacing_m,
     )
-
-
-def _numbers(path: Path, name: str, values: Array) -> Array:
-    """Read an array of the file as real numbers."""
-    if values.dtype.kind not in "iuf":
-        raise EstimatorError(f"`map_file` {path}: {name} holds {values.dtype} and no real numbers")
-    return values.astype(np.float64)
-
-
-def _number(path: Path, name: str, values: Array) -> float:
-    """Read a single number of the file."""
-    if values.size != 1:
-        raise EstimatorError(
-            f"`map_file` {path}: {name} has the shape {values.shape}; it is to be one number"
-        )
-    return float(_numbers(path, name, values).reshape(()))

@@ -9,9 +9,11 @@ one) and 8 of eddy currents. Their regression is nearly singular on any flight, 
 coefficients small.
 """
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -20,17 +22,29 @@ from scipy.signal import butter, sosfiltfilt
 
 from estimators.errors import EstimatorError
 
-__all__ = ["TERMS", "Compensation", "direction_cosines", "figure_of_merit_nt", "fit_compensation"]
+__all__ = [
+    "TERMS",
+    "Compensation",
+    "compensation_bytes",
+    "direction_cosines",
+    "figure_of_merit_nt",
+    "fit_compensation",
+    "load_compensation",
+    "mean_cycle",
+]
 
 Array = NDArray[np.float64]
 
 TERMS: Final = 16
-_BAND_HZ: Final = (0.03, 1.0)  # of manoeuvres: above the geology, below the noise
+_BAND_HZ: Final = (0.08, 1.0)  # of manoeuvres: above the geology, below the noise
 _ORDER: Final = 3
 _LEAST_SAMPLES: Final = 300
 _RIDGE: Final = 1e-6
 _LEAST_TURN_RAD: Final = math.radians(5.0)
 _HEADINGS: Final = 4
+_CYCLES: Final = 3  # of each manoeuvre
+_TREND: Final = 2  # degree of what geology does during a manoeuvre
+FORMAT: Final = "flightstack-compensation-1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -137,8 +151,10 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
     """Figure of merit: the sum of the peak-to-peak values of the readings during rolls, pitches and yaws on
     four headings, twelve manoeuvres in all, without their slow change. Survey contracts ask for 1 to 2 nT.
 
+    The three cycles of a manoeuvre are averaged, so that noise counts less than what the manoeuvre does.
+
     Args:
-        manoeuvres: (n,) readings of each manoeuvre, evenly spaced.
+        manoeuvres: (n,) readings of each manoeuvre of three cycles, evenly spaced.
         rate_hz: of the readings.
 
     Raises:
@@ -148,12 +164,62 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
         raise EstimatorError(
             f"a figure of merit of {len(manoeuvres)} manoeuvres; accepted: 12, three on each of four headings"
         )
-    found = 0.0
-    for values in manoeuvres:
-        times = np.arange(len(values)) / rate_hz
-        level = np.polynomial.Polynomial.fit(times, values, 1)
-        # a second's mean: the noise of single readings is no manoeuvre
-        width = max(1, round(rate_hz))
-        smooth = np.convolve(values - level(times), np.full(width, 1.0 / width), "valid")
-        found += float(np.ptp(smooth))
-    return found
+    return math.fsum(float(np.ptp(mean_cycle(values, rate_hz=rate_hz))) for values in manoeuvres)
+
+
+def mean_cycle(values_nt: Array, *, rate_hz: float) -> Array:
+    """The mean of the three cycles of a manoeuvre (n,), without its slow trend, as means over a second:
+    the noise of single readings is no manoeuvre.
+    """
+    length = len(values_nt) // _CYCLES
+    # the filter of a second takes from the ends, so cycles are averaged before it, and repeated for it
+    times = np.arange(len(values_nt)) / rate_hz
+    level = np.polynomial.Polynomial.fit(times, values_nt, _TREND)(times)
+    cycle = (values_nt - level)[: _CYCLES * length].reshape(_CYCLES, length).mean(axis=0)
+    width = max(1, round(rate_hz))
+    around = np.concatenate((cycle[length - width // 2 :], cycle, cycle[: width - width // 2 - 1]))
+    return np.convolve(around, np.full(width, 1.0 / width), "valid")
+
+
+def compensation_bytes(compensation: Compensation) -> bytes:
+    """Contents of a file of coefficients (JSON), which `load_compensation` reads."""
+    return (
+        json.dumps(
+            {
+                "format": FORMAT,
+                "coefficients_nt": compensation.coefficients.tolist(),
+                "main_nt": compensation.main_nt,
+                "improvement": compensation.improvement,
+            },
+            indent=1,
+        )
+        + "\n"
+    ).encode()
+
+
+def load_compensation(path: Path) -> Compensation:
+    """Read coefficients.
+
+    Raises:
+        EstimatorError: the file can't be read, or holds no coefficients.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise EstimatorError(f"`compensation_file` {path} can't be read: {error}") from None
+    if not isinstance(found, dict) or found.get("format") != FORMAT:
+        raise EstimatorError(
+            f"`compensation_file` {path} is no compensation; accepted is the format {FORMAT}, which "
+            "a calibration flight writes"
+        )
+    try:
+        coefficients = np.array(found["coefficients_nt"], dtype=np.float64)
+        main_nt, improvement = float(found["main_nt"]), float(found["improvement"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise EstimatorError(f"`compensation_file` {path}: {error!r}") from None
+    if coefficients.shape != (TERMS,) or not np.all(np.isfinite(coefficients)):
+        raise EstimatorError(
+            f"`compensation_file` {path}: coefficients_nt of shape {coefficients.shape}; accepted are "
+            f"{TERMS} finite numbers"
+        )
+    return Compensation(coefficients=coefficients, main_nt=main_nt, improvement=improvement)

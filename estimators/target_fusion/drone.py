@@ -10,8 +10,7 @@ import numpy as np
 from estimators.input_guard import InputGuard
 from estimators.interface import Outcome
 from estimators.lissajous.model import VX, VY, Array, course, course_variance
-from estimators.lissajous.pattern_frame import Track
-from estimators.lissajous.positions import PositionReader, values_of
+from estimators.lissajous.pattern_frame import PositionReader, Track, values_of
 from estimators.messages import Message
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
 from estimators.target_fusion.sight import Detection, place_in_level_frame

@@ -12,8 +12,7 @@ from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.model import Array
 from estimators.lissajous.motion_filter import off_pattern_remarks
-from estimators.lissajous.pattern_frame import PatternFrame
-from estimators.lissajous.positions import MESSAGES
+from estimators.lissajous.pattern_frame import MESSAGES, PatternFrame
 from estimators.messages import Message
 from estimators.target_fusion.belief import TargetBelief
 from estimators.target_fusion.drone import Drone

@@ -78,6 +78,10 @@ class ExplorationMap:
         found = south * (1.0 - fy) + north * fy
         return np.where(self.near_area(north_m, east_m), found, 0.0)
 
+    def points(self) -> tuple[Array, Array, Array]:
+        """North and east (n,) of the cells, and the area in each in which no target was detected, m^2."""
+        return self._north, self._east, self.undetected.ravel() * self.layout.cell_m**2
+
     def near_area(self, north_m: Array, east_m: Array) -> NDArray[np.bool_]:
         """Which places (n,) can be those of measurements of targets in the area."""
         layout, margin = self.layout, self._edge_m

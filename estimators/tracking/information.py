@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from estimators.tracking.range_bearing import FORWARD, GAIN, REACH, RIGHT
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["condensed", "detection_information", "information_at"]
+__all__ = ["condensed", "detection_information", "detections_at", "information_at"]
 
 Array = NDArray[np.float64]
 
@@ -65,6 +65,37 @@ def information_at(north_m: Array, east_m: Array, mass: Array, sensor: Array, vi
         found,
     )
     return found
+
+
+def detections_at(north_m: Array, east_m: Array, mass: Array, sensor: Array, viewpoints: Array) -> Array:
+    """Expected number of detections in a scan from each viewpoint, (v,): int p D.
+
+    Args:
+        north_m, east_m, mass: (n,) points of the intensity.
+        sensor: `RangeBearingSensor.values`.
+        viewpoints: (v, 3) north, east, heading.
+    """
+    found = np.empty(len(viewpoints))
+    _detections_at(north_m, east_m, mass, sensor, np.ascontiguousarray(viewpoints), found)
+    return found
+
+
+@kernel
+def _detections_at(
+    north_m: Array, east_m: Array, mass: Array, sensor: Array, viewpoints: Array, found: Array
+) -> None:
+    gain, inverse_f, inverse_r = sensor[GAIN], 1.0 / sensor[FORWARD], 1.0 / sensor[RIGHT]
+    reach_squared = sensor[REACH] * sensor[REACH]
+    for v in range(found.size):
+        cosine, sine = math.cos(viewpoints[v, 2]), math.sin(viewpoints[v, 2])
+        total = 0.0
+        for i in range(mass.size):
+            n, e = north_m[i] - viewpoints[v, 0], east_m[i] - viewpoints[v, 1]
+            if n * n + e * e > reach_squared:
+                continue
+            forward, right = (cosine * n + sine * e) * inverse_f, (cosine * e - sine * n) * inverse_r
+            total += mass[i] * gain * math.exp(-0.5 * math.sqrt(forward * forward + right * right))
+        found[v] = total
 
 
 @kernel

@@ -1,5 +1,7 @@
-"""Earth's magnetic field from the World Magnetic Model, through `pygeomag`."""
+"""Earth's main field: the World Magnetic Model (`pygeomag`), and the IGRF (`ppigrf`, an extra)."""
 
+from datetime import datetime, timedelta
+from enum import StrEnum
 from functools import lru_cache
 
 import numpy as np
@@ -38,3 +40,41 @@ def magnetic_field_ned_gauss(
         glat=lat_deg, glon=lon_deg, alt=alt_m / 1000.0, time=decimal_year, allow_date_outside_lifespan=True
     )
     return np.array([result.x, result.y, result.z]) * _GAUSS_PER_NANOTESLA
+
+
+class FieldModel(StrEnum):
+    """Models of the main field."""
+
+    WMM = "wmm"
+    IGRF = "igrf"
+
+
+def main_field_ned_gauss(
+    lat_deg: float, lon_deg: float, alt_m: float, decimal_year: float, model: FieldModel = FieldModel.WMM
+) -> NDArray[np.float64]:
+    """Main field at a place and date by one of the models; see `magnetic_field_ned_gauss`.
+
+    Args:
+        decimal_year: 1900.0 to 2030.0 for the IGRF (its 14th generation).
+
+    Raises:
+        ValueError: date outside the model's validity, or `ppigrf` is not installed.
+    """
+    if model is FieldModel.WMM:
+        return magnetic_field_ned_gauss(lat_deg, lon_deg, alt_m, decimal_year)
+    if not 1900.0 <= decimal_year <= 2030.0:
+        raise ValueError(f"decimal year {decimal_year} is outside the IGRF's validity, 1900.0 to 2030.0")
+    try:
+        import ppigrf
+    except ImportError:
+        raise ValueError(
+            "the IGRF needs ppigrf, which is not installed: pip install 'flightstack[maps]'"
+        ) from None
+    year = int(decimal_year)
+    start = datetime(year, 1, 1)
+    length = datetime(year + 1, 1, 1) - start
+    date = start + timedelta(seconds=(decimal_year - year) * length.total_seconds())
+    east, north, up = (
+        float(np.ravel(part)[0]) for part in ppigrf.igrf(lon_deg, lat_deg, alt_m / 1000.0, date)
+    )
+    return np.array([north, east, -up]) * _GAUSS_PER_NANOTESLA

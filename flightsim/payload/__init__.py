@@ -5,9 +5,11 @@ magnetometer over a magnetic map with targets' signatures in it. All read the ve
 measurements.
 """
 
+from flightsim.foundation.main_field import MainField
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal, gimbal_from_camera
 from flightsim.payload.camera_view import CameraView, TargetView
+from flightsim.payload.daily_variation import DailyVariation, DailyVariationParameters
 from flightsim.payload.detection import (
     CameraFrame,
     Detection,
@@ -29,7 +31,6 @@ from flightsim.payload.magnetic_spec import (
     SignatureSpec,
     magnetic_field_of,
 )
-from flightsim.payload.main_field import MainField
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
@@ -67,6 +68,8 @@ __all__ = [
     "CameraView",
     "Circle",
     "ConstantVelocity",
+    "DailyVariation",
+    "DailyVariationParameters",
     "Detection",
     "DetectionModel",
     "DipoleSignature",

@@ -31,7 +31,7 @@ from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.imager import ImagerParameters
 from flightsim.payload.targets import NO_TAG, GroundTargets
-from flightsim.sensors.schedule import steps_per_sample
+from flightsim.sensors.suite import steps_per_sample
 
 Array = NDArray[np.float64]
 

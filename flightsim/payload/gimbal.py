@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive, require_rate
 from flightsim.payload import gimbal_kernel as k
-from flightsim.sensors.kernels import gauss_markov
-from flightsim.sensors.schedule import steps_per_sample
+from flightsim.sensors.sensor import gauss_markov
+from flightsim.sensors.suite import steps_per_sample
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.main_field import MainField
+from flightsim.payload.daily_variation import DailyVariation
 from flightsim.payload.magnetic_map import MagneticMap, bilinear
-from flightsim.payload.main_field import MainField
 from flightsim.payload.signature import Signature
 
 Array = NDArray[np.float64]
@@ -24,7 +25,7 @@ class MagneticField:
         signatures: the targets.
     """
 
-    __slots__ = ("_axes", "_background", "_field_ned_nt", "home", "signatures")
+    __slots__ = ("_axes", "_background", "_daily", "_field_ned_nt", "home", "signatures")
 
     def __init__(
         self,
@@ -32,6 +33,7 @@ class MagneticField:
         signatures: Sequence[Signature] = (),
         *,
         decimal_year: float = 2026.0,
+        daily: DailyVariation | None = None,
     ) -> None:
         """Put the targets into the field.
 
@@ -39,6 +41,7 @@ class MagneticField:
             background: the true field without them.
             signatures: the targets.
             decimal_year: date of the main field, which gives the direction.
+            daily: variation in time; None: there is none.
 
         Raises:
             MagneticMapError: a target outside the grid.
@@ -48,6 +51,7 @@ class MagneticField:
         self.home = background.home
         self.signatures = tuple(signatures)
         self._background = background.without_holes()
+        self._daily = daily
         row_step_m, column_step_m = background.spacing_m
         self._axes = (
             (float(background.north_m[0]), row_step_m, background.north_m.size - 1.0),
@@ -56,8 +60,8 @@ class MagneticField:
         main = MainField(background.home, decimal_year)
         self._field_ned_nt: Array = main.total_nt * main.direction_ned
 
-    def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:
-        """Total field at a place, local NED of the map's home, and a height above it."""
+    def total_nt(self, north_m: float, east_m: float, height_m: float, time_s: float = 0.0) -> float:
+        """Total field at a place, local NED of the map's home, a height above it, and a time since boot."""
         (south_m, row_step_m, last_row), (west_m, column_step_m, last_column) = self._axes
         row = min(last_row, max(0.0, (north_m - south_m) / row_step_m))
         column = min(last_column, max(0.0, (east_m - west_m) / column_step_m))
@@ -67,13 +71,13 @@ class MagneticField:
             gradient: float = bilinear(background.vertical_gradient_nt_m, row, column)
             total += gradient * (height_m - background.height_m)
         for signature in self.signatures:
-            total += float(
-                signature.anomaly_nt(np.float64(north_m), np.float64(east_m), height_m, self._field_ned_nt)
-            )
-        return total
+            drift_n, drift_e = signature.velocity_ne_m_s
+            north, east = np.float64(north_m - drift_n * time_s), np.float64(east_m - drift_e * time_s)
+            total += float(signature.anomaly_nt(north, east, height_m, self._field_ned_nt))
+        return total if self._daily is None else total + self._daily.at_nt(time_s)
 
     def total_at_nt(self, north_m: Array, east_m: Array, height_m: float) -> Array:
-        """Total field at places of any shape, at one height above home."""
+        """Total field at places of any shape, at one height above home, at boot, without daily variation."""
         background = self._background
         total = background.interpolate(
             np.clip(north_m, background.north_m[0], background.north_m[-1]),

@@ -1,49 +1,32 @@
 """A magnetic map: total field on a regular grid, as a survey publishes it.
 
-The file is a numpy `.npz` archive that needs nothing of this package to be read:
-
-    format                  "flightstack-magnetic-map-1"
-    north_m  (rows,)        grid lines, metres north of home, evenly spaced, rising
-    east_m   (columns,)     metres east of home, likewise
-    total_field_nt          (rows, columns) float64; NaN: no data there
-    vertical_gradient_nt_m  (rows, columns) change of the total field with height, upwards; absent: not known
-    height_m                height above home that the map is valid at
-    home_lat_deg, home_lon_deg, home_alt_m   the home whose local frame it is in
-    error_nt                stated standard deviation of total_field_nt; absent: not stated
-    line_spacing_m          distance of the survey's lines, across which the error changes; absent: not stated
-
-Between grid points it is interpolated bilinearly in both arrays. A reading at a height h compares with
-total_field_nt + vertical_gradient_nt_m * (h - height_m).
+`flightsim.foundation.magnetic_map_file` describes its file. The grid lines of a map in a world are evenly
+spaced. Between grid points it is interpolated bilinearly.
 """
 
 import math
-import tokenize
-import zipfile
-import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.magnetic_map_file import (
+    MagneticMapError,
+    MapContents,
+    map_file_bytes,
+    read_map_file,
+)
 from flightsim.home import Home
+
+__all__ = ["MagneticMap", "MagneticMapError", "bilinear"]
 
 Array = NDArray[np.float64]
 
-FORMAT: Final = "flightstack-magnetic-map-1"
-# What zipfile, zlib and numpy's reader of array headers raise for spoiled bytes.
-_UNREADABLE: Final = (
-    *(OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
-    *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
-)
-_STATED: Final = ("error_nt", "line_spacing_m")
 _CSV_HEADER: Final = "north_m,east_m,total_field_nt"
-
-
-class MagneticMapError(ValueError):
-    """A map that can't be used; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,27 +62,26 @@ class MagneticMap:
                     f"{name} of a magnetic map is spaced {steps.min():g} to {steps.max():g} m; "
                     "accepted is even spacing"
                 )
-        shape = (self.north_m.size, self.east_m.size)
-        for name, grid in (
-            ("total_field_nt", self.total_field_nt),
-            ("vertical_gradient_nt_m", self.vertical_gradient_nt_m),
-        ):
-            if grid is not None and grid.shape != shape:
-                raise MagneticMapError(
-                    f"{name} of a magnetic map has shape {grid.shape}; its grid lines make {shape}"
-                )
-        if np.any(np.isinf(self.total_field_nt)) or not np.any(np.isfinite(self.total_field_nt)):
-            raise MagneticMapError("a magnetic map without data: total_field_nt needs finite numbers")
-        gradient = self.vertical_gradient_nt_m
-        if gradient is not None and not np.all(np.isfinite(gradient[np.isfinite(self.total_field_nt)])):
-            raise MagneticMapError(
-                "vertical_gradient_nt_m of a magnetic map has no number at places where the total field has"
-            )
-        if not math.isfinite(self.height_m):
-            raise MagneticMapError(f"height_m = {self.height_m} of a magnetic map is not finite")
-        for name, value in (("error_nt", self.error_nt), ("line_spacing_m", self.line_spacing_m)):
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise MagneticMapError(f"{name} = {value} of a magnetic map is not accepted: more than 0 is")
+        self.contents()
+
+    def contents(self) -> MapContents:
+        """The map as the contents of a file.
+
+        Raises:
+            MagneticMapError: the grid is not one, or has no data.
+        """
+        return MapContents(
+            north_m=self.north_m,
+            east_m=self.east_m,
+            total_field_nt=self.total_field_nt,
+            vertical_gradient_nt_m=self.vertical_gradient_nt_m,
+            height_m=self.height_m,
+            home=GeodeticPosition(
+                lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt_m=self.home.alt_m
+            ),
+            error_nt=self.error_nt,
+            line_spacing_m=self.line_spacing_m,
+        )
 
     @property
     def spacing_m(self) -> tuple[float, float]:
@@ -171,29 +153,8 @@ class MagneticMap:
         )
 
     def save(self, path: Path) -> None:
-        """Write the map; the file's contents are described at the head of this module."""
-        contents: dict[str, Any] = {
-            "format": FORMAT,
-            "north_m": self.north_m,
-            "east_m": self.east_m,
-            "total_field_nt": self.total_field_nt,
-            "height_m": self.height_m,
-            "home_lat_deg": self.home.lat_deg,
-            "home_lon_deg": self.home.lon_deg,
-            "home_alt_m": self.home.alt_m,
-        }
-        if self.vertical_gradient_nt_m is not None:
-            contents["vertical_gradient_nt_m"] = self.vertical_gradient_nt_m
-        for name in _STATED:
-            if getattr(self, name) is not None:
-                contents[name] = getattr(self, name)
-        # Like numpy.savez_compressed, but without the time of day: the same map gives the same bytes.
-        with zipfile.ZipFile(path, "w", compression=zipfile.ZIP_DEFLATED) as archive:
-            for name, value in contents.items():
-                member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-                member.compress_type = zipfile.ZIP_DEFLATED
-                with archive.open(member, "w", force_zip64=True) as file:
-                    np.lib.format.write_array(file, np.asanyarray(value), allow_pickle=False)
+        """Write the map to a file."""
+        path.write_bytes(map_file_bytes(self.contents()))
 
     @classmethod
     def load(cls, path: Path) -> "MagneticMap":
@@ -202,41 +163,19 @@ class MagneticMap:
         Raises:
             MagneticMapError: no such file, or not such a file.
         """
-        try:
-            with zipfile.ZipFile(path) as archive:
-                found = {}
-                for name in archive.namelist():
-                    with archive.open(name) as file:
-                        found[name.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
-        except _UNREADABLE as error:
-            raise MagneticMapError(f"{path} is not a magnetic map (.npz): {error}") from None
-        needed = (
-            *("format", "north_m", "east_m", "total_field_nt", "height_m"),
-            *("home_lat_deg", "home_lon_deg", "home_alt_m"),
-        )
-        missing = [name for name in needed if name not in found]
-        if missing or str(found["format"]) != FORMAT:
-            raise MagneticMapError(
-                f"{path} is not a magnetic map: "
-                + (f"it has no {', '.join(missing)}" if missing else f"its format is {found['format']}")
-                + f"; accepted is format {FORMAT}"
-            )
-        gradient = found.get("vertical_gradient_nt_m")
+        found = read_map_file(path)
         try:
             return cls(
-                north_m=found["north_m"].astype(np.float64),
-                east_m=found["east_m"].astype(np.float64),
-                total_field_nt=found["total_field_nt"].astype(np.float64),
-                vertical_gradient_nt_m=None if gradient is None else gradient.astype(np.float64),
-                height_m=float(found["height_m"]),
-                **{name: float(found[name]) for name in _STATED if name in found},
-                home=Home(
-                    lat_deg=float(found["home_lat_deg"]),
-                    lon_deg=float(found["home_lon_deg"]),
-                    alt_m=float(found["home_alt_m"]),
-                ),
+                north_m=found.north_m,
+                east_m=found.east_m,
+                total_field_nt=found.total_field_nt,
+                vertical_gradient_nt_m=found.vertical_gradient_nt_m,
+                height_m=found.height_m,
+                home=Home(lat_deg=found.home.lat_deg, lon_deg=found.home.lon_deg, alt_m=found.home.alt_m),
+                error_nt=found.error_nt,
+                line_spacing_m=found.line_spacing_m,
             )
-        except (TypeError, ValueError) as error:
+        except ValueError as error:
             raise MagneticMapError(f"{path}: {error}") from None
 
     @classmethod

@@ -7,12 +7,13 @@ from typing import Final, TypeAlias
 
 from flightsim.foundation.checks import require_finite, require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.main_field import MainField
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
+from flightsim.payload.daily_variation import DailyVariation, DailyVariationParameters
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.payload.main_field import MainField
-from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
+from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature, require_velocity
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.synthetic_map import SyntheticMapParameters, synthetic_map
 
@@ -28,14 +29,17 @@ class InducedDipole:
         north_m, east_m: place, local NED of the map's home.
         moment_a_m2: dipole moment.
         depth_m: below home.
+        velocity_ne_m_s: of a target that drifts, north and east.
     """
 
     north_m: float
     east_m: float
     moment_a_m2: float
     depth_m: float = 10.0
+    velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        require_velocity(self.velocity_ne_m_s)
         require_finite(north_m=self.north_m, east_m=self.east_m, depth_m=self.depth_m)
         require_positive(moment_a_m2=self.moment_a_m2)
 
@@ -53,6 +57,10 @@ class MagneticSpec:
         width_m, height_m: size of a generated map, east and north.
         spacing_m: distance of the grid lines of a generated map; 100 m suit survey size, 60 km x 50 km.
         survey_height_m: height above home at which a generated map is valid.
+        raised_m: height of a generated map above the level of a survey: its geology is continued upwards.
+        exact_map: the true field is the map of `map_file` itself, or a generated one is published without an
+            error.
+        daily: variation of the field in time; None: there is none but the drift of magnetometers.
         signatures: targets in the field; places are local NED of the map's home.
     """
 
@@ -61,6 +69,9 @@ class MagneticSpec:
     height_m: float = 2000.0
     spacing_m: float = _MAP_SPACING_M
     survey_height_m: float = 100.0
+    raised_m: float = 0.0
+    exact_map: bool = False
+    daily: DailyVariationParameters | None = None
     signatures: tuple[SignatureSpec, ...] = ()
 
     def __post_init__(self) -> None:
@@ -86,12 +97,17 @@ def magnetic_field_of(
     if spec.map_file is not None:
         published = MagneticMap.load(spec.map_file)
         _require_here(published, spec.map_file, home)
-        truth = truth_behind(published, SurveyParameters(), seed=stream)
+        truth = published if spec.exact_map else truth_behind(published, SurveyParameters(), seed=stream)
     else:
         truth = _generated(spec, home, seed, decimal_year)
-        published = surveyed(truth, SurveyParameters(), seed=stream)
+        published = truth if spec.exact_map else surveyed(truth, SurveyParameters(), seed=stream)
     signatures = [_resolved(signature, truth, decimal_year) for signature in spec.signatures]
-    return MagneticField(truth, signatures, decimal_year=decimal_year), published
+    daily = (
+        None
+        if spec.daily is None
+        else DailyVariation(spec.daily, RandomStreams(seed).child("daily_variation"))
+    )
+    return MagneticField(truth, signatures, decimal_year=decimal_year, daily=daily), published
 
 
 def _resolved(signature: SignatureSpec, truth: MagneticMap, decimal_year: float) -> Signature:
@@ -103,6 +119,7 @@ def _resolved(signature: SignatureSpec, truth: MagneticMap, decimal_year: float)
         east_m=signature.east_m,
         height_m=-signature.depth_m,
         moment_ned_a_m2=tuple(moment.tolist()),
+        velocity_ne_m_s=signature.velocity_ne_m_s,
     )
 
 
@@ -139,6 +156,7 @@ def _generated(spec: MagneticSpec, home: Home, seed: int, decimal_year: float) -
             east_m=half_e_m,
             spacing_m=spec.spacing_m,
             height_m=spec.survey_height_m,
+            raised_m=spec.raised_m,
         ),
         home=home,
         seed=RandomStreams(seed).child("magnetic_map"),

@@ -27,8 +27,24 @@ class Signature(Protocol):
     def east_m(self) -> float:
         """Metres east of home."""
 
+    @property
+    def velocity_ne_m_s(self) -> tuple[float, float]:
+        """Velocity of a target that drifts, north and east; it is at its place at boot."""
+
     def anomaly_nt(self, north_m: Places, east_m: Places, height_m: float, field_ned_nt: Array) -> Places:
         """What it adds at places of any shape, at a height above home, in an Earth's field (3,)."""
+
+
+_FASTEST_M_S: Final = 20.0
+
+
+def require_velocity(velocity_ne_m_s: tuple[float, float]) -> None:
+    """Raise ValueError unless a target drifts slowly."""
+    if len(velocity_ne_m_s) != 2 or not math.hypot(*velocity_ne_m_s) <= _FASTEST_M_S:
+        raise ValueError(
+            f"velocity_ne_m_s = {velocity_ne_m_s!r} is not accepted: north and east, together up to "
+            f"{_FASTEST_M_S:g} m/s, are"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +56,7 @@ class GaussianSignature:
         amplitude_nt: at the centre; below zero for a hole.
         sigma_along_m, sigma_across_m: standard deviations along and across the target's axis.
         heading_rad: of that axis, clockwise from north.
+        velocity_ne_m_s: of a target that drifts, north and east.
     """
 
     north_m: float
@@ -48,8 +65,10 @@ class GaussianSignature:
     sigma_along_m: float = 250.0
     sigma_across_m: float = 120.0
     heading_rad: float = 0.0
+    velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        require_velocity(self.velocity_ne_m_s)
         require_finite(
             north_m=self.north_m,
             east_m=self.east_m,
@@ -80,14 +99,17 @@ class DipoleSignature:
         north_m, east_m: place, local NED of home.
         height_m: above home; below the ground or the water it is negative.
         moment_ned_a_m2: dipole moment. Steel has some 0.1 to 1 A m2 per kilogram, a submarine 1e5.
+        velocity_ne_m_s: of a target that drifts, north and east.
     """
 
     north_m: float
     east_m: float
     height_m: float
     moment_ned_a_m2: tuple[float, float, float]
+    velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        require_velocity(self.velocity_ne_m_s)
         require_finite(north_m=self.north_m, east_m=self.east_m, height_m=self.height_m)
         if len(self.moment_ned_a_m2) != 3 or not all(map(math.isfinite, self.moment_ned_a_m2)):
             raise ValueError(

@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
 
+from flightsim.foundation.main_field import MainField
 from flightsim.home import Home
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
-from flightsim.payload.main_field import MainField
 
 Array = NDArray[np.float64]
 

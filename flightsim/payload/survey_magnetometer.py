@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.main_field import NANOTESLA_PER_GAUSS
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
-from flightsim.payload.main_field import NANOTESLA_PER_GAUSS
 from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
-from flightsim.sensors.kernels import gauss_markov
-from flightsim.sensors.schedule import steps_per_sample
+from flightsim.sensors.sensor import gauss_markov
+from flightsim.sensors.suite import steps_per_sample
 
 Array = NDArray[np.float64]
 
@@ -143,13 +143,13 @@ class SurveyMagnetometer:
             self._countdown -= 1
         else:
             self._countdown = self._interval_steps - 1
-            self._waiting.append(MagneticReading(time_us, self._measure()))
+            self._waiting.append(MagneticReading(time_us, self._measure(time_us * 1e-6)))
         if self._waiting and self._waiting[0].time_us + self._latency_us <= time_us:
             self.reading = self._waiting.popleft()
             return self.reading
         return None
 
-    def _measure(self) -> float:
+    def _measure(self, time_s: float) -> float:
         p, truth = self.parameters, self._truth
         north_m, east_m, down_m = self._home_frame.position_ned_m(truth)
         white, drive = self._rng.standard_normal(2).tolist()
@@ -157,7 +157,7 @@ class SurveyMagnetometer:
         strength = math.sqrt(float(self._body_field @ self._body_field))
         heading_error_nt = float(self._permanent_nt @ self._body_field) / strength if strength else 0.0
         value_nt = (
-            self._field.total_nt(north_m, east_m, -down_m)
+            self._field.total_nt(north_m, east_m, -down_m, time_s)
             + heading_error_nt
             + self._drift_nt
             + p.noise_nt * white

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.main_field import MainField
 from flightsim.home import Home
 from flightsim.payload.magnetic_map import MagneticMap
-from flightsim.payload.main_field import MainField
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,8 @@ class SyntheticMapParameters:
         spectral_exponent: b above; 3 is common for crust.
         shallow_anomaly_nt, shallow_depth_m: a second layer, of the ground itself: what lies between the
             lines of a survey and is not on its map.
+        raised_m: height of the map above the level that anomalies and depths are given for; the field is
+            continued upwards by it.
     """
 
     south_m: float = -2000.0
@@ -49,6 +51,7 @@ class SyntheticMapParameters:
     spectral_exponent: float = 3.0
     shallow_anomaly_nt: float = 3.0
     shallow_depth_m: float = 100.0
+    raised_m: float = 0.0
 
     def __post_init__(self) -> None:
         require_finite(
@@ -61,6 +64,7 @@ class SyntheticMapParameters:
         require_positive(spacing_m=self.spacing_m, source_depth_m=self.source_depth_m)
         require_positive(shallow_depth_m=self.shallow_depth_m)
         require_not_negative(shallow_anomaly_nt=self.shallow_anomaly_nt)
+        require_not_negative(raised_m=self.raised_m)
         require_not_negative(anomaly_nt=self.anomaly_nt, spectral_exponent=self.spectral_exponent)
         for low, high, names in (
             (self.south_m, self.north_m, "south_m and north_m"),
@@ -143,7 +147,11 @@ def _layer(
     k[0, 0] = 0.0
     size = (2 * rows, 2 * columns)
     anomaly: Array = np.fft.irfft2(spectrum, s=size)[:rows, :columns]
-    gradient: Array = np.fft.irfft2(-k * spectrum, s=size)[:rows, :columns]
     anomaly = anomaly - anomaly.mean()
     scale = amplitude_nt / float(np.sqrt(np.mean(anomaly**2)))
+    if p.raised_m:
+        spectrum = spectrum * np.exp(-k * p.raised_m)
+        anomaly = np.fft.irfft2(spectrum, s=size)[:rows, :columns]
+        anomaly = anomaly - anomaly.mean()
+    gradient: Array = np.fft.irfft2(-k * spectrum, s=size)[:rows, :columns]
     return scale * anomaly, scale * gradient

@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import ICE_POINT_K
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import AIRSPEED_DIFFERENTIAL_PRESSURE_PA, AIRSPEED_SIZE, AIRSPEED_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
 
 Array = NDArray[np.float64]
 
@@ -83,18 +82,10 @@ class AirspeedParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(drift_time_constant_s=self.drift_time_constant_s, range_pa=self.range_pa)
-        require_not_negative(
-            latency_s=self.latency_s,
-            noise_pa=self.noise_pa,
-            zero_offset_pa=self.zero_offset_pa,
-            scale_error=self.scale_error,
-            drift_pa=self.drift_pa,
-            lag_s=self.lag_s,
-            insensitive_angle_rad=self.insensitive_angle_rad,
-            quantum_pa=self.quantum_pa,
-            self_heating_k=self.self_heating_k,
-            temperature_quantum_k=self.temperature_quantum_k,
+        check_fields(
+            self,
+            require_not_negative,
+            but=dict.fromkeys(("drift_time_constant_s", "range_pa"), require_positive),
         )
         if self.insensitive_angle_rad >= 0.5 * math.pi:
             raise ValueError(

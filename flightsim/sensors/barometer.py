@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import ICE_POINT_K
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
 
 Array = NDArray[np.float64]
 
@@ -65,17 +64,7 @@ class BarometerParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(drift_time_constant_s=self.drift_time_constant_s)
-        require_not_negative(
-            latency_s=self.latency_s,
-            noise_pa=self.noise_pa,
-            turn_on_bias_pa=self.turn_on_bias_pa,
-            drift_pa=self.drift_pa,
-            lag_s=self.lag_s,
-            quantum_pa=self.quantum_pa,
-            self_heating_k=self.self_heating_k,
-            temperature_quantum_k=self.temperature_quantum_k,
-        )
+        check_fields(self, require_not_negative, but={"drift_time_constant_s": require_positive})
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its offset and where its drift starts."""

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise
 
 Array = NDArray[np.float64]
 
@@ -57,15 +56,7 @@ class BatteryMonitorParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_not_negative(
-            latency_s=self.latency_s,
-            voltage_noise_v=self.voltage_noise_v,
-            voltage_scale_error=self.voltage_scale_error,
-            voltage_quantum_v=self.voltage_quantum_v,
-            current_noise_a=self.current_noise_a,
-            current_scale_error=self.current_scale_error,
-            current_quantum_a=self.current_quantum_a,
-        )
+        check_fields(self, require_not_negative)
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its scale errors. The charge used before the first sample is taken as known."""

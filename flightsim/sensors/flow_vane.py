@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import VANE_ANGLE_OF_ATTACK_RAD, VANE_SIDESLIP_RAD, VANE_SIZE
-from flightsim.sensors.kernels import quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise, saturate
 
 Array = NDArray[np.float64]
 
@@ -55,15 +54,7 @@ class FlowVaneParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(limit_rad=self.limit_rad)
-        require_not_negative(
-            latency_s=self.latency_s,
-            noise_rad=self.noise_rad,
-            misalignment_rad=self.misalignment_rad,
-            lag_s=self.lag_s,
-            quantum_rad=self.quantum_rad,
-            min_dynamic_pressure_pa=self.min_dynamic_pressure_pa,
-        )
+        check_fields(self, require_not_negative, but={"limit_rad": require_positive})
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its misalignments. Both vanes stand at zero before the first flow."""

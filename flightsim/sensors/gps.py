@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.geodesy import curvature_radii_m
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_180
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
 
 Array = NDArray[np.float64]
 
@@ -126,19 +125,11 @@ class GpsParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(
-            wander_time_constant_s=self.wander_time_constant_s,
-            reported_accuracy_scale=self.reported_accuracy_scale,
-        )
-        require_not_negative(
-            latency_s=self.latency_s,
-            horizontal_noise_m=self.horizontal_noise_m,
-            vertical_noise_m=self.vertical_noise_m,
-            horizontal_wander_m=self.horizontal_wander_m,
-            vertical_wander_m=self.vertical_wander_m,
-            velocity_noise_north_m_s=self.velocity_noise_north_m_s,
-            velocity_noise_east_m_s=self.velocity_noise_east_m_s,
-            velocity_noise_down_m_s=self.velocity_noise_down_m_s,
+        check_fields(
+            self,
+            require_not_negative,
+            but=dict.fromkeys(("wander_time_constant_s", "reported_accuracy_scale"), require_positive),
+            unchecked=("fix_timeline",),
         )
         starts = [stage.start_s for stage in self.fix_timeline]
         if starts != sorted(starts):

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, ICE_POINT_K
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import gauss_markov, quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
 from flightsim.sensors.vibration import CONSTANTS, ROTORS, RotorVibrationParameters, add_vibration
 
 Array = NDArray[np.float64]
@@ -103,29 +102,19 @@ class ImuParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(
-            gyro_bias_time_constant_s=self.gyro_bias_time_constant_s,
-            gyro_range_rad_s=self.gyro_range_rad_s,
-            accel_bias_time_constant_s=self.accel_bias_time_constant_s,
-            accel_range_m_s2=self.accel_range_m_s2,
-            warm_up_s=self.warm_up_s,
-        )
-        require_not_negative(
-            latency_s=self.latency_s,
-            gyro_noise_density_rad_s_sqrt_hz=self.gyro_noise_density_rad_s_sqrt_hz,
-            gyro_bias_instability_rad_s=self.gyro_bias_instability_rad_s,
-            gyro_turn_on_bias_rad_s=self.gyro_turn_on_bias_rad_s,
-            gyro_scale_error=self.gyro_scale_error,
-            gyro_cross_axis_error=self.gyro_cross_axis_error,
-            gyro_quantum_rad_s=self.gyro_quantum_rad_s,
-            accel_noise_density_m_s2_sqrt_hz=self.accel_noise_density_m_s2_sqrt_hz,
-            accel_bias_instability_m_s2=self.accel_bias_instability_m_s2,
-            accel_turn_on_bias_m_s2=self.accel_turn_on_bias_m_s2,
-            accel_scale_error=self.accel_scale_error,
-            accel_cross_axis_error=self.accel_cross_axis_error,
-            accel_quantum_m_s2=self.accel_quantum_m_s2,
-            self_heating_k=self.self_heating_k,
-            temperature_quantum_k=self.temperature_quantum_k,
+        check_fields(
+            self,
+            require_not_negative,
+            but=dict.fromkeys(
+                (
+                    "gyro_bias_time_constant_s",
+                    "gyro_range_rad_s",
+                    "accel_bias_time_constant_s",
+                    "accel_range_m_s2",
+                    "warm_up_s",
+                ),
+                require_positive,
+            ),
         )
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.interface import MAG_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import quantise, saturate
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise, saturate
 
 Array = NDArray[np.float64]
 
@@ -48,14 +47,7 @@ class MagnetometerParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(range_gauss=self.range_gauss)
-        require_not_negative(
-            latency_s=self.latency_s,
-            noise_gauss=self.noise_gauss,
-            hard_iron_gauss=self.hard_iron_gauss,
-            scale_error=self.scale_error,
-            quantum_gauss=self.quantum_gauss,
-        )
+        check_fields(self, require_not_negative, but={"range_gauss": require_positive})
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its hard iron and scale errors."""

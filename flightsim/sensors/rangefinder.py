@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.kernels import quantise
-from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.sensor import SensorModel, quantise
 
 Array = NDArray[np.float64]
 
@@ -56,13 +55,8 @@ class RangefinderParameters:
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(max_range_m=self.max_range_m, max_tilt_rad=self.max_tilt_rad)
-        require_not_negative(
-            latency_s=self.latency_s,
-            min_range_m=self.min_range_m,
-            noise_m=self.noise_m,
-            noise_per_range=self.noise_per_range,
-            quantum_m=self.quantum_m,
+        check_fields(
+            self, require_not_negative, but=dict.fromkeys(("max_range_m", "max_tilt_rad"), require_positive)
         )
         if self.max_range_m <= self.min_range_m:
             raise ValueError(

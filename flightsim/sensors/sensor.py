@@ -3,8 +3,11 @@
 What differs between sensors is a `SensorModel`: a compiled measurement kernel with its constants and state.
 The way of a sample: kernel (always run, so that a fault never shifts the noise sequence), delay line, fault
 stage, reading.
+
+Compiled parts the sensor models share: quantisation, saturation, Gauss-Markov noise.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -12,7 +15,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.kernels import bound
+from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import Reading
 from flightsim.sensors.fault_kinds import FaultTarget
 from flightsim.sensors.fault_stage import FaultPoint
@@ -171,3 +174,27 @@ class Sensor:
         if reading.fresh:
             reading.values[:] = values
             reading.time_us = measured_us
+
+
+@kernel
+def quantise(value: float, quantum: float) -> float:
+    """`value` rounded to the nearest multiple of `quantum`; a quantum of zero leaves it alone."""
+    if quantum <= 0.0:
+        return value
+    return math.floor(value / quantum + 0.5) * quantum
+
+
+@kernel
+def saturate(value: float, limit: float) -> float:
+    """`value` limited to -limit..limit."""
+    return min(limit, max(-limit, value))
+
+
+def gauss_markov(sigma: float, time_constant_s: float, interval_s: float) -> tuple[float, float]:
+    """Coefficients (decay, drive) of x[k+1] = decay x[k] + drive n[k], n standard normal.
+
+    The exact discretisation of a first-order Gauss-Markov process with stationary standard deviation `sigma`
+    (Gelb, Applied Optimal Estimation, section 3.8).
+    """
+    decay = math.exp(-interval_s / time_constant_s)
+    return decay, sigma * math.sqrt(1.0 - decay * decay)

@@ -23,6 +23,7 @@ _MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
     "orbit": ("missions.cli.orbit_command", "COMMAND"),
     "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
     "multi-target": ("missions.cli.multi_target_command", "COMMAND"),
+    "survey": ("missions.cli.survey_command", "COMMAND"),
 }
 _FILES_OF_USERS: Final = "missions.cli.file_command"
 _OWN: Final = "a mission of your own"

@@ -36,6 +36,7 @@ _COMMANDS: Final = {
         "vehicle",
         "Talk to a vehicle: info, parameters, logs, health.",
     ),
+    "map": ("missions.cli.map", "magnetic_map", "Make magnetic maps from other files, and look into them."),
     "study": ("missions.cli.study", "study", "Monte Carlo: the papers' experiments."),
 }
 

@@ -27,6 +27,7 @@ def _numbers(name: str, text: str, count: int, shown: str) -> tuple[float, ...]:
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
     from estimators.multi_target.parameters import Belief
     from estimators.tracking.intensity import MotionKind
+    from missions.multi_target.objective import Exploration
     from missions.multi_target.options import MultiTargetOptions, PlannerKind, StepLawKind
     from missions.options import parse_pair
 
@@ -42,6 +43,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         planner=PlannerKind(given["planner"]),
         step_m=given["step"],
         alpha=given["alpha"],
+        exploration=Exploration(given["exploration"]),
         horizon=given["horizon"],
         beam=given["beam"],
         spacing_m=given["spacing"],
@@ -104,7 +106,13 @@ COMMAND: Final = MissionCommand(
             help="Information and exploration, information alone, or the legs of a parallel sweep.",
         ),
         option("--step", type=float, help="To the next scan, m. [default: 9; an aircraft: 2.5 turn radii]"),
-        option("--alpha", type=float, default=1.0, help="Weight of exploration against information, nats."),
+        option("--alpha", type=float, default=0.3, help="Weight of exploration against information, nats."),
+        option(
+            "--exploration",
+            type=click.Choice(["view", "place"]),
+            default="view",
+            help="Targets that a scan detects for the first time, or the map at its place (the paper's).",
+        ),
         option("--horizon", type=int, default=3, help="Steps that are planned; the paper plans 1."),
         option("--beam", type=int, default=6, help="Sequences of steps that are kept at each depth."),
         option("--spacing", type=float, help="Of the sweep's legs, m. [default: one pass in all steps]"),

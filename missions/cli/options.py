@@ -36,11 +36,12 @@ def radians_of(name: str, degrees: float) -> float:
     return math.radians(degrees)
 
 
-_FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:]+))?`")
+_FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:-]+))?`")
 _UNIT: Final = re.compile(r"_(ne_m|m_s|a_m2|nt|hz|rad|deg|m|s)$")
 _NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "arguments": "--arg",
+        "compensation_file": "--compensation",
         "false_count": "--false-anomalies",
         "gps_fault=False": "--no-gps-fault",
         "height_m": "--size",
@@ -51,6 +52,7 @@ _NAMES: Final[Mapping[str, str]] = MappingProxyType(
         "settings": "--set",
         "sigma_across_m": "--sigma",
         "sigma_along_m": "--sigma",
+        "terrain_file": "--terrain",
         "width_m": "--size",
     }
 )

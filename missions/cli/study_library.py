@@ -33,9 +33,10 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
 
 
 def _multi_target(given: Given) -> "Study[Any, Any]":
+    from missions.multi_target.objective import Exploration
     from missions.studies.multi_target_search import study
 
-    return study(horizon=given["horizon"], alpha=given["alpha"])
+    return study(given["horizon"], given["alpha"], Exploration(given["exploration"]))
 
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
@@ -112,7 +113,13 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     help="Steps that are planned; the paper plans 1.",
                 ),
                 click.Option(
-                    ["--alpha"], type=FiniteRange(min=0.0), default=1.0, help="Weight of exploration, nats."
+                    ["--alpha"], type=FiniteRange(min=0.0), default=0.3, help="Weight of exploration, nats."
+                ),
+                click.Option(
+                    ["--exploration"],
+                    type=click.Choice(["view", "place"]),
+                    default="view",
+                    help="What a scan sees, or the map at its place (the paper's).",
                 ),
             ),
             build=_multi_target,

@@ -7,6 +7,7 @@ from flightsim.foundation.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
+    from missions.embedded.survey_worlds import survey_world
     from missions.embedded.tag_search import TagTarget, search_camera, tag_search_world
     from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
     from missions.embedded.worlds import (
@@ -36,6 +37,7 @@ __all__ = [
     "occupancy_world",
     "orbit_world",
     "search_camera",
+    "survey_world",
     "tag_search_world",
     "terrain_targets_world",
 ]
@@ -54,6 +56,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
         **dict.fromkeys(("CAMERA", "MAGNETOMETER", "MotionKind", "carrying", "motion_of"), _WORLDS),
+        "survey_world": "missions.embedded.survey_worlds",
         **dict.fromkeys(("occupancy_world", "orbit_world"), _WORLDS),
     },
 )

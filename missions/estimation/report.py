@@ -79,7 +79,8 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
 
     Args:
         request: the run.
-        summary_file: whether to write `summary.json`; a flight includes it in its own summary file.
+        summary_file: whether to write `summary.json` and the estimator's own files; a flight includes the
+            summary in its own, and has files of its mission.
     """
     fleet, logs = request.fleet, _opened(request.logs)
     assessment = assess(
@@ -104,6 +105,8 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
         if summary_file:
             write_summary(request.folder, summary)
         write_estimates(request.folder, fleet)
+        if summary_file:
+            write_files(request.folder, fleet)
         if request.picture and compared:
             from estimators.reports.picture import draw_errors
 
@@ -144,6 +147,15 @@ def write_estimates(folder: Path, fleet: Fleet) -> list[Path]:
             parts.append(table.name)
         written += _write_table(folder, "-".join(parts), table)
     return written
+
+
+def write_files(folder: Path, fleet: Fleet) -> None:
+    """Write the estimators' own files; with several vehicles, their names begin with the system id."""
+    for runner in fleet.runners.values():
+        for name, contents in runner.files.items():
+            path = folder / (name if len(fleet.runners) == 1 else f"{runner.system_id}-{name}")
+            with whole(path):
+                path.write_bytes(contents)
 
 
 def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:

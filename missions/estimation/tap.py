@@ -41,7 +41,10 @@ class EstimatorTap:
             without an error.
         received: number of frames by (system id, message id) that estimators may receive, for rates.
         autopilots: number of frames of autopilots, by system id.
+        acts: estimates are sent when their inputs are recorded.
     """
+
+    acts: Final = True
 
     def __init__(
         self,

@@ -1,24 +1,34 @@
 """The value of a place for the next scan: information about detected targets, and exploration.
 
 Source: Yousuf, Lendek and Busoniu, equation 14; docs/multi_target.md has the forms for several steps and
-several vehicles.
+several vehicles, and why exploration counts what the scan sees.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking.exploration import ExplorationMap
-from estimators.tracking.information import condensed, information_at
+from estimators.tracking.information import condensed, detections_at, information_at
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
 
-__all__ = ["Outlook", "SearchObjective"]
+__all__ = ["Exploration", "Outlook", "SearchObjective"]
 
 Array = NDArray[np.float64]
 
 _CELL_M = 1.0  # the intensity is summed up in cells of this side: the sensor's scale is some ten metres
+
+
+class Exploration(StrEnum):
+    """What the exploration of a scan is."""
+
+    VIEW = "view"
+    """The expected number of targets that it detects for the first time."""
+    PLACE = "place"
+    """The exploration map at the place of the vehicle (the paper's equation 14)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,10 +37,13 @@ class Outlook:
 
     Attributes:
         mass: (n,) of each point of the intensity.
+        undetected: (m,) expected number of undetected targets in each cell of the exploration map; empty
+            where the map at the vehicle's place is the exploration.
         views: the scans.
     """
 
     mass: Array
+    undetected: Array
     views: tuple[Viewpoint, ...]
 
 
@@ -46,7 +59,10 @@ class SearchObjective:
         sensor: what is known about the sensor.
         points: north, east and mass (n,) of the intensity.
         exploration: the map.
-        alpha: weight of the exploration, nats.
+        alpha: weight of the exploration, nats: of a target that is detected for the first time, or of an
+            unexplored place.
+        kind: what exploration is.
+        targets_per_m2: expected before the search.
     """
 
     def __init__(
@@ -55,15 +71,21 @@ class SearchObjective:
         points: tuple[Array, Array, Array],
         exploration: ExplorationMap,
         alpha: float,
+        *,
+        kind: Exploration = Exploration.PLACE,
+        targets_per_m2: float = 0.0,
     ) -> None:
         self._sensor = sensor
         self._north, self._east, self._mass = condensed(*points, cell_m=_CELL_M)
         self._exploration = exploration
         self._alpha = alpha
+        self._cells_north, self._cells_east, undetected_m2 = exploration.points()
+        in_view = alpha > 0.0 and kind is Exploration.VIEW
+        self._undetected = targets_per_m2 * undetected_m2 if in_view else np.empty(0)
 
     def outlook(self, views: Sequence[Viewpoint] = ()) -> Outlook:
         """The outlook after the scans that other vehicles are about to take."""
-        found = Outlook(mass=self._mass, views=())
+        found = Outlook(mass=self._mass, undetected=self._undetected, views=())
         for view in views:
             found = self.after(found, view)
         return found
@@ -71,7 +93,12 @@ class SearchObjective:
     def after(self, outlook: Outlook, view: Viewpoint) -> Outlook:
         """The outlook after one more scan."""
         left = outlook.mass * (1.0 - self._sensor.probability(self._north, self._east, view))
-        return Outlook(mass=left, views=(*outlook.views, view))
+        undetected = outlook.undetected
+        if undetected.size:
+            undetected = undetected * (
+                1.0 - self._sensor.probability(self._cells_north, self._cells_east, view)
+            )
+        return Outlook(mass=left, undetected=undetected, views=(*outlook.views, view))
 
     def values(self, outlook: Outlook, places: Array, heading_rad: Array) -> Array:
         """Information plus alpha times exploration of a scan at each place.
@@ -85,6 +112,10 @@ class SearchObjective:
         information = information_at(self._north, self._east, outlook.mass, self._sensor.values, viewpoints)
         if not self._alpha > 0.0:
             return information
+        if outlook.undetected.size:
+            return information + self._alpha * detections_at(
+                self._cells_north, self._cells_east, outlook.undetected, self._sensor.values, viewpoints
+            )
         unexplored = self._exploration.at(places[:, 0], places[:, 1])
         for view in outlook.views:
             unexplored = unexplored * (1.0 - self._sensor.probability(places[:, 0], places[:, 1], view))

@@ -8,6 +8,7 @@ from typing import Any, Final
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
 from estimators.tracking.intensity import MotionKind
 from missions.errors import PlanError
+from missions.multi_target.objective import Exploration
 from missions.multi_target.planner import Area, PlannerParameters
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
@@ -48,8 +49,8 @@ class MultiTargetOptions(MissionOptions):
         start_ne_m: place of the first scan (paper: 10, 10); each further vehicle of a team starts a step
             farther east.
         planner: how the next place is chosen.
-        step_m, alpha, horizon, beam: of the exploring planner, as in `PlannerParameters`; None: 9 m for a
-            multicopter, 2.5 turn radii for an aircraft.
+        step_m, alpha, exploration, horizon, beam: of the exploring planner, as in `PlannerParameters`; a step
+            of None: 9 m for a multicopter, 2.5 turn radii for an aircraft.
         turn_limit_rad: largest change of direction in a step; None: any for a multicopter, 90 degrees for an
             aircraft.
         spacing_m: track spacing of the sweep; None: so that the steps are just enough for one pass.
@@ -81,7 +82,8 @@ class MultiTargetOptions(MissionOptions):
     start_ne_m: tuple[float, float] = (10.0, 10.0)
     planner: PlannerKind = PlannerKind.EXPLORING
     step_m: float | None = None
-    alpha: float = 1.0
+    alpha: float = 0.3
+    exploration: Exploration = Exploration.VIEW
     horizon: int = 3
     beam: int = 6
     turn_limit_rad: float | None = None
@@ -162,6 +164,7 @@ class MultiTargetOptions(MissionOptions):
         return PlannerParameters(
             step_m=9.0 if self.step_m is None else self.step_m,
             alpha=0.0 if self.planner is PlannerKind.INFORMATION else self.alpha,
+            exploration=self.exploration,
             horizon=self.horizon,
             beam=self.beam,
             turn_limit_rad=math.pi if self.turn_limit_rad is None else self.turn_limit_rad,

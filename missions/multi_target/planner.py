@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
 from missions.errors import PlanError
-from missions.multi_target.objective import Outlook, SearchObjective
+from missions.multi_target.objective import Exploration, Outlook, SearchObjective
 from missions.patterns.polyline import Polyline
 
 __all__ = ["Area", "ExploringPlanner", "PlannerParameters", "SearchPlanner", "SweepPlanner"]
@@ -75,6 +75,7 @@ class PlannerParameters:
     Attributes:
         step_m: distance to the next scan; also along the diagonals (paper: 9 m).
         alpha: weight of the exploration against the information, nats (not given in the paper).
+        exploration: what the exploration of a scan is.
         horizon: number of steps that are planned; the first one is flown.
         beam: number of sequences of steps that are kept at each depth.
         discount: weight of a step against the one before it.
@@ -83,6 +84,7 @@ class PlannerParameters:
 
     step_m: float = 9.0
     alpha: float = 1.0
+    exploration: Exploration = Exploration.PLACE
     horizon: int = 1
     beam: int = 6
     discount: float = 0.9
@@ -156,7 +158,14 @@ class ExploringPlanner:
         self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
     ) -> Place:
         p = self._parameters
-        objective = SearchObjective(belief.sensor, belief.intensity.points(), belief.exploration, p.alpha)
+        objective = SearchObjective(
+            belief.sensor,
+            belief.intensity.points(),
+            belief.exploration,
+            p.alpha,
+            kind=p.exploration,
+            targets_per_m2=belief.parameters.birth_per_m2,
+        )
         branches = self._grown(objective, objective.outlook(others), here, direction_rad)
         if not branches:  # outside the area: back to it
             return self._area.nearest(*here)

@@ -4,8 +4,7 @@ commands roll.
 Sans-IO: the functions compute commands from numbers.
 """
 
-from missions.piloting.energy import EnergyController, EnergyParameters
-from missions.piloting.heading import HeadingController
+from missions.piloting.control import EnergyController, EnergyParameters, HeadingController
 
 __all__ = [
     "EnergyController",

@@ -83,7 +83,10 @@ class FlightRecorder:
     Attributes:
         failure: reason why the log can no longer be written. The log ends there, and recording continues in
             memory. "" without a failure.
+        acts: it does not act on frames.
     """
+
+    acts: Final = False
 
     def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
         self.failure = ""

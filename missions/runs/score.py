@@ -17,7 +17,7 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, quaternions_from_euler
 from missions.notes import PATTERN, FlightNotes
 from missions.runs.records import FlightRecords
-from missions.runs.waypoint_passes import waypoint_misses_m
+from missions.runs.track import waypoint_misses_m
 
 Array = NDArray[np.float64]
 
@@ -159,7 +159,7 @@ def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
     """
     if len(path_ned_m) < 2 or not len(track_ned_m):
         return np.zeros(0)
-    from missions.runs.path_distance import follow_path
+    from missions.runs.track import follow_path
 
     errors = np.empty(len(track_ned_m))
     path, track = np.ascontiguousarray(path_ned_m), np.ascontiguousarray(track_ned_m)

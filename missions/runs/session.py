@@ -216,6 +216,9 @@ def _fly_interruptible(
     try:
         write_summary(folder, summary)
         written = True
+        for name, contents in mission.files(debriefing).items():
+            with whole(folder / name):
+                (folder / name).write_bytes(contents)
         if request.picture and debriefing.flights:
             with whole(folder / PICTURE_NAME):
                 mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
@@ -356,8 +359,14 @@ def _debrief(request: RunRequest, records: FlightRecords, flight: Flight) -> Deb
     notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
     flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
     options = notes[0].options if notes and notes[0].options is not None else request.options
-    target_ne_m = None if request.world is None else request.world.magnetic_target_ne_m
-    return Debriefing(records=records, flights=flights, options=options, target_ne_m=target_ne_m)
+    targets_ne_m = () if request.world is None else request.world.magnetic_targets_ne_m
+    return Debriefing(
+        records=records,
+        flights=flights,
+        options=options,
+        target_ne_m=targets_ne_m[0] if targets_ne_m else None,
+        targets_ne_m=targets_ne_m,
+    )
 
 
 def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:

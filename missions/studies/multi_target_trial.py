@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flightsim.world_spec import WorldSpec
 from missions.embedded import TargetField, multi_target_world, terrain_targets_world
+from missions.multi_target.objective import Exploration
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.runs.request import RunRequest
 from missions.studies.flights import fly_trial
@@ -116,21 +117,24 @@ class SearchTrial:
     Attributes:
         horizon: steps that the exploring planner plans.
         alpha: weight of its exploration, nats.
+        exploration: what its exploration is.
     """
 
     horizon: int = 3
-    alpha: float = 1.0
+    alpha: float = 0.3
+    exploration: Exploration = Exploration.VIEW
 
     def __call__(self, cell: Cell, seed: int) -> Found:
         """Fly the search. The same seed has the same targets and the same sensor noise for all planners."""
-        experiment = EXPERIMENTS[cell.experiment]
+        experiment, planner = EXPERIMENTS[cell.experiment], PLANNERS[cell.planner]
         _, run = run_of(seed)
         options = MultiTargetOptions(
             area_m=experiment.area_m,
             steps=experiment.steps,
-            planner=PLANNERS[cell.planner],
-            horizon=self.horizon,
+            planner=planner,
+            horizon=self.horizon if planner is PlannerKind.EXPLORING else 1,  # a baseline is the paper's
             alpha=self.alpha,
+            exploration=self.exploration,
             expected_targets=float(experiment.targets),
             search_seed=run,
         )

@@ -12,8 +12,8 @@ from typing import Final
 from estimators.pressure_height import PressureHeight
 from flightsim.foundation.atmosphere import air_density_ratio
 from missions.errors import MissionError, VehicleTimeout
-from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
-from missions.vehicle.adapter import Adapter
+from missions.piloting.control import EnergyController, EnergyParameters, EnergyState
+from missions.vehicle.adapters import Adapter
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.link import VehicleLink
 from missions.vehicle.parameters import VehicleParameters

@@ -47,6 +47,11 @@ _POLL_S: Final = 0.002  # for links without a file descriptor
 class Recorder(Protocol):
     """Receives all frames of a connection, in both directions."""
 
+    @property
+    def acts(self) -> bool:
+        """Whether it acts on the frames, so that their order among the calls of listeners counts."""
+        ...
+
     def record(self, packet: Packet, time_us: int) -> None:
         """Process frames that were sent or received together at a vehicle time."""
         ...
@@ -91,10 +96,12 @@ class Connection:
         self._link = link
         self._forget = getattr(link, "forget", None)
         self._recorder = recorder
+        self._recorder_acts = recorder is not None and recorder.acts
         self._encoder = FrameEncoder(*identity)
         self._newest = NewestFrames()
         self._listeners: dict[int, list[Listener]] = {}
-        self._in_order: Counter[int] = Counter()  # listeners that depend on the order, by message id
+        # listeners that depend on the order, by message id; packets with a key are looked at more closely too
+        self._in_order = Counter([SETUP_SIGNING])
         self._observed = clock if isinstance(clock, TelemetryClock) else None
         self._clock_source = vehicle_system_id
         self._tasks: list[asyncio.Task[None]] = []
@@ -165,8 +172,10 @@ class Connection:
 
     def _on_packet(self, packet: Packet) -> None:
         listeners = self._listeners
-        if self._in_order.keys().isdisjoint(packet.message_ids):
-            self._keep(packet)
+        if not self._recorder_acts and self._in_order.keys().isdisjoint(packet.message_ids):
+            if self._recorder is not None:
+                self._recorder.record(packet, self.clock.time_us)
+            self._newest.put(packet)
             for index, message_id in enumerate(packet.message_ids):
                 if message_id in listeners:
                     frame = packet.frame(index)

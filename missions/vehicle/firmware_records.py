@@ -1,21 +1,43 @@
 """What missions know of PX4 (v1.16) and ArduPilot (4.6), by class of vehicle."""
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.resources import files
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits, MulticopterLimits
 from missions.vehicle.firmware import Firmware, Mode
 
+_DATA: Final = tomllib.loads(
+    files("missions.vehicle").joinpath("firmware_records.toml").read_text(encoding="utf-8")
+)
+
+
+def _tables(name: str) -> dict[str, Any]:
+    """The tables of a record, read-only; those that a class of vehicle lacks are those of its firmware."""
+    tables = _DATA[name]
+    read: dict[str, Any] = {
+        key: MappingProxyType(tables[key]) for key in ("stream_rates_hz", "limiting_parameters")
+    }
+    if "modes" in tables:
+        modes = {Mode[mode]: _custom_mode(number) for mode, number in tables["modes"].items()}
+        names = {_custom_mode(number): name for number, name in tables["mode_names"].items()}
+        read.update(modes=MappingProxyType(modes), mode_names=MappingProxyType(names))
+    return read
+
+
+def _custom_mode(number: int | str) -> int:
+    """A custom mode from its number, or from PX4's main and sub mode ("4.3")."""
+    main, dot, sub = str(number).partition(".")
+    return int(main) << 16 | int(sub) << 24 if dot else int(main)
+
+
 # PX4
-
-
-def _px4_mode(main: int, sub: int = 0) -> int:
-    return main << 16 | sub << 24
 
 
 def _px4_copter_limits(values: Mapping[str, float]) -> Limits:
@@ -38,74 +60,21 @@ def _px4_plane_limits(values: Mapping[str, float]) -> Limits:
 PX4_COPTER: Final = Firmware(
     name="px4",
     kind=VehicleKind.MULTICOPTER,
-    modes=MappingProxyType(
-        {
-            Mode.HOLD: _px4_mode(4, 3),
-            Mode.TAKEOFF: _px4_mode(4, 2),
-            Mode.GUIDED: _px4_mode(6),
-            Mode.MISSION: _px4_mode(4, 4),
-            Mode.RETURN: _px4_mode(4, 5),
-            Mode.LAND: _px4_mode(4, 6),
-            Mode.POSITION: _px4_mode(3),
-        }
-    ),
-    mode_names=MappingProxyType(
-        {
-            _px4_mode(1): "Manual",
-            _px4_mode(2): "Altitude",
-            _px4_mode(3): "Position",
-            _px4_mode(3, 1): "Orbit",
-            _px4_mode(3, 2): "Position Slow",
-            _px4_mode(4, 2): "Takeoff",
-            _px4_mode(4, 3): "Hold",
-            _px4_mode(4, 4): "Mission",
-            _px4_mode(4, 5): "Return",
-            _px4_mode(4, 6): "Land",
-            _px4_mode(4, 8): "Follow",
-            _px4_mode(4, 9): "Precision Land",
-            _px4_mode(5): "Acro",
-            _px4_mode(6): "Offboard",
-            _px4_mode(7): "Stabilized",
-            _px4_mode(10): "Termination",
-        }
-    ),
+    **_tables("px4_copter"),
     sub_modes=True,
-    stream_rates_hz=MappingProxyType(
-        {
-            "GLOBAL_POSITION_INT": 10.0,
-            "LOCAL_POSITION_NED": 10.0,
-            "ATTITUDE": 20.0,
-            "ATTITUDE_TARGET": 10.0,
-            "SYS_STATUS": 2.0,
-            "EXTENDED_SYS_STATE": 5.0,
-            "GPS_RAW_INT": 2.0,
-            "MISSION_CURRENT": 1.0,
-        }
-    ),
     bytewise_parameters=True,
     setpoints_before_guided=True,
     first_mission_item_is_home=False,
     goto_mode=Mode.HOLD,
     resting_mode=Mode.HOLD,
     unset=math.nan,
-    limiting_parameters=MappingProxyType({"MPC_XY_VEL_MAX": 12.0, "MPC_ACC_HOR": 3.0}),
     limits_from=_px4_copter_limits,
 )
 
 PX4_PLANE: Final = replace(
     PX4_COPTER,
     kind=VehicleKind.FIXED_WING,
-    stream_rates_hz=MappingProxyType({**PX4_COPTER.stream_rates_hz, "VFR_HUD": 10.0}),
-    limiting_parameters=MappingProxyType(
-        {
-            "FW_AIRSPD_MIN": 10.0,
-            "FW_AIRSPD_TRIM": 15.0,
-            "FW_AIRSPD_MAX": 20.0,
-            "FW_R_LIM": 50.0,
-            "NPFG_PERIOD": 10.0,
-            "NPFG_DAMPING": 0.7,
-        }
-    ),
+    **_tables("px4_plane"),
     limits_from=_px4_plane_limits,
 )
 
@@ -143,128 +112,23 @@ def _arduplane_limits(values: Mapping[str, float]) -> Limits:
 ARDUCOPTER: Final = Firmware(
     name="ardupilot",
     kind=VehicleKind.MULTICOPTER,
-    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would follow (throttle low:
-    # descend)
-    modes=MappingProxyType(
-        {
-            Mode.HOLD: 17,
-            Mode.TAKEOFF: 4,
-            Mode.GUIDED: 4,
-            Mode.MISSION: 3,
-            Mode.RETURN: 6,
-            Mode.LAND: 9,
-            Mode.POSITION: 5,
-        }
-    ),
-    mode_names=MappingProxyType(
-        {
-            0: "Stabilize",
-            1: "Acro",
-            2: "Alt Hold",
-            3: "Auto",
-            4: "Guided",
-            5: "Loiter",
-            6: "RTL",
-            7: "Circle",
-            9: "Land",
-            11: "Drift",
-            13: "Sport",
-            14: "Flip",
-            15: "AutoTune",
-            16: "PosHold",
-            17: "Brake",
-            18: "Throw",
-            19: "Avoid ADSB",
-            20: "Guided NoGPS",
-            21: "Smart RTL",
-            22: "FlowHold",
-            23: "Follow",
-            24: "ZigZag",
-            25: "SystemID",
-            26: "Autorotate",
-            27: "Auto RTL",
-            28: "Turtle",
-        }
-    ),
+    **_tables("arducopter"),
     sub_modes=False,
-    stream_rates_hz=MappingProxyType(
-        {
-            "GLOBAL_POSITION_INT": 10.0,
-            "LOCAL_POSITION_NED": 20.0,
-            "ATTITUDE": 20.0,
-            "ATTITUDE_TARGET": 20.0,
-            "POSITION_TARGET_LOCAL_NED": 10.0,
-            "EXTENDED_SYS_STATE": 5.0,
-        }
-    ),
     bytewise_parameters=False,
     setpoints_before_guided=False,
     first_mission_item_is_home=True,
     goto_mode=Mode.GUIDED,
     resting_mode=Mode.GUIDED,
     unset=0.0,  # NaN is refused
-    limiting_parameters=MappingProxyType({"WPNAV_SPEED": 1000.0, "WPNAV_ACCEL": 250.0}),
     limits_from=_arducopter_limits,
 )
 
 ARDUPLANE: Final = replace(
     ARDUCOPTER,
     kind=VehicleKind.FIXED_WING,
-    # HOLD is LOITER: it circles where it is. A plane lands by a mission's landing only: LAND is the way home
-    modes=MappingProxyType(
-        {
-            Mode.HOLD: 12,
-            Mode.TAKEOFF: 13,
-            Mode.GUIDED: 15,
-            Mode.MISSION: 10,
-            Mode.RETURN: 11,
-            Mode.LAND: 11,
-            Mode.POSITION: 7,
-        }
-    ),
-    mode_names=MappingProxyType(
-        {
-            0: "Manual",
-            1: "Circle",
-            2: "Stabilize",
-            3: "Training",
-            4: "Acro",
-            5: "FBWA",
-            6: "FBWB",
-            7: "Cruise",
-            8: "Autotune",
-            10: "Auto",
-            11: "RTL",
-            12: "Loiter",
-            13: "Takeoff",
-            14: "Avoid ADSB",
-            15: "Guided",
-            16: "Initialising",
-            24: "Thermal",
-        }
-    ),
-    stream_rates_hz=MappingProxyType(
-        {
-            "GLOBAL_POSITION_INT": 10.0,
-            "LOCAL_POSITION_NED": 10.0,
-            "ATTITUDE": 20.0,
-            "VFR_HUD": 10.0,
-            "EXTENDED_SYS_STATE": 5.0,
-        }
-    ),
+    **_tables("arduplane"),
     roll_alone=True,
     takeoff_pitch_deg=12.0,
-    limiting_parameters=MappingProxyType(
-        {
-            "AIRSPEED_MIN": 10.0,
-            "AIRSPEED_CRUISE": 22.0,
-            "AIRSPEED_MAX": 30.0,
-            "ROLL_LIMIT_DEG": 65.0,
-            "NAVL1_PERIOD": 17.0,
-            "NAVL1_DAMPING": 0.75,
-            "RLL2SRV_TCONST": 0.5,
-        }
-    ),
     limits_from=_arduplane_limits,
 )
 

@@ -10,8 +10,8 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError, PlanError
-from missions.piloting.heading import HeadingController, heading_deg
-from missions.vehicle.adapter import Adapter
+from missions.piloting.control import HeadingController, heading_deg
+from missions.vehicle.adapters import Adapter
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode

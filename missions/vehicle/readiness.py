@@ -5,7 +5,7 @@ from typing import Final
 from autopilot_bridge.mavlink import dialect
 from missions.errors import VehicleTimeout
 from missions.preflight.health import not_ready_because
-from missions.vehicle.adapter import PREARM, Adapter
+from missions.vehicle.adapters import PREARM, Adapter
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
 from missions.vehicle.plans import VehiclePlans

@@ -14,8 +14,7 @@ from missions.errors import LinkClosed, MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.notes import FlightNotes
 from missions.planning.limits import FORECAST_WIND_M_S, FixedWingLimits, Limits
-from missions.vehicle.adapter import Adapter
-from missions.vehicle.ardupilot import ArduPilot
+from missions.vehicle.adapters import Adapter, ArduPilot, Px4
 from missions.vehicle.commands import ACK_S, VehicleCommands
 from missions.vehicle.connection import Connection
 from missions.vehicle.firmware import Firmware, Mode
@@ -25,7 +24,6 @@ from missions.vehicle.parameters import VehicleParameters
 from missions.vehicle.payload import Payload
 from missions.vehicle.plans import VehiclePlans
 from missions.vehicle.point_flight import PointFlight
-from missions.vehicle.px4 import Px4
 from missions.vehicle.readiness import Readiness
 from missions.vehicle.telemetry import Position
 from missions.vehicle.wing import FixedWing

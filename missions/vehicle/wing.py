@@ -10,7 +10,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError, PlanError
-from missions.vehicle.adapter import Adapter
+from missions.vehicle.adapters import Adapter
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode

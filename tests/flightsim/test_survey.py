@@ -125,5 +125,5 @@ def test_the_truth_behind_a_map_is_off_by_what_the_map_states() -> None:
 
 @pytest.mark.parametrize("name", ["error_nt", "line_spacing_m"])
 def test_a_stated_error_that_is_none_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match=f"{name} = 0.0"):
+    with pytest.raises(ValueError, match=f"{name} 0 is not accepted"):
         replace(field(), **{name: 0.0})

@@ -21,6 +21,8 @@ from tests.clients.sitl_process import free_port
 
 
 class Recording:
+    acts = False
+
     def __init__(self):
         self.frames = []
 
@@ -242,3 +244,26 @@ def test_a_stranger_on_the_port_is_not_spoken_to():
         stranger.close()
 
     asyncio.run(asyncio.wait_for(script(), 20.0))
+
+
+def packet_order(*, acts):
+    """What a recorder, and a listener of the first of two messages in a packet, see in turn."""
+    seen = []
+
+    class Recorder:
+        def record(self, packet, time_us):
+            seen.extend(frame.message_id for frame in packet)
+
+    Recorder.acts = acts
+
+    async def script(connection, send):
+        connection.listen("ATTITUDE", lambda _: seen.append("listener"), in_order=False)
+        send(attitude(1), dialect.MAVLink_system_time_message(0, 1))
+
+    on_memory(script, recorder=Recorder())
+    return [known for known in seen if known != 0]  # without our heartbeat
+
+
+def test_a_packet_is_split_for_a_recorder_that_acts_on_frames():
+    assert packet_order(acts=False) == [30, 2, "listener"]
+    assert packet_order(acts=True) == [30, "listener", 2]

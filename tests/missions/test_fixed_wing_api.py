@@ -16,9 +16,8 @@ from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle import Mode, Vehicle
-from missions.vehicle.ardupilot import ArduPilot
+from missions.vehicle.adapters import ArduPilot, Px4
 from missions.vehicle.connection import Connection
-from missions.vehicle.px4 import Px4
 from missions.vehicle.telemetry import AirData, Attitude, Position
 from missions.vehicle.wing import Approach
 from tests.slow import slow_after

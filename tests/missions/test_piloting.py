@@ -13,8 +13,7 @@ from missions.piloting import (
     EnergyParameters,
     HeadingController,
 )
-from missions.piloting.energy import EnergyState
-from missions.piloting.heading import heading_deg
+from missions.piloting.control import EnergyState, heading_deg
 
 G = 9.80665
 

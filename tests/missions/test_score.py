@@ -13,7 +13,7 @@ from missions.notes import PATTERN, CommandedPath, FlightNotes
 from missions.runs.records import FlightRecords
 from missions.runs.run_folder import team_figures, vehicle_summary, versions, write_summary
 from missions.runs.score import path_errors_m, score
-from missions.runs.waypoint_passes import waypoint_misses_m
+from missions.runs.track import waypoint_misses_m
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
 

@@ -16,7 +16,7 @@ from missions.errors import PlanError
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.pattern_search.mission import PatternMission
-from missions.pattern_search.wings.entry import with_leads
+from missions.pattern_search.wings.flight import with_leads
 from missions.pattern_search.wings.pattern import check_wings
 from missions.pattern_search.wings.setpoints import path_point
 from missions.pattern_search.wings.waypoints import turn_in_m, waypoints_of

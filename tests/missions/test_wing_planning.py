@@ -18,7 +18,7 @@ from missions.library import MISSIONS
 from missions.occupancy.options import OccupancyOptions
 from missions.options import FlightOptions, Via
 from missions.orbit.options import OrbitOptions
-from missions.pattern_search.wings.entry import Entry, with_leads
+from missions.pattern_search.wings.flight import Entry, with_leads
 from missions.pattern_search.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.patterns import Polyline, named_lissajous, parallel_sweep, sector

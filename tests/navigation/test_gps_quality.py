@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import NavigationParameters
-from autopilot_bridge.navigation.gps_quality import GpsQuality
+from autopilot_bridge.navigation.gps_aiding import GpsQuality
 from flightsim.interface import (
     GPS_ALT_M,
     GPS_EPH_M,

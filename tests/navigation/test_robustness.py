@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters
-from autopilot_bridge.navigation.gps_quality import GpsQuality
+from autopilot_bridge.navigation.gps_aiding import GpsQuality
 from autopilot_bridge.navigation.terrain import TerrainEstimator
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import SensorReadings

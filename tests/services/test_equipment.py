@@ -5,8 +5,7 @@ from typing import Any
 import pytest
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration
-from autopilot_bridge.firmware.ardupilot.compass_calibration import CompassCalibration
+from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration, CompassCalibration
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.fixed_wing import setpoint as sp
-from autopilot_bridge.flight.streamed import OffboardKind
+from autopilot_bridge.flight.task import OffboardKind
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.services.command_rig import NAN
 from tests.services.plane_rig import PlaneRig

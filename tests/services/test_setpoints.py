@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
-from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
+from autopilot_bridge.flight.task import GuidedKind, OffboardKind
 from autopilot_bridge.navigation import layout as nav_layout
 from tests.services.command_rig import NAN, ServiceRig
 

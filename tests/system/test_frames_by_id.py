@@ -12,6 +12,8 @@ from missions.vehicle.connection import Connection
 
 
 class Recorded:
+    acts = False
+
     def __init__(self):
         self.frames = []
 

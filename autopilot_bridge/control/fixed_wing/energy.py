@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
-from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
-from autopilot_bridge.control.fixed_wing.vertical_speed import pitch_for_climb
+from autopilot_bridge.control.fixed_wing.vertical import follow_height, pitch_for_climb, reset_height
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel

@@ -7,6 +7,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.data import load_data, message_ids
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.common import NAN, CommonMessages
@@ -15,77 +16,29 @@ from flightsim.foundation.vectors import euler_of
 
 _M = mavlink
 
+_DATA: Final = load_data("ardupilot", "messages.toml")
+
 START_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {_M.MAVLINK_MSG_ID_HEARTBEAT: 1, _M.MAVLINK_MSG_ID_TIMESYNC: 0.1}
 )
 """What a copter sends before anything is requested: SRn_* are 0 (docs/firmware/ardupilot.md, section 1)."""
 
+
+def _stream(name: str) -> int:
+    return int(getattr(mavlink, f"MAV_DATA_STREAM_{name}"))
+
+
 STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
-    {
-        _M.MAV_DATA_STREAM_RAW_SENSORS: (
-            _M.MAVLINK_MSG_ID_RAW_IMU,
-            _M.MAVLINK_MSG_ID_SCALED_IMU2,
-            _M.MAVLINK_MSG_ID_SCALED_PRESSURE,
-        ),
-        _M.MAV_DATA_STREAM_EXTENDED_STATUS: (
-            _M.MAVLINK_MSG_ID_SYS_STATUS,
-            _M.MAVLINK_MSG_ID_POWER_STATUS,
-            _M.MAVLINK_MSG_ID_MEMINFO,
-            _M.MAVLINK_MSG_ID_MISSION_CURRENT,
-            _M.MAVLINK_MSG_ID_GPS_RAW_INT,
-            _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
-            _M.MAVLINK_MSG_ID_FENCE_STATUS,
-            _M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
-        ),
-        _M.MAV_DATA_STREAM_RC_CHANNELS: (
-            _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
-            _M.MAVLINK_MSG_ID_RC_CHANNELS,
-        ),
-        _M.MAV_DATA_STREAM_POSITION: (
-            _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-            _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
-        ),
-        _M.MAV_DATA_STREAM_EXTRA1: (_M.MAVLINK_MSG_ID_ATTITUDE, _M.MAVLINK_MSG_ID_AHRS2),
-        _M.MAV_DATA_STREAM_EXTRA2: (_M.MAVLINK_MSG_ID_VFR_HUD,),
-        _M.MAV_DATA_STREAM_EXTRA3: (
-            _M.MAVLINK_MSG_ID_AHRS,
-            _M.MAVLINK_MSG_ID_BATTERY_STATUS,
-            _M.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
-            _M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4,
-            _M.MAVLINK_MSG_ID_SYSTEM_TIME,
-            _M.MAVLINK_MSG_ID_TERRAIN_REPORT,
-            _M.MAVLINK_MSG_ID_VIBRATION,
-            _M.MAVLINK_MSG_ID_WIND,
-            _M.MAVLINK_MSG_ID_DISTANCE_SENSOR,
-        ),
-    }
+    {_stream(name): message_ids(stream["messages"]) for name, stream in _DATA["streams"].items()}
 )
 """REQUEST_DATA_STREAM groups (docs/firmware/ardupilot.md, section 2)."""
 
 STREAM_RATE_PARAMETERS: Final[Mapping[int, str]] = MappingProxyType(
-    {
-        _M.MAV_DATA_STREAM_RAW_SENSORS: "RAW_SENS",
-        _M.MAV_DATA_STREAM_EXTENDED_STATUS: "EXT_STAT",
-        _M.MAV_DATA_STREAM_RC_CHANNELS: "RC_CHAN",
-        _M.MAV_DATA_STREAM_POSITION: "POSITION",
-        _M.MAV_DATA_STREAM_EXTRA1: "EXTRA1",
-        _M.MAV_DATA_STREAM_EXTRA2: "EXTRA2",
-        _M.MAV_DATA_STREAM_EXTRA3: "EXTRA3",
-    }
+    {_stream(name): stream["rate"] for name, stream in _DATA["streams"].items()}
 )
 """Ending of the SRn_ parameter that holds a group's rate."""
 
-NOT_REQUESTABLE: Final = frozenset(
-    {
-        _M.MAVLINK_MSG_ID_AVAILABLE_MODES,
-        _M.MAVLINK_MSG_ID_CURRENT_MODE,
-        _M.MAVLINK_MSG_ID_ALTITUDE,
-        _M.MAVLINK_MSG_ID_ODOMETRY,
-        _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
-        _M.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION,
-        _M.MAVLINK_MSG_ID_TIMESYNC,
-    }
-)
+NOT_REQUESTABLE: Final = frozenset(message_ids(_DATA["not_requestable"]))
 """Messages that 4.6 refuses to send on request (docs/firmware/ardupilot.md, section 1)."""
 
 _RC_NEUTRAL_US: Final = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)

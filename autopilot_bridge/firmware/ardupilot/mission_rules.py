@@ -5,6 +5,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.data import commands, load_data
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.plans.policy import CRITICAL, WARNING, MissionPolicy, MissionTexts
@@ -17,121 +18,27 @@ from autopilot_bridge.services.plans.rules import (
     check_special,
 )
 
-POSITION_COMMANDS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_NAV_WAYPOINT,
-        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-        mavlink.MAV_CMD_NAV_LOITER_TURNS,
-        mavlink.MAV_CMD_NAV_LOITER_TIME,
-        mavlink.MAV_CMD_NAV_LAND,
-        mavlink.MAV_CMD_NAV_TAKEOFF,
-        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
-        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
-        mavlink.MAV_CMD_NAV_VTOL_LAND,
-        mavlink.MAV_CMD_DO_SET_HOME,
-        mavlink.MAV_CMD_DO_LAND_START,
-        mavlink.MAV_CMD_DO_RETURN_PATH_START,
-        mavlink.MAV_CMD_DO_GO_AROUND,
-        mavlink.MAV_CMD_DO_SET_ROI,
-        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
-    )
-)
+_ITEMS: Final = load_data("ardupilot", "mission_items.toml")
+POSITION_COMMANDS: Final = commands(_ITEMS["position_commands"])
 """Mission commands with a position."""
 
-PLAIN_COMMANDS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
-        mavlink.MAV_CMD_NAV_DELAY,
-        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
-        mavlink.MAV_CMD_CONDITION_DELAY,
-        mavlink.MAV_CMD_CONDITION_DISTANCE,
-        mavlink.MAV_CMD_CONDITION_YAW,
-        mavlink.MAV_CMD_DO_JUMP,
-        mavlink.MAV_CMD_JUMP_TAG,
-        mavlink.MAV_CMD_DO_JUMP_TAG,
-        mavlink.MAV_CMD_DO_CHANGE_SPEED,
-        mavlink.MAV_CMD_DO_SET_RELAY,
-        mavlink.MAV_CMD_DO_REPEAT_RELAY,
-        mavlink.MAV_CMD_DO_SET_SERVO,
-        mavlink.MAV_CMD_DO_REPEAT_SERVO,
-        mavlink.MAV_CMD_DO_SET_REVERSE,
-        mavlink.MAV_CMD_DO_SET_ROI_NONE,
-        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
-        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-        mavlink.MAV_CMD_DO_FENCE_ENABLE,
-        mavlink.MAV_CMD_DO_PARACHUTE,
-        mavlink.MAV_CMD_DO_GRIPPER,
-        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
-        mavlink.MAV_CMD_DO_SPRAYER,
-        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
-        mavlink.MAV_CMD_DO_AUX_FUNCTION,
-        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
-        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
-        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
-        mavlink.MAV_CMD_SET_CAMERA_SOURCE,
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
-        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
-        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
-        mavlink.MAV_CMD_DO_WINCH,
-    )
-)
+PLAIN_COMMANDS: Final = commands(_ITEMS["plain_commands"])
 """Mission commands without a position; their frame is not checked.
 
 The firmware supports some more that are not flown here, so they are refused: NAV_GUIDED_ENABLE with
 DO_GUIDED_LIMITS, NAV_SCRIPT_TIME, NAV_ATTITUDE_TIME, NAV_PAYLOAD_PLACE, DO_INVERTED_FLIGHT.
 """
 
-PASSED_OVER: Final = frozenset(
-    (
-        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
-        mavlink.MAV_CMD_DO_SET_REVERSE,
-        mavlink.MAV_CMD_DO_PARACHUTE,
-        mavlink.MAV_CMD_DO_SPRAYER,
-        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
-        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
-        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
-        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
-        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,  # for planes
-    )
-)
+PASSED_OVER: Final = commands(_ITEMS["passed_over"])
 """Accepted and skipped on vehicles without the device, as in the firmware."""
 
 AIRCRAFT_REFUSED: Final = frozenset((mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,))
 """Items that aircraft refuse."""
 
-_MARKERS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_DO_LAND_START,
-        mavlink.MAV_CMD_DO_RETURN_PATH_START,
-        mavlink.MAV_CMD_DO_GO_AROUND,
-    )
-)
-"""Commands whose position is optional: ground stations send them in MAV_FRAME_MISSION."""
-
-_PLACE_OPTIONAL: Final = frozenset(
-    (
-        mavlink.MAV_CMD_DO_LAND_START,
-        mavlink.MAV_CMD_DO_RETURN_PATH_START,
-        mavlink.MAV_CMD_DO_GO_AROUND,
-    )
-)
+_PLACE_OPTIONAL: Final = commands(_ITEMS["place_optional"])
 """Ground stations send these without a position, in MAV_FRAME_MISSION (QGroundControl's landing pattern)."""
 
-_YAW_IN_PARAM4: Final = frozenset(
-    (
-        mavlink.MAV_CMD_NAV_WAYPOINT,
-        mavlink.MAV_CMD_NAV_LAND,
-        mavlink.MAV_CMD_NAV_TAKEOFF,
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
-    )
-)
+_YAW_IN_PARAM4: Final = commands(_ITEMS["yaw_in_param4"])
 
 
 class ArdupilotItemRules:
@@ -153,9 +60,9 @@ class ArdupilotItemRules:
             return int(mavlink.MAV_MISSION_ACCEPTED)
         if item.command in self._refused:
             return int(mavlink.MAV_MISSION_UNSUPPORTED)
-        placeless = item.command in _MARKERS and item.frame == mavlink.MAV_FRAME_MISSION
+        placeless = _without_place(item)
         if item.command in POSITION_COMMANDS and not placeless:
-            if item.frame not in GEODETIC_FRAMES and not _without_place(item):
+            if item.frame not in GEODETIC_FRAMES:
                 return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
             result = self._check_params(item) or check_position(item)
         elif item.command in PLAIN_COMMANDS or placeless:

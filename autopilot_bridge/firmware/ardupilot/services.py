@@ -11,8 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.ardupilot import messages, packed_parameters
-from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration
-from autopilot_bridge.firmware.ardupilot.compass_calibration import CompassCalibration
+from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration, CompassCalibration
 from autopilot_bridge.firmware.ardupilot.copter import modes as copter_modes
 from autopilot_bridge.firmware.ardupilot.copter.commands import ArduCopterCommands
 from autopilot_bridge.firmware.ardupilot.copter.setpoints import ArduCopterSetpoints
@@ -28,6 +27,7 @@ from autopilot_bridge.firmware.ardupilot.plane import messages as plane_messages
 from autopilot_bridge.firmware.ardupilot.plane import modes as plane_modes
 from autopilot_bridge.firmware.ardupilot.plane.commands import ArduPlaneCommands
 from autopilot_bridge.firmware.ardupilot.plane.setpoints import ArduPlaneSetpoints
+from autopilot_bridge.firmware.data import commands, load_data, message_ids
 from autopilot_bridge.firmware.mapping import integer
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices
 from autopilot_bridge.navigation.external import ExternalFrame
@@ -99,17 +99,10 @@ def _local_frame(store: ParameterStore) -> ExternalFrame:
     return ExternalFrame.LOCAL_FRD if yaw_source == EXTERNAL_NAV_SOURCE else ExternalFrame.NED
 
 
+_MESSAGES: Final = load_data("ardupilot", "messages.toml")
+_ITEMS: Final = load_data("ardupilot", "mission_items.toml")
 ODOMETRY: Final = ExternalPolicy(
-    messages=frozenset(
-        {
-            mavlink.MAVLINK_MSG_ID_ODOMETRY,
-            mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
-            mavlink.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE,
-            mavlink.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE,
-            mavlink.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE,
-            mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP,
-        }
-    ),
+    messages=frozenset(message_ids(_MESSAGES["odometry"])),
     pose_frames=frozenset({mavlink.MAV_FRAME_LOCAL_FRD}),
     velocity_frames=frozenset({mavlink.MAV_FRAME_BODY_FRD}),
     enabled=lambda store: integer(store, "VISO_TYPE", 0) != 0,
@@ -117,21 +110,7 @@ ODOMETRY: Final = ExternalPolicy(
     one_frame=True,
 )
 PAYLOAD: Final = PayloadPolicy(
-    camera=frozenset(
-        {
-            mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-            mavlink.MAV_CMD_SET_CAMERA_ZOOM,
-            mavlink.MAV_CMD_SET_CAMERA_FOCUS,
-            mavlink.MAV_CMD_IMAGE_START_CAPTURE,
-            mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
-            mavlink.MAV_CMD_VIDEO_START_CAPTURE,
-            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
-            mavlink.MAV_CMD_CAMERA_TRACK_POINT,
-            mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE,
-            mavlink.MAV_CMD_CAMERA_STOP_TRACKING,
-        }
-    ),
+    camera=commands(_ITEMS["camera"]),
     absent=Result.UNSUPPORTED,
     nose_modes={FlightMode.MISSION: False, FlightMode.GUIDED: True},  # autoyaw.cpp: set_roi
     kinds_of_roi=False,

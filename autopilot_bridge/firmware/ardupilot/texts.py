@@ -13,46 +13,12 @@ from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.firmware.ardupilot.copter.modes import MODE_NAMES, REFUSED_NAMES
 from autopilot_bridge.firmware.ardupilot.plane.modes import MODE_NAMES as PLANE_MODE_NAMES
 from autopilot_bridge.firmware.ardupilot.plane.modes import REFUSED_TEXTS
+from autopilot_bridge.firmware.data import by_member, load_data
 from autopilot_bridge.firmware.texts import Notice, Severity, TextTable, notices_of
 
-_REASONS: Final[Mapping[Reason, str]] = {
-    Reason.BOOTING: "System not initialised",
-    Reason.GYRO: "Gyros not healthy",
-    Reason.ACCELEROMETER: "Accels not healthy",
-    Reason.BAROMETER: "Barometer not healthy",
-    Reason.COMPASS: "Compass not healthy",
-    Reason.AIRSPEED: "Airspeed 1 not healthy",
-    Reason.GPS: "GPS 1: Bad fix",
-    Reason.ATTITUDE: "AHRS: EKF3 not ready",
-    Reason.ALTITUDE: "Need Alt Estimate",
-    Reason.POSITION: "Need Position Estimate",
-    Reason.HOME: "waiting for home",
-    Reason.BATTERY_LOW: "Battery 1 low voltage failsafe",
-    Reason.BATTERY_FAILSAFE: "Battery 1 critical voltage failsafe",
-    Reason.MANUAL_CONTROL: "Radio failsafe on",
-    Reason.GCS_LOST: "GCS failsafe on",
-    Reason.MISSION_MISSING: "Mode requires mission",
-    Reason.MISSION_INVALID: "Mode requires mission",
-    Reason.OUTSIDE_FENCE: "vehicle outside fence",
-    Reason.FENCE_MISSING: "Fences enabled, but none selected",
-    Reason.FENCE_PARAMETERS: "FENCE_MARGIN too big",
-    Reason.TERMINATED: "Vehicle is terminated",
-    Reason.CALIBRATING: "Calibration running",
-    Reason.LEANING: "Leaning",
-    Reason.THROTTLE_HIGH: "Throttle too high",
-    Reason.LANDING_SEQUENCE: "In landing sequence",
-}
-_MODE_REASONS: Final[Mapping[Reason, str]] = {
-    Reason.POSITION: "requires position",
-    Reason.ALTITUDE: "need alt estimate",
-    Reason.ATTITUDE: "need attitude estimate",
-    Reason.HOME: "requires home",
-    Reason.MISSION_MISSING: "requires mission",
-    Reason.MISSION_INVALID: "requires mission",
-    Reason.MANUAL_CONTROL: "requires radio",
-    Reason.TERMINATED: "terminated",
-    Reason.FENCE_RECOVERY: "in fence recovery",
-}
+_WORDS: Final = load_data("ardupilot", "texts.toml")
+_REASONS: Final[Mapping[Reason, str]] = by_member(Reason, _WORDS["reasons"])
+_MODE_REASONS: Final[Mapping[Reason, str]] = by_member(Reason, _WORDS["mode_reasons"])
 _FAILSAFES: Final[Mapping[FailsafeKind, str]] = {
     FailsafeKind.GCS_LOST: "GCS Failsafe",
     FailsafeKind.MANUAL_LOST: "Radio Failsafe",

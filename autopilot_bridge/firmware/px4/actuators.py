@@ -10,6 +10,7 @@ control allocator's `module.yaml`.
 from collections.abc import Collection, Mapping
 from typing import Any, Final
 
+from autopilot_bridge.firmware.data import load_data
 from autopilot_bridge.parameters import ParameterDefinition
 
 FUNCTIONS: Final[Mapping[int, str]] = {
@@ -23,29 +24,7 @@ FUNCTIONS: Final[Mapping[int, str]] = {
 """Values of PWM_MAIN_FUNCn; MAV_CMD_ACTUATOR_TEST names them with 1000 added."""
 
 _AIRFRAMES: Final[Mapping[int, str]] = {0: "Multirotor", 1: "Fixed-wing"}
-_SURFACES: Final[Mapping[int, str]] = dict(
-    enumerate(
-        (
-            "(Not set)",
-            "Left Aileron",
-            "Right Aileron",
-            "Elevator",
-            "Rudder",
-            "Left Elevon",
-            "Right Elevon",
-            "Left V-Tail",
-            "Right V-Tail",
-            "Left Flap",
-            "Right Flap",
-            "Airbrake",
-            "Custom",
-            "Left A-tail",
-            "Right A-tail",
-            "Single Channel Aileron",
-            "Steering Wheel",
-        )
-    )
-)
+_SURFACES: Final[Mapping[int, str]] = dict(enumerate(load_data("px4", "texts.toml")["surfaces"]))
 _MULTIROTOR: Final = 0
 
 

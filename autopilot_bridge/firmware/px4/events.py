@@ -7,12 +7,13 @@ numbers and names are this project's own: clients decode them by the metadata th
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import Aid, FailsafeAction, FailsafeKind
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.firmware.data import by_member, load_data
 from autopilot_bridge.firmware.event_kinds import Argument, EventEnum, EventKind, LogLevel, Occurrence
 from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.firmware.px4.copter.modes import CUSTOM_MODES
@@ -20,23 +21,10 @@ from autopilot_bridge.firmware.texts import Notice, Severity
 
 NAMESPACE: Final = "px4"
 
-MODE_BITS: Final[Mapping[FlightMode, int]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: 1 << 0,
-        FlightMode.ALTITUDE: 1 << 1,
-        FlightMode.POSITION: 1 << 2,
-        FlightMode.MISSION: 1 << 3,
-        FlightMode.HOLD: 1 << 4,
-        FlightMode.RETURN: 1 << 5,
-        FlightMode.ACRO: 1 << 10,
-        FlightMode.OFFBOARD: 1 << 14,
-        FlightMode.STABILIZED: 1 << 15,
-        FlightMode.TAKEOFF: 1 << 17,
-        FlightMode.LAND: 1 << 18,
-        FlightMode.FOLLOW: 1 << 19,
-        FlightMode.PRECISION_LAND: 1 << 20,
-        FlightMode.ORBIT: 1 << 21,
-    }
+_DATA: Final = load_data("px4", "events.toml")
+
+MODE_BITS: Final[Mapping[FlightMode, int]] = by_member(
+    FlightMode, {name: 1 << mode["bit"] for name, mode in _DATA["modes"].items()}
 )
 """Groups of modes in the report, by PX4's navigation states; modes without one are not reported."""
 
@@ -45,73 +33,23 @@ MODE_GROUPS: Final[Mapping[int, int]] = MappingProxyType(
 )
 """HEARTBEAT.custom_mode of each group."""
 
-_MODE_NAMES: Final[Mapping[int, tuple[str, str]]] = {
-    1 << 0: ("manual", "Fully manual mode"),
-    1 << 1: ("altctl", "Altitude mode"),
-    1 << 2: ("posctl", "Position mode"),
-    1 << 3: ("mission", "Mission mode"),
-    1 << 4: ("loiter", "Loiter"),
-    1 << 5: ("rtl", "RTL"),
-    1 << 10: ("acro", "Acro"),
-    1 << 14: ("offboard", "Offboard"),
-    1 << 15: ("stab", "Stabilized"),
-    1 << 17: ("takeoff", "Takeoff"),
-    1 << 18: ("land", "Land"),
-    1 << 19: ("follow_target", "Follow Target"),
-    1 << 20: ("precland", "Precision Land"),
-    1 << 21: ("orbit", "Orbit"),
-}
-_COMPONENTS: Final[Mapping[int, tuple[str, str]]] = {
-    0: ("none", "None"),
-    1: ("absolute_pressure", "Absolute pressure"),
-    2: ("differential_pressure", "Differential pressure"),
-    3: ("gps", "GPS"),
-    7: ("remote_control", "Remote Control (RC or Joystick)"),
-    11: ("battery", "Battery"),
-    12: ("communication_links", "Communication links"),
-    16: ("attitude_estimate", "Attitude estimate"),
-    17: ("local_position_estimate", "Local position estimate"),
-    18: ("mission", "Mission"),
-    20: ("system", "System"),
-    24: ("global_position_estimate", "Global position estimate"),
-    27: ("magnetometer", "Magnetometer"),
-    28: ("accel", "Accelerometer"),
-    29: ("gyro", "Gyroscope"),
-}
+_COMPONENTS: Final[Mapping[str, dict[str, Any]]] = _DATA["components"]
 COMPONENT_OF: Final[Mapping[Reason, int]] = MappingProxyType(
-    {
-        Reason.BAROMETER: 1,
-        Reason.AIRSPEED: 2,
-        Reason.GPS: 3,
-        Reason.MANUAL_CONTROL: 7,
-        Reason.THROTTLE_HIGH: 7,
-        Reason.BATTERY_LOW: 11,
-        Reason.BATTERY_FAILSAFE: 11,
-        Reason.GCS_LOST: 12,
-        Reason.NO_SETPOINTS: 12,
-        Reason.ATTITUDE: 16,
-        Reason.LEANING: 16,
-        Reason.ALTITUDE: 17,
-        Reason.MISSION_MISSING: 18,
-        Reason.MISSION_INVALID: 18,
-        Reason.BOOTING: 20,
-        Reason.CALIBRATING: 20,
-        Reason.TERMINATED: 20,
-        Reason.POSITION: 24,
-        Reason.HOME: 24,
-        Reason.COMPASS: 27,
-        Reason.ACCELEROMETER: 28,
-        Reason.GYRO: 29,
-    }
+    {Reason[name]: part["bit"] for part in _COMPONENTS.values() for name in part["reasons"]}
 )
 """Index of the health component that a reason is about; 0 (none) for the others."""
-PRESENT: Final = sum(1 << bit for bit in (1, 3, 7, 11, 12, 16, 17, 20, 24, 27, 28, 29))
+PRESENT: Final = sum(1 << part["bit"] for part in _COMPONENTS.values() if part["present"])
 
-_MODES: Final = EventEnum(name="navigation_mode_group_t", type="uint32_t", entries=_MODE_NAMES, bits=True)
+_MODES: Final = EventEnum(
+    name="navigation_mode_group_t",
+    type="uint32_t",
+    entries={1 << mode["bit"]: (mode["name"], mode["label"]) for mode in _DATA["modes"].values()},
+    bits=True,
+)
 _HEALTH: Final = EventEnum(
     name="health_component_t",
     type="uint64_t",
-    entries={1 << bit: entry for bit, entry in _COMPONENTS.items()},
+    entries={1 << part["bit"]: (name, part["label"]) for name, part in _COMPONENTS.items()},
     bits=True,
 )
 

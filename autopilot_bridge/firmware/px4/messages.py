@@ -7,6 +7,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.data import load_data, message_rates
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
@@ -17,71 +18,13 @@ from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 _M = mavlink
 _ACTUATOR_OUTPUTS: Final = 32  # fields of ACTUATOR_OUTPUT_STATUS
 
+_DATA: Final = load_data("px4", "messages.toml")
 ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
-    {
-        _M.MAVLINK_MSG_ID_ATTITUDE: 100,
-        _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50,
-        _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50,
-        _M.MAVLINK_MSG_ID_HIGHRES_IMU: 50,
-        _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30,
-        _M.MAVLINK_MSG_ID_ODOMETRY: 30,
-        _M.MAVLINK_MSG_ID_ALTITUDE: 10,
-        _M.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10,
-        _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10,
-        _M.MAVLINK_MSG_ID_DISTANCE_SENSOR: 10,
-        _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 10,
-        _M.MAVLINK_MSG_ID_TIMESYNC: 10,
-        _M.MAVLINK_MSG_ID_VFR_HUD: 10,
-        _M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 10,
-        _M.MAVLINK_MSG_ID_GPS_RAW_INT: 8,
-        _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5,
-        _M.MAVLINK_MSG_ID_SYS_STATUS: 5,
-        _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 2,
-        _M.MAVLINK_MSG_ID_HEARTBEAT: 1,
-        _M.MAVLINK_MSG_ID_SYSTEM_TIME: 1,
-        _M.MAVLINK_MSG_ID_PING: 1,
-        _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1,
-        _M.MAVLINK_MSG_ID_SCALED_PRESSURE: 1,
-        _M.MAVLINK_MSG_ID_MISSION_CURRENT: 1,
-        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: 1,
-        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: 1,
-        _M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
-        _M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
-        _M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
-        _M.MAVLINK_MSG_ID_VIBRATION: 0.5,
-        CURRENT_EVENT_SEQUENCE: 1 / 3,
-    }
+    {**message_rates(_DATA["onboard_rates_hz"]), CURRENT_EVENT_SEQUENCE: 1 / 3}
 )
 """PX4's ONBOARD mode (UDP 14540; docs/firmware/px4.md, section 6)."""
 
-GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
-    {
-        _M.MAVLINK_MSG_ID_ATTITUDE: 50,
-        _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50,
-        _M.MAVLINK_MSG_ID_ATTITUDE_TARGET: 50,
-        _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50,
-        _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50,
-        _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 50,
-        _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 50,
-        _M.MAVLINK_MSG_ID_GPS_RAW_INT: 5,
-        _M.MAVLINK_MSG_ID_VFR_HUD: 4,
-        _M.MAVLINK_MSG_ID_ALTITUDE: 1,
-        _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1,
-        _M.MAVLINK_MSG_ID_HEARTBEAT: 1,
-        _M.MAVLINK_MSG_ID_MISSION_CURRENT: 1,
-        _M.MAVLINK_MSG_ID_SCALED_PRESSURE: 1,
-        _M.MAVLINK_MSG_ID_SYS_STATUS: 1,
-        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: 1,
-        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: 1,
-        _M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
-        _M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
-        _M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
-        _M.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.5,
-        _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
-        _M.MAVLINK_MSG_ID_VIBRATION: 0.1,
-        _M.MAVLINK_MSG_ID_PING: 0.1,
-    }
-)
+GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(message_rates(_DATA["gcs_rates_hz"]))
 """PX4's NORMAL mode with raised rates (UDP 14550; docs/firmware/px4.md, section 6)."""
 
 _TARGET_BITS: Final = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.data import commands, load_data
 from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
 from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
 from autopilot_bridge.mission_plan import MissionItem, MissionType
@@ -24,73 +25,17 @@ from autopilot_bridge.services.plans.rules import (
     check_special,
 )
 
-POSITION_COMMANDS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_NAV_WAYPOINT,
-        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-        mavlink.MAV_CMD_NAV_LOITER_TIME,
-        mavlink.MAV_CMD_NAV_LAND,
-        mavlink.MAV_CMD_NAV_TAKEOFF,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
-        mavlink.MAV_CMD_NAV_ROI,
-        mavlink.MAV_CMD_DO_SET_ROI,
-        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
-        mavlink.MAV_CMD_NAV_VTOL_LAND,
-    )
-)
+_ITEMS: Final = load_data("px4", "mission_items.toml")
+POSITION_COMMANDS: Final = commands(_ITEMS["position_commands"])
 """Mission commands accepted in a global frame."""
 
-PLAIN_COMMANDS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_DO_JUMP,
-        mavlink.MAV_CMD_NAV_ROI,
-        mavlink.MAV_CMD_DO_SET_ROI,
-        mavlink.MAV_CMD_DO_WINCH,
-        mavlink.MAV_CMD_DO_GRIPPER,
-        mavlink.MAV_CMD_DO_CHANGE_SPEED,
-        mavlink.MAV_CMD_DO_SET_HOME,
-        mavlink.MAV_CMD_DO_LAND_START,
-        mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
-        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-        mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
-        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
-        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
-        mavlink.MAV_CMD_SET_CAMERA_MODE,
-        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
-        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
-        mavlink.MAV_CMD_DO_CONTROL_VIDEO,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
-        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
-        mavlink.MAV_CMD_NAV_DELAY,
-        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
-        mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
-        mavlink.MAV_CMD_DO_SET_ROI_NONE,
-        mavlink.MAV_CMD_CONDITION_DELAY,
-        mavlink.MAV_CMD_CONDITION_DISTANCE,
-        mavlink.MAV_CMD_DO_SET_ACTUATOR,
-        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
-        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
-    )
-)
+PLAIN_COMMANDS: Final = commands(_ITEMS["plain_commands"])
 """Mission commands accepted in MAV_FRAME_MISSION.
 
 The firmware supports CONDITION_GATE and OBLIQUE_SURVEY too, which are not flown here, so they are refused.
 """
 
-PASSED_OVER: Final = frozenset(
-    (
-        mavlink.MAV_CMD_CONDITION_DELAY,
-        mavlink.MAV_CMD_CONDITION_DISTANCE,
-        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
-        mavlink.MAV_CMD_DO_WINCH,
-    )
-)
+PASSED_OVER: Final = commands(_ITEMS["passed_over"])
 """Accepted and skipped, as in the firmware."""
 
 _POSITION_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.firmware.data import commands, load_data, message_ids
 from autopilot_bridge.firmware.px4 import messages
 from autopilot_bridge.firmware.px4.calibration import Px4Calibration
 from autopilot_bridge.firmware.px4.commands import Px4Commands, Px4PlaneCommands
@@ -91,14 +92,10 @@ POWER: Final = PowerPolicy(
     force=None,
     delay_s=0.4,
 )
+_MESSAGES: Final = load_data("px4", "messages.toml")
+_ITEMS: Final = load_data("px4", "mission_items.toml")
 ODOMETRY: Final = ExternalPolicy(
-    messages=frozenset(
-        {
-            mavlink.MAVLINK_MSG_ID_ODOMETRY,
-            mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
-            mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP,
-        }
-    ),
+    messages=frozenset(message_ids(_MESSAGES["odometry"])),
     pose_frames=frozenset(POSE_FRAMES),
     velocity_frames=frozenset(VELOCITY_FRAMES),
     enabled=lambda store: True,
@@ -106,14 +103,7 @@ ODOMETRY: Final = ExternalPolicy(
     one_frame=False,
 )
 PAYLOAD: Final = PayloadPolicy(
-    camera=frozenset(
-        {
-            mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-            mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
-            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
-        }
-    ),
+    camera=commands(_ITEMS["camera"]),
     absent=None,
     nose_modes={FlightMode.MISSION: False},  # mission_base.cpp: heading_sp_update
     kinds_of_roi=True,

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.services.channel import MavlinkMessage
-from autopilot_bridge.services.inputs.setpoint_frames import (
+from autopilot_bridge.services.inputs.setpoints import (
     ATTITUDE_BIT,
     FORCE_BIT,
     POSITION_BITS,

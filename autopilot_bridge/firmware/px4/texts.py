@@ -14,44 +14,14 @@ from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import Aid, BatteryLevel, DisarmReason, FailsafeAction
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.firmware.data import by_member, load_data
 from autopilot_bridge.firmware.px4.copter.modes import MODE_NAMES
 from autopilot_bridge.firmware.texts import Notice, Severity, TextTable, notices_of
 
-_REASONS: Final[Mapping[Reason, str]] = {
-    Reason.BOOTING: "System is starting up",
-    Reason.GYRO: "Gyro data missing or unhealthy",
-    Reason.ACCELEROMETER: "Accelerometer data missing or unhealthy",
-    Reason.BAROMETER: "Barometer data missing or unhealthy",
-    Reason.COMPASS: "Compass data missing or unhealthy",
-    Reason.AIRSPEED: "Airspeed data missing or unhealthy",
-    Reason.GPS: "GNSS data fusion stopped or no 3D fix",
-    Reason.ATTITUDE: "Attitude estimate invalid",
-    Reason.ALTITUDE: "Altitude estimate invalid",
-    Reason.POSITION: "Position estimate invalid",
-    Reason.HOME: "Home position not set",
-    Reason.BATTERY_LOW: "Low battery",
-    Reason.BATTERY_FAILSAFE: "Critical battery",
-    Reason.MANUAL_CONTROL: "No manual control input",
-    Reason.GCS_LOST: "No connection to the ground control station",
-    Reason.MISSION_MISSING: "No valid mission available",
-    Reason.MISSION_INVALID: "Mission is not feasible",
-    Reason.NO_SETPOINTS: "No offboard signal",
-    Reason.MODE_NOT_ARMABLE: "Mode not suitable for takeoff",
-    Reason.OUTSIDE_FENCE: "Geofence violation",
-    Reason.TERMINATED: "Flight termination active",
-    Reason.CALIBRATING: "Calibrating",
-    Reason.LEANING: "Attitude too far from level",
-    Reason.THROTTLE_HIGH: "Throttle above center",
-}
+_WORDS: Final = load_data("px4", "texts.toml")
+_REASONS: Final[Mapping[Reason, str]] = by_member(Reason, _WORDS["reasons"])
 
-_DISARMED: Final[Mapping[DisarmReason, str]] = {
-    DisarmReason.COMMAND: "Disarmed by external command",
-    DisarmReason.FORCED: "Disarmed by external command",
-    DisarmReason.PREFLIGHT_TIMEOUT: "Disarmed by auto preflight disarming",
-    DisarmReason.LANDED: "Disarmed by landing",
-    DisarmReason.FAILSAFE: "Disarmed by failsafe",
-    DisarmReason.TERMINATION: "Disarmed by flight termination",
-}
+_DISARMED: Final[Mapping[DisarmReason, str]] = by_member(DisarmReason, _WORDS["disarmed"])
 
 _COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
     (300, Reason.MISSION_MISSING): Notice(Severity.CRITICAL, "Mission start denied! No valid mission"),

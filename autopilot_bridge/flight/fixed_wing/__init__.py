@@ -17,7 +17,7 @@ from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnPhase, ReturnTask
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffPhase, TakeoffTask
 from autopilot_bridge.flight.parameters import ReturnDestination
-from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
+from autopilot_bridge.flight.task import GuidedKind, OffboardKind
 
 __all__ = [
     "DescendTask",

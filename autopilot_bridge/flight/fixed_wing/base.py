@@ -6,9 +6,8 @@ from typing import ClassVar, Protocol, runtime_checkable
 
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 
 

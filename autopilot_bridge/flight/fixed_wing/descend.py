@@ -4,7 +4,7 @@ import math
 
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, TouchedDown
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
+from autopilot_bridge.flight.fixed_wing.state import FlightCommand
 from autopilot_bridge.flight.task import TaskStatus
 
 

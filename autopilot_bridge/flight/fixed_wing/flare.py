@@ -11,9 +11,8 @@ that fades towards the ground, is in `surface_wind`.
 import math
 
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 
 

@@ -12,8 +12,7 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.streamed import GuidedKind, Vector
-from autopilot_bridge.flight.task import SpeedKind, TaskStatus
+from autopilot_bridge.flight.task import GuidedKind, SpeedKind, TaskStatus, Vector
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 _NEVER: Final = math.inf

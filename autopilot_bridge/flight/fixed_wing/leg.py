@@ -3,11 +3,10 @@
 import math
 from typing import Final
 
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, TurnInRule
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.vectors import wrap_pi
 

@@ -3,9 +3,8 @@
 import math
 from typing import Final
 
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 
 _STEER_GAIN_RAD_M: Final = 0.02
 _STEER_MAX_RAD: Final = math.radians(6.0)

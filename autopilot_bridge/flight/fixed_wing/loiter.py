@@ -7,8 +7,8 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext, TaskFinished
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle import Circle
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.descend import PositionLost
+from autopilot_bridge.flight.fixed_wing.state import FlightCommand
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 
 

@@ -9,14 +9,13 @@ from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing.base import GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle_item import CircleItem
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.descend import PositionLost
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.leg import Leg, Place
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffTask
 from autopilot_bridge.flight.heading import turn_angle
 from autopilot_bridge.flight.plan_reading import (

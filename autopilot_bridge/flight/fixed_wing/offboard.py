@@ -10,8 +10,7 @@ from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle import Circle
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.streamed import NAN3, OffboardKind, Vector
-from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+from autopilot_bridge.flight.task import NAN3, OffboardKind, TaskStatus, Vector, clear_setpoint
 from flightsim.foundation.rotations import euler_from_quaternion
 
 _STILL_M_S: Final = 0.5  # a slower velocity has no direction

@@ -1,9 +1,8 @@
 """Flight tasks: each flies one kind of manoeuvre by writing the control setpoint. Flavour-neutral."""
 
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState, ManualInput
-from autopilot_bridge.flight.multicopter.goto import GotoTask, RepositionTask
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
-from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask
+from autopilot_bridge.flight.multicopter.hold import BrakeTask, GotoTask, HoldTask, RepositionTask
 from autopilot_bridge.flight.multicopter.land import LandTask
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector, LandDetectorParameters
 from autopilot_bridge.flight.multicopter.manual import ManualMode, ManualTask
@@ -13,8 +12,14 @@ from autopilot_bridge.flight.multicopter.orbit import OrbitTask, OrbitYaw
 from autopilot_bridge.flight.multicopter.return_home import ReturnPhase, ReturnTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
-from autopilot_bridge.flight.streamed import GuidedKind, OffboardKind
-from autopilot_bridge.flight.task import FlightTask, IdleTask, TaskStatus, clear_setpoint
+from autopilot_bridge.flight.task import (
+    FlightTask,
+    GuidedKind,
+    IdleTask,
+    OffboardKind,
+    TaskStatus,
+    clear_setpoint,
+)
 
 __all__ = [
     "BrakeTask",

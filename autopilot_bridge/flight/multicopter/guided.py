@@ -13,12 +13,10 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.avoidance import limited_velocity
-from autopilot_bridge.flight.multicopter.goto import GotoTask
-from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
-from autopilot_bridge.flight.multicopter.hold import HoldTask
+from autopilot_bridge.flight.multicopter.hold import GotoTask, HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.streamed import NAN3, GuidedKind, Vector
-from autopilot_bridge.flight.task import SpeedKind, TaskStatus, clear_setpoint
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
+from autopilot_bridge.flight.task import NAN3, GuidedKind, SpeedKind, TaskStatus, Vector, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
 

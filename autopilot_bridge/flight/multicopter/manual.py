@@ -8,9 +8,9 @@ import numpy as np
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.multicopter.avoidance import limited_velocity
-from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.task import FlightTask, TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout

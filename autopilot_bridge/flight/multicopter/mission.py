@@ -10,14 +10,13 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.heading import Point, Turn
 from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_in_distance
-from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
 from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.spline import SplineCurve, SplineFlight
-from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp, TakeoffTask
 from autopilot_bridge.flight.multicopter.trajectory import SPEED
 from autopilot_bridge.flight.multicopter.yaw import Nose
 from autopilot_bridge.flight.parameters import YawBehaviour

@@ -7,10 +7,9 @@ import numpy as np
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
-from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.hold import HoldTask
-from autopilot_bridge.flight.streamed import NAN3, OffboardKind, Vector
-from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
+from autopilot_bridge.flight.task import NAN3, OffboardKind, TaskStatus, Vector, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
 _WANTS_UP_M: Final = 0.2

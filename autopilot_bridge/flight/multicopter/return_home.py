@@ -10,9 +10,9 @@ from enum import IntEnum
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
-from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
 from autopilot_bridge.flight.parameters import ALONG_PLAN, FlightParameters
 from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules
 from autopilot_bridge.flight.plan_task import PlanTask

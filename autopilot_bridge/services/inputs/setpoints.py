@@ -1,16 +1,167 @@
-"""Streamed setpoints: SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET.
+"""The frames of streamed setpoints: a SET_POSITION_TARGET in local NED. Message fields are untrusted.
+
+Streamed setpoints: SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET.
 
 PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of life (docs/firmware/px4.md,
 section 9). ArduPilot flies them smoothly in GUIDED (docs/firmware/ardupilot.md, sections 6 and 7). Neither
 acknowledges them.
 """
 
+import math
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Final, NamedTuple, Protocol
 
+import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver
+
+Triple = tuple[float, float, float]
+
+UNSET: Final[Triple] = (math.nan, math.nan, math.nan)
+_MAX_POSITION_M: Final = 1e6
+_MAX_SPEED_M_S: Final = 1e3
+_MAX_ACCELERATION_M_S2: Final = 1e3
+_MAX_ANGLE_RAD: Final = 1e3
+
+POSITION_BITS: Final = (1, 2, 4)
+VELOCITY_BITS: Final = (8, 16, 32)
+ACCELERATION_BITS: Final = (64, 128, 256)
+FORCE_BIT: Final = 512
+YAW_BIT: Final = 1024
+YAW_RATE_BIT: Final = 2048
+
+THROTTLE_BIT: Final = 64
+"""Of SET_ATTITUDE_TARGET.type_mask, as the next."""
+ATTITUDE_BIT: Final = 128
+_RATE_BITS: Final = (1, 2, 4)
+_MAX_RATE_RAD_S: Final = 100.0
+
+
+class Target(NamedTuple):
+    """A setpoint in local NED; NaN: not controlled."""
+
+    position: Triple
+    velocity: Triple
+    acceleration: Triple
+    yaw_rad: float
+    yaw_rate_rad_s: float
+
+    @property
+    def has_position(self) -> bool:
+        """Some component of the position is controlled."""
+        return any_finite(self.position)
+
+    @property
+    def has_velocity(self) -> bool:
+        """Some component of the velocity is controlled."""
+        return any_finite(self.velocity)
+
+    @property
+    def has_acceleration(self) -> bool:
+        """Some component of the acceleration is controlled."""
+        return any_finite(self.acceleration)
+
+
+def any_finite(triple: Triple) -> bool:
+    """At least one component is set."""
+    return any(math.isfinite(value) for value in triple)
+
+
+def masked(values: Triple, bits: tuple[int, int, int], type_mask: int, limit: float) -> Triple:
+    """Components that the mask does not ignore; one that is not finite or too large counts as ignored."""
+    x, y, z = (
+        float(value) if not type_mask & bit and abs(value) <= limit else math.nan
+        for value, bit in zip(values, bits, strict=True)
+    )
+    return x, y, z
+
+
+def position_of(values: Triple, type_mask: int) -> Triple:
+    """Position components, m."""
+    return masked(values, POSITION_BITS, type_mask, _MAX_POSITION_M)
+
+
+def velocity_of(values: Triple, type_mask: int) -> Triple:
+    """Velocity components, m/s."""
+    return masked(values, VELOCITY_BITS, type_mask, _MAX_SPEED_M_S)
+
+
+def acceleration_of(values: Triple, type_mask: int) -> Triple:
+    """Acceleration components, m/s^2."""
+    return masked(values, ACCELERATION_BITS, type_mask, _MAX_ACCELERATION_M_S2)
+
+
+def yaw_of(yaw_rad: float, yaw_rate_rad_s: float, type_mask: int) -> tuple[float, float]:
+    """(yaw, yaw rate); the yaw wrapped to -pi..pi."""
+    yaw = yaw_rad if not type_mask & YAW_BIT and abs(yaw_rad) <= _MAX_ANGLE_RAD else math.nan
+    rate = (
+        yaw_rate_rad_s if not type_mask & YAW_RATE_BIT and abs(yaw_rate_rad_s) <= _MAX_ANGLE_RAD else math.nan
+    )
+    return math.remainder(yaw, 2.0 * math.pi) if math.isfinite(yaw) else math.nan, rate
+
+
+def rotated_by_heading(values: Triple, heading_rad: float) -> Triple:
+    """A vector given as forward, right, down, in NED. A single unset horizontal component is zero."""
+    forward, right, down = values
+    if not (math.isfinite(forward) or math.isfinite(right)):
+        return math.nan, math.nan, down
+    forward = forward if math.isfinite(forward) else 0.0
+    right = right if math.isfinite(right) else 0.0
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return c * forward - s * right, s * forward + c * right, down
+
+
+def heading_of(context: FlightContext) -> float:
+    """The vehicle's heading."""
+    return float(context.nav[nav.EULER_RAD][2])
+
+
+def place_of(context: FlightContext) -> Triple:
+    """The vehicle's position, local NED."""
+    north_m, east_m, down_m = (float(value) for value in context.nav[nav.POS_NED_M])
+    return north_m, east_m, down_m
+
+
+def local_from_global(
+    context: FlightContext, lat_e7: int, lon_e7: int, altitude_m: float, *, relative: bool
+) -> Triple | None:
+    """Local NED of a geodetic position; None when it is invalid, or the vehicle's own position is not known.
+
+    Args:
+        relative: the altitude is over home, else over mean sea level.
+    """
+    frame = context.frame
+    if frame is None or not math.isfinite(altitude_m) or abs(altitude_m) > _MAX_POSITION_M:
+        return None
+    if abs(lat_e7) > 900_000_000 or abs(lon_e7) > 1_800_000_000:
+        return None
+    reference_down_m = float(context.home_ned_m[2]) if relative else frame.origin.alt_m
+    if not math.isfinite(reference_down_m):
+        return None
+    north_m, east_m, _ = frame.ned_from_geodetic(lat_e7 * 1e-7, lon_e7 * 1e-7, frame.origin.alt_m)
+    if max(abs(north_m), abs(east_m)) > _MAX_POSITION_M:
+        return None
+    return north_m, east_m, reference_down_m - altitude_m
+
+
+def unit_quaternion(values: list[float], tolerance: float) -> np.ndarray | None:
+    """q_ned_from_frd, normalised; None when it is not of unit length within `tolerance`."""
+    q = np.array(values, dtype=np.float64)
+    length = float(np.sqrt(q @ q)) if np.isfinite(q).all() else math.nan
+    return q / length if abs(length - 1.0) <= tolerance else None
+
+
+def rates_of(message: MavlinkMessage) -> Triple:
+    """Body rates that are not ignored, rad/s; NaN for the others."""
+    values = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
+    roll, pitch, yaw = (
+        float(value) if not message.type_mask & bit and abs(value) <= _MAX_RATE_RAD_S else math.nan
+        for value, bit in zip(values, _RATE_BITS, strict=True)
+    )
+    return roll, pitch, yaw
 
 
 class SetpointRules(Protocol):

@@ -8,8 +8,7 @@ import numpy as np
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import PlanError
 from missions.options import FlightOptions, Via
-from missions.pattern_search.wings.entry import with_leads
-from missions.pattern_search.wings.flight import PatternFlight
+from missions.pattern_search.wings.flight import PatternFlight, with_leads
 from missions.pattern_search.wings.setpoints import fly_setpoints
 from missions.pattern_search.wings.waypoints import fly_waypoints
 from missions.patterns.curve import Curve

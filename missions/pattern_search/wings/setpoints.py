@@ -7,8 +7,7 @@ from typing import Final
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.notes import PATTERN
-from missions.pattern_search.wings.entry import Entry
-from missions.pattern_search.wings.flight import PatternFlight
+from missions.pattern_search.wings.flight import Entry, PatternFlight
 from missions.pattern_search.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.planning.flyable import FlyablePath

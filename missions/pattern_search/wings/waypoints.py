@@ -10,8 +10,7 @@ from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import VehicleTimeout
 from missions.notes import PATTERN
 from missions.options import FlightOptions
-from missions.pattern_search.wings.entry import Entry
-from missions.pattern_search.wings.flight import PatternFlight
+from missions.pattern_search.wings.flight import Entry, PatternFlight
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.planning.flyable import FlyablePath
 from missions.planning.limits import FixedWingLimits
@@ -125,15 +124,35 @@ def turn_in_m(options: FlightOptions, limits: FixedWingLimits) -> float:
 def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
     """Takeoff, airspeed, and a circle at the pattern's height that is left along the first leg."""
     options = flight.options
-    entry = Entry.to(flight.route, flight.turn_radius_m)
+    return way_in_items(
+        vehicle,
+        Entry.to(flight.route, flight.turn_radius_m),
+        airspeed_m_s=options.speed_m_s,
+        takeoff_m=options.own_altitude_m,
+        height_m=options.own_altitude_m,
+    )
+
+
+def way_in_items(
+    vehicle: Vehicle, entry: Entry, *, airspeed_m_s: float, takeoff_m: float, height_m: float
+) -> list[MissionItem]:
+    """Takeoff, airspeed, and a circle that is left along a path's beginning.
+
+    Args:
+        vehicle: the aircraft.
+        entry: the circle, from its home.
+        airspeed_m_s: from the takeoff on.
+        takeoff_m: height above home at the end of the takeoff.
+        height_m: height above home of the circle.
+    """
     lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(*entry.centre_m, 0.0)
     return [
-        vehicle.firmware.takeoff_item(vehicle.home, options.own_altitude_m),
+        vehicle.firmware.takeoff_item(vehicle.home, takeoff_m),
         MissionItem(
             command=dialect.MAV_CMD_DO_CHANGE_SPEED,
             frame=dialect.MAV_FRAME_MISSION,
             param1=0.0,  # airspeed
-            param2=options.speed_m_s,
+            param2=airspeed_m_s,
             param3=-1.0,
         ),
         MissionItem(
@@ -143,7 +162,7 @@ def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
             param4=1.0,  # the leg begins where the circle is left
             x=lat,
             y=lon,
-            z=options.own_altitude_m,
+            z=height_m,
         ),
     ]
 
@@ -151,6 +170,13 @@ def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
 def _waypoint(
     vehicle: Vehicle, options: FlightOptions, radius_m: float, north_m: float, east_m: float
 ) -> MissionItem:
+    return waypoint_item(vehicle, radius_m, north_m, east_m, options.own_altitude_m)
+
+
+def waypoint_item(
+    vehicle: Vehicle, radius_m: float, north_m: float, east_m: float, height_m: float
+) -> MissionItem:
+    """A waypoint at a place from home, with the distance before it at which the next leg may begin."""
     lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(north_m, east_m, 0.0)
     return MissionItem(
         command=dialect.MAV_CMD_NAV_WAYPOINT,
@@ -158,7 +184,7 @@ def _waypoint(
         param4=vehicle.firmware.unset,
         x=lat,
         y=lon,
-        z=options.own_altitude_m,
+        z=height_m,
     )
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.control.fixed_wing import FixedWingParameters
 from autopilot_bridge.control.fixed_wing import layout as c
-from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
+from autopilot_bridge.control.fixed_wing.vertical import follow_height, reset_height
 from tests.control.fixed_wing.test_lateral import packed
 
 DT_S = 0.02

@@ -20,8 +20,8 @@ from autopilot_bridge.control.fixed_wing.attitude import (
     wheel_control,
 )
 from autopilot_bridge.control.fixed_wing.energy import energy_control
-from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
 from autopilot_bridge.control.fixed_wing.lateral import heading_for_course, lateral_control
+from autopilot_bridge.control.fixed_wing.vertical import follow_height, reset_height
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
 from flightsim.foundation.rotations import quaternion_from_euler

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.control.fixed_wing import FixedWingParameters
 from autopilot_bridge.control.fixed_wing import layout as c
-from autopilot_bridge.control.fixed_wing.vertical_speed import pitch_for_climb
+from autopilot_bridge.control.fixed_wing.vertical import pitch_for_climb
 from autopilot_bridge.navigation import layout as n
 from flightsim.environment import CosineGust, Environment
 from tests.control.fixed_wing.aerosonde import AEROSONDE

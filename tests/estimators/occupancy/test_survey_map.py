@@ -90,7 +90,7 @@ def test_missing_file_is_refused_by_name(tmp_path):
         ({"total_field_nt": np.full((13, 7), np.nan)}, "has no data"),
         ({"total_field_nt": np.zeros((3, 3))}, "does not fit"),
         ({"north_m": np.linspace(700.0, -500.0, 13)}, "does not fit"),
-        ({"home_lat_deg": 95.0}, "not a place"),
+        ({"home_lat_deg": 95.0}, r"latitude 95\.0 deg is not in"),
         ({"height_m": "high"}, "height_m holds"),
     ],
 )

@@ -5,10 +5,9 @@ import math
 import pytest
 
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters
-from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.leg import Leg
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
-from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 
 
 def flying(north_m: float, east_m: float, course_deg: float) -> AircraftState:

@@ -10,7 +10,7 @@ from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.information import detection_information
 from estimators.tracking.range_bearing import Viewpoint
 from missions.errors import PlanError
-from missions.multi_target.objective import SearchObjective
+from missions.multi_target.objective import Exploration, SearchObjective
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.planner import Area, ExploringPlanner, PlannerParameters, SweepPlanner
 from missions.multi_target.search import TargetSearch, sweep_path
@@ -91,6 +91,52 @@ def test_values_are_information_plus_alpha_times_exploration():
         unexplored = float(found.exploration.at(np.array([n]), np.array([e]))[0])
         expected = detection_information(mass, probability) + 0.7 * unexplored
         assert value == pytest.approx(expected, rel=2e-3)  # the intensity is summed up in cells of a metre
+
+
+def in_view(found, alpha=0.7):
+    return SearchObjective(
+        *(found.sensor, found.intensity.points(), found.exploration, alpha),
+        kind=Exploration.VIEW,
+        targets_per_m2=PARAMETERS.birth_per_m2,
+    )
+
+
+def undetected(found, viewpoint):
+    """Expected number of targets that a scan detects for the first time, summed up over the cells."""
+    layout, expected = found.exploration.layout, 0.0
+    for row, north in enumerate(layout.centres()[0].ravel()):
+        for column, east in enumerate(layout.centres()[1].ravel()):
+            probability = found.sensor.probability(np.array([north]), np.array([east]), viewpoint)[0]
+            left = found.exploration.undetected[row, column] * layout.cell_m**2
+            expected += PARAMETERS.birth_per_m2 * left * probability
+    return expected
+
+
+def test_exploration_is_the_expected_number_of_first_detections():
+    found = after_scan([[20.0, 1.0], [30.0, -2.0]])
+    objective, view = in_view(found), Viewpoint(north_m=91.0, east_m=109.0, heading_rad=0.3)
+    north, east, mass = found.intensity.points()
+    (value,) = objective.values(objective.outlook(), np.array([[91.0, 109.0]]), np.array([0.3]))
+    information = detection_information(mass, found.sensor.probability(north, east, view))
+    assert value == pytest.approx(information + 0.7 * undetected(found, view), rel=2e-3)
+
+
+def test_what_an_earlier_scan_detects_is_not_detected_for_the_first_time():
+    found = belief()
+    objective, first = in_view(found, alpha=1.0), Viewpoint(north_m=109.0, east_m=100.0)
+    after = objective.after(objective.outlook(), first)
+    (value,) = objective.values(after, np.array([[109.0, 100.0]]), np.zeros(1))
+    found.exploration.look(first)
+    assert value == pytest.approx(undetected(found, first), rel=1e-9)
+
+
+def test_exploration_in_view_leads_where_more_of_the_area_is_in_view():
+    """At the border, half of what the sensor sees is outside the area."""
+    found = belief()
+    place = ExploringPlanner(PlannerParameters(exploration=Exploration.VIEW), AREA).next_place(
+        found, (9.0, 9.0), None, ()
+    )
+    assert place == pytest.approx((9.0 + 9.0 * math.sqrt(0.5), 9.0 + 9.0 * math.sqrt(0.5)))
 
 
 def test_several_steps_sum_the_information_of_two_scans():

@@ -158,6 +158,7 @@ def test_a_killed_study_resumes_on_the_cluster(cluster: Cluster, expected: bytes
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(2400)  # three times 60 flights
 def test_flights_are_the_same_in_this_process_in_processes_and_on_the_cluster(
     cluster: Cluster, tmp_path: Path
 ) -> None:
@@ -170,7 +171,7 @@ def test_flights_are_the_same_in_this_process_in_processes_and_on_the_cluster(
     ):
         out = tmp_path / name
         command = tied([sys.executable, "-m", "missions", *words, *engine, "--out", str(out)])
-        subprocess.run(command, cwd=ROOT, check=True, timeout=550.0)
+        subprocess.run(command, cwd=ROOT, check=True, timeout=1200.0)
         found.append((out / "rows.parquet").read_bytes())
     assert found[0] == found[1] == found[2]
     with suppress(OSError):

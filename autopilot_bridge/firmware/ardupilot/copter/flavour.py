@@ -14,6 +14,7 @@ from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
 from autopilot_bridge.firmware.ardupilot.services import SERVICES, address_rule
 from autopilot_bridge.firmware.ardupilot.texts import copter_notices
+from autopilot_bridge.firmware.data import load_data, modes
 from autopilot_bridge.firmware.external_mapping import ardupilot_gps_source
 from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.firmware.mapping import airframe_overrides
@@ -22,32 +23,9 @@ from autopilot_bridge.flight.multicopter.land_detector import LandDetector
 from autopilot_bridge.flight.plan_reading import ARDUCOPTER_PLANS
 from flightsim.airframe import AirframeKind
 
-_FLOWN: Final = frozenset(
-    {
-        FlightMode.STABILIZED,
-        FlightMode.ACRO,
-        FlightMode.ALTITUDE,
-        FlightMode.MISSION,
-        FlightMode.GUIDED,
-        FlightMode.HOLD,
-        FlightMode.RETURN,
-        FlightMode.CIRCLE,
-        FlightMode.LAND,
-        FlightMode.POSHOLD,
-        FlightMode.BRAKE,
-        FlightMode.GUIDED_NOGPS,
-        FlightMode.FOLLOW,
-    }
-)
-_GROUND_ONLY: Final = frozenset(
-    {
-        FlightMode.DRIFT,
-        FlightMode.THROW,
-        FlightMode.AVOID,
-        FlightMode.SMART_RETURN,
-        FlightMode.ZIGZAG,
-    }
-)
+_MODES: Final = load_data("ardupilot.copter", "modes.toml")
+_FLOWN: Final = modes(_MODES["flown"])
+_GROUND_ONLY: Final = modes(_MODES["ground_only"])
 """Accepted on the ground as the firmware does; not flown here, so not armed in or entered in flight."""
 
 POLICY: Final = CommanderPolicy(

@@ -15,7 +15,7 @@ from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_external, ardupilot_gps_source
-from autopilot_bridge.firmware.mapping import FieldMap, RatioMap, build, clamp, integer, scaled_values
+from autopilot_bridge.firmware.mapping import build, clamp, integer, load_tables, scaled_values
 from autopilot_bridge.firmware.navigation_noise import ardupilot_noise
 from autopilot_bridge.firmware.surroundings_mapping import (
     ardupilot_avoidance,
@@ -26,6 +26,7 @@ from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, YawB
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 
+_TABLES: Final = load_tables("ardupilot.copter")
 _CM: Final = 0.01
 _CENTIDEGREE: Final = math.radians(0.01)
 _DEG: Final = math.radians(1.0)
@@ -33,48 +34,11 @@ _NEVER_S: Final = 1e9
 
 # A return over the remembered path is not flown here: where the firmware would fall back to RTL or LAND
 # without one, so do these tables.
-_GCS: Final = {
-    1: FailsafeAction.RETURN,
-    2: FailsafeAction.RETURN,
-    3: FailsafeAction.RETURN,
-    4: FailsafeAction.LAND,
-    5: FailsafeAction.LAND,
-    6: FailsafeAction.RETURN,
-    7: FailsafeAction.BRAKE,
-}  # FS_GCS_ENABLE
-_RADIO: Final = {
-    1: FailsafeAction.RETURN,
-    2: FailsafeAction.RETURN,
-    3: FailsafeAction.LAND,
-    4: FailsafeAction.RETURN,
-    5: FailsafeAction.LAND,
-    6: FailsafeAction.RETURN,
-    7: FailsafeAction.BRAKE,
-}  # FS_THR_ENABLE
-_BATTERY: Final = {
-    0: FailsafeAction.WARN,
-    1: FailsafeAction.LAND,
-    2: FailsafeAction.RETURN,
-    3: FailsafeAction.RETURN,
-    4: FailsafeAction.LAND,
-    5: FailsafeAction.TERMINATE,
-    6: FailsafeAction.RETURN,
-    7: FailsafeAction.BRAKE,
-}  # BATT_FS_LOW_ACT, BATT_FS_CRT_ACT
-_EKF: Final = {
-    0: FailsafeAction.WARN,
-    1: FailsafeAction.LAND,
-    2: FailsafeAction.ALTITUDE,
-    3: FailsafeAction.LAND,
-}  # FS_EKF_ACTION
-_FENCE: Final = {
-    0: FailsafeAction.WARN,
-    1: FailsafeAction.RETURN,
-    2: FailsafeAction.LAND,
-    3: FailsafeAction.RETURN,
-    4: FailsafeAction.BRAKE,
-    5: FailsafeAction.LAND,
-}  # FENCE_ACTION
+_GCS: Final = _TABLES.actions["FS_GCS_ENABLE"]
+_RADIO: Final = _TABLES.actions["FS_THR_ENABLE"]
+_BATTERY: Final = _TABLES.actions["BATT_FS_LOW_ACT"]  # BATT_FS_LOW_ACT, BATT_FS_CRT_ACT
+_EKF: Final = _TABLES.actions["FS_EKF_ACTION"]
+_FENCE: Final = _TABLES.actions["FENCE_ACTION"]
 _GIVE_UP_M: Final = 100.0  # so far outside the copter lands (AC_FENCE_GIVE_UP_DISTANCE)
 _UNION: Final = 2  # of FENCE_OPTIONS
 _LOCKS_MODE: Final = 1
@@ -87,87 +51,10 @@ _CONTINUE_PILOT_ON_GCS: Final = 16
 POSITION_LOSS_S: Final = 3.0
 """From the filter's own loss of position (5 s after the last aiding) to the EKF failsafe: 8 s in all."""
 
-FLIGHT: Final = (
-    FieldMap("cruise_speed_m_s", "WPNAV_SPEED", _CM),
-    FieldMap("max_speed_m_s", "WPNAV_SPEED", _CM),
-    FieldMap("climb_speed_m_s", "WPNAV_SPEED_UP", _CM),
-    FieldMap("descend_speed_m_s", "WPNAV_SPEED_DN", _CM),
-    FieldMap("acceleration_m_s2", "WPNAV_ACCEL", _CM),
-    FieldMap("acceleration_up_m_s2", "WPNAV_ACCEL_Z", _CM),
-    FieldMap("acceleration_down_m_s2", "WPNAV_ACCEL_Z", _CM),
-    FieldMap("jerk_m_s3", "PSC_JERK_XY"),
-    FieldMap("yaw_rate_max_rad_s", "ATC_SLEW_YAW", _CENTIDEGREE),
-    FieldMap("acceptance_radius_m", "WPNAV_RADIUS", _CM),
-    FieldMap("takeoff_speed_m_s", "WPNAV_SPEED_UP", _CM),
-    FieldMap("takeoff_ramp_time_s", "TKOFF_SLEW_TIME"),
-    FieldMap("spoolup_time_s", "MOT_SPOOL_TIME"),
-    FieldMap("land_speed_m_s", "LAND_SPEED", _CM),
-    FieldMap("land_descend_speed_m_s", "WPNAV_SPEED_DN", _CM),
-    FieldMap("land_slow_altitude_m", "LAND_ALT_LOW", _CM),
-    FieldMap("land_fast_altitude_m", "LAND_ALT_LOW", _CM),
-    FieldMap("return_altitude_m", "RTL_ALT", _CM),
-    FieldMap("return_descend_altitude_m", "RTL_ALT_FINAL", _CM),
-    FieldMap("return_loiter_time_s", "RTL_LOIT_TIME", 1e-3),
-    FieldMap("return_climb_min_m", "RTL_CLIMB_MIN", _CM),
-    FieldMap("orbit_radius_m", "CIRCLE_RADIUS", _CM),
-    FieldMap("manual_speed_m_s", "LOIT_SPEED", _CM),
-    FieldMap("manual_climb_speed_m_s", "PILOT_SPEED_UP", _CM),
-    FieldMap("manual_tilt_rad", "ANGLE_MAX", _CENTIDEGREE),
-    FieldMap("manual_yaw_rate_rad_s", "PILOT_Y_RATE", _DEG),
-    FieldMap("acro_rate_rad_s", "ACRO_RP_RATE", _DEG),
-    FieldMap("acro_yaw_rate_rad_s", "ACRO_Y_RATE", _DEG),
-    FieldMap("manual_expo", "ACRO_RP_EXPO"),
-    FieldMap("guided_timeout_s", "GUID_TIMEOUT"),
-)
-
-CONTROLLER: Final = (
-    FieldMap("pos_xy_p_1_s", "PSC_POSXY_P"),
-    FieldMap("pos_z_p_1_s", "PSC_POSZ_P"),
-    FieldMap("vel_xy_p_1_s", "PSC_VELXY_P"),
-    FieldMap("vel_xy_i_1_s2", "PSC_VELXY_I"),
-    FieldMap("vel_xy_d", "PSC_VELXY_D"),
-    FieldMap("roll_p_1_s", "ATC_ANG_RLL_P"),
-    FieldMap("pitch_p_1_s", "ATC_ANG_PIT_P"),
-    FieldMap("yaw_p_1_s", "ATC_ANG_YAW_P"),
-    FieldMap("rate_roll_p", "ATC_RAT_RLL_P"),
-    FieldMap("rate_roll_i", "ATC_RAT_RLL_I"),
-    FieldMap("rate_roll_d", "ATC_RAT_RLL_D"),
-    FieldMap("rate_roll_ff", "ATC_RAT_RLL_FF"),
-    FieldMap("rate_roll_integral_max", "ATC_RAT_RLL_IMAX"),
-    FieldMap("rate_pitch_p", "ATC_RAT_PIT_P"),
-    FieldMap("rate_pitch_i", "ATC_RAT_PIT_I"),
-    FieldMap("rate_pitch_d", "ATC_RAT_PIT_D"),
-    FieldMap("rate_pitch_ff", "ATC_RAT_PIT_FF"),
-    FieldMap("rate_pitch_integral_max", "ATC_RAT_PIT_IMAX"),
-    FieldMap("rate_yaw_p", "ATC_RAT_YAW_P"),
-    FieldMap("rate_yaw_i", "ATC_RAT_YAW_I"),
-    FieldMap("rate_yaw_d", "ATC_RAT_YAW_D"),
-    FieldMap("rate_yaw_ff", "ATC_RAT_YAW_FF"),
-    FieldMap("rate_yaw_integral_max", "ATC_RAT_YAW_IMAX"),
-    FieldMap("hover_thrust", "MOT_THST_HOVER"),
-    FieldMap("thrust_model_factor", "MOT_THST_EXPO"),
-    FieldMap("motor_idle", "MOT_SPIN_ARM"),
-)
-
-NAVIGATION: Final = (
-    FieldMap("gps_gate", "EK3_POS_I_GATE", 0.01),
-    FieldMap("gps_velocity_gate", "EK3_VEL_I_GATE", 0.01),
-    FieldMap("barometer_gate", "EK3_HGT_I_GATE", 0.01),
-    FieldMap("magnetometer_gate", "EK3_MAG_I_GATE", 0.01),
-    FieldMap("no_aid_noise_m", "EK3_NOAID_M_NSE"),
-)
-
-NAVIGATION_RATIOS: Final = (
-    RatioMap(
-        (
-            "gps_required_eph_m",
-            "gps_required_epv_m",
-            "gps_required_speed_accuracy_m_s",
-            "gps_required_hdop",
-        ),
-        "EK3_CHECK_SCALE",
-    ),
-)
+FLIGHT: Final = _TABLES.fields["flight"]
+CONTROLLER: Final = _TABLES.fields["controller"]
+NAVIGATION: Final = _TABLES.fields["navigation"]
+NAVIGATION_RATIOS: Final = _TABLES.ratios["navigation"]
 _SOURCE_GPS: Final = 3  # of EK3_SRC1_POSXY
 
 

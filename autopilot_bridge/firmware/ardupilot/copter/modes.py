@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.firmware.data import by_member, load_data
 from autopilot_bridge.firmware.flavour import ModeDisplay
 
 _CUSTOM: Final = 0x01
@@ -13,54 +14,13 @@ _STABILIZE: Final = 0x10
 _MANUAL_INPUT: Final = 0x40
 _ARMED: Final = 0x80
 
-CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
-    {
-        FlightMode.STABILIZED: 0,
-        FlightMode.ACRO: 1,
-        FlightMode.ALTITUDE: 2,
-        FlightMode.MISSION: 3,
-        FlightMode.GUIDED: 4,
-        FlightMode.HOLD: 5,
-        FlightMode.RETURN: 6,
-        FlightMode.CIRCLE: 7,
-        FlightMode.LAND: 9,
-        FlightMode.DRIFT: 11,
-        FlightMode.POSHOLD: 16,
-        FlightMode.BRAKE: 17,
-        FlightMode.THROW: 18,
-        FlightMode.AVOID: 19,
-        FlightMode.GUIDED_NOGPS: 20,
-        FlightMode.SMART_RETURN: 21,
-        FlightMode.FOLLOW: 23,
-        FlightMode.ZIGZAG: 24,
-        FlightMode.AUTO_RETURN: 27,
-        FlightMode.TERMINATION: 0,  # not a separate mode
-    }
+_DATA: Final = load_data("ardupilot.copter", "modes.toml")
+CUSTOM_MODES: Final[Mapping[FlightMode, int]] = by_member(
+    FlightMode, {name: mode["number"] for name, mode in _DATA["modes"].items()}
 )
 
-MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
-    {
-        FlightMode.STABILIZED: "STABILIZE",
-        FlightMode.ACRO: "ACRO",
-        FlightMode.ALTITUDE: "ALT_HOLD",
-        FlightMode.MISSION: "AUTO",
-        FlightMode.GUIDED: "GUIDED",
-        FlightMode.HOLD: "LOITER",
-        FlightMode.RETURN: "RTL",
-        FlightMode.CIRCLE: "CIRCLE",
-        FlightMode.LAND: "LAND",
-        FlightMode.DRIFT: "DRIFT",
-        FlightMode.POSHOLD: "POSHOLD",
-        FlightMode.BRAKE: "BRAKE",
-        FlightMode.THROW: "THROW",
-        FlightMode.AVOID: "AVOID_ADSB",
-        FlightMode.GUIDED_NOGPS: "GUIDED_NOGPS",
-        FlightMode.SMART_RETURN: "SMART_RTL",
-        FlightMode.FOLLOW: "FOLLOW",
-        FlightMode.ZIGZAG: "ZIGZAG",
-        FlightMode.AUTO_RETURN: "AUTO RTL",
-        FlightMode.TERMINATION: "STABILIZE",
-    }
+MODE_NAMES: Final[Mapping[FlightMode, str]] = by_member(
+    FlightMode, {name: mode["name"] for name, mode in _DATA["modes"].items()}
 )
 
 REFUSED_NAMES: Final[Mapping[int, str]] = MappingProxyType(

@@ -9,7 +9,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
 from autopilot_bridge.services.channel import MavlinkMessage
-from autopilot_bridge.services.inputs.setpoint_frames import (
+from autopilot_bridge.services.inputs.setpoints import (
     ACCELERATION_BITS,
     ATTITUDE_BIT,
     FORCE_BIT,

@@ -17,31 +17,15 @@ from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_m
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
 from autopilot_bridge.firmware.ardupilot.services import PLANE_SERVICES
 from autopilot_bridge.firmware.ardupilot.texts import plane_notices
+from autopilot_bridge.firmware.data import load_data, modes
 from autopilot_bridge.firmware.flavour import SensorBits
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.fixed_wing import LandDetector
 from autopilot_bridge.flight.plan_reading import ARDUPLANE_PLANS
 from flightsim.airframe import AirframeKind, LaunchKind
 
-_FLOWN: Final = frozenset(
-    {
-        FlightMode.MANUAL,
-        FlightMode.CIRCLE,
-        FlightMode.STABILIZED,
-        FlightMode.TRAINING,
-        FlightMode.ACRO,
-        FlightMode.FBWA,
-        FlightMode.FBWB,
-        FlightMode.CRUISE,
-        FlightMode.AUTOTUNE,
-        FlightMode.MISSION,
-        FlightMode.RETURN,
-        FlightMode.HOLD,
-        FlightMode.TAKEOFF,
-        FlightMode.AVOID,
-        FlightMode.GUIDED,
-    }
-)
+_MODES: Final = load_data("ardupilot.plane", "modes.toml")
+_FLOWN: Final = modes(_MODES["flown"])
 _NOT_ARMABLE: Final = frozenset({FlightMode.RETURN, FlightMode.HOLD, FlightMode.CIRCLE, FlightMode.AVOID})
 
 MODE_NEEDS_BY_DEAD_RECKONING: Final[Mapping[FlightMode, Need]] = MappingProxyType(

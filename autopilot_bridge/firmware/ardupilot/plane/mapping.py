@@ -18,12 +18,11 @@ from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapp
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import (
-    FieldMap,
-    RatioMap,
     build,
     clamp,
     field_values,
     integer,
+    load_tables,
     scaled_values,
 )
 from autopilot_bridge.firmware.navigation_noise import ardupilot_noise
@@ -44,11 +43,9 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope
 
+_TABLES: Final = load_tables("ardupilot.plane")
 _DEG: Final = math.radians(1.0)
 _PERCENT: Final = 0.01
-_TENTHS: Final = 0.1
-_RATE_GAIN: Final = 4.0 / math.pi  # the firmware's rate loops give the surface as an angle, 45 deg being full
-_TURN_ENERGY: Final = 2.2  # per load factor: n^2 - 1 = 2.2 (n - 1), about n = 1.2
 _NEVER_S: Final = 1e6
 _LEAST_CLIMB_M_S: Final = 0.1  # of the control laws
 _GREATEST_ROLL_TIME_S: Final = 3.0  # of the path guidance
@@ -57,84 +54,12 @@ _THROTTLE_FUNCTION: Final = 70  # of SERVOn_FUNCTION
 
 _AUTOMATIC: Final = frozenset({FlightMode.MISSION, FlightMode.GUIDED, FlightMode.HOLD, FlightMode.AVOID})
 _SAFE: Final = frozenset({FlightMode.RETURN, FlightMode.TAKEOFF})
-_SHORT: Final = {
-    0: FailsafeAction.CIRCLE,
-    1: FailsafeAction.CIRCLE,
-    2: FailsafeAction.GLIDE,
-    3: FailsafeAction.NONE,
-    4: FailsafeAction.ALTITUDE,
-}  # FS_SHORT_ACTN
-_LONG: Final = {
-    0: FailsafeAction.RETURN,
-    1: FailsafeAction.RETURN,
-    2: FailsafeAction.GLIDE,
-    3: FailsafeAction.GLIDE,  # no parachute here
-    4: FailsafeAction.MISSION,
-}  # FS_LONG_ACTN
-_BATTERY: Final = {
-    0: FailsafeAction.WARN,
-    1: FailsafeAction.RETURN,
-    2: FailsafeAction.RETURN,
-    3: FailsafeAction.TERMINATE,
-    4: FailsafeAction.RETURN,
-    5: FailsafeAction.GLIDE,
-    6: FailsafeAction.HOLD,
-}  # BATT_FS_LOW_ACT, BATT_FS_CRT_ACT
-_FENCE: Final = {
-    0: FailsafeAction.WARN,
-    1: FailsafeAction.RETURN,
-    6: FailsafeAction.FENCE_POINT,
-    7: FailsafeAction.FENCE_POINT,
-    8: FailsafeAction.RETURN,
-}  # FENCE_ACTION
+_SHORT: Final = _TABLES.actions["FS_SHORT_ACTN"]
+_LONG: Final = _TABLES.actions["FS_LONG_ACTN"]
+_BATTERY: Final = _TABLES.actions["BATT_FS_LOW_ACT"]  # BATT_FS_LOW_ACT, BATT_FS_CRT_ACT
+_FENCE: Final = _TABLES.actions["FENCE_ACTION"]
 
-CONTROLLER: Final = (
-    FieldMap("airspeed_stall_m_s", "AIRSPEED_STALL"),
-    FieldMap("airspeed_min_m_s", "AIRSPEED_MIN"),
-    FieldMap("airspeed_trim_m_s", "AIRSPEED_CRUISE"),
-    FieldMap("airspeed_max_m_s", "AIRSPEED_MAX"),
-    FieldMap("scaling_airspeed_m_s", "SCALING_SPEED"),
-    FieldMap("ground_speed_min_m_s", "MIN_GROUNDSPEED"),
-    FieldMap("roll_limit_rad", "ROLL_LIMIT_DEG", _DEG),
-    FieldMap("trim_throttle", "TRIM_THROTTLE", _PERCENT),
-    FieldMap("throttle_min", "THR_MIN", _PERCENT),
-    FieldMap("throttle_max", "THR_MAX", _PERCENT),
-    FieldMap("throttle_slew_1_s", "THR_SLEWRATE", _PERCENT),
-    FieldMap("pitch_min_rad", "PTCH_LIM_MIN_DEG", _DEG),
-    FieldMap("pitch_max_rad", "PTCH_LIM_MAX_DEG", _DEG),
-    FieldMap("trim_pitch_rad", "PTCH_TRIM_DEG", _DEG),
-    FieldMap("climb_max_m_s", "TECS_CLMB_MAX"),
-    FieldMap("sink_min_m_s", "TECS_SINK_MIN"),
-    FieldMap("sink_max_m_s", "TECS_SINK_MAX"),
-    FieldMap("height_time_constant_s", "TECS_TIME_CONST"),
-    FieldMap("pitch_damping", "TECS_PTCH_DAMP"),
-    FieldMap("pitch_integral_1_s", "TECS_INTEG_GAIN"),
-    FieldMap("throttle_damping", "TECS_THR_DAMP"),
-    FieldMap("speed_weight", "TECS_SPDWEIGHT"),
-    FieldMap("vertical_acceleration_max_m_s2", "TECS_VERT_ACC"),
-    FieldMap("turn_energy_rate_m2_s3", "TECS_RLL2THR", _TURN_ENERGY),
-    FieldMap("roll_time_constant_s", "RLL2SRV_TCONST"),
-    FieldMap("pitch_time_constant_s", "PTCH2SRV_TCONST"),
-    FieldMap("roll_rate_max_rad_s", "RLL2SRV_RMAX", _DEG),
-    FieldMap("pitch_rate_max_up_rad_s", "PTCH2SRV_RMAX_UP", _DEG),
-    FieldMap("pitch_rate_max_down_rad_s", "PTCH2SRV_RMAX_DN", _DEG),
-    FieldMap("rate_roll_p", "RLL_RATE_P", _RATE_GAIN),
-    FieldMap("rate_roll_i", "RLL_RATE_I", _RATE_GAIN),
-    FieldMap("rate_roll_d", "RLL_RATE_D", _RATE_GAIN),
-    FieldMap("rate_roll_ff", "RLL_RATE_FF", _RATE_GAIN),
-    FieldMap("rate_roll_integral_max", "RLL_RATE_IMAX", _RATE_GAIN),
-    FieldMap("rate_pitch_p", "PTCH_RATE_P", _RATE_GAIN),
-    FieldMap("rate_pitch_i", "PTCH_RATE_I", _RATE_GAIN),
-    FieldMap("rate_pitch_d", "PTCH_RATE_D", _RATE_GAIN),
-    FieldMap("rate_pitch_ff", "PTCH_RATE_FF", _RATE_GAIN),
-    FieldMap("rate_pitch_integral_max", "PTCH_RATE_IMAX", _RATE_GAIN),
-    FieldMap("rate_yaw_p", "YAW2SRV_DAMP"),
-    FieldMap("rate_yaw_i", "YAW2SRV_INT"),
-    FieldMap("sideslip_gain_rad_s_per_m_s2", "YAW2SRV_SLIP"),
-    FieldMap("rate_derivative_cutoff_hz", "RLL_RATE_FLTD"),
-    FieldMap("roll_to_rudder_ff", "KFF_RDDRMIX"),
-    FieldMap("wheel_time_constant_s", "STEER2SRV_TCONST"),
-)
+CONTROLLER: Final = _TABLES.fields["controller"]
 
 _TOGETHER: Final = (
     ("airspeed_time_constant_s", "height_time_constant_s"),
@@ -142,72 +67,13 @@ _TOGETHER: Final = (
 )
 """Fields that ArduPlane sets with the parameter of another one: they change in proportion to it."""
 
-CONTROLLER_SCALED: Final = (
-    RatioMap(("wheel_p",), "STEER2SRV_P"),
-    RatioMap(("wheel_i",), "STEER2SRV_I"),
-    RatioMap(("wheel_integral_max",), "STEER2SRV_IMAX"),
-    RatioMap(("wheel_rate_max_rad_s",), "GROUND_STEER_DPS"),
-)
-
-AIRFRAME_FLIGHT: Final = (
-    FieldMap("airspeed_min_m_s", "AIRSPEED_MIN"),
-    FieldMap("airspeed_trim_m_s", "AIRSPEED_CRUISE"),
-    FieldMap("airspeed_max_m_s", "AIRSPEED_MAX"),
-    FieldMap("bank_max_rad", "ROLL_LIMIT_DEG", _DEG),
-    FieldMap("pitch_max_rad", "PTCH_LIM_MAX_DEG", _DEG),
-    FieldMap("pitch_min_rad", "PTCH_LIM_MIN_DEG", _DEG),
-    FieldMap("trim_throttle", "TRIM_THROTTLE", _PERCENT),
-    FieldMap("guidance_period_s", "NAVL1_PERIOD"),
-    FieldMap("guidance_damping", "NAVL1_DAMPING"),
-    FieldMap("loiter_radius_m", "WP_LOITER_RAD"),
-    FieldMap("takeoff_pitch_min_rad", "TKOFF_LVL_PITCH", _DEG),
-    FieldMap("takeoff_clearance_m", "TKOFF_LVL_ALT"),
-    FieldMap("ground_bank_max_rad", "LEVEL_ROLL_LIMIT", _DEG),
-    FieldMap("takeoff_roll_pitch_rad", "TKOFF_GND_PITCH", _DEG),
-    FieldMap("rotation_airspeed_m_s", "TKOFF_ROTATE_SPD"),
-    FieldMap("flaps_takeoff", "TKOFF_FLAP_PCNT", _PERCENT),
-    FieldMap("flare_height_m", "LAND_FLARE_ALT"),
-    FieldMap("flare_time_s", "LAND_FLARE_SEC"),
-    FieldMap("flare_sink_m_s", "TECS_LAND_SINK"),
-    FieldMap("flare_pitch_min_rad", "LAND_PITCH_DEG", _DEG),
-    FieldMap("flare_pitch_max_rad", "TECS_LAND_PMAX", _DEG),
-    FieldMap("flaps_landing", "LAND_FLAP_PERCNT", _PERCENT),
-    FieldMap("landing_airspeed_m_s", "TECS_LAND_ARSPD"),
-)
+CONTROLLER_SCALED: Final = _TABLES.ratios["controller"]
+AIRFRAME_FLIGHT: Final = _TABLES.fields["airframe_flight"]
 """What a user tunes an aircraft to, of the flight tasks."""
 
-FLIGHT: Final = (
-    *AIRFRAME_FLIGHT,
-    FieldMap("climb_max_m_s", "TECS_CLMB_MAX"),
-    FieldMap("sink_max_m_s", "TECS_SINK_MAX"),
-    FieldMap("trim_pitch_rad", "PTCH_TRIM_DEG", _DEG),
-    FieldMap("throttle_idle", "THR_MIN", _PERCENT),
-    FieldMap("roll_time_constant_s", "RLL2SRV_TCONST"),
-    FieldMap("acceptance_radius_m", "WP_RADIUS"),
-    FieldMap("takeoff_altitude_m", "TKOFF_ALT"),
-    FieldMap("launch_acceleration_m_s2", "TKOFF_THR_MINACC"),
-    FieldMap("launch_speed_min_m_s", "TKOFF_THR_MINSPD"),
-    FieldMap("launch_delay_s", "TKOFF_THR_DELAY", _TENTHS),
-    FieldMap("return_climb_min_m", "RTL_CLIMB_MIN"),
-    FieldMap("manual_bank_max_rad", "ROLL_LIMIT_DEG", _DEG),
-    FieldMap("manual_pitch_max_rad", "PTCH_LIM_MAX_DEG", _DEG),
-    FieldMap("manual_pitch_down_max_rad", "PTCH_LIM_MIN_DEG", -_DEG),
-    FieldMap("acro_roll_rate_rad_s", "ACRO_ROLL_RATE", _DEG),
-    FieldMap("acro_pitch_rate_rad_s", "ACRO_PITCH_RATE", _DEG),
-    FieldMap("manual_expo", "MAN_EXPO_ROLL", _PERCENT),
-)
-
-NAVIGATION: Final = (
-    *ardupilot_mapping.NAVIGATION,
-    FieldMap("airspeed_gate", "EK3_EAS_I_GATE", 0.01),
-    FieldMap("wind_height_scale", "EK3_WIND_PSCALE"),
-)
-
-NAVIGATION_RATIOS: Final = (
-    *ardupilot_mapping.NAVIGATION_RATIOS,
-    RatioMap(("airspeed_noise_m_s",), "EK3_EAS_M_NSE"),
-    RatioMap(("wind_walk_m_s_sqrt_s",), "EK3_WIND_P_NSE"),
-)
+FLIGHT: Final = (*AIRFRAME_FLIGHT, *_TABLES.fields["flight"])
+NAVIGATION: Final = (*ardupilot_mapping.NAVIGATION, *_TABLES.fields["navigation"])
+NAVIGATION_RATIOS: Final = (*ardupilot_mapping.NAVIGATION_RATIOS, *_TABLES.ratios["navigation"])
 _CHECK_WIND: Final = 1  # bits of ARSPD_OPTIONS
 _USE_AGAIN: Final = 2
 

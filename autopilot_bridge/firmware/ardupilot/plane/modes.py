@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.firmware.data import by_member, load_data, modes
 from autopilot_bridge.firmware.flavour import ModeDisplay
 
 _CUSTOM: Final = 0x01
@@ -13,61 +14,16 @@ _STABILIZE: Final = 0x10
 _MANUAL_INPUT: Final = 0x40
 _ARMED: Final = 0x80
 
-CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: 0,
-        FlightMode.CIRCLE: 1,
-        FlightMode.STABILIZED: 2,
-        FlightMode.TRAINING: 3,
-        FlightMode.ACRO: 4,
-        FlightMode.FBWA: 5,
-        FlightMode.FBWB: 6,
-        FlightMode.CRUISE: 7,
-        FlightMode.AUTOTUNE: 8,
-        FlightMode.MISSION: 10,
-        FlightMode.RETURN: 11,
-        FlightMode.HOLD: 12,
-        FlightMode.TAKEOFF: 13,
-        FlightMode.AVOID: 14,
-        FlightMode.GUIDED: 15,
-        FlightMode.INITIALISING: 16,
-        FlightMode.TERMINATION: 0,  # not a separate mode: shown as the mode in which it ends
-    }
+_DATA: Final = load_data("ardupilot.plane", "modes.toml")
+CUSTOM_MODES: Final[Mapping[FlightMode, int]] = by_member(
+    FlightMode, {name: mode["number"] for name, mode in _DATA["modes"].items()}
 )
 
-MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: "MANUAL",
-        FlightMode.CIRCLE: "CIRCLE",
-        FlightMode.STABILIZED: "STABILIZE",
-        FlightMode.TRAINING: "TRAINING",
-        FlightMode.ACRO: "ACRO",
-        FlightMode.FBWA: "FBWA",
-        FlightMode.FBWB: "FBWB",
-        FlightMode.CRUISE: "CRUISE",
-        FlightMode.AUTOTUNE: "AUTOTUNE",
-        FlightMode.MISSION: "AUTO",
-        FlightMode.RETURN: "RTL",
-        FlightMode.HOLD: "LOITER",
-        FlightMode.TAKEOFF: "TAKEOFF",
-        FlightMode.AVOID: "AVOID_ADSB",
-        FlightMode.GUIDED: "GUIDED",
-        FlightMode.INITIALISING: "INITIALISING",
-        FlightMode.TERMINATION: "MANUAL",
-    }
+MODE_NAMES: Final[Mapping[FlightMode, str]] = by_member(
+    FlightMode, {name: mode["name"] for name, mode in _DATA["modes"].items()}
 )
 
-NAVIGATING_MODES: Final = frozenset(
-    {
-        FlightMode.MISSION,
-        FlightMode.RETURN,
-        FlightMode.HOLD,
-        FlightMode.CIRCLE,
-        FlightMode.TAKEOFF,
-        FlightMode.AVOID,
-        FlightMode.GUIDED,
-    }
-)
+NAVIGATING_MODES: Final = modes(_DATA["navigating"])
 """Modes that the autopilot flies by itself; HEARTBEAT shows GUIDED, NAV_CONTROLLER_OUTPUT is sent."""
 
 REFUSED_TEXTS: Final[Mapping[int, str]] = MappingProxyType(

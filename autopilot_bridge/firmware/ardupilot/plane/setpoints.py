@@ -14,7 +14,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import AltitudeChanged
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.services.channel import MavlinkMessage
-from autopilot_bridge.services.inputs.setpoint_frames import POSITION_BITS, place_of, unit_quaternion
+from autopilot_bridge.services.inputs.setpoints import POSITION_BITS, place_of, unit_quaternion
 from flightsim.foundation.rotations import euler_from_quaternion
 
 _ROLL_RATE_BIT, _PITCH_RATE_BIT = 1, 2  # SET_ATTITUDE_TARGET.type_mask

@@ -9,6 +9,7 @@ from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.control.multicopter import MulticopterController
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from autopilot_bridge.firmware.data import load_data, modes
 from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.px4.copter import mapping as px4_mapping
@@ -22,35 +23,9 @@ from flightsim.airframe import AirframeKind
 
 _AUTOPILOT_COMPONENT: Final = 1
 
-_SELECTABLE: Final = frozenset(
-    {
-        FlightMode.MANUAL,
-        FlightMode.STABILIZED,
-        FlightMode.ACRO,
-        FlightMode.ALTITUDE,
-        FlightMode.POSITION,
-        FlightMode.POSITION_SLOW,
-        FlightMode.HOLD,
-        FlightMode.TAKEOFF,
-        FlightMode.MISSION,
-        FlightMode.RETURN,
-        FlightMode.LAND,
-        FlightMode.FOLLOW,
-        FlightMode.PRECISION_LAND,
-        FlightMode.ORBIT,
-        FlightMode.OFFBOARD,
-    }
-)
-_PREVENT_ARMING: Final = frozenset(
-    {
-        FlightMode.RETURN,
-        FlightMode.LAND,
-        FlightMode.PRECISION_LAND,
-        FlightMode.FOLLOW,
-        FlightMode.ORBIT,
-        FlightMode.DESCEND,
-    }
-)
+_MODES: Final = load_data("px4.copter", "modes.toml")
+_SELECTABLE: Final = modes(_MODES["selectable"])
+_PREVENT_ARMING: Final = modes(_MODES["prevent_arming"])
 
 POLICY: Final = CommanderPolicy(
     boot_mode=FlightMode.HOLD,

@@ -1,6 +1,5 @@
 """PX4 parameters to the typed parameters of commander, flight tasks, control laws and filter."""
 
-import math
 from typing import Final
 
 from autopilot_bridge.commander.events import FailsafeAction
@@ -9,7 +8,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.firmware.external_mapping import px4_external
-from autopilot_bridge.firmware.mapping import FieldMap, RatioMap, build, integer, scaled_values
+from autopilot_bridge.firmware.mapping import build, integer, load_tables, scaled_values
 from autopilot_bridge.firmware.navigation_noise import px4_noise
 from autopilot_bridge.firmware.surroundings_mapping import (
     px4_avoidance,
@@ -21,34 +20,10 @@ from autopilot_bridge.flight.parameters import FlightParameters, RallyRule, Retu
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 
-_DEG: Final = math.radians(1.0)
-
-_OFFBOARD_LOSS: Final = {
-    0: FailsafeAction.POSITION,
-    1: FailsafeAction.ALTITUDE,
-    2: FailsafeAction.STABILIZED,
-    3: FailsafeAction.RETURN,
-    4: FailsafeAction.LAND,
-    5: FailsafeAction.HOLD,
-    6: FailsafeAction.TERMINATE,
-    7: FailsafeAction.DISARM,
-}  # COM_OBL_RC_ACT
-_LINK_LOSS: Final = {
-    0: FailsafeAction.NONE,
-    1: FailsafeAction.HOLD,
-    2: FailsafeAction.RETURN,
-    3: FailsafeAction.LAND,
-    5: FailsafeAction.TERMINATE,
-    6: FailsafeAction.DISARM,
-}  # NAV_DLL_ACT, NAV_RCL_ACT
-_FENCE: Final = {
-    0: FailsafeAction.NONE,
-    1: FailsafeAction.WARN,
-    2: FailsafeAction.HOLD,
-    3: FailsafeAction.RETURN,
-    4: FailsafeAction.TERMINATE,
-    5: FailsafeAction.LAND,
-}  # GF_ACTION
+_TABLES: Final = load_tables("px4.copter")
+_OFFBOARD_LOSS: Final = _TABLES.actions["COM_OBL_RC_ACT"]
+_LINK_LOSS: Final = _TABLES.actions["NAV_DLL_ACT"]  # NAV_DLL_ACT, NAV_RCL_ACT
+_FENCE: Final = _TABLES.actions["GF_ACTION"]
 _RETURNS: Final = {
     0: ReturnDestination.HOME,
     1: ReturnDestination.LANDING_OR_RALLY,
@@ -57,118 +32,18 @@ _RETURNS: Final = {
     4: ReturnDestination.ALONG_PLAN_SHORTER,
 }  # RTL_TYPE
 _RALLY_RETURNS: Final = frozenset({0, 1, 3})
-_BATTERY_CRITICAL: Final = {1: FailsafeAction.RETURN, 2: FailsafeAction.LAND, 3: FailsafeAction.RETURN}
-_BATTERY_EMERGENCY: Final = {1: FailsafeAction.RETURN, 2: FailsafeAction.LAND, 3: FailsafeAction.LAND}
+_BATTERY_CRITICAL: Final = _TABLES.actions["COM_LOW_BAT_ACT_CRITICAL"]
+_BATTERY_EMERGENCY: Final = _TABLES.actions["COM_LOW_BAT_ACT_EMERGENCY"]
 _EXCEPTIONS: Final = {
     1: FlightMode.MISSION,
     2: FlightMode.HOLD,
     4: FlightMode.OFFBOARD,
 }  # COM_RCL_EXCEPT, COM_DLL_EXCEPT
 
-FLIGHT: Final = (
-    FieldMap("cruise_speed_m_s", "MPC_XY_CRUISE"),
-    FieldMap("max_speed_m_s", "MPC_XY_VEL_MAX"),
-    FieldMap("climb_speed_m_s", "MPC_Z_V_AUTO_UP"),
-    FieldMap("descend_speed_m_s", "MPC_Z_V_AUTO_DN"),
-    FieldMap("acceleration_m_s2", "MPC_ACC_HOR"),
-    FieldMap("acceleration_up_m_s2", "MPC_ACC_UP_MAX"),
-    FieldMap("acceleration_down_m_s2", "MPC_ACC_DOWN_MAX"),
-    FieldMap("jerk_m_s3", "MPC_JERK_AUTO"),
-    FieldMap("trajectory_p_1_s", "MPC_XY_TRAJ_P"),
-    FieldMap("trajectory_error_max_m", "MPC_XY_ERR_MAX"),
-    FieldMap("yaw_rate_max_rad_s", "MPC_YAWRAUTO_MAX", _DEG),
-    FieldMap("yaw_acceleration_rad_s2", "MPC_YAWRAUTO_ACC", _DEG),
-    FieldMap("acceptance_radius_m", "NAV_ACC_RAD"),
-    FieldMap("acceptance_altitude_m", "NAV_MC_ALT_RAD"),
-    FieldMap("takeoff_altitude_m", "MIS_TAKEOFF_ALT"),
-    FieldMap("takeoff_speed_m_s", "MPC_TKO_SPEED"),
-    FieldMap("takeoff_ramp_time_s", "MPC_TKO_RAMP_T"),
-    FieldMap("spoolup_time_s", "COM_SPOOLUP_TIME"),
-    FieldMap("land_speed_m_s", "MPC_LAND_SPEED"),
-    FieldMap("land_descend_speed_m_s", "MPC_Z_V_AUTO_DN"),
-    FieldMap("return_altitude_m", "RTL_RETURN_ALT"),
-    FieldMap("return_descend_altitude_m", "RTL_DESCEND_ALT"),
-    FieldMap("return_loiter_time_s", "RTL_LAND_DELAY"),
-    FieldMap("return_speed_m_s", "MPC_XY_CRUISE"),
-    FieldMap("return_cone_half_angle_rad", "RTL_CONE_ANG", _DEG),
-    FieldMap("return_min_distance_m", "RTL_MIN_DIST"),
-    FieldMap("manual_speed_m_s", "MPC_VEL_MANUAL"),
-    FieldMap("manual_climb_speed_m_s", "MPC_Z_VEL_MAX_UP"),
-    FieldMap("manual_descend_speed_m_s", "MPC_Z_VEL_MAX_DN"),
-    FieldMap("manual_tilt_rad", "MPC_MAN_TILT_MAX", _DEG),
-    FieldMap("manual_yaw_rate_rad_s", "MPC_MAN_Y_MAX", _DEG),
-    FieldMap("acro_rate_rad_s", "MC_ACRO_R_MAX", _DEG),
-    FieldMap("acro_yaw_rate_rad_s", "MC_ACRO_Y_MAX", _DEG),
-    FieldMap("manual_throttle_min", "MPC_MANTHR_MIN"),
-    FieldMap("manual_deadzone", "MPC_HOLD_DZ"),
-    FieldMap("manual_expo", "MPC_XY_MAN_EXPO"),
-)
-
-CONTROLLER: Final = (
-    FieldMap("pos_xy_p_1_s", "MPC_XY_P"),
-    FieldMap("pos_z_p_1_s", "MPC_Z_P"),
-    FieldMap("vel_xy_p_1_s", "MPC_XY_VEL_P_ACC"),
-    FieldMap("vel_xy_i_1_s2", "MPC_XY_VEL_I_ACC"),
-    FieldMap("vel_xy_d", "MPC_XY_VEL_D_ACC"),
-    FieldMap("vel_z_p_1_s", "MPC_Z_VEL_P_ACC"),
-    FieldMap("vel_z_i_1_s2", "MPC_Z_VEL_I_ACC"),
-    FieldMap("vel_z_d", "MPC_Z_VEL_D_ACC"),
-    FieldMap("vel_derivative_cutoff_hz", "MPC_VELD_LP"),
-    FieldMap("speed_xy_max_m_s", "MPC_XY_VEL_MAX"),
-    FieldMap("speed_up_max_m_s", "MPC_Z_VEL_MAX_UP"),
-    FieldMap("speed_down_max_m_s", "MPC_Z_VEL_MAX_DN"),
-    FieldMap("tilt_max_rad", "MPC_TILTMAX_AIR", _DEG),
-    FieldMap("thrust_min", "MPC_THR_MIN"),
-    FieldMap("thrust_max", "MPC_THR_MAX"),
-    FieldMap("thrust_xy_margin", "MPC_THR_XY_MARG"),
-    FieldMap("hover_thrust", "MPC_THR_HOVER"),
-    FieldMap("roll_p_1_s", "MC_ROLL_P"),
-    FieldMap("pitch_p_1_s", "MC_PITCH_P"),
-    FieldMap("yaw_p_1_s", "MC_YAW_P"),
-    FieldMap("yaw_weight", "MC_YAW_WEIGHT"),
-    FieldMap("roll_rate_max_rad_s", "MC_ROLLRATE_MAX", _DEG),
-    FieldMap("pitch_rate_max_rad_s", "MC_PITCHRATE_MAX", _DEG),
-    FieldMap("yaw_rate_max_rad_s", "MC_YAWRATE_MAX", _DEG),
-    FieldMap("rate_roll_p", "MC_ROLLRATE_P"),
-    FieldMap("rate_roll_i", "MC_ROLLRATE_I"),
-    FieldMap("rate_roll_d", "MC_ROLLRATE_D"),
-    FieldMap("rate_roll_ff", "MC_ROLLRATE_FF"),
-    FieldMap("rate_roll_k", "MC_ROLLRATE_K"),
-    FieldMap("rate_roll_integral_max", "MC_RR_INT_LIM"),
-    FieldMap("rate_pitch_p", "MC_PITCHRATE_P"),
-    FieldMap("rate_pitch_i", "MC_PITCHRATE_I"),
-    FieldMap("rate_pitch_d", "MC_PITCHRATE_D"),
-    FieldMap("rate_pitch_ff", "MC_PITCHRATE_FF"),
-    FieldMap("rate_pitch_k", "MC_PITCHRATE_K"),
-    FieldMap("rate_pitch_integral_max", "MC_PR_INT_LIM"),
-    FieldMap("rate_yaw_p", "MC_YAWRATE_P"),
-    FieldMap("rate_yaw_i", "MC_YAWRATE_I"),
-    FieldMap("rate_yaw_d", "MC_YAWRATE_D"),
-    FieldMap("rate_yaw_ff", "MC_YAWRATE_FF"),
-    FieldMap("rate_yaw_k", "MC_YAWRATE_K"),
-    FieldMap("rate_yaw_integral_max", "MC_YR_INT_LIM"),
-    FieldMap("rate_derivative_cutoff_hz", "IMU_DGYRO_CUTOFF"),
-    FieldMap("yaw_torque_cutoff_hz", "MC_YAW_TQ_CUTOFF"),
-    FieldMap("thrust_model_factor", "THR_MDL_FAC"),
-)
-
-NAVIGATION: Final = (
-    FieldMap("no_aid_timeout_s", "EKF2_NOAID_TOUT", 1e-6),
-    FieldMap("gps_required_eph_m", "EKF2_REQ_EPH"),
-    FieldMap("gps_required_epv_m", "EKF2_REQ_EPV"),
-    FieldMap("gps_required_speed_accuracy_m_s", "EKF2_REQ_SACC"),
-    FieldMap("gps_gate", "EKF2_GPS_P_GATE"),
-    FieldMap("gps_velocity_gate", "EKF2_GPS_V_GATE"),
-    FieldMap("barometer_gate", "EKF2_BARO_GATE"),
-    FieldMap("magnetometer_gate", "EKF2_MAG_GATE"),
-    FieldMap("gps_required_hdop", "EKF2_REQ_PDOP"),
-    FieldMap("no_aid_noise_m", "EKF2_NOAID_NOISE"),
-)
-
-NAVIGATION_RATIOS: Final = (
-    RatioMap(("gps_check_time_s",), "EKF2_REQ_GPS_H"),
-    RatioMap(("gyro_bias_rad_s",), "EKF2_GBIAS_INIT"),
-)
+FLIGHT: Final = _TABLES.fields["flight"]
+CONTROLLER: Final = _TABLES.fields["controller"]
+NAVIGATION: Final = _TABLES.fields["navigation"]
+NAVIGATION_RATIOS: Final = _TABLES.ratios["navigation"]
 _GPS_POSITION_OR_VELOCITY: Final = 1 | 4  # of EKF2_GPS_CTRL
 
 

@@ -7,6 +7,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
+from autopilot_bridge.firmware.data import by_member, load_data
 from autopilot_bridge.firmware.flavour import ModeDisplay
 from autopilot_bridge.services.commands.available_modes import ListedMode
 
@@ -32,48 +33,13 @@ def custom_mode(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
-CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: custom_mode(MAIN_MANUAL),
-        FlightMode.ALTITUDE: custom_mode(MAIN_ALTITUDE),
-        FlightMode.POSITION: custom_mode(MAIN_POSITION),
-        FlightMode.ORBIT: custom_mode(MAIN_POSITION, 1),
-        FlightMode.POSITION_SLOW: custom_mode(MAIN_POSITION, 2),
-        FlightMode.TAKEOFF: custom_mode(MAIN_AUTO, 2),
-        FlightMode.HOLD: custom_mode(MAIN_AUTO, 3),
-        FlightMode.MISSION: custom_mode(MAIN_AUTO, 4),
-        FlightMode.RETURN: custom_mode(MAIN_AUTO, 5),
-        FlightMode.LAND: custom_mode(MAIN_AUTO, 6),
-        FlightMode.DESCEND: custom_mode(MAIN_AUTO, 6),  # shown as AUTO.LAND
-        FlightMode.FOLLOW: custom_mode(MAIN_AUTO, 8),
-        FlightMode.PRECISION_LAND: custom_mode(MAIN_AUTO, 9),
-        FlightMode.ACRO: custom_mode(MAIN_ACRO),
-        FlightMode.OFFBOARD: custom_mode(MAIN_OFFBOARD),
-        FlightMode.STABILIZED: custom_mode(MAIN_STABILIZED),
-        FlightMode.TERMINATION: custom_mode(MAIN_TERMINATION),
-    }
+_DATA: Final = load_data("px4.copter", "modes.toml")
+CUSTOM_MODES: Final[Mapping[FlightMode, int]] = by_member(
+    FlightMode, {name: custom_mode(mode["main"], mode["sub"]) for name, mode in _DATA["modes"].items()}
 )
 
-MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
-    {
-        FlightMode.MANUAL: "Manual",
-        FlightMode.ALTITUDE: "Altitude",
-        FlightMode.POSITION: "Position",
-        FlightMode.ORBIT: "Orbit",
-        FlightMode.POSITION_SLOW: "Position Slow",
-        FlightMode.TAKEOFF: "Takeoff",
-        FlightMode.HOLD: "Hold",
-        FlightMode.MISSION: "Mission",
-        FlightMode.RETURN: "Return",
-        FlightMode.LAND: "Land",
-        FlightMode.DESCEND: "Descend",
-        FlightMode.FOLLOW: "Follow Target",
-        FlightMode.PRECISION_LAND: "Precision Landing",
-        FlightMode.ACRO: "Acro",
-        FlightMode.OFFBOARD: "Offboard",
-        FlightMode.STABILIZED: "Stabilized",
-        FlightMode.TERMINATION: "Termination",
-    }
+MODE_NAMES: Final[Mapping[FlightMode, str]] = by_member(
+    FlightMode, {name: mode["name"] for name, mode in _DATA["modes"].items()}
 )
 
 _ADVANCED: Final = mavlink.MAV_MODE_PROPERTY_ADVANCED

@@ -13,12 +13,11 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.firmware import mapping
 from autopilot_bridge.firmware.mapping import (
-    FieldMap,
-    RatioMap,
     build,
     clamp,
     field_values,
     integer,
+    load_tables,
     scaled_values,
 )
 from autopilot_bridge.firmware.navigation_noise import px4_noise
@@ -40,6 +39,7 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope
 
+_TABLES: Final = load_tables("px4.plane")
 _DEG: Final = math.radians(1.0)
 _TERMINATION_OFF: Final = 121212  # CBRK_FLIGHTTERM
 _DATA_CHECKS: Final = 1 | 2 | 4  # ASPD_DO_CHECKS: missing, stuck, innovation
@@ -47,164 +47,15 @@ _NEVER_S: Final = 1e6
 _LEAST_CLIMB_M_S: Final = 0.1  # of the control laws
 _ROTATION_SHARE: Final = 0.9  # RWTO_ROT_AIRSPD -1: of the climb-out's airspeed
 
-_LOW_ACCURACY: Final = {
-    0: FailsafeAction.NONE,
-    1: FailsafeAction.WARN,
-    2: FailsafeAction.HOLD,
-    3: FailsafeAction.RETURN,
-    4: FailsafeAction.TERMINATE,
-    5: FailsafeAction.LAND,
-}  # COM_POS_LOW_ACT
+_LOW_ACCURACY: Final = _TABLES.actions["COM_POS_LOW_ACT"]
 
-CONTROLLER: Final = (
-    FieldMap("airspeed_stall_m_s", "FW_AIRSPD_STALL"),
-    FieldMap("airspeed_min_m_s", "FW_AIRSPD_MIN"),
-    FieldMap("airspeed_trim_m_s", "FW_AIRSPD_TRIM"),
-    FieldMap("airspeed_max_m_s", "FW_AIRSPD_MAX"),
-    FieldMap("scaling_airspeed_m_s", "FW_AIRSPD_TRIM"),
-    FieldMap("ground_speed_min_m_s", "FW_GND_SPD_MIN"),
-    FieldMap("roll_limit_rad", "FW_R_LIM", _DEG),
-    FieldMap("roll_slew_rad_s", "FW_PN_R_SLEW_MAX", _DEG),
-    FieldMap("trim_throttle", "FW_THR_TRIM"),
-    FieldMap("trim_throttle_min_speed", "FW_THR_ASPD_MIN"),
-    FieldMap("trim_throttle_max_speed", "FW_THR_ASPD_MAX"),
-    FieldMap("throttle_min", "FW_THR_MIN"),
-    FieldMap("throttle_max", "FW_THR_MAX"),
-    FieldMap("throttle_slew_1_s", "FW_THR_SLEW_MAX"),
-    FieldMap("pitch_min_rad", "FW_P_LIM_MIN", _DEG),
-    FieldMap("pitch_max_rad", "FW_P_LIM_MAX", _DEG),
-    FieldMap("trim_pitch_rad", "FW_PSP_OFF", _DEG),
-    FieldMap("climb_max_m_s", "FW_T_CLMB_MAX"),
-    FieldMap("sink_min_m_s", "FW_T_SINK_MIN"),
-    FieldMap("sink_max_m_s", "FW_T_SINK_MAX"),
-    FieldMap("climb_rate_target_m_s", "FW_T_CLMB_R_SP"),
-    FieldMap("sink_rate_target_m_s", "FW_T_SINK_R_SP"),
-    FieldMap("height_time_constant_s", "FW_T_ALT_TC"),
-    FieldMap("airspeed_time_constant_s", "FW_T_TAS_TC"),
-    FieldMap("height_rate_ff", "FW_T_HRATE_FF"),
-    FieldMap("energy_balance_ff", "FW_T_SEB_R_FF"),
-    FieldMap("pitch_damping", "FW_T_PTCH_DAMP"),
-    FieldMap("pitch_integral_1_s", "FW_T_I_GAIN_PIT"),
-    FieldMap("throttle_damping", "FW_T_THR_DAMPING"),
-    FieldMap("throttle_integral_1_s", "FW_T_THR_INTEG"),
-    FieldMap("speed_weight", "FW_T_SPDWEIGHT"),
-    FieldMap("energy_rate_time_constant_s", "FW_T_STE_R_TC"),
-    FieldMap("vertical_acceleration_max_m_s2", "FW_T_VERT_ACC"),
-    FieldMap("turn_energy_rate_m2_s3", "FW_T_RLL2THR"),
-    FieldMap("airspeed_noise_m_s", "FW_T_SPD_STD"),
-    FieldMap("airspeed_rate_noise_m_s2", "FW_T_SPD_DEV_STD"),
-    FieldMap("airspeed_rate_process_noise_m_s2", "FW_T_SPD_PRC_STD"),
-    FieldMap("roll_time_constant_s", "FW_R_TC"),
-    FieldMap("pitch_time_constant_s", "FW_P_TC"),
-    FieldMap("roll_rate_max_rad_s", "FW_R_RMAX", _DEG),
-    FieldMap("pitch_rate_max_up_rad_s", "FW_P_RMAX_POS", _DEG),
-    FieldMap("pitch_rate_max_down_rad_s", "FW_P_RMAX_NEG", _DEG),
-    FieldMap("yaw_rate_max_rad_s", "FW_Y_RMAX", _DEG),
-    FieldMap("rate_roll_p", "FW_RR_P"),
-    FieldMap("rate_roll_i", "FW_RR_I"),
-    FieldMap("rate_roll_d", "FW_RR_D"),
-    FieldMap("rate_roll_ff", "FW_RR_FF"),
-    FieldMap("rate_roll_integral_max", "FW_RR_IMAX"),
-    FieldMap("rate_pitch_p", "FW_PR_P"),
-    FieldMap("rate_pitch_i", "FW_PR_I"),
-    FieldMap("rate_pitch_d", "FW_PR_D"),
-    FieldMap("rate_pitch_ff", "FW_PR_FF"),
-    FieldMap("rate_pitch_integral_max", "FW_PR_IMAX"),
-    FieldMap("rate_yaw_p", "FW_YR_P"),
-    FieldMap("rate_yaw_i", "FW_YR_I"),
-    FieldMap("rate_yaw_d", "FW_YR_D"),
-    FieldMap("rate_yaw_ff", "FW_YR_FF"),
-    FieldMap("rate_yaw_integral_max", "FW_YR_IMAX"),
-    FieldMap("rate_derivative_cutoff_hz", "IMU_DGYRO_CUTOFF"),
-    FieldMap("roll_to_rudder_ff", "FW_RLL_TO_YAW_FF"),
-    FieldMap("trim_aileron", "TRIM_ROLL"),
-    FieldMap("trim_elevator", "TRIM_PITCH"),
-    FieldMap("trim_rudder", "TRIM_YAW"),
-    FieldMap("wheel_rate_max_rad_s", "FW_W_RMAX", _DEG),
-    FieldMap("wheel_p", "FW_WR_P"),
-    FieldMap("wheel_i", "FW_WR_I"),
-    FieldMap("wheel_integral_max", "FW_WR_IMAX"),
-    FieldMap("wheel_ff", "FW_WR_FF"),
-)
-
-AIRFRAME_FLIGHT: Final = (
-    FieldMap("airspeed_min_m_s", "FW_AIRSPD_MIN"),
-    FieldMap("airspeed_trim_m_s", "FW_AIRSPD_TRIM"),
-    FieldMap("airspeed_max_m_s", "FW_AIRSPD_MAX"),
-    FieldMap("climb_rate_m_s", "FW_T_CLMB_R_SP"),
-    FieldMap("sink_rate_m_s", "FW_T_SINK_R_SP"),
-    FieldMap("bank_max_rad", "FW_R_LIM", _DEG),
-    FieldMap("pitch_max_rad", "FW_P_LIM_MAX", _DEG),
-    FieldMap("pitch_min_rad", "FW_P_LIM_MIN", _DEG),
-    FieldMap("trim_throttle", "FW_THR_TRIM"),
-    FieldMap("guidance_period_s", "NPFG_PERIOD"),
-    FieldMap("guidance_damping", "NPFG_DAMPING"),
-    FieldMap("guidance_period_safety", "NPFG_PERIOD_SF"),
-    FieldMap("roll_time_constant_s", "NPFG_ROLL_TC"),
-    FieldMap("switch_distance_multiplier", "NPFG_SW_DST_MLT"),
-    FieldMap("loiter_radius_m", "NAV_LOITER_RAD"),
-    FieldMap("return_loiter_radius_m", "RTL_LOITER_RAD"),
-    FieldMap("takeoff_airspeed_m_s", "FW_TKO_AIRSPD"),
-    FieldMap("takeoff_pitch_min_rad", "FW_TKO_PITCH_MIN", _DEG),
-    FieldMap("takeoff_throttle_max", "RWTO_MAX_THR"),
-    FieldMap("takeoff_throttle_ramp_s", "RWTO_RAMP_TIME"),
-    FieldMap("takeoff_roll_pitch_rad", "RWTO_PSP", _DEG),
-    FieldMap("rotation_airspeed_m_s", "RWTO_ROT_AIRSPD"),
-    FieldMap("rotation_time_s", "RWTO_ROT_TIME"),
-    FieldMap("launch_acceleration_m_s2", "FW_LAUN_AC_THLD"),
-    FieldMap("launch_time_s", "FW_LAUN_AC_T"),
-    FieldMap("launch_delay_s", "FW_LAUN_MOT_DEL"),
-    FieldMap("landing_angle_rad", "FW_LND_ANG", _DEG),
-    FieldMap("landing_airspeed_m_s", "FW_LND_AIRSPD"),
-    FieldMap("flare_height_m", "FW_LND_FLALT"),
-    FieldMap("flare_time_s", "FW_LND_FL_TIME"),
-    FieldMap("flare_sink_m_s", "FW_LND_FL_SINK"),
-    FieldMap("flare_pitch_min_rad", "FW_LND_FL_PMIN", _DEG),
-    FieldMap("flare_pitch_max_rad", "FW_LND_FL_PMAX", _DEG),
-    FieldMap("flaps_takeoff", "FW_FLAPS_TO_SCL"),
-    FieldMap("flaps_landing", "FW_FLAPS_LND_SCL"),
-    FieldMap("manual_bank_max_rad", "FW_MAN_R_MAX", _DEG),
-    FieldMap("manual_pitch_max_rad", "FW_MAN_P_MAX", _DEG),
-)
+CONTROLLER: Final = _TABLES.fields["controller"]
+AIRFRAME_FLIGHT: Final = _TABLES.fields["airframe_flight"]
 """What an airframe file sets of the flight tasks."""
 
-FLIGHT: Final = (
-    *AIRFRAME_FLIGHT,
-    FieldMap("climb_max_m_s", "FW_T_CLMB_MAX"),
-    FieldMap("sink_max_m_s", "FW_T_SINK_MAX"),
-    FieldMap("trim_pitch_rad", "FW_PSP_OFF", _DEG),
-    FieldMap("throttle_idle", "FW_THR_IDLE"),
-    FieldMap("acceptance_radius_m", "NAV_ACC_RAD"),
-    FieldMap("acceptance_altitude_m", "NAV_FW_ALT_RAD"),
-    FieldMap("takeoff_altitude_m", "MIS_TAKEOFF_ALT"),
-    FieldMap("landing_abort_climb_m", "MIS_LND_ABRT_ALT"),
-    FieldMap("return_altitude_m", "RTL_RETURN_ALT"),
-    FieldMap("return_descend_altitude_m", "RTL_DESCEND_ALT"),
-    FieldMap("return_loiter_time_s", "RTL_LAND_DELAY"),
-    FieldMap("manual_pitch_down_max_rad", "FW_MAN_P_MAX", _DEG),
-    FieldMap("acro_roll_rate_rad_s", "FW_ACRO_X_MAX", _DEG),
-    FieldMap("acro_pitch_rate_rad_s", "FW_ACRO_Y_MAX", _DEG),
-    FieldMap("acro_yaw_rate_rad_s", "FW_ACRO_Z_MAX", _DEG),
-    FieldMap("position_lost_bank_rad", "FW_GPSF_R", _DEG),
-    FieldMap("position_lost_wait_s", "FW_GPSF_LT"),
-)
-
-NAVIGATION: Final = (
-    *px4_mapping.NAVIGATION,
-    FieldMap("airspeed_gate", "EKF2_TAS_GATE"),
-    FieldMap("sideslip_gate", "EKF2_BETA_GATE"),
-    FieldMap("airspeed_scale", "ASPD_SCALE_1"),
-    FieldMap("airspeed_check_innovation_m_s", "ASPD_FS_INNOV"),
-    FieldMap("airspeed_check_integral_m", "ASPD_FS_INTEG"),
-    FieldMap("airspeed_stop_delay_s", "ASPD_FS_T_STOP"),
-)
-
-NAVIGATION_RATIOS: Final = (
-    *px4_mapping.NAVIGATION_RATIOS,
-    RatioMap(("airspeed_noise_m_s",), "EKF2_EAS_NOISE"),
-    RatioMap(("sideslip_noise_rad",), "EKF2_BETA_NOISE"),
-    RatioMap(("wind_walk_m_s_sqrt_s",), "EKF2_WIND_NSD"),
-)
+FLIGHT: Final = (*AIRFRAME_FLIGHT, *_TABLES.fields["flight"])
+NAVIGATION: Final = (*px4_mapping.NAVIGATION, *_TABLES.fields["navigation"])
+NAVIGATION_RATIOS: Final = (*px4_mapping.NAVIGATION_RATIOS, *_TABLES.ratios["navigation"])
 """Of the air, relative to the defaults: theirs contain the gusts, which the filter measures apart."""
 
 

@@ -1,0 +1,84 @@
+"""The values of an imported map: total field, or an anomaly and the main field it is added to."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import EstimatorError
+from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.magnetics import FieldModel
+from flightsim.foundation.main_field import MainField
+
+__all__ = ["VALUES", "Values", "with_main_field"]
+
+Array = NDArray[np.float64]
+
+VALUES: Final = (
+    *("levelled_nt", "total_field_nt", "total_nt", "tmi", "total_field_anomaly_nt", "anomaly_nt"),
+    *("anomaly", "mag", "z", "value"),
+)
+"""Usual names of the field's column, the first ones preferred."""
+
+_EARTH_NT: Final = (18_000.0, 72_000.0)  # smallest and largest total field on the Earth, with anomalies
+_ANOMALY_NT: Final = 10_000.0
+
+
+class Values(StrEnum):
+    """What the values of a file are."""
+
+    TOTAL = "total"
+    ANOMALY_WMM = "anomaly-wmm"
+    ANOMALY_IGRF = "anomaly-igrf"
+
+
+def with_main_field(
+    path: Path,
+    values_nt: Array,
+    kind: Values,
+    home: GeodeticPosition,
+    north_m: Array,
+    east_m: Array,
+    height_m: float,
+    decimal_year: float,
+) -> Array:
+    """Total field (rows, columns) of a map.
+
+    Args:
+        path: the file, for errors.
+        values_nt: (rows, columns) of the file; NaN: no data.
+        kind: what they are.
+        home: origin of the map's frame.
+        north_m, east_m: grid lines.
+        height_m: height of the map above home.
+        decimal_year: date of the main field.
+
+    Raises:
+        EstimatorError: the values are not what they are said to be.
+    """
+    finite = values_nt[np.isfinite(values_nt)]
+    if not len(finite):
+        raise EstimatorError(f"{path} has no data in the map's area; is `home` of another place?")
+    low, high = float(finite.min()), float(finite.max())
+    if kind is Values.TOTAL:
+        if not _EARTH_NT[0] <= low <= high <= _EARTH_NT[1]:
+            raise EstimatorError(
+                f"{path} has values from {low:g} to {high:g} nT, which is no total field of the Earth "
+                f"({_EARTH_NT[0]:g} to {_EARTH_NT[1]:g} nT); a main field is added to anomalies with "
+                "`values=anomaly-wmm`. Values that stand for no data have to be marked as such in the file"
+            )
+        return values_nt
+    if not -_ANOMALY_NT <= low <= high <= _ANOMALY_NT:
+        raise EstimatorError(
+            f"{path} has values from {low:g} to {high:g} nT, which is no anomaly (up to {_ANOMALY_NT:g} nT); "
+            "is it total field (`values=total`), or are values that stand for no data not marked as such?"
+        )
+    model = FieldModel.IGRF if kind is Values.ANOMALY_IGRF else FieldModel.WMM
+    try:
+        main = MainField(home, decimal_year, model=model)
+    except ValueError as error:
+        raise EstimatorError(str(error)) from None
+    total: Array = values_nt + main.total_at_nt(north_m[:, None], east_m[None, :], height_m)
+    return total

@@ -1,0 +1,236 @@
+"""What a survey flight has made: figures, files, and whether the lines were flown."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from estimators.errors import EstimatorError
+from estimators.survey.compensation import compensation_bytes
+from estimators.survey.export import survey_files
+from estimators.survey.lines import LineKind, LinePlan
+from estimators.survey.processing import ProcessingParameters, SurveyResult, process_survey
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.main_field import MainField
+from missions.mission import Debriefing
+from missions.survey.options import SurveyOptions
+from missions.survey.records import Calibration, calibrated, flight_readings
+
+__all__ = ["COMPENSATION", "Outcome", "outcome_of", "report_lines"]
+
+COMPENSATION: Final = "compensation.json"
+LEAST_COVERAGE: Final = 0.97
+"""Share of each line that readings must cover."""
+
+_FOUND_WITHIN: Final = 0.5  # of a line spacing, and the least distance below: a target on the list
+_FOUND_LEAST_M: Final = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """The outcome of a flight.
+
+    Attributes:
+        survey: processed lines; None: a calibration, or there were no readings.
+        calibration: None: a survey, or it failed.
+        failure: why there is neither; "" if there is.
+        figures: for the summary.
+        files: contents by name.
+        coverage: share of each line's length that readings cover, in the order of flight.
+    """
+
+    survey: SurveyResult | None = None
+    calibration: Calibration | None = None
+    failure: str = ""
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    coverage: tuple[float, ...] = ()
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there is something of the mission's own to be drawn."""
+        return self.survey is not None or self.calibration is not None
+
+    def verdict(self, max_error_m: float | None) -> str:
+        """Why the survey was not flown as commanded; "" if it was. By the vehicle's own messages alone.
+
+        Args:
+            max_error_m: the user's bound of the path error, which is checked apart from this.
+        """
+        if self.failure:
+            return self.failure
+        if self.survey is None:
+            return ""
+        missed = [
+            f"{line.name} ({100.0 * share:.0f} %)"
+            for line, share in zip(self.survey.plan.lines, self.coverage, strict=True)
+            if share < LEAST_COVERAGE
+        ]
+        if not missed:
+            return ""
+        shown = ", ".join(missed[:5]) + ("" if len(missed) <= 5 else f" and {len(missed) - 5} more")
+        return (
+            f"{len(missed)} of {len(self.coverage)} lines were not measured: readings within "
+            f"{self.survey.plan.corridor_m:g} m cover less than {100.0 * LEAST_COVERAGE:g} % of {shown}"
+        )
+
+
+def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosition) -> Outcome:
+    """Process the readings of a flight.
+
+    Args:
+        debriefing: of the flight.
+        plan: lines that were commanded; None: a calibration.
+        home: the vehicle's home.
+    """
+    options = debriefing.options
+    assert isinstance(options, SurveyOptions)
+    notes = debriefing.flights[0][0]
+    survey_map = options.survey_map()
+    origin = home if survey_map is None else survey_map.home
+    readings = flight_readings(debriefing.records, notes.system_id, LocalFrame(origin))
+    if len(readings) < 2:
+        return Outcome(
+            failure=f"vehicle {notes.system_id} sent no readings of the magnetic field with a place"
+        )
+    if plan is None:
+        main = MainField(origin)
+        try:
+            made = calibrated(readings, notes, options.direction_rad, main)
+        except EstimatorError as error:
+            return Outcome(failure=str(error))
+        return Outcome(
+            calibration=made,
+            figures=_calibration_figures(made),
+            files={COMPENSATION: compensation_bytes(made.compensation)},
+        )
+    result = process_survey(
+        readings,
+        plan,
+        home=origin,
+        survey_map=survey_map,
+        compensation=options.compensation(),
+        parameters=ProcessingParameters(
+            line_spacing_m=options.spacing_m,
+            grid_m=options.grid_m,
+            map_error_nt=options.map_error_nt,
+            level=options.level,
+        ),
+    )
+    coverage = covered(result)
+    return Outcome(
+        survey=result,
+        figures=_survey_figures(result, coverage, debriefing.targets_ne_m),
+        files=survey_files(result),
+        coverage=coverage,
+    )
+
+
+def covered(result: SurveyResult) -> tuple[float, ...]:
+    """Share of each line's length that its readings span."""
+    found = []
+    for number, line in enumerate(result.plan.lines):
+        own = result.line_of == number
+        along, _ = line.along_across_m(result.readings.north_m[own], result.readings.east_m[own])
+        found.append(float(np.ptp(along)) / line.length_m if len(along) > 1 else 0.0)
+    return tuple(found)
+
+
+def _survey_figures(
+    result: SurveyResult, coverage: Sequence[float], targets_ne_m: Sequence[tuple[float, float]]
+) -> dict[str, Any]:
+    lines = result.plan.lines
+    found: dict[str, Any] = {
+        "lines": sum(line.kind is LineKind.LINE for line in lines),
+        "tie_lines": sum(line.kind is LineKind.TIE for line in lines),
+        "line_km": round(sum(line.length_m for line in lines) * 1e-3, 3),
+        "least_coverage": round(min(coverage), 4),
+        "readings_on_lines": int(result.on_lines.sum()),
+        "readings_unplaced": result.readings.unplaced,
+        "readings_implausible": result.readings.implausible,
+        "noise_nt": _rounded(result.noise_nt),
+        "differential_noise_nt": _rounded(result.differential_noise_nt),
+        "crossings": result.levelling.crossings,
+        "misclosure_before_nt": _rounded(result.levelling.before_nt),
+        "misclosure_after_nt": _rounded(result.levelling.after_nt),
+        "grid_error_nt": _rounded(result.grid_error_nt),
+        "compared_with_map": result.against_map,
+        "anomalies": [
+            {
+                "north": round(anomaly.north_m, 1),
+                "east": round(anomaly.east_m, 1),
+                "peak_nt": round(anomaly.peak_nt, 2),
+                "signal_to_noise": round(anomaly.ratio, 1),
+                "lines": [lines[k].name for k in anomaly.lines],
+            }
+            for anomaly in result.anomalies
+        ],
+    }
+    if targets_ne_m:
+        within_m = max(_FOUND_LEAST_M, _FOUND_WITHIN * result.parameters.line_spacing_m)
+        errors = [
+            min((math.dist(place, (a.north_m, a.east_m)) for a in result.anomalies), default=math.inf)
+            for place in targets_ne_m
+        ]
+        found["targets"] = [{"north": round(n, 1), "east": round(e, 1)} for n, e in targets_ne_m]
+        found["target_errors_m"] = [_rounded(error, 1) for error in errors]
+        found["targets_found"] = sum(error <= within_m for error in errors)
+        found["false_anomalies"] = sum(
+            all(math.dist(place, (a.north_m, a.east_m)) > 2.0 * within_m for place in targets_ne_m)
+            for a in result.anomalies
+        )
+    return found
+
+
+def _calibration_figures(made: Calibration) -> dict[str, Any]:
+    return {
+        "figure_of_merit_nt": _rounded(made.figure_of_merit_nt),
+        "figure_of_merit_before_nt": _rounded(made.figure_of_merit_before_nt),
+        "improvement": _rounded(made.improvement, 2),
+    }
+
+
+def report_lines(summary: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    if "figure_of_merit_nt" in summary:
+        return (
+            f"figure of merit {summary['figure_of_merit_before_nt']:.1f} nT before compensation, "
+            f"{summary['figure_of_merit_nt']:.2f} nT after, improvement ratio {summary['improvement']:.1f}: "
+            f"{COMPENSATION}",
+        )
+    if "lines" not in summary:
+        return ()
+    lines = [
+        f"{summary['lines']} lines and {summary['tie_lines']} tie lines, {summary['line_km']:.1f} km, "
+        f"{summary['readings_on_lines']} readings with {_nt(summary['noise_nt'])} of noise",
+    ]
+    if summary["crossings"]:
+        lines.append(
+            f"{summary['crossings']} crossings: misclosure {_nt(summary['misclosure_before_nt'])} before "
+            f"levelling, {_nt(summary['misclosure_after_nt'])} after; map by the lines within "
+            f"{_nt(summary['grid_error_nt'])} of the tie lines"
+        )
+    if summary["compared_with_map"]:
+        count = len(summary["anomalies"])
+        of_targets = (
+            f"; {summary['targets_found']} of {len(summary['targets'])} targets are among them"
+            if "targets" in summary
+            else ""
+        )
+        lines.append(
+            f"{count} {'anomaly' if count == 1 else 'anomalies'} against the published map, "
+            f"{_nt(summary['differential_noise_nt'])} elsewhere{of_targets}"
+        )
+    else:
+        lines.append("there is no published map to compare with: no anomalies are listed")
+    return tuple(lines)
+
+
+def _nt(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.2f} nT"
+
+
+def _rounded(value: float, digits: int = 4) -> float | None:
+    return round(value, digits) if math.isfinite(value) else None

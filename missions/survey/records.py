@@ -1,0 +1,128 @@
+"""The readings of a flight from its records, and what they make."""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import EstimatorError
+from estimators.survey.compensation import (
+    Compensation,
+    direction_cosines,
+    figure_of_merit_nt,
+    fit_compensation,
+    mean_cycle,
+)
+from estimators.survey.processing import aircraft_field_nt
+from estimators.survey.readings import SurveyReadings, placed_readings
+from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.main_field import MainField
+from missions.notes import FlightNotes
+from missions.runs.records import FlightRecords
+from missions.survey.manoeuvres import BOXES, manoeuvres
+from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT, TOTAL_FIELD_NAME
+
+__all__ = ["Calibration", "calibrated", "flight_readings"]
+
+Array = NDArray[np.float64]
+
+_AUTOPILOT: Final = 1
+_MARGIN_S: Final = 5.0  # of the flight around the manoeuvres, for the filter's ends
+
+
+def flight_readings(records: FlightRecords, system_id: int, frame: LocalFrame) -> SurveyReadings:
+    """All readings of a vehicle's magnetometer in a flight, placed in a frame."""
+    sent = records.table("NAMED_VALUE_FLOAT", system_id, SURVEY_MAGNETOMETER_COMPONENT)
+    sent = sent[sent["name"] == TOTAL_FIELD_NAME.encode()]
+    positions = records.table("GLOBAL_POSITION_INT", system_id, _AUTOPILOT)
+    attitudes = records.table("ATTITUDE", system_id, _AUTOPILOT)
+    finite = np.all([np.isfinite(attitudes[name]) for name in ("roll", "pitch", "yaw")], axis=0)
+    attitudes = attitudes[finite]
+    return placed_readings(
+        sent["time_boot_ms"] * 1e-3,
+        sent["value"].astype(np.float64),
+        positions=_columns(positions, ("lat", 1e-7), ("lon", 1e-7), ("alt", 1e-3)),
+        attitudes=_columns(attitudes, ("roll", 1.0), ("pitch", 1.0), ("yaw", 1.0)),
+        frame=frame,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Calibration:
+    """A compensation and how good it is, from the second box, which it was not fitted to.
+
+    Attributes:
+        compensation: the coefficients.
+        figure_of_merit_nt: of the compensated readings: sum of the peak-to-peak values of twelve manoeuvres.
+        figure_of_merit_before_nt: of the readings as they were.
+        improvement: improvement ratio: standard deviation of the readings during the manoeuvres before
+            compensation over that after it, of the mean cycles.
+        before_nt, after_nt: readings of the manoeuvres of the second box, less their level, by label.
+    """
+
+    compensation: Compensation
+    figure_of_merit_nt: float
+    figure_of_merit_before_nt: float
+    improvement: float
+    before_nt: dict[str, Array] = field(default_factory=dict)
+    after_nt: dict[str, Array] = field(default_factory=dict)
+
+
+def calibrated(
+    readings: SurveyReadings, notes: FlightNotes, direction_rad: float, main: MainField
+) -> Calibration:
+    """Fit the first box of a calibration flight, and judge the fit by the second.
+
+    Args:
+        readings: of the flight, in the frame of the main field's home.
+        notes: with the phases of the manoeuvres.
+        direction_rad: of the first leg.
+        main: the main field, which is taken out of the readings. Geology is not: the flight is high above it.
+
+    Raises:
+        EstimatorError: manoeuvres are missing, or too small.
+    """
+    times: list[list[tuple[str, float, float]]] = [[] for _ in range(BOXES)]
+    for manoeuvre in manoeuvres(direction_rad):
+        phase = notes.phase(manoeuvre.label)
+        if phase is None:
+            raise EstimatorError(f"the calibration flight has no {manoeuvre.label}")
+        times[manoeuvre.box].append((manoeuvre.label, phase.start_us * 1e-6, phase.end_us * 1e-6))
+    residual = readings.total_nt - (
+        main.total_at_nt(readings.north_m, readings.east_m) + main.gradient_up_nt_m * readings.height_m
+    )
+    fitted_from, fitted_to = times[0][0][1] - _MARGIN_S, times[0][-1][2] + _MARGIN_S
+    part = (readings.time_s >= fitted_from) & (readings.time_s <= fitted_to)
+    cosines, rates = direction_cosines(
+        readings.roll_rad, readings.pitch_rad, readings.yaw_rad, readings.time_s, main.direction_ned
+    )
+    compensation = fit_compensation(
+        readings.time_s[part], residual[part] + main.total_nt, cosines[part], rates[part]
+    )
+    left = residual - aircraft_field_nt(readings, compensation, main.direction_ned)
+    rate_hz = 1.0 / float(np.median(np.diff(readings.time_s)))
+    before, after = (
+        {
+            label: values[(readings.time_s >= start) & (readings.time_s <= end)]
+            for label, start, end in times[1]
+        }
+        for values in (residual, left)
+    )
+    spreads = [
+        np.concatenate([mean_cycle(values, rate_hz=rate_hz) for values in parts.values()]).std()
+        for parts in (before, after)
+    ]
+    return Calibration(
+        compensation=compensation,
+        figure_of_merit_nt=figure_of_merit_nt(list(after.values()), rate_hz=rate_hz),
+        figure_of_merit_before_nt=figure_of_merit_nt(list(before.values()), rate_hz=rate_hz),
+        improvement=float(spreads[0] / max(float(spreads[1]), 1e-12)),
+        before_nt=before,
+        after_nt=after,
+    )
+
+
+def _columns(table: NDArray[np.void], *fields: tuple[str, float]) -> Array:
+    columns = [table["time_boot_ms"] * 1e-3, *(table[name] * scale for name, scale in fields)]
+    return np.column_stack([np.asarray(column, dtype=np.float64) for column in columns])
