@@ -233,7 +233,12 @@ class Camera:
         self._row = _BLOCK
         self.reader: FrameReader | None = None
         if p.reader is not None:
-            self.reader = p.reader.start(p, int(seeds("camera").generate_state(1, np.uint64)[0]))
+            self.reader = p.reader.start(
+                model=p.model,
+                imager=p.imager,
+                blur_px_m=p.blur_px_m,
+                seed=int(seeds("camera").generate_state(1, np.uint64)[0]),
+            )
         self._waiting: deque[CameraFrame] = deque()
         self.frame: CameraFrame | None = None
 

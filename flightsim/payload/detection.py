@@ -3,17 +3,16 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_not_negative, require_positive, require_probability
+from flightsim.payload.camera_model import PinholeModel
 from flightsim.payload.camera_view import CameraView
+from flightsim.payload.imager import ImagerParameters
 from flightsim.payload.targets import NO_TAG
-
-if TYPE_CHECKING:
-    from flightsim.payload.camera import CameraParameters
 
 Array = NDArray[np.float64]
 
@@ -95,8 +94,10 @@ class FrameReader(Protocol):
 class FrameReaderParameters(Protocol):
     """A kind of detector that works on pictures: a parameter set that starts a reader."""
 
-    def start(self, camera: "CameraParameters", seed: int) -> FrameReader:
-        """The reader of one camera; what is random about its pictures comes from the seed."""
+    def start(
+        self, *, model: PinholeModel, imager: ImagerParameters, blur_px_m: float, seed: int
+    ) -> FrameReader:
+        """The reader of a camera with this geometry, sensor and lens; what is random comes from the seed."""
 
 
 class DetectionModel(Protocol):

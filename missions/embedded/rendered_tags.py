@@ -16,7 +16,7 @@ from estimators.vision import (
     TagDetectorParameters,
     draw_detections,
 )
-from flightsim.payload import CameraParameters, CameraView, Detection
+from flightsim.payload import CameraView, Detection, ImagerParameters, PinholeModel
 from flightsim.picture import Renderer, Scenery
 
 __all__ = ["RenderedTags", "RenderedTagsReader", "TagPicture"]
@@ -61,13 +61,15 @@ class RenderedTags:
     scenery: Scenery = field(default_factory=Scenery)
     skip: bool = True
 
-    def start(self, camera: CameraParameters, seed: int) -> "RenderedTagsReader":
+    def start(
+        self, *, model: PinholeModel, imager: ImagerParameters, blur_px_m: float, seed: int
+    ) -> "RenderedTagsReader":
         """The reader of one camera.
 
         Raises:
             ValueError: the distortion folds the picture.
         """
-        return RenderedTagsReader(self, camera, seed)
+        return RenderedTagsReader(self, model, imager, blur_px_m, seed)
 
 
 class RenderedTagsReader:
@@ -79,14 +81,21 @@ class RenderedTagsReader:
         skipped: number of frames that were not.
     """
 
-    def __init__(self, parameters: RenderedTags, camera: CameraParameters, seed: int) -> None:
+    def __init__(
+        self,
+        parameters: RenderedTags,
+        model: PinholeModel,
+        imager: ImagerParameters,
+        blur_px_m: float,
+        seed: int,
+    ) -> None:
         self._parameters = parameters
-        self._camera = camera
+        self._model, self._imager = model, imager
         self._renderer = Renderer(
-            camera.model,
-            aperture_px_m=camera.blur_px_m,
+            model,
+            aperture_px_m=blur_px_m,
             scenery=parameters.scenery,
-            imager=camera.imager,
+            imager=imager,
             seed=seed,
         )
         self._zoom = 0.0
@@ -97,7 +106,7 @@ class RenderedTagsReader:
 
     def _detector_at(self, zoom: float) -> TagDetector:
         if zoom != self._zoom:
-            model, imager = self._camera.model, self._camera.imager
+            model, imager = self._model, self._imager
             geometry = CameraGeometry(
                 width_px=model.width_px,
                 height_px=model.height_px,

@@ -60,8 +60,9 @@ def test_a_tag_of_another_number_is_not_found(tmp_path):
 
 def test_frames_that_are_not_rendered_have_the_same_detections():
     camera = search_camera(0.3)
-    quick = camera.reader.start(camera, 1)
-    whole = replace(camera.reader, skip=False).start(camera, 1)
+    given = {"model": camera.model, "imager": camera.imager, "blur_px_m": camera.blur_px_m, "seed": 1}
+    quick = camera.reader.start(**given)
+    whole = replace(camera.reader, skip=False).start(**given)
     rng = np.random.default_rng(4)
     detected = 0
     for number in range(14):
