@@ -120,6 +120,9 @@ class FlightOptions(MissionOptions):
         via: uploaded waypoints or streamed setpoints.
         acceptance_m: radius within which a waypoint counts as reached; corners are rounded by the same
             distance.
+        search: end the pattern when the camera has detected the tag `tag_id`; `search_time_s` is the limit of
+            the search, counted from its altitude.
+        tag_id: number of the tag, of the family 36h11.
     """
 
     pattern: str = "L3"
@@ -136,6 +139,8 @@ class FlightOptions(MissionOptions):
     search_time_s: float | None = None
     via: Via = Via.WAYPOINTS
     acceptance_m: float = 2.0
+    search: bool = False
+    tag_id: int = 0
 
     def __post_init__(self) -> None:
         super(FlightOptions, self).__post_init__()
@@ -165,6 +170,8 @@ class FlightOptions(MissionOptions):
                 raise PlanError(f"`{name}` {math.degrees(phase_rad):g} degrees is not in -3600..3600 degrees")
         if not math.isfinite(self.heading_rad):
             raise PlanError(f"`heading_rad` {self.heading_rad} is not a direction; give a finite angle")
+        if not 0 <= self.tag_id <= 254:
+            raise PlanError(f"`tag_id` {self.tag_id} is not in 0..254, what LANDING_TARGET can report")
         if self.period_s is not None and self.via is not Via.SETPOINTS:
             raise PlanError("`period_s` needs `via=setpoints`: waypoints are flown at a speed, not at times")
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.camera_scan import CameraScan, camera_scan_message
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_commands import CameraCommands
 from autopilot_bridge.payload.camera_definition import CameraDefinition
@@ -87,6 +88,8 @@ class CameraComponent(CameraActions):
         self.tracker.update(frame)
         for detection in frame.detections:
             self.send(landing_target(detection))
+        if self.device.parameters.reader is not None:
+            self.send(self._scan(frame))
 
     # inside
 
@@ -100,6 +103,25 @@ class CameraComponent(CameraActions):
             self.take_photo()
         if not new:
             self.definition.handle(message, sender, self._time_us)
+
+    def _scan(self, frame: CameraFrame) -> Any:
+        parameters = self.device.parameters
+        model = parameters.model
+        return camera_scan_message(
+            CameraScan(
+                number=frame.number,
+                time_us=frame.time_us,
+                detections=len(frame.detections),
+                width_px=model.width_px,
+                height_px=model.height_px,
+                focal_px=model.focal_px * self.device.zoom,
+                distortion=parameters.imager.distortion.coefficients,
+                mount_rad=None
+                if self._gimbal is not None
+                else (parameters.mount_roll_rad, parameters.mount_pitch_rad, parameters.mount_yaw_rad),
+                position_frd_m=parameters.position_frd_m,
+            )
+        )
 
     def _record(self, time_us: int) -> None:
         if self.recorded_mib >= self.storage.available_mib:

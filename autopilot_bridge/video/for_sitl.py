@@ -70,6 +70,7 @@ def show_cameras(
                 camera=component.device,
                 model=component.device.parameters.model,
                 blur_px_m=component.device.parameters.blur_px_m,
+                imager=component.device.parameters.imager,
                 streaming=lambda index=index: streaming(index),  # type: ignore[misc]
             )
             for index, (system_id, component) in enumerate(components)

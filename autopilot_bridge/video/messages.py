@@ -4,7 +4,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from flightsim.payload import CameraView, PinholeModel, TargetView
+from flightsim.payload import BrownDistortion, CameraView, ImagerParameters, PinholeModel, TargetView
 from flightsim.picture import Scenery
 
 MAX_LINE = 1 << 20
@@ -18,11 +18,13 @@ class CameraSetup:
         name: last part of its address.
         model: its geometry.
         blur_px_m: of its lens.
+        imager: its distortion, noise and shutter.
     """
 
     name: str
     model: PinholeModel
     blur_px_m: float
+    imager: ImagerParameters = field(default_factory=ImagerParameters)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +75,12 @@ def setup_to_json(setup: StudioSetup) -> dict[str, Any]:
 def setup_from_json(data: dict[str, Any]) -> StudioSetup:
     """From plain data."""
     cameras = tuple(
-        CameraSetup(name=item["name"], model=PinholeModel(**item["model"]), blur_px_m=item["blur_px_m"])
+        CameraSetup(
+            name=item["name"],
+            model=PinholeModel(**item["model"]),
+            blur_px_m=item["blur_px_m"],
+            imager=_imager(item["imager"]),
+        )
         for item in data["cameras"]
     )
     return StudioSetup(
@@ -106,7 +113,14 @@ def view_from_json(data: dict[str, Any]) -> CameraView:
         focus_distance_m=data["focus_distance_m"],
         covered=data["covered"],
         targets=targets,
+        exposure_s=data["exposure_s"],
+        velocity_ned_m_s=_triple(data["velocity_ned_m_s"]),
+        rotation_mount_rad_s=_triple(data["rotation_mount_rad_s"]),
     )
+
+
+def _imager(data: dict[str, Any]) -> ImagerParameters:
+    return ImagerParameters(**{**data, "distortion": BrownDistortion(**data["distortion"])})
 
 
 def _triple(values: list[float]) -> tuple[float, float, float]:

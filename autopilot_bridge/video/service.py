@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -20,7 +20,7 @@ from autopilot_bridge.video.messages import (
     unpack,
     view_to_json,
 )
-from flightsim.payload import CameraView, PinholeModel
+from flightsim.payload import CameraView, ImagerParameters, PinholeModel
 from flightsim.picture import Scenery
 
 DEFAULT_PORT: Final = 8554
@@ -82,6 +82,7 @@ class CameraOnShow:
         camera: the device.
         model: its geometry.
         blur_px_m: of its lens.
+        imager: its distortion, noise and shutter.
         streaming: returns whether its stream is running (VIDEO_STOP_STREAMING); called for each picture.
     """
 
@@ -89,6 +90,7 @@ class CameraOnShow:
     camera: Watched
     model: PinholeModel
     blur_px_m: float = 0.0
+    imager: ImagerParameters = field(default_factory=ImagerParameters)
     streaming: Callable[[], bool] = lambda: True
 
 
@@ -121,7 +123,10 @@ class VideoService:
         self._cameras = tuple(cameras)
         self._parameters = parameters
         self._setup = StudioSetup(
-            cameras=tuple(CameraSetup(name=c.name, model=c.model, blur_px_m=c.blur_px_m) for c in cameras),
+            cameras=tuple(
+                CameraSetup(name=c.name, model=c.model, blur_px_m=c.blur_px_m, imager=c.imager)
+                for c in cameras
+            ),
             scenery=scenery,
             width_px=parameters.width_px,
             rate_hz=parameters.rate_hz,

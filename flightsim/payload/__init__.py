@@ -14,12 +14,15 @@ from flightsim.payload.detection import (
     CameraFrame,
     Detection,
     DetectionModel,
+    FrameReader,
+    FrameReaderParameters,
     PictureDetection,
     ResolutionDetection,
     SeenTargets,
 )
 from flightsim.payload.gimbal import LEVEL, Gimbal, GimbalFlags, GimbalParameters
 from flightsim.payload.home_frame import HomeFrame
+from flightsim.payload.imager import BrownDistortion, ImagerParameters
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
 from flightsim.payload.magnetic_spec import (
@@ -58,6 +61,7 @@ from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
 __all__ = [
     "LEVEL",
     "NO_TAG",
+    "BrownDistortion",
     "Camera",
     "CameraFrame",
     "CameraParameters",
@@ -69,6 +73,8 @@ __all__ = [
     "Detection",
     "DetectionModel",
     "DipoleSignature",
+    "FrameReader",
+    "FrameReaderParameters",
     "GaussianSignature",
     "Gimbal",
     "GimbalFlags",
@@ -77,6 +83,7 @@ __all__ = [
     "GroundTargetParameters",
     "GroundTargets",
     "HomeFrame",
+    "ImagerParameters",
     "InducedDipole",
     "MagneticField",
     "MagneticMap",

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from flightsim import truth as t
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive, require_rate
 from flightsim.foundation.rotations import multiply, quaternion_from_euler, rotate
+from flightsim.foundation.vectors import Quaternion, conjugate, product
+from flightsim.foundation.vectors import rotate as rotate_vector
 from flightsim.home import Home
 from flightsim.payload import camera_kernel as k
 from flightsim.payload.camera_model import PinholeModel
@@ -20,11 +22,14 @@ from flightsim.payload.detection import (
     CameraFrame,
     Detection,
     DetectionModel,
+    FrameReader,
+    FrameReaderParameters,
     PictureDetection,
     SeenTargets,
 )
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
+from flightsim.payload.imager import ImagerParameters
 from flightsim.payload.targets import NO_TAG, GroundTargets
 from flightsim.sensors.suite import steps_per_sample
 
@@ -60,6 +65,9 @@ class CameraParameters:
         blur_px_m: of the lens at zoom 1: diameter of the circle of confusion in pixels, for each 1/m between
             the focus and the object. Pictures show it; the detector is not affected.
         min_focus_m: nearest distance that can be focused on.
+        imager: distortion, noise and shutter of the pictures; detections without a `reader` are not affected.
+        reader: detects targets in rendered pictures; then `detection`, the noise of its detections and the
+            false detections have no effect. None: detections come from the models.
     """
 
     model: PinholeModel = field(default_factory=PinholeModel)
@@ -82,6 +90,8 @@ class CameraParameters:
     max_zoom: float = 6.0
     blur_px_m: float = 2.0
     min_focus_m: float = 0.5
+    imager: ImagerParameters = field(default_factory=ImagerParameters)
+    reader: FrameReaderParameters | None = None
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
@@ -119,6 +129,7 @@ class Camera:
         parameters: as given.
         frame: newest delivered frame; None before the first.
         focus_distance_m: distance in focus; None: that of the centre of the picture (autofocus).
+        reader: detects targets in its pictures; None: detections come from the models.
     """
 
     __slots__ = (
@@ -151,6 +162,7 @@ class Camera:
         "focus_distance_m",
         "frame",
         "parameters",
+        "reader",
     )
 
     def __init__(
@@ -219,6 +231,14 @@ class Camera:
         self._uniforms: Array = np.empty((_BLOCK, len(targets)))
         self._normals: Array = np.empty((_BLOCK, len(targets), 3))
         self._row = _BLOCK
+        self.reader: FrameReader | None = None
+        if p.reader is not None:
+            self.reader = p.reader.start(
+                model=p.model,
+                imager=p.imager,
+                blur_px_m=p.blur_px_m,
+                seed=int(seeds("camera").generate_state(1, np.uint64)[0]),
+            )
         self._waiting: deque[CameraFrame] = deque()
         self.frame: CameraFrame | None = None
 
@@ -260,6 +280,7 @@ class Camera:
         targets = self._targets
         if time_us > targets.time_us:
             targets.step(time_us)
+        velocity, rotation = self._motion(time_us, eye, q)
         return CameraView(
             time_us=time_us,
             eye_ned_m=eye,
@@ -277,7 +298,35 @@ class Camera:
                     targets.targets, targets.positions_ned_m.tolist(), strict=True
                 )
             ),
+            exposure_s=self.parameters.exposure_s,
+            velocity_ned_m_s=velocity,
+            rotation_mount_rad_s=rotation,
         )
+
+    def _motion(self, time_us: int, eye: Vector, q: Quaternion) -> tuple[Vector, Vector]:
+        """Velocity, and rate of rotation in the camera's axes, since the step before; 0 where not known."""
+        passed_s = self._since_note_s(time_us)
+        if passed_s is None:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        b, m = self._q_before.tolist()
+        before = product((b[0], b[1], b[2], b[3]), (m[0], m[1], m[2], m[3]))
+        arm = rotate_vector((b[0], b[1], b[2], b[3]), self.parameters.position_frd_m)
+        place = self._vehicle_before_ned_m.tolist()
+        w, x, y, z = product(conjugate(before), q)
+        turn = math.copysign(2.0 / passed_s, w)
+        return (
+            (
+                (eye[0] - place[0] - arm[0]) / passed_s,
+                (eye[1] - place[1] - arm[1]) / passed_s,
+                (eye[2] - place[2] - arm[2]) / passed_s,
+            ),
+            (turn * x, turn * y, turn * z),
+        )
+
+    def _since_note_s(self, time_us: int) -> float | None:
+        """Time since the pose of the step before an exposure was kept; None: it wasn't the step before."""
+        passed_s = (time_us - self._before_us) * 1e-6
+        return passed_s if self._before_us >= 0 and 0.0 < passed_s < 1.5 * self._step_s else None
 
     def step(self, time_us: int) -> CameraFrame | None:
         """One physics step; the frame that is delivered on it, if there is one."""
@@ -303,7 +352,9 @@ class Camera:
         uniforms, normals = self._uniforms[self._row], self._normals[self._row]
         self._row += 1
         found: list[Detection] = []
-        if self._gimbal is None or not self._gimbal.retracted:
+        if self.reader is not None:
+            found = list(self.reader.read(self.view(time_us)))
+        elif self._gimbal is None or not self._gimbal.retracted:
             found = self._detections(time_us, uniforms, normals) + self._false_detections(time_us)
             found.sort(key=lambda detection: (detection.u_px, detection.v_px))
         frame = CameraFrame(time_us, self._number, tuple(found))
@@ -364,8 +415,8 @@ class Camera:
     def _blur_px(self, time_us: int) -> Array:
         """Ways (n,) of the targets in the picture during the exposure; 0 where it isn't known."""
         view, before = self._view, self._view_before
-        passed_s = (time_us - self._before_us) * 1e-6
-        if self._before_us < 0 or not 0.0 < passed_s < 1.5 * self._step_s:
+        passed_s = self._since_note_s(time_us)
+        if passed_s is None:
             return np.zeros(len(view))
         k.look(
             self._q_before[0],

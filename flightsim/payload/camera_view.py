@@ -31,6 +31,9 @@ class CameraView:
         zoom: the focal length against that of the camera's model.
         focus_distance_m: what is sharp; infinity: the far distance.
         covered: put away, it sees nothing.
+        exposure_s: time in which the picture is taken, with `time_us` in its middle.
+        velocity_ned_m_s: of the camera.
+        rotation_mount_rad_s: of the camera, in its own axes (x optical, y right, z down).
         targets: those of the world.
     """
 
@@ -41,3 +44,11 @@ class CameraView:
     focus_distance_m: float = float("inf")
     covered: bool = False
     targets: tuple[TargetView, ...] = ()
+    exposure_s: float = 0.0
+    velocity_ned_m_s: Vector = (0.0, 0.0, 0.0)
+    rotation_mount_rad_s: Vector = (0.0, 0.0, 0.0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the camera is known to move."""
+        return any(self.velocity_ned_m_s) or any(self.rotation_mount_rad_s)

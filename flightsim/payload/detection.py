@@ -1,6 +1,7 @@
 """The result of a detector for one frame, and its probability to detect a target."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_not_negative, require_positive, require_probability
+from flightsim.payload.camera_model import PinholeModel
+from flightsim.payload.camera_view import CameraView
+from flightsim.payload.imager import ImagerParameters
 from flightsim.payload.targets import NO_TAG
 
 Array = NDArray[np.float64]
@@ -78,6 +82,22 @@ class SeenTargets:
     edge_px: Array
     covered: NDArray[np.bool_]
     tagged: NDArray[np.bool_]
+
+
+class FrameReader(Protocol):
+    """Detects targets in the pictures of one camera."""
+
+    def read(self, view: CameraView) -> Sequence[Detection]:
+        """The detections in the picture of a view."""
+
+
+class FrameReaderParameters(Protocol):
+    """A kind of detector that works on pictures: a parameter set that starts a reader."""
+
+    def start(
+        self, *, model: PinholeModel, imager: ImagerParameters, blur_px_m: float, seed: int
+    ) -> FrameReader:
+        """The reader of a camera with this geometry, sensor and lens; what is random comes from the seed."""
 
 
 class DetectionModel(Protocol):

@@ -112,13 +112,16 @@ def paint_landscape(
     r_ned_from_mount: Array,
     eye_ned_m: Array,
     focal_px: float,
+    centre_u_px: float,
+    centre_v_px: float,
     scenery: Array,
     texture: NDArray[np.float32],
     out: NDArray[np.uint8],
 ) -> None:
     """Fill a picture (height, width, 3), BGR; pixel (i, j) shows the ray through its middle.
 
-    `r_ned_from_mount` (3, 3) has the optical axis, the picture's right and its down as columns. An eye at or
+    `r_ned_from_mount` (3, 3) has the optical axis, the picture's right and its down as columns. `centre_u_px`
+    and `centre_v_px` are where that axis meets the picture, which may be a part of a larger one. An eye at or
     under the ground sees it from 5 cm over it.
     """
     height, width = out.shape[0], out.shape[1]
@@ -127,9 +130,9 @@ def paint_landscape(
     length_m, width_m = scenery[RUNWAY_LENGTH_M], scenery[RUNWAY_WIDTH_M]
     colour = np.empty(3)
     for row in range(height):
-        v = (row + 0.5 - 0.5 * height) / focal_px
+        v = (row + 0.5 - centre_v_px) / focal_px
         for column in range(width):
-            u = (column + 0.5 - 0.5 * width) / focal_px
+            u = (column + 0.5 - centre_u_px) / focal_px
             stretch = math.sqrt(1.0 + u * u + v * v)
             dn = r_ned_from_mount[0, 0] + u * r_ned_from_mount[0, 1] + v * r_ned_from_mount[0, 2]
             de = r_ned_from_mount[1, 0] + u * r_ned_from_mount[1, 1] + v * r_ned_from_mount[1, 2]

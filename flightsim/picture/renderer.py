@@ -9,15 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
-from flightsim.foundation.rotations import rotate
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
 from flightsim.payload.camera_view import CameraView
+from flightsim.payload.imager import ImagerParameters
 from flightsim.picture import landscape_kernel as k
+from flightsim.picture.exposure import Exposure
 from flightsim.picture.ground_texture import ground_texture
-from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag
+from flightsim.picture.pose import rotation_of
+from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag, tag_box, tag_may_show
+from flightsim.picture.window import Window
 
 Picture = NDArray[np.uint8]
 
+_KEPT: Final = 4  # sizes and zooms at a time
 _COVERED: Final = 12  # grey of a camera that is put away
 
 
@@ -57,16 +61,31 @@ class Renderer:
         aperture_px_m: blur of what is far off when focused near: diameter in pixels times distance in metres
             at zoom 1 (thin lens). 0: all is sharp always.
         scenery: of the world.
+        imager: lens and sensor; ideal by default.
+        seed: of the noise.
+
+    Raises:
+        ValueError: the distortion folds the picture.
     """
 
     def __init__(
-        self, model: PinholeModel, *, aperture_px_m: float = 0.0, scenery: Scenery | None = None
+        self,
+        model: PinholeModel,
+        *,
+        aperture_px_m: float = 0.0,
+        scenery: Scenery | None = None,
+        imager: ImagerParameters | None = None,
+        seed: int = 0,
     ) -> None:
         require_not_negative(aperture_px_m=aperture_px_m)
         self.model = model
         self.scenery = scenery or Scenery()
         self._aperture_px_m = aperture_px_m
         self._texture = ground_texture()
+        self._imager = imager or ImagerParameters()
+        self._seed = seed
+        self._exposures: dict[tuple[int, float], Exposure] = {}
+        self._exposure(model.width_px, 1.0)
         numbers = self._numbers = np.zeros(k.SCENERY)
         s = self.scenery
         numbers[k.RUNWAY_LENGTH_M] = s.runway_length_m
@@ -81,20 +100,44 @@ class Renderer:
             -math.sin(s.sun_elevation_rad),
         )
 
-    def render(self, view: CameraView, *, width_px: int | None = None) -> Picture:
-        """The picture (height, width, 3), BGR, at the model's size or scaled to another width."""
+    def render(
+        self, view: CameraView, *, width_px: int | None = None, window: Window | None = None
+    ) -> Picture:
+        """The picture (height, width, 3), BGR, at the model's size or scaled to another width.
+
+        Args:
+            view: the view.
+            width_px: width of the picture; None: the model's.
+            window: a part of the picture; None: all of it.
+        """
         model = self.model
         width = model.width_px if width_px is None else width_px
         height = max(1, round(model.height_px * width / model.width_px))
-        picture: Picture = np.empty((height, width, 3), np.uint8)
         if view.covered:
-            picture[:] = _COVERED
-            return picture
+            shape = (height, width) if window is None else (window.height, window.width)
+            return np.full((*shape, 3), _COVERED, np.uint8)
+        exposure = self._exposure(width, view.zoom)
+        size_px = exposure.ideal_px
+        if window is None:
+            window = Window(left=0, top=0, width=width, height=height)
+            part = Window(left=0, top=0, width=size_px[0], height=size_px[1])
+        else:
+            part = exposure.ideal_window(window)
+        picture: Picture = np.empty((part.height, part.width, 3), np.uint8)
         scale = width / model.width_px
         focal_px = model.focal_px * view.zoom * scale
-        r_ned_from_mount = _matrix(view.q_ned_from_mount)
+        r_ned_from_mount = rotation_of(view.q_ned_from_mount)
         eye = np.array(view.eye_ned_m)
-        k.paint_landscape(r_ned_from_mount, eye, focal_px, self._numbers, self._texture, picture)
+        k.paint_landscape(
+            r_ned_from_mount,
+            eye,
+            focal_px,
+            0.5 * size_px[0] - part.left,
+            0.5 * size_px[1] - part.top,
+            self._numbers,
+            self._texture,
+            picture,
+        )
         camera_from_ned = camera_from_gimbal(r_ned_from_mount).T
         sun = self._numbers[k.SUN_NED]
 
@@ -104,10 +147,58 @@ class Renderer:
         for index in sorted(range(len(view.targets)), key=distance_m, reverse=True):
             target = view.targets[index]
             if shows_tag(target):
-                draw_tag(picture, target, camera_from_ned, eye, focal_px)
+                draw_tag(picture, part, size_px, target, camera_from_ned, eye, focal_px)
             else:
-                draw_ball(picture, target, camera_from_ned, eye, focal_px, sun)
-        return self._defocused(picture, view, r_ned_from_mount, scale)
+                draw_ball(picture, part, size_px, target, camera_from_ned, eye, focal_px, sun)
+        sharp = self._defocused(picture, view, r_ned_from_mount, scale)
+        return exposure.expose(sharp, view, window, part)
+
+    def tag_window(self, view: CameraView, margin_px: int) -> Window | None:
+        """The part of the picture around the tags of a view; None: all of it, or nothing, may be needed."""
+        model = self.model
+        focal_px = model.focal_px * view.zoom
+        box = tag_box(view, focal_px)
+        if box is None:
+            return None
+        centre = np.array(model.centre_px)
+        distortion = self._imager.distortion
+        corners = np.array([(x, y) for x in (box[0][0], box[1][0]) for y in (box[0][1], box[1][1])])
+        reach = np.hypot(*self._exposure(model.width_px, view.zoom).ideal_px)
+        if np.hypot(*corners.T).max() > reach:  # beyond what the model of the distortion is for
+            return None
+        seen = distortion.distorted(corners / focal_px) * focal_px + centre
+        low, high = seen.min(axis=0).tolist(), seen.max(axis=0).tolist()
+        return Window.around(
+            (low[0], low[1]), (high[0], high[1]), margin_px, (model.width_px, model.height_px)
+        )
+
+    def may_show_tag(self, view: CameraView, margin: float = 0.05) -> bool:
+        """Whether a tag, or a part of one, may lie in the picture of a view; False is certain.
+
+        Args:
+            view: camera and targets.
+            margin: around the picture, in focal lengths.
+        """
+        width, height = self._exposure(self.model.width_px, 1.0).ideal_px
+        focal_px = self.model.focal_px
+        return tag_may_show(view, 0.5 * width / focal_px + margin, 0.5 * height / focal_px + margin)
+
+    def _exposure(self, width_px: int, zoom: float) -> Exposure:
+        """Lens and sensor for a size and a zoom; a few are kept."""
+        key = (width_px, zoom)
+        if key not in self._exposures:
+            model = self.model
+            made = Exposure(
+                self._imager,
+                width_px=width_px,
+                height_px=max(1, round(model.height_px * width_px / model.width_px)),
+                focal_px=model.focal_px * zoom * width_px / model.width_px,
+                seed=self._seed,
+            )
+            if len(self._exposures) == _KEPT:
+                del self._exposures[next(iter(self._exposures))]
+            self._exposures[key] = made
+        return self._exposures[key]
 
     def _defocused(
         self, picture: Picture, view: CameraView, r_ned_from_mount: NDArray[np.float64], scale: float
@@ -123,12 +214,3 @@ class Renderer:
         sigma = min(40.0, 0.35 * circle_px)
         blurred: Picture = cv2.GaussianBlur(picture, (0, 0), sigma).astype(np.uint8, copy=False)
         return blurred
-
-
-def _matrix(q: tuple[float, float, float, float]) -> NDArray[np.float64]:
-    """Rotation matrix of a quaternion."""
-    columns = np.empty((3, 3))
-    quaternion = np.array(q)
-    for axis in range(3):
-        rotate(quaternion, np.eye(3)[axis], columns[axis])
-    return np.ascontiguousarray(columns.T)

@@ -13,7 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.payload.camera_view import TargetView
+from flightsim.payload.camera_model import camera_from_gimbal
+from flightsim.payload.camera_view import CameraView, TargetView
+from flightsim.picture.pose import rotation_of
+from flightsim.picture.window import Window
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -47,13 +50,11 @@ def tag_plate(tag_id: int) -> Picture:
     return plate
 
 
-def draw_tag(
-    picture: Picture, target: TargetView, camera_from_ned: Array, eye: Array, focal_px: float
-) -> None:
-    """Lay a tag's plate on the ground."""
+def _plate_corners(target: TargetView) -> Array:
+    """Corners (4, 3) of a tag's plate with its margin, from north-west clockwise, local NED."""
     half = 0.5 * target.size_m * (_CELLS + 2) / _CELLS
     north, east, down = target.position_ned_m
-    corners = np.array(
+    return np.array(
         [
             (north + half, east - half, down),
             (north + half, east + half, down),
@@ -61,14 +62,26 @@ def draw_tag(
             (north - half, east - half, down),
         ]
     )
-    seen = (corners - eye) @ camera_from_ned.T
+
+
+def draw_tag(
+    picture: Picture,
+    window: Window,
+    size_px: tuple[int, int],
+    target: TargetView,
+    camera_from_ned: Array,
+    eye: Array,
+    focal_px: float,
+) -> None:
+    """Lay a tag's plate on the ground; `picture` is the part `window` of one of a size."""
+    seen = (_plate_corners(target) - eye) @ camera_from_ned.T
     if seen[:, 2].min() < _NEAREST_M:
         return
-    height, width = picture.shape[:2]
+    width, height = size_px
     pixels = focal_px * seen[:, :2] / seen[:, 2:] + (0.5 * width, 0.5 * height)
     if not np.abs(pixels).max() < _LARGEST_PX:
         return
-    box = _box(pixels.min(axis=0), pixels.max(axis=0), width, height)
+    box = _box(pixels.min(axis=0), pixels.max(axis=0), window)
     if box is None:
         return
     left, top, right, bottom = box
@@ -91,24 +104,31 @@ def draw_tag(
     if fine > 1:
         colour = cv2.resize(colour, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
         mask = cv2.resize(mask, (right - left, bottom - top), interpolation=cv2.INTER_AREA).astype(np.uint8)
-    _blend(picture[top:bottom, left:right], colour, mask / 255.0)
+    _blend(_part(picture, window, box), colour, mask / 255.0)
 
 
 def draw_ball(
-    picture: Picture, target: TargetView, camera_from_ned: Array, eye: Array, focal_px: float, sun_ned: Array
+    picture: Picture,
+    window: Window,
+    size_px: tuple[int, int],
+    target: TargetView,
+    camera_from_ned: Array,
+    eye: Array,
+    focal_px: float,
+    sun_ned: Array,
 ) -> None:
-    """Put a ball where the target is, lit by the sun."""
+    """Put a ball where the target is, lit by the sun; `picture` is the part `window` of one of a size."""
     sight = np.asarray(target.position_ned_m) - eye
     seen = camera_from_ned @ sight
     if seen[2] < _NEAREST_M:
         return
-    height, width = picture.shape[:2]
+    width, height = size_px
     centre = focal_px * seen[:2] / seen[2] + (0.5 * width, 0.5 * height)
     range_m = float(np.linalg.norm(sight))
     radius = focal_px * 0.5 * target.size_m / range_m
     if not radius < _LARGEST_PX:
         return
-    box = _box(centre - radius - 1.0, centre + radius + 1.0, width, height)
+    box = _box(centre - radius - 1.0, centre + radius + 1.0, window)
     if box is None:
         return
     left, top, right, bottom = box
@@ -122,16 +142,66 @@ def draw_ball(
     depth = np.sqrt(np.clip(1.0 - (distance / max(radius, 1e-9)) ** 2, 0.0, 1.0))
     lit = np.clip((x * facing[0] + y * facing[1]) / max(radius, 1e-9) - depth * facing[2], 0.0, 1.0)
     colour = (0.6 + 0.4 * lit)[:, :, None] * _BALL_BGR
-    _blend(picture[top:bottom, left:right], colour, np.clip(cover, 0.0, 1.0))
+    _blend(_part(picture, window, box), colour, np.clip(cover, 0.0, 1.0))
 
 
-def _box(low: Array, high: Array, width: int, height: int) -> tuple[int, int, int, int] | None:
-    """The pixels of a picture that a box covers: left, top, right, bottom; None: none."""
-    left, top = max(0, math.floor(low[0])), max(0, math.floor(low[1]))
-    right, bottom = min(width, math.ceil(high[0])), min(height, math.ceil(high[1]))
+def _box(low: Array, high: Array, window: Window) -> tuple[int, int, int, int] | None:
+    """The pixels of a part of a picture that a box covers: left, top, right, bottom; None: none."""
+    left, top = max(window.left, math.floor(low[0])), max(window.top, math.floor(low[1]))
+    right, bottom = min(window.right, math.ceil(high[0])), min(window.bottom, math.ceil(high[1]))
     return (left, top, right, bottom) if left < right and top < bottom else None
+
+
+def _part(picture: Picture, window: Window, box: tuple[int, int, int, int]) -> Picture:
+    """Those pixels of a part of a picture."""
+    left, top, right, bottom = box
+    return picture[top - window.top : bottom - window.top, left - window.left : right - window.left]
 
 
 def _blend(part: Picture, colour: NDArray[Any], cover: Array) -> None:
     share = cover[:, :, None]
     part[:] = np.round(part * (1.0 - share) + colour * share).astype(np.uint8)
+
+
+def tag_may_show(view: CameraView, half_width: float, half_height: float) -> bool:
+    """Whether a plate of a tag, or a part of one, may lie in a picture; False is certain.
+
+    A plate whose corners are all beyond the same side of the view cannot.
+
+    Args:
+        view: camera and targets.
+        half_width, half_height: half of the picture at zoom 1, with its margin, in focal lengths.
+    """
+    if view.covered:
+        return False
+    camera_from_ned = None
+    blur = view.exposure_s * (
+        math.hypot(*view.rotation_mount_rad_s)
+        + math.hypot(*view.velocity_ned_m_s) / max(0.05, -view.eye_ned_m[2])
+    )
+    for target in view.targets:
+        if not shows_tag(target):
+            continue
+        if camera_from_ned is None:
+            camera_from_ned = camera_from_gimbal(rotation_of(view.q_ned_from_mount)).T
+        seen = (_plate_corners(target) - view.eye_ned_m) @ camera_from_ned.T
+        right, down, ahead = seen.T
+        wide = ahead * (half_width / view.zoom + blur)
+        tall = ahead * (half_height / view.zoom + blur)
+        sides = (ahead <= 0.0, right > wide, -right > wide, down > tall, -down > tall)
+        if not any(side.all() for side in sides):
+            return True
+    return False
+
+
+def tag_box(view: CameraView, focal_px: float) -> tuple[Array, Array] | None:
+    """Least and greatest offsets of the tags' plates from the optical axis: (right, down), in pixels, without
+    lens distortion. None: a plate reaches behind the camera.
+    """
+    camera_from_ned = camera_from_gimbal(rotation_of(view.q_ned_from_mount)).T
+    plates = [_plate_corners(target) for target in view.targets if shows_tag(target)]
+    seen = (np.concatenate(plates) - view.eye_ned_m) @ camera_from_ned.T
+    if seen[:, 2].min() < _NEAREST_M:
+        return None
+    offsets = focal_px * seen[:, :2] / seen[:, 2:]
+    return offsets.min(axis=0), offsets.max(axis=0)

@@ -3,13 +3,24 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.mission_command import FlightOption, Given, MissionCommand, option
+from missions.cli.mission_command import (
+    MISSION_GROUP,
+    FlightOption,
+    Given,
+    MissionCommand,
+    Scope,
+    option,
+)
 from missions.cli.options import radians_of
 
+if TYPE_CHECKING:
+    from flightsim.world_spec import WorldSpec
+
+SEARCH_LIMIT_S: Final = 1800.0
 _WINGS: Final = " Aircraft: {}."
 
 
@@ -47,6 +58,22 @@ def _shape(given: Given) -> dict[str, Any]:
     }
 
 
+def _limit_s(given: Given) -> float | None:
+    if given["search_time"] is None and given["search"]:
+        return SEARCH_LIMIT_S
+    limit_s: float | None = given["search_time"]
+    return limit_s
+
+
+def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
+    if not options.search:
+        return world
+    from missions.embedded.tag_search import TagTarget, tag_search_world
+
+    target = TagTarget(speed_m_s=given["target_speed"], size_m=given["tag_size"])
+    return tag_search_world(world, options, target)
+
+
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
     from missions.options import FlightOptions, Via, parse_pair
 
@@ -65,9 +92,11 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         height_m=height_m,
         speed_m_s=given["speed"],
         periods=given["periods"],
-        search_time_s=given["search_time"],
+        search_time_s=_limit_s(given),
         via=Via(given["via"]),
         acceptance_m=given["acceptance"],
+        search=given["search"],
+        tag_id=given["tag"],
     )
 
 
@@ -134,6 +163,31 @@ _EVERY: Final = (
     ),
     option("--rate", type=float, default=25.0, help="Setpoints per second."),
     option(
+        "--search",
+        is_flag=True,
+        show_default=False,
+        help="Fly until the camera has detected a tag; --search-time is the limit, 1800 s if not given.",
+    ),
+    option("--tag", type=int, default=0, help="Number of the tag (AprilTag 36h11) that --search looks for."),
+    FlightOption(
+        ("--target-speed",),
+        group=MISSION_GROUP,
+        scope=Scope.EMBEDDED,
+        type=float,
+        default=0.3,
+        show_default=True,
+        help="Speed of the target's random walk, m/s; 0: it stays where it is.",
+    ),
+    FlightOption(
+        ("--tag-size",),
+        group=MISSION_GROUP,
+        scope=Scope.EMBEDDED,
+        type=float,
+        default=0.3,
+        show_default=True,
+        help="Side of the tag's black square, m.",
+    ),
+    option(
         "--separation",
         type=float,
         default=4.0,
@@ -147,6 +201,7 @@ def _pattern(help_text: str, own: tuple[FlightOption, ...]) -> MissionCommand:
         help=help_text,
         options=(*own, *_EVERY),
         build=_build,
+        world=_world,
         fields=MappingProxyType(
             {
                 "size": ("width_m", "height_m"),
@@ -154,6 +209,7 @@ def _pattern(help_text: str, own: tuple[FlightOption, ...]) -> MissionCommand:
                 "amplitude_y": ("height_m",),
                 "ratio": ("ratio", "pattern"),
                 "rate": ("rate_hz",),
+                "tag": ("tag_id",),
             }
         ),
     )

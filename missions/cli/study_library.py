@@ -20,6 +20,12 @@ def _lissajous_localization(given: Given) -> "Study[Any, Any]":
     return study(given["equations"])
 
 
+def _lissajous_search(given: Given) -> "Study[Any, Any]":
+    from missions.studies.lissajous_search import study
+
+    return study(speed=given["speed"], target_speed=given["target_speed"])
+
+
 def _magnetic_identification(given: Given) -> "Study[Any, Any]":
     from missions.studies.magnetic_identification import study
 
@@ -53,6 +59,29 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_lissajous_localization,
+        ),
+        "lissajous-search": StudyCommand(
+            help=(
+                "Seven patterns search for a walking tag in 1800 s: Table I of Steckenrider et al. 2020, as "
+                "flights on SITL.\n\n"
+                "The tag is read off rendered pictures. The folder gets search.png, the share of searches "
+                "that have found it over time."
+            ),
+            options=(
+                click.Option(
+                    ["--speed"],
+                    type=FiniteRange(min=0.5, max=10.0),
+                    default=5.0,
+                    help="Of the vehicle, m/s; the paper does not give it.",
+                ),
+                click.Option(
+                    ["--target-speed"],
+                    type=FiniteRange(min=0.0, max=5.0),
+                    default=0.3,
+                    help="Of the target, m/s; the paper does not give it.",
+                ),
+            ),
+            build=_lissajous_search,
         ),
         "magnetic-identification": StudyCommand(
             help=(

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
     from missions.embedded.survey_worlds import survey_world
+    from missions.embedded.tag_search import TagTarget, search_camera, tag_search_world
     from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
     from missions.embedded.worlds import (
         CAMERA,
@@ -24,6 +26,8 @@ __all__ = [
     "MAX_FLIGHT_S",
     "EmbeddedSitl",
     "MotionKind",
+    "RenderedTags",
+    "TagTarget",
     "TargetField",
     "alone",
     "carrying",
@@ -32,11 +36,15 @@ __all__ = [
     "multi_target_world",
     "occupancy_world",
     "orbit_world",
+    "search_camera",
     "survey_world",
+    "tag_search_world",
     "terrain_targets_world",
 ]
 
 _SITL: Final = "missions.embedded.sitl"
+_RENDERED_TAGS: Final = "missions.embedded.rendered_tags"
+_TAG_SEARCH: Final = "missions.embedded.tag_search"
 _TARGET_FIELDS: Final = "missions.embedded.target_fields"
 _WORLDS: Final = "missions.embedded.worlds"
 
@@ -44,6 +52,8 @@ __getattr__ = lazy_exports(
     __name__,
     {
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
+        "RenderedTags": _RENDERED_TAGS,
+        **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
         **dict.fromkeys(("CAMERA", "MAGNETOMETER", "MotionKind", "carrying", "motion_of"), _WORLDS),
         "survey_world": "missions.embedded.survey_worlds",

@@ -15,6 +15,7 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
+from missions.embedded.rendered_tags import RenderedTagsReader
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 
@@ -85,6 +86,18 @@ class EmbeddedSitl:
     def time_us(self) -> int:
         """Vehicle time, microseconds since boot."""
         return self.sitl.time_us
+
+    def pictures(self) -> dict[str, bytes]:
+        """The first picture of each camera in which a tag was read, as PNG with the detections drawn in, by
+        file name.
+        """
+        found = {}
+        for vehicle in self.sitl.vehicles:
+            camera = None if vehicle.payload is None else vehicle.payload.camera
+            reader = None if camera is None else camera.device.reader
+            if isinstance(reader, RenderedTagsReader) and reader.kept is not None:
+                found[f"tag{vehicle.specification.system_id}.png"] = reader.kept.drawn()
+        return found
 
     def on_truth(self, listener: TruthListener) -> None:
         """Subscribe to frames of truth at 50 Hz, for the log and the score."""

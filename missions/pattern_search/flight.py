@@ -2,8 +2,9 @@
 
 import asyncio
 import math
+from collections.abc import Coroutine
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -33,6 +34,9 @@ from missions.vehicle.guided import GuidedSession
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.telemetry import Attitude
 from missions.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from missions.pattern_search.tag_watch import TagWatch
 
 _SETTLE_S: Final = 1.5
 _SAME_PLACE_M: Final = 0.3
@@ -87,11 +91,17 @@ def pattern_frequencies(curve: Curve, period_s: float) -> tuple[float, float]:
     return natural_frequencies(curve, _fundamental_period_s(curve, period_s))
 
 
-async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> None:
+async def fly_pattern(
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, search: "TagWatch | None" = None
+) -> None:
     """Fly a curve as the options specify, including takeoff and landing.
 
     The vehicle is ready (`wait_ready`) and on the ground. The commanded path and the phases are stored in its
     notes.
+
+    Args:
+        search: ends the pattern when its tag is found, or its time is over; None: the pattern is flown to its
+            end.
 
     Raises:
         PlanError: the vehicle's parameters don't allow the pattern.
@@ -108,9 +118,9 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
         trajectory = await asyncio.to_thread(plan_pattern, curve, options, limits)
     centre = _centre(vehicle, options)
     if options.via is Via.SETPOINTS:
-        await _fly_setpoints(vehicle, options, limits, trajectory, centre)
+        await _fly_setpoints(vehicle, options, limits, trajectory, centre, search)
     else:
-        await _fly_waypoints(vehicle, options, curve, trajectory, centre)
+        await _fly_waypoints(vehicle, options, curve, trajectory, centre, search)
 
 
 def pattern_outline(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> Outline:
@@ -151,6 +161,7 @@ async def _fly_setpoints(
     limits: MulticopterLimits,
     trajectory: Trajectory,
     centre: Vector,
+    search: "TagWatch | None",
 ) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     altitude_m = options.own_altitude_m
@@ -176,11 +187,24 @@ async def _fly_setpoints(
         duration_s = trajectory.duration_s
 
         def source(t: float) -> Setpoint | None:
+            nonlocal last
             notes.progress = min(1.0, t / duration_s)
-            return setpoint_at(trajectory.at(t), centre) if t <= duration_s else None
+            if t > duration_s:
+                return None
+            setpoint = setpoint_at(trajectory.at(t), centre)
+            if search is not None and search.over:
+                last, notes.cut_short = setpoint, True
+                assert notes.commanded is not None
+                path = notes.commanded.points_ned_m
+                notes.commanded = replace(
+                    notes.commanded, points_ned_m=path[: max(2, math.floor(notes.progress * len(path)))]
+                )
+                return None
+            return setpoint
 
         await guided.follow(source)
         notes.begin("return", clock.stamp_us)
+        assert last.position_ned_m is not None
         await _fly_line(vehicle, guided, last.position_ned_m, above_home, limits)
     await vehicle.land()
     notes.end(clock.stamp_us)
@@ -316,7 +340,12 @@ async def pattern_items(vehicle: Vehicle, options: FlightOptions, curve: Curve) 
 
 
 async def _fly_waypoints(
-    vehicle: Vehicle, options: FlightOptions, curve: Curve, trajectory: Trajectory, centre: Vector
+    vehicle: Vehicle,
+    options: FlightOptions,
+    curve: Curve,
+    trajectory: Trajectory,
+    centre: Vector,
+    search: "TagWatch | None",
 ) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     length_m = _length_m(options)
@@ -337,22 +366,41 @@ async def _fly_waypoints(
     await vehicle.start_mission()
     route_m = float(np.linalg.norm(np.diff(notes.commanded.points_ned_m, axis=0), axis=1).sum())
     reach_m = float(np.linalg.norm(notes.commanded.points_ned_m, axis=1).max())
-    await vehicle.plans.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
+
+    async def fly_items(waiting: Coroutine[Any, Any, None]) -> bool:
+        if search is None:
+            await waiting
+            return False
+        return await search.unless_over(waiting)
+
+    over = await fly_items(
+        vehicle.plans.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
+    )
     notes.begin(PATTERN, clock.stamp_us)
 
+    reached = 0
+
     def progress(done: int) -> None:
+        nonlocal reached
+        reached = done - start
         notes.progress = min(1.0, max(0.0, (done - first) / max(1, last - first)))
 
     limit_s = 60.0 + 4.0 * route_m / options.speed_m_s
     if options.search_time_s is not None:
         limit_s = min(limit_s, options.search_time_s)
     try:
-        await vehicle.plans.wait_item_reached(last, limit_s, progress)
+        over = over or await fly_items(vehicle.plans.wait_item_reached(last, limit_s, progress))
     except VehicleTimeout:
         if options.search_time_s is None:
             raise
+        over = True  # the search time has ended
+    if over:
         notes.cut_short = True
-        await vehicle.return_to_launch(wait=False)  # the search time has ended
+        flown = [item.command for item in plan.items[: reached + 1]].count(dialect.MAV_CMD_NAV_WAYPOINT)
+        notes.commanded = replace(
+            notes.commanded, waypoints_ned_m=notes.commanded.waypoints_ned_m[:flown]
+        )  # the way home may pass others
+        await vehicle.return_to_launch(wait=False)
     notes.begin("return", clock.stamp_us)
     await vehicle.link.wait_disarmed(300.0 + 2.0 * reach_m)
     notes.end(clock.stamp_us)

@@ -19,6 +19,27 @@ from missions.patterns import Curve
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.vehicle.vehicle import Vehicle
 
+
+def check_search(options: FlightOptions, limits: Limits) -> None:
+    """Raise PlanError if these vehicles can't search for a tag."""
+    if isinstance(limits, FixedWingLimits):
+        raise PlanError("`search` is flown by multicopters; aircraft fly their patterns without it")
+    if options.vehicles > 1:
+        raise PlanError(f"`search` is flown by one vehicle; `vehicles` is {options.vehicles}")
+
+
+def search_line(search: Mapping[str, Any]) -> str:
+    """The result of a search in one line."""
+    if not search["found"]:
+        return f"tag {search['tag_id']} was not found in {search['search_s']:.0f} s"
+    line = f"tag {search['tag_id']} found after {search['search_s']:.1f} s"
+    if search["north_m"] is not None:
+        line += f" at {search['north_m']:.1f} m north, {search['east_m']:.1f} m east"
+    if search["error_m"] is not None:
+        line += f", {search['error_m']:.2f} m from its true place"
+    return line
+
+
 CurveMaker = Callable[[FlightOptions], Curve]
 Sizing = Callable[[FlightOptions, FixedWingLimits], FlightOptions]
 
@@ -45,6 +66,8 @@ class PatternMission(Mission[FlightOptions]):
     def check(self, options: FlightOptions, limits: Limits) -> None:
         for name in options.arguments:
             raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
+        if options.search:
+            check_search(options, limits)
         check_pattern(self.curve(options), options, limits)
 
     def curve(self, options: FlightOptions) -> Curve:
@@ -58,7 +81,23 @@ class PatternMission(Mission[FlightOptions]):
         return pattern_outline(vehicle, options, self.curve(options))
 
     async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
-        await fly_pattern(vehicle, options, self.curve(options))
+        if not options.search:
+            await fly_pattern(vehicle, options, self.curve(options))
+            return
+        from missions.pattern_search.tag_watch import TagWatch
+
+        search = TagWatch(
+            vehicle,
+            tag_id=options.tag_id,
+            altitude_m=options.own_altitude_m,
+            limit_s=options.search_time_s,
+        )
+        search.start()
+        try:
+            await fly_pattern(vehicle, options, self.curve(options), search)
+        finally:
+            search.stop()
+            search.note()
 
     def estimator_settings(self, options: FlightOptions) -> Mapping[str, float | str]:
         if options.period_s is None:
@@ -68,13 +107,21 @@ class PatternMission(Mission[FlightOptions]):
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         assert isinstance(debriefing.options, FlightOptions)
-        return self.estimator_settings(debriefing.options)
+        figures: dict[str, Any] = dict(self.estimator_settings(debriefing.options))
+        if debriefing.options.search and debriefing.flights:
+            from missions.pattern_search.search_figures import search_figures
+
+            figures["search"] = search_figures(debriefing)
+        return figures
 
     def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        if "omega_x_rad_s" not in summary:
-            return ()
-        x, y = summary["omega_x_rad_s"], summary["omega_y_rad_s"]
-        return (f"frequencies: omega_x_rad_s={x:.6g} (east), omega_y_rad_s={y:.6g} (north)",)
+        lines = []
+        if "omega_x_rad_s" in summary:
+            x, y = summary["omega_x_rad_s"], summary["omega_y_rad_s"]
+            lines.append(f"frequencies: omega_x_rad_s={x:.6g} (east), omega_y_rad_s={y:.6g} (north)")
+        if "search" in summary:
+            lines.append(search_line(summary["search"]))
+        return lines
 
     def title(self, options: FlightOptions) -> str:
         parts = [self.name]

@@ -222,6 +222,10 @@ def _fly_interruptible(
         if request.picture and debriefing.flights:
             with whole(folder / PICTURE_NAME):
                 mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
+            for name, data in stage.pictures().items():
+                with whole(folder / name):
+                    with (folder / name).open("xb") as file:
+                        file.write(data)
     except OSError as error:
         missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))

@@ -1,7 +1,7 @@
 """Opens the world of a flight: an embedded world, or links to vehicles."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -38,6 +38,7 @@ class Stage:
         home: home of an embedded world; None: the vehicles report theirs.
         close: releases everything; called at the end.
         published_map: file of the published magnetic map of an embedded world; None: there is none.
+        pictures: pictures of the embedded cameras with what they have detected, by file name.
     """
 
     loop: asyncio.AbstractEventLoop
@@ -50,6 +51,7 @@ class Stage:
     home: GeodeticPosition | None
     close: Callable[[], None]
     published_map: Path | None = None
+    pictures: Callable[[], Mapping[str, bytes]] = dict
 
 
 def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
@@ -65,6 +67,7 @@ def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
         home=sitl.home,
         close=sitl.close,
         published_map=sitl.published_map,
+        pictures=sitl.pictures,
     )
 
 

@@ -1,0 +1,189 @@
+"""Detector of AprilTags of the family 36h11 (Olson 2011) in pictures, by OpenCV's ArUco module.
+
+The corners are refined to fractions of a pixel, freed of the lens distortion, and give the tag's pose by the
+solution for squares of Collins and Bartoli (2014, IPPE).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import EstimatorError
+from estimators.vision.camera import CameraGeometry
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+TAGS: Final = 587
+"""Number of tags in the family."""
+_REFINE_PX: Final = 5
+_LEAST_SIDE_PX: Final = 4.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TagDetectorParameters:
+    """Parameters of the detector.
+
+    Attributes:
+        size_m: side of the black square.
+        sizes_m: (number, side) of single tags whose side is not `size_m`.
+        tag_ids: the tags that are reported; empty: all of the family.
+        corrected_bits: at most this many wrong bits of a tag are corrected. The family's codes differ in 11
+            bits; each bit that is corrected lets more of what is no tag pass.
+
+    Raises:
+        EstimatorError: a value is not possible.
+    """
+
+    size_m: float = 1.0
+    sizes_m: tuple[tuple[int, float], ...] = ()
+    tag_ids: tuple[int, ...] = ()
+    corrected_bits: int = 1
+
+    def __post_init__(self) -> None:
+        for name, size_m in (
+            ("size_m", self.size_m),
+            *(("sizes_m", size_m) for _, size_m in self.sizes_m),
+        ):
+            if not (math.isfinite(size_m) and size_m > 0.0):
+                raise EstimatorError(f"`{name}` {size_m:g} m is not possible; give more than 0")
+        for tag_id in (*self.tag_ids, *(number for number, _ in self.sizes_m)):
+            if not 0 <= tag_id < TAGS:
+                raise EstimatorError(f"tag {tag_id} is not in 0..{TAGS - 1}, the family 36h11")
+        if not 0 <= self.corrected_bits <= 5:
+            raise EstimatorError(f"`corrected_bits` {self.corrected_bits} is not in 0..5")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TagDetection:
+    """One tag in one picture.
+
+    Attributes:
+        tag_id: its number.
+        corners_px: (4, 2), from the tag's top left clockwise.
+        centre_px: where its centre is seen: of the diagonals' intersection, not of the corners' mean.
+        angle_x_rad, angle_y_rad: of the centre's ray off the optical axis, right and down, each in its plane
+            (LANDING_TARGET).
+        size_rad: angle that the mean side covers.
+        position_camera_m: (3,) of its centre in the camera frame.
+        r_camera_from_tag: (3, 3); the tag's x to its right, y to its top, z out of it.
+        reprojection_px: root mean square distance of the corners from those of the pose.
+    """
+
+    tag_id: int
+    corners_px: Array
+    centre_px: tuple[float, float]
+    angle_x_rad: float
+    angle_y_rad: float
+    size_rad: float
+    position_camera_m: Array
+    r_camera_from_tag: Array
+    reprojection_px: float
+
+    @property
+    def distance_m(self) -> float:
+        """Distance of the centre from the camera."""
+        return float(np.linalg.norm(self.position_camera_m))
+
+
+class TagDetector:
+    """Finds tags in the pictures of one camera.
+
+    Args:
+        camera: its geometry.
+        parameters: None: the defaults.
+    """
+
+    def __init__(self, camera: CameraGeometry, parameters: TagDetectorParameters | None = None) -> None:
+        self.camera = camera
+        p = self.parameters = parameters or TagDetectorParameters()
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+        settings = cv2.aruco.DetectorParameters()
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        settings.cornerRefinementWinSize = _REFINE_PX
+        most_corrected = (11 - 1) // 2
+        settings.errorCorrectionRate = p.corrected_bits / most_corrected
+        self._detector = cv2.aruco.ArucoDetector(dictionary, settings)
+        self._wanted = frozenset(p.tag_ids)
+        self._sizes_m = dict(p.sizes_m)
+
+    def detect(
+        self, picture: Picture, *, corner_px: tuple[int, int] | None = None
+    ) -> tuple[TagDetection, ...]:
+        """The tags in a picture (height, width) or (height, width, 3) BGR, from left to right.
+
+        Args:
+            picture: the whole picture, or a part of it.
+            corner_px: column and row of the camera's picture at which the part begins; None: it is the whole.
+
+        Raises:
+            EstimatorError: the whole picture has another size than the camera's.
+        """
+        height, width = picture.shape[:2]
+        if corner_px is None and (width, height) != (self.camera.width_px, self.camera.height_px):
+            raise EstimatorError(
+                f"a picture of {width} x {height} pixels is not of the camera of {self.camera.width_px} x "
+                f"{self.camera.height_px}; calibrate the camera for this size"
+            )
+        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
+        settings = self._detector.getDetectorParameters()
+        settings.minMarkerPerimeterRate = 4.0 * _LEAST_SIDE_PX / max(width, height)
+        settings.maxMarkerPerimeterRate = 4.0
+        self._detector.setDetectorParameters(settings)
+        corners, numbers, _ = self._detector.detectMarkers(grey)
+        left_top = np.array(corner_px or (0, 0)) + 0.5  # OpenCV counts from the middle of the first pixel
+        found = []
+        for tag_corners, tag_id in zip(
+            corners, () if numbers is None else numbers.ravel().tolist(), strict=True
+        ):
+            if self._wanted and tag_id not in self._wanted:
+                continue
+            detection = self._measured(int(tag_id), tag_corners.reshape(4, 2).astype(np.float64) + left_top)
+            if detection is not None:
+                found.append(detection)
+        found.sort(key=lambda detection: detection.centre_px)
+        return tuple(found)
+
+    def _measured(self, tag_id: int, corners_px: Array) -> TagDetection | None:
+        """A tag's angles and pose; None: no pose before the camera has such corners."""
+        half_m = 0.5 * self._sizes_m.get(tag_id, self.parameters.size_m)
+        square = half_m * np.array([(-1.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (-1.0, -1.0, 0.0)])
+        rays = self.camera.rays(corners_px)
+        solved, turn, place = cv2.solvePnP(square, rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
+        if not solved or not float(place[2, 0]) > 0.0:
+            return None
+        turn, place = cv2.solvePnPRefineLM(square, rays, np.eye(3), None, turn, place)
+        rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)
+        position = np.asarray(place, dtype=np.float64).ravel()
+        seen = self.camera.pixels(square @ rotation.T + position)
+        off_px = float(np.sqrt(np.mean(np.sum((seen - corners_px) ** 2, axis=1))))
+        centre = self.camera.pixels(position[None])[0]
+        sides = np.linalg.norm(np.diff(np.vstack((rays, rays[:1])), axis=0), axis=1)
+        return TagDetection(
+            tag_id=tag_id,
+            corners_px=corners_px,
+            centre_px=(float(centre[0]), float(centre[1])),
+            angle_x_rad=math.atan2(position[0], position[2]),
+            angle_y_rad=math.atan2(position[1], position[2]),
+            size_rad=2.0 * math.atan(0.5 * float(sides.mean())),
+            position_camera_m=position,
+            r_camera_from_tag=rotation,
+            reprojection_px=off_px,
+        )
+
+
+def draw_detections(picture: Picture, detections: tuple[TagDetection, ...]) -> Picture:
+    """A copy of a picture (height, width, 3) with the outline and the number of each tag."""
+    drawn = picture.copy()
+    for found in detections:
+        outline = np.round((found.corners_px - 0.5) * 16).astype(np.int32)
+        cv2.polylines(drawn, [outline], True, (0, 255, 0), 2, cv2.LINE_AA, 4)
+        place = (found.corners_px.max(axis=0) + 4).astype(int).tolist()
+        text = f"{found.tag_id}: {found.distance_m:.1f} m"
+        for colour, width in (((0, 0, 0), 4), ((255, 255, 255), 1)):
+            cv2.putText(drawn, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, width, cv2.LINE_AA)
+    return drawn

@@ -1,0 +1,145 @@
+"""A camera whose detections are read off rendered pictures: the world's renderer and the detector of
+`estimators.vision`, frame by frame on vehicle time.
+"""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.vision import (
+    CameraGeometry,
+    TagDetection,
+    TagDetector,
+    TagDetectorParameters,
+    draw_detections,
+)
+from flightsim.payload import CameraView, Detection, ImagerParameters, PinholeModel
+from flightsim.picture import Renderer, Scenery
+
+__all__ = ["RenderedTags", "RenderedTagsReader", "TagPicture"]
+
+Picture = NDArray[np.uint8]
+
+_MARGIN_PX: Final = 40  # more than the windows of the detector's thresholds and corners
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TagPicture:
+    """A picture with detections.
+
+    Attributes:
+        time_us: vehicle time of the exposure.
+        pixels: (height, width, 3), BGR.
+        detections: what the detector found in it.
+    """
+
+    time_us: int
+    pixels: Picture
+    detections: tuple[TagDetection, ...]
+
+    def drawn(self) -> bytes:
+        """The picture with the detections drawn in, as PNG."""
+        _, data = cv2.imencode(".png", draw_detections(self.pixels, self.detections))
+        return bytes(data)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderedTags:
+    """Renders what a camera sees, and detects the tags in it.
+
+    Attributes:
+        detector: parameters of the detector.
+        scenery: of the world.
+        skip: render only the part of a frame around the tags, and no frame in whose view no tag can lie. The
+            detections are the same: the detector finds no tag where there is none.
+    """
+
+    detector: TagDetectorParameters = field(default_factory=TagDetectorParameters)
+    scenery: Scenery = field(default_factory=Scenery)
+    skip: bool = True
+
+    def start(
+        self, *, model: PinholeModel, imager: ImagerParameters, blur_px_m: float, seed: int
+    ) -> "RenderedTagsReader":
+        """The reader of one camera.
+
+        Raises:
+            ValueError: the distortion folds the picture.
+        """
+        return RenderedTagsReader(self, model, imager, blur_px_m, seed)
+
+
+class RenderedTagsReader:
+    """Renders and searches the frames of one camera.
+
+    Attributes:
+        kept: the first picture with a detection; None: there was none yet.
+        rendered: number of frames that were rendered.
+        skipped: number of frames that were not.
+    """
+
+    def __init__(
+        self,
+        parameters: RenderedTags,
+        model: PinholeModel,
+        imager: ImagerParameters,
+        blur_px_m: float,
+        seed: int,
+    ) -> None:
+        self._parameters = parameters
+        self._model, self._imager = model, imager
+        self._renderer = Renderer(
+            model,
+            aperture_px_m=blur_px_m,
+            scenery=parameters.scenery,
+            imager=imager,
+            seed=seed,
+        )
+        self._zoom = 0.0
+        self._detector = self._detector_at(1.0)
+        self.kept: TagPicture | None = None
+        self.rendered = 0
+        self.skipped = 0
+
+    def _detector_at(self, zoom: float) -> TagDetector:
+        if zoom != self._zoom:
+            model, imager = self._model, self._imager
+            geometry = CameraGeometry(
+                width_px=model.width_px,
+                height_px=model.height_px,
+                focal_px=(model.focal_px * zoom,) * 2,
+                centre_px=model.centre_px,
+                distortion=() if imager.distortion.none else imager.distortion.coefficients,
+            )
+            self._zoom = zoom
+            self._detector = TagDetector(geometry, self._parameters.detector)
+        return self._detector
+
+    def read(self, view: CameraView) -> tuple[Detection, ...]:
+        """The tags in the picture of a view."""
+        if self._parameters.skip and not self._renderer.may_show_tag(view):
+            self.skipped += 1
+            return ()
+        self.rendered += 1
+        window = self._renderer.tag_window(view, _MARGIN_PX) if self._parameters.skip else None
+        picture = self._renderer.render(view, window=window)
+        corner = (0, 0) if window is None else (window.left, window.top)
+        found = self._detector_at(view.zoom).detect(picture, corner_px=corner)
+        if found and self.kept is None:
+            whole = picture if window is None else self._renderer.render(view)
+            self.kept = TagPicture(time_us=view.time_us, pixels=whole, detections=found)
+        return tuple(
+            Detection(
+                view.time_us,
+                *tag.centre_px,
+                tag.angle_x_rad,
+                tag.angle_y_rad,
+                tag.size_rad,
+                tag.tag_id,
+                tag.distance_m,
+            )
+            for tag in found
+        )

@@ -1,0 +1,52 @@
+"""The figures of a search for a tag, from the notes of the flight and the truth in its log."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flightsim.foundation.geodesy import LocalFrame
+from missions.multi_target.figures import true_targets
+from missions.options import FlightOptions
+
+if TYPE_CHECKING:
+    from missions.mission import Debriefing
+
+__all__ = ["search_figures"]
+
+
+def search_figures(debriefing: "Debriefing") -> Mapping[str, Any]:
+    """`search` in `summary.json`.
+
+    Its `search_s` is the time from the search altitude to the exposure of the picture with the tag, or to the
+    end of the search; `error_m` the distance of the tag's place from the nearest true target at that time.
+    """
+    options, notes = debriefing.options, debriefing.flights[0][0]
+    assert isinstance(options, FlightOptions)
+    marks = notes.marks
+    north_m, east_m = marks.get("search_north_m"), marks.get("search_east_m")
+    error_m = None
+    if north_m is not None and east_m is not None and notes.commanded is not None:
+        at_us = marks["search_exposed_us"]
+        places = [
+            (float(np.interp(at_us, times, place[:, 0])), float(np.interp(at_us, times, place[:, 1])))
+            for times, place in true_targets(debriefing.records, LocalFrame(notes.commanded.origin))
+        ]
+        if places:
+            error_m = min(math.dist(place, (north_m, east_m)) for place in places)
+    return {
+        "tag_id": options.tag_id,
+        "found": bool(marks.get("search_found", 0.0)),
+        "search_s": round(marks.get("search_s", 0.0), 3),
+        "limit_s": options.search_time_s,
+        "frames": int(marks.get("search_frames", 0.0)),
+        "north_m": _rounded(north_m),
+        "east_m": _rounded(east_m),
+        "distance_m": _rounded(marks.get("search_distance_m")),
+        "error_m": _rounded(error_m),
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 3)

@@ -1,0 +1,263 @@
+"""The Monte Carlo study `lissajous-search`: how soon seven patterns find a walking tag (Steckenrider, Leamy
+and Furukawa 2020, Table I), as flights on SITL with rendered pictures.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from flightsim.world_spec import WorldSpec
+from missions.embedded import TagTarget, tag_search_world
+from missions.options import FlightOptions
+from missions.runs.request import RunRequest
+from missions.studies.design import grid
+from missions.studies.flights import fly_trial
+from missions.studies.results import Results
+from missions.studies.statistics import rate_of
+from missions.studies.study import Study
+
+__all__ = ["PAPER", "PATTERNS", "Cell", "SearchTrial", "Searched", "restricted_mean_s", "study"]
+
+Array = NDArray[np.float64]
+
+LIMIT_S: Final = 1800.0
+PATTERNS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
+    {
+        **{name: ("lissajous", name) for name in ("L1", "L2", "L3", "L4")},
+        "sector": ("sector", "L3"),
+        "parallel_sweep": ("parallel-sweep", "L3"),
+        "expanding_square": ("expanding-square", "L3"),
+    }
+)
+"""Mission and named Lissajous pattern of each entry."""
+
+PAPER: Final[Mapping[str, tuple[int, float | None, float | None]]] = MappingProxyType(
+    {
+        "L1": (0, None, None),
+        "L2": (1, 87.0, None),
+        "L3": (5, 185.0, 138.0),
+        "L4": (6, 364.0, 343.0),
+        "sector": (1, 134.0, None),
+        "parallel_sweep": (6, 493.0, 224.0),
+        "expanding_square": (5, 304.4, 174.0),
+    }
+)
+"""Table I: found of seven, mean and standard deviation of the time in seconds."""
+_PAPER_RUNS: Final = 7
+_PARAMETERS: Final = MappingProxyType({"COM_LOW_BAT_ACT": 0.0})  # the search outlasts the battery's failsafe
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """Parameters of a trial."""
+
+    pattern: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Searched:
+    """The result of a search.
+
+    Attributes:
+        completed: the search was flown, and passed its checks.
+        reason: why not; "" otherwise.
+        found: whether the tag was detected within the limit.
+        search_s: time until then, or the searched time.
+        error_m: distance of the tag's estimated place from the true one; NaN: not found.
+        frames: number of searched pictures.
+        sim_time_s: time from boot to the end.
+    """
+
+    completed: bool
+    reason: str
+    found: bool
+    search_s: float
+    error_m: float
+    frames: int
+    sim_time_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchTrial:
+    """One search with a pattern.
+
+    Attributes:
+        speed_m_s: of the vehicle.
+        target_speed_m_s: of the target's random walk.
+        limit_s: duration of a search.
+    """
+
+    speed_m_s: float = 5.0
+    target_speed_m_s: float = 0.3
+    limit_s: float = LIMIT_S
+
+    def __call__(self, cell: Cell, seed: int) -> Searched:
+        """Fly the search. The same seed has the same walk of the target for all patterns."""
+        mission, pattern = PATTERNS[cell.pattern]
+        options = FlightOptions(
+            pattern=pattern, speed_m_s=self.speed_m_s, search=True, search_time_s=self.limit_s
+        )
+        world = tag_search_world(
+            WorldSpec.of_team(1, seed=seed), options, TagTarget(speed_m_s=self.target_speed_m_s)
+        )
+        result = fly_trial(mission, RunRequest(options=options, world=world, parameters=dict(_PARAMETERS)))
+        search = result.summary["search"]
+        return Searched(
+            completed=result.outcome == "completed",
+            reason=result.reason,
+            found=search["found"],
+            search_s=search["search_s"],
+            error_m=math.nan if search["error_m"] is None else search["error_m"],
+            frames=search["frames"],
+            sim_time_s=result.summary["sim_time_s"],
+        )
+
+
+def study(speed: float = 5.0, target_speed: float = 0.3) -> Study[Cell, Searched]:
+    """The study.
+
+    Args:
+        speed: of the vehicle, m/s.
+        target_speed: of the target, m/s.
+    """
+    return Study(
+        name="lissajous-search",
+        description="Seven patterns search for a walking tag: Table I of Steckenrider et al. 2020.",
+        trial=SearchTrial(speed_m_s=speed, target_speed_m_s=target_speed),
+        parameters=Cell,
+        row=Searched,
+        design=grid(pattern=tuple(PATTERNS)),
+        runs=100,
+        success="completed",
+        metrics=("search_s", "error_m"),
+        options={"speed": speed, "target_speed": target_speed},
+        summarise=summarise,
+        report=lines_of,
+        draw=draw,
+    )
+
+
+def restricted_mean_s(time_s: Array, found: NDArray[np.bool_], limit_s: float) -> float:
+    """Mean of min(T, limit) by the Kaplan-Meier curve: the area under it up to the limit.
+
+    Searches that ended without success are censored at their time.
+    """
+    times, missed = survival(time_s, found)
+    edges = np.concatenate(([0.0], np.minimum(times, limit_s), [limit_s]))
+    return float(np.sum(np.diff(edges) * np.concatenate(([1.0], missed))))
+
+
+def survival(time_s: Array, found: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """The Kaplan-Meier curve: times (n,), and the probability that the search lasts longer (n,)."""
+    data = stats.CensoredData.right_censored(time_s, ~found)
+    curve = stats.ecdf(data).sf
+    return np.asarray(curve.quantiles, dtype=np.float64), np.asarray(curve.probabilities, dtype=np.float64)
+
+
+def _searches(results: Results, pattern: str) -> tuple[Array, NDArray[np.bool_]]:
+    """Times, and whether the tag was found, of the searches of a pattern that were flown."""
+    cell = next(index for index, one in enumerate(results.cells) if one["pattern"] == pattern)
+    time_s, found = results.values("search_s")[cell], results.values("found")[cell]
+    flown = results.values("completed")[cell] == 1.0
+    return time_s[flown], found[flown] == 1.0
+
+
+def summarise(results: Results) -> Mapping[str, Any]:
+    """Entries of `summary.json`: the searches of each pattern, beside the paper's."""
+    return {"patterns": {name: _pattern(results, name) for name in PATTERNS}, "limit_s": LIMIT_S}
+
+
+def _pattern(results: Results, name: str) -> dict[str, Any]:
+    time_s, found = _searches(results, name)
+    rate = rate_of(int(found.sum()), len(found))
+    entry: dict[str, Any] = {
+        "found": rate.count,
+        "runs": rate.n,
+        "rate_ci95": [_rounded(value) for value in rate.ci95],
+        "mean_s": _rounded(float(time_s[found].mean())) if found.any() else None,
+        "restricted_mean_s": None,
+        "restricted_mean_ci95_s": None,
+        "median_s": None,
+    }
+    if len(found):
+        restricted = np.where(found, np.minimum(time_s, LIMIT_S), LIMIT_S)
+        entry["restricted_mean_s"] = _rounded(restricted_mean_s(time_s, found, LIMIT_S))
+        if len(found) > 1:
+            # all censoring is at the limit, so that the variance is that of the restricted times
+            half = float(stats.t.ppf(0.975, len(found) - 1)) * float(stats.sem(restricted))
+            middle = float(restricted.mean())
+            entry["restricted_mean_ci95_s"] = [_rounded(middle - half), _rounded(middle + half)]
+        times, missed = survival(time_s, found)
+        below = np.flatnonzero(missed <= 0.5)
+        entry["median_s"] = _rounded(float(times[below[0]])) if len(below) else None
+    paper_found, mean_s, sd_s = PAPER[name]
+    low, high = rate_of(paper_found, _PAPER_RUNS).ci95
+    entry["paper"] = {
+        "found": paper_found,
+        "runs": _PAPER_RUNS,
+        "rate_ci95": [_rounded(low), _rounded(high)],
+        "mean_s": mean_s,
+        "sd_s": sd_s,
+    }
+    return entry
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, 4) if math.isfinite(value) else None
+
+
+def lines_of(results: Results) -> list[str]:
+    """The table of the study."""
+    lines = [
+        f"{'pattern':<17} {'found':>9} {'rate, 95 %':>15} {'mean s':>8} {'restricted s':>13} {'median s':>9}"
+        f" {'paper':>6} {'mean s':>7}"
+    ]
+    for name, entry in summarise(results)["patterns"].items():
+        low, high = entry["rate_ci95"]
+        shown = "" if low is None else f"{low:.2f} to {high:.2f}"
+        paper = entry["paper"]
+        numbers = [entry["mean_s"], entry["restricted_mean_s"], entry["median_s"]]
+        mean, restricted, median = ("" if value is None else f"{value:.0f}" for value in numbers)
+        theirs = "" if paper["mean_s"] is None else f"{paper['mean_s']:.0f}"
+        lines.append(
+            f"{name:<17} {entry['found']:>4} / {entry['runs']:<3} {shown:>14} {mean:>8} {restricted:>13} "
+            f"{median:>9} {paper['found']:>4}/7 {theirs:>7}"
+        )
+    return lines
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw `search.png`: the share of searches that have found the tag, over time."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    for name in PATTERNS:
+        time_s, found = _searches(results, name)
+        if not len(found):
+            continue
+        times, missed = survival(time_s, found)
+        axes.step(
+            np.concatenate(([0.0], times, [LIMIT_S])),
+            1.0 - np.concatenate(([1.0], missed, missed[-1:])),
+            where="post",
+            label=name.replace("_", " "),
+        )
+    axes.set_xlim(0.0, LIMIT_S)
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlabel("time of the search, s", fontsize=9)
+    axes.set_ylabel("share of searches that have found the tag", fontsize=9)
+    axes.grid(color="#e5e7eb", linewidth=0.8)
+    axes.tick_params(labelsize=8)
+    axes.legend(fontsize=8, frameon=False)
+    with (folder / "search.png").open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})

@@ -1,0 +1,34 @@
+"""The study `lissajous-search`: its statistics of censored times."""
+
+import numpy as np
+import pytest
+
+from missions.studies.lissajous_search import PAPER, PATTERNS, restricted_mean_s, study, survival
+
+
+def test_all_patterns_of_the_table_are_there():
+    assert set(PATTERNS) == set(PAPER)
+    assert [cell["pattern"] for cell in study().design.cells] == list(PATTERNS)
+
+
+def test_the_restricted_mean_with_censoring_at_the_limit_is_the_mean_of_the_limited_times():
+    rng = np.random.default_rng(2)
+    time_s = rng.exponential(900.0, 200)
+    found = time_s < 1800.0
+    limited = np.minimum(time_s, 1800.0)
+    assert restricted_mean_s(limited, found, 1800.0) == pytest.approx(limited.mean(), rel=1e-9)
+
+
+def test_the_curve_is_that_of_kaplan_and_meier():
+    # Freireich et al. 1963, remission times under 6-MP: the textbook example (Kleinbaum and Klein, table 2.1)
+    time = np.array(
+        [6, 6, 6, 7, 10, 13, 16, 22, 23, 6, 9, 10, 11, 17, 19, 20, 25, 32, 32, 34, 35], dtype=float
+    )
+    found = np.arange(21) < 9
+    times, missed = survival(time, found)
+    at = {t: missed[np.searchsorted(times, t)] for t in (6.0, 7.0, 10.0, 13.0, 16.0, 22.0, 23.0)}
+    assert list(at.values()) == pytest.approx([0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448], abs=5e-4)
+
+
+def test_no_search_found_anything():
+    assert restricted_mean_s(np.full(5, 1800.0), np.zeros(5, dtype=bool), 1800.0) == 1800.0
