@@ -12,11 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.parameters import (
-    MAX_NAME_LENGTH,
-    ParameterDefinition,
-    ParameterError,
-)
+from autopilot_bridge.parameters import MAX_NAME_LENGTH, ParameterDefinition, ParameterError
 
 QGC_SUFFIX: Final = ".params"
 MAVPROXY_SUFFIXES: Final = (".parm", ".param")
@@ -73,11 +69,7 @@ def format_qgc(
 ) -> str:
     """Values as a `.params` text; ParameterError for a name without definition."""
     types = {definition.name: int(definition.type) for definition in definitions}
-    lines = [
-        "# Onboard parameters\n",
-        "#\n",
-        "# Vehicle-Id Component-Id Name Value Type\n",
-    ]
+    lines = ["# Onboard parameters\n", "#\n", "# Vehicle-Id Component-Id Name Value Type\n"]
     for name, value in values.items():
         if name not in types:
             raise ParameterError(f"no parameter {name!r}: its type for the file is not known")

@@ -14,14 +14,7 @@ import statistics
 import sys
 
 from tests.flights.aircraft_figures import MissionFigures, rms
-from tests.flights.test_aircraft_missions import (
-    DIRECTIONS_DEG,
-    LAUNCHES,
-    PLANS,
-    Case,
-    fly_case,
-    shortfalls,
-)
+from tests.flights.test_aircraft_missions import DIRECTIONS_DEG, LAUNCHES, PLANS, Case, fly_case, shortfalls
 
 _FIGURES = (
     "across m",

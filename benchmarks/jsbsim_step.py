@@ -74,12 +74,7 @@ def main() -> None:
 
 
 def jsbsim_alone(
-    model: str,
-    state: InitialState,
-    actuators: NDArray[np.float64],
-    home: Home,
-    air: Environment,
-    steps: int,
+    model: str, state: InitialState, actuators: NDArray[np.float64], home: Home, air: Environment, steps: int
 ) -> float:
     """Microseconds of a JSBSim step, nothing around it."""
     airframe = load_airframe(model)

@@ -175,15 +175,7 @@ def preload() -> None:
 
 
 def run(
-    folder: Path,
-    results: Path,
-    *,
-    size: int,
-    seed: int,
-    only: str,
-    again: bool,
-    jobs: int,
-    budget_s: float,
+    folder: Path, results: Path, *, size: int, seed: int, only: str, again: bool, jobs: int, budget_s: float
 ) -> None:
     """Test the mutants of the sample that have no result yet, or those that survived so far."""
     done = {row["key"] for row in rows_of(results) if not (again and row["outcome"] == "survived")}

@@ -126,10 +126,7 @@ def passes(seed: int) -> list[Array]:
             c, s = math.cos(course_rad), math.sin(course_rad)
             tracks.append(
                 np.column_stack(
-                    (
-                        TARGET_NE_M[0] + along_m * c - offset_m * s,
-                        TARGET_NE_M[1] + along_m * s + offset_m * c,
-                    )
+                    (TARGET_NE_M[0] + along_m * c - offset_m * s, TARGET_NE_M[1] + along_m * s + offset_m * c)
                 )
             )
     return tracks

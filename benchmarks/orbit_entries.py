@@ -187,7 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         shown = [f"{'-' if value is None else format(value, '.3f')}" for value in reached.values()]
         say(
             f"{case.autopilot:<10} {case.entry:>5} {case.direction:>4} {case.target_speed_m_s:>10g} "
-            f"{case.seed:>5} {shown[0]:>26} {shown[1]:>13} {shown[2]:>17} {1 if reason else 0:>5}",
+            f"{case.seed:>5} {shown[0]:>26} {shown[1]:>13} {shown[2]:>17} {1 if reason else 0:>5}"
         )
         wrong = reason or verdict(summary, chosen.duration)
         if wrong:

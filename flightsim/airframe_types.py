@@ -7,16 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from flightsim.interface import (
-    AILERON,
-    BRAKE,
-    ELEVATOR,
-    FLAPS,
-    MAX_ACTUATORS,
-    RUDDER,
-    STEERING,
-    THROTTLE,
-)
+from flightsim.interface import AILERON, BRAKE, ELEVATOR, FLAPS, MAX_ACTUATORS, RUDDER, STEERING, THROTTLE
 
 
 class AirframeError(ValueError):

@@ -87,16 +87,7 @@ class Reading:
 class SensorReadings:
     """All readings of one vehicle: the autopilot's whole view of the world."""
 
-    __slots__ = (
-        "airspeed",
-        "barometer",
-        "battery",
-        "flow_vane",
-        "gps",
-        "imu",
-        "magnetometer",
-        "rangefinder",
-    )
+    __slots__ = ("airspeed", "barometer", "battery", "flow_vane", "gps", "imu", "magnetometer", "rangefinder")
 
     def __init__(self) -> None:
         self.imu = Reading(IMU_SIZE)

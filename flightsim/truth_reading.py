@@ -13,15 +13,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.airframe import Airframe, AirframeKind
-from flightsim.crash import (
-    BREAKS_AT_M_S2,
-    DEEPEST_M,
-    FASTEST_M_S,
-    FASTEST_RAD_S,
-    MOVING_M_S,
-    NEAR_M,
-    Touches,
-)
+from flightsim.crash import BREAKS_AT_M_S2, DEEPEST_M, FASTEST_M_S, FASTEST_RAD_S, MOVING_M_S, NEAR_M, Touches
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.imperial import KG_M3_PER_SLUG_FT3, M_PER_FT, PA_PER_PSF
 from flightsim.foundation.kernels import bound, kernel

@@ -54,8 +54,7 @@ class Direction:
     def take(self, now_s: float, elapsed_s: float) -> bytes:
         """What arrives now."""
         self._budget = min(
-            self._budget + elapsed_s * self.bytes_per_s,
-            max(1.0, (elapsed_s + _TICK_S) * self.bytes_per_s),
+            self._budget + elapsed_s * self.bytes_per_s, max(1.0, (elapsed_s + _TICK_S) * self.bytes_per_s)
         )
         out = bytearray()
         while self._queue and self._queue[0][0] <= now_s and self._budget >= 1.0:

@@ -34,10 +34,7 @@ SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "thre
 SANS_IO = (
     *(
         f"autopilot_bridge.{name}"
-        for name in (
-            *("mavlink", "routing"),
-            *("mission_plan", "mission_wire", "fence_shapes"),
-        )
+        for name in (*("mavlink", "routing"), *("mission_plan", "mission_wire", "fence_shapes"))
     ),
     *(
         f"autopilot_bridge.{name}"

@@ -30,10 +30,7 @@ class Pacer:
     """
 
     def __init__(
-        self,
-        speedup: float = 1.0,
-        monotonic: Callable[[], float] = wall_time_s,
-        max_lag_s: float = MAX_LAG_S,
+        self, speedup: float = 1.0, monotonic: Callable[[], float] = wall_time_s, max_lag_s: float = MAX_LAG_S
     ) -> None:
         if not 0.0 < speedup < float("inf"):
             raise ValueError(

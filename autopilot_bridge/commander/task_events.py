@@ -60,10 +60,7 @@ class TaskFollower:
             distance_m = commander.vehicle.distance_to(items[event.seq], commander.context)
         commander.emit(
             MissionItemReached(
-                time_us=commander.time_us,
-                index=event.seq,
-                distance_m=distance_m,
-                navigation=event.navigation,
+                time_us=commander.time_us, index=event.seq, distance_m=distance_m, navigation=event.navigation
             )
         )
 

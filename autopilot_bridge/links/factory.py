@@ -3,14 +3,7 @@
 from collections.abc import Callable
 
 from autopilot_bridge.clock.pacing import wall_time_s
-from autopilot_bridge.links.address import (
-    Address,
-    ReplayLog,
-    SerialPort,
-    TcpClient,
-    TcpServer,
-    parse_address,
-)
+from autopilot_bridge.links.address import Address, ReplayLog, SerialPort, TcpClient, TcpServer, parse_address
 from autopilot_bridge.links.link import Link
 from autopilot_bridge.links.replay import ReplayLink
 from autopilot_bridge.links.serial_port import SerialLink

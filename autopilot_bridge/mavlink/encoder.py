@@ -9,12 +9,7 @@ from typing import Any, Final
 from fastcrc.crc16 import mcrf4xx
 
 from autopilot_bridge.errors import MessageError
-from autopilot_bridge.mavlink.definitions import (
-    MAVLinkMessage,
-    MessageDefinition,
-    WireField,
-    definition,
-)
+from autopilot_bridge.mavlink.definitions import MAVLinkMessage, MessageDefinition, WireField, definition
 from autopilot_bridge.mavlink.frame import MAGIC_V2
 
 _pack_head: Final = struct.Struct("<BBHB").pack

@@ -13,11 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.covariance import apply_scalar, inject, is_sound
 from autopilot_bridge.navigation.delayed_fusion import body_axis_in_ned, fuse_position, fuse_velocity
-from autopilot_bridge.navigation.states import (
-    ATT,
-    DX,
-    PH,
-)
+from autopilot_bridge.navigation.states import ATT, DX, PH
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.layouts import Slots
 

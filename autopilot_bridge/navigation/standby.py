@@ -43,13 +43,7 @@ class Standby:
         self.held = self._adrift = False
 
     def prepare(
-        self,
-        parameters: NavigationParameters,
-        time_us: int,
-        *,
-        at_rest: bool,
-        winged: bool,
-        flying: bool,
+        self, parameters: NavigationParameters, time_us: int, *, at_rest: bool, winged: bool, flying: bool
     ) -> int:
         """What of this to fuse at `time_us` (bits of `fusion`), with its variances written into `obs`.
 

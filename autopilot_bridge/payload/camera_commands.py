@@ -18,11 +18,7 @@ _DENIED: Final = int(mavlink.MAV_RESULT_DENIED)
 _FAILED: Final = int(mavlink.MAV_RESULT_FAILED)
 _REJECTED: Final = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 _UNSUPPORTED: Final = int(mavlink.MAV_RESULT_UNSUPPORTED)
-_MODES: Final = (
-    mavlink.CAMERA_MODE_IMAGE,
-    mavlink.CAMERA_MODE_VIDEO,
-    mavlink.CAMERA_MODE_IMAGE_SURVEY,
-)
+_MODES: Final = (mavlink.CAMERA_MODE_IMAGE, mavlink.CAMERA_MODE_VIDEO, mavlink.CAMERA_MODE_IMAGE_SURVEY)
 _REPEATED_US: Final = 3_000_000  # a single photo requested again within this time is the same photo
 _MAX_STATUS_HZ: Final = 50.0
 _OLD_REQUESTS: Final[Mapping[int, int]] = {

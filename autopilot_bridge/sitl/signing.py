@@ -185,9 +185,7 @@ class VehicleSigning:
             return LinkSigning(self.state, link_id=0, policy=INTERNAL)
         number, self._links = self._links, self._links + 1
         return LinkSigning(
-            self.state,
-            link_id=number & 0xFF,
-            policy=POLICIES[self._parameters.unsigned_from][reach],
+            self.state, link_id=number & 0xFF, policy=POLICIES[self._parameters.unsigned_from][reach]
         )
 
     def take_setup(self, frame: Frame, link: LinkSigning, reach: Reach) -> str | None:

@@ -86,12 +86,7 @@ class SimulatorParameters:
             self._weaken_motors(*wanted)
 
     def _blow(
-        self,
-        speed_m_s: float,
-        from_deg: float,
-        rising_deg: float,
-        turbulence_m_s: float,
-        *over_height: float,
+        self, speed_m_s: float, from_deg: float, rising_deg: float, turbulence_m_s: float, *over_height: float
     ) -> None:
         to_rad, up_rad = math.radians(from_deg) + math.pi, math.radians(rising_deg)
         level_m_s = speed_m_s * math.cos(up_rad)

@@ -60,10 +60,7 @@ class Sitl:
         self.spec = spec
         self.world = World(
             WorldParameters(
-                seed=spec.seed,
-                physics_rate_hz=spec.physics_rate_hz,
-                home=spec.place,
-                environment=spec.air,
+                seed=spec.seed, physics_rate_hz=spec.physics_rate_hz, home=spec.place, environment=spec.air
             )
         )
         streams = self.world.streams

@@ -147,13 +147,7 @@ _PARTS: Final = _parts()
 
 
 @kernel
-def _frames(
-    record: NDArray[np.uint8],
-    out: NDArray[np.uint8],
-    due: int,
-    sender: int,
-    sequence: int,
-) -> int:
+def _frames(record: NDArray[np.uint8], out: NDArray[np.uint8], due: int, sender: int, sequence: int) -> int:
     """MAVLink 2 frames of the parts whose bit is set in `due`, in sequence; returns their length.
 
     Args:

@@ -51,10 +51,7 @@ class CameraStream:
     def __init__(self, camera: CameraSetup, setup: StudioSetup, ask: Ask) -> None:
         self.name = camera.name
         self.renderer = Renderer(
-            camera.model,
-            aperture_px_m=camera.blur_px_m,
-            scenery=setup.scenery,
-            imager=camera.imager,
+            camera.model, aperture_px_m=camera.blur_px_m, scenery=setup.scenery, imager=camera.imager
         )
         self.size_px = stream_size_px(camera.model, setup.width_px)
         self.rate_hz = setup.rate_hz

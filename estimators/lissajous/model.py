@@ -162,12 +162,7 @@ def predict(
 
 @kernel
 def predict_augmented(
-    state: Array,
-    covariance: Array,
-    axes: Array,
-    process: Array,
-    frequency_process: float,
-    jacobian: Array,
+    state: Array, covariance: Array, axes: Array, process: Array, frequency_process: float, jacobian: Array
 ) -> None:
     """Predict with the frequencies as states, in place: the extended Kalman filter that the paper names as
     future work.

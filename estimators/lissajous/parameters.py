@@ -89,12 +89,7 @@ class LissajousParameters:
             object.__setattr__(self, name, kind(value))
         for name in ("omega_x_rad_s", "omega_y_rad_s", "max_gap_s", "history_s"):
             _require(name, getattr(self, name), above_zero=True)
-        for name in (
-            "epsilon_rad_s",
-            "acceleration_psd_m2_s3",
-            "frequency_walk_rad2_s3",
-            "off_pattern_gate",
-        ):
+        for name in ("epsilon_rad_s", "acceleration_psd_m2_s3", "frequency_walk_rad2_s3", "off_pattern_gate"):
             _require(name, getattr(self, name), above_zero=False)
         for name in ("orientation_rad", "centre_north_m", "centre_east_m", "position_delay_s"):
             if not math.isfinite(getattr(self, name)):

@@ -116,8 +116,7 @@ def _pymavlink_dialect(name: str) -> Dialect:
 
 
 def _described(
-    name: str,
-    items: Iterable[tuple[MessageDefinition, Mapping[str, str], str | None]],
+    name: str, items: Iterable[tuple[MessageDefinition, Mapping[str, str], str | None]]
 ) -> Mapping[int, Description]:
     found = {}
     for made, units, instance_field in sorted(items, key=lambda item: item[0].message_id):

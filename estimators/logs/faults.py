@@ -75,12 +75,7 @@ class FaultKind(StrEnum):
 
 
 DEFAULTS: Final = MappingProxyType(
-    {
-        FaultKind.SLOW: 5.0,
-        FaultKind.DELAYED: 0.2,
-        FaultKind.DROP: 0.2,
-        FaultKind.INTERMITTENT: 1.0,
-    }
+    {FaultKind.SLOW: 5.0, FaultKind.DELAYED: 0.2, FaultKind.DROP: 0.2, FaultKind.INTERMITTENT: 1.0}
 )
 """VALUE of the kinds that have one default for all messages."""
 

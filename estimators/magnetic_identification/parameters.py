@@ -93,10 +93,7 @@ class IdentificationParameters:
     @property
     def classes(self) -> tuple[AnomalyClass, ...]:
         """The classes, those sought first."""
-        found = (
-            *classes_from(self.targets, sought=True),
-            *classes_from(self.false_anomalies, sought=False),
-        )
+        found = (*classes_from(self.targets, sought=True), *classes_from(self.false_anomalies, sought=False))
         names = [of.name for of in found]
         if len(set(names)) != len(names):
             raise ValueError(f"the classes {', '.join(names)} do not all have a name of their own")

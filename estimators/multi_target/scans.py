@@ -93,7 +93,5 @@ class ScanAssembler:
         self.counts["complete"] += 1
         places = [scan.places[number] for number in sorted(scan.places)]
         return Scan(
-            number=scan.number,
-            time_us=time_us,
-            detections=np.array(places, dtype=np.float64).reshape(-1, 2),
+            number=scan.number, time_us=time_us, detections=np.array(places, dtype=np.float64).reshape(-1, 2)
         )

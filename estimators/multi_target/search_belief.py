@@ -128,10 +128,7 @@ class SearchBelief:
             self.intensity.remove(cluster)
             self.found.append(
                 FoundTarget(
-                    time_us=time_us,
-                    north_m=cluster.north_m,
-                    east_m=cluster.east_m,
-                    width_m=cluster.width_m,
+                    time_us=time_us, north_m=cluster.north_m, east_m=cluster.east_m, width_m=cluster.width_m
                 )
             )
         if new:

@@ -1,9 +1,5 @@
 """A target followed by line of sight from an aircraft that does not know its own position."""
 
-from estimators.orbit_target.estimator import (
-    OrbitTargetEstimate,
-    OrbitTargetEstimator,
-    OrbitTargetParameters,
-)
+from estimators.orbit_target.estimator import OrbitTargetEstimate, OrbitTargetEstimator, OrbitTargetParameters
 
 __all__ = ["OrbitTargetEstimate", "OrbitTargetEstimator", "OrbitTargetParameters"]

@@ -232,10 +232,7 @@ class RelativeTarget:
         rate = (float(self._x[2]) - self._air[0], float(self._x[3]) - self._air[1])
         return RelativeState(
             time_us=time_us,
-            offset_ne_m=(
-                float(self._x[0]) + ahead_s * rate[0],
-                float(self._x[1]) + ahead_s * rate[1],
-            ),
+            offset_ne_m=(float(self._x[0]) + ahead_s * rate[0], float(self._x[1]) + ahead_s * rate[1]),
             offset_rate_ne_m_s=rate,
             offset_std_m=math.sqrt(max(self._p[0, 0], self._p[1, 1])),
         )

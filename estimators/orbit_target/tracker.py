@@ -239,9 +239,7 @@ class TargetTracker:
                     return sample if time_us - sample.time_us <= _GIMBAL_STALE_US else None
                 share = (time_us - sample.time_us) / (later.time_us - sample.time_us)
                 return GimbalAttitude(
-                    time_us=time_us,
-                    q=between(sample.q, later.q, share),
-                    from_north=sample.from_north,
+                    time_us=time_us, q=between(sample.q, later.q, share), from_north=sample.from_north
                 )
             later = sample
         return None

@@ -170,10 +170,7 @@ def detected_lines(north_m: Array, east_m: Array, *, least_length_m: float = 500
                 continue
             start, end = (
                 (float(north_m[first]), float(east_m[first])),
-                (
-                    float(north_m[k - 1]),
-                    float(east_m[k - 1]),
-                ),
+                (float(north_m[k - 1]), float(east_m[k - 1])),
             )
             if math.dist(start, end) >= least_length_m:
                 name = f"L{len(lines) + 1}"

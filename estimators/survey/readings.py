@@ -59,12 +59,7 @@ def joined(parts: Sequence[SurveyReadings]) -> SurveyReadings:
 
 
 def placed_readings(
-    time_s: Array,
-    total_nt: Array,
-    *,
-    positions: Array,
-    attitudes: Array,
-    frame: LocalFrame,
+    time_s: Array, total_nt: Array, *, positions: Array, attitudes: Array, frame: LocalFrame
 ) -> SurveyReadings:
     """Give readings the place and the attitude at their times, linearly between two messages.
 

@@ -160,10 +160,7 @@ class GridBelief:
         across = float(np.sum(p * off_n * off_e))
         within = self.layout.cell_m**2 / 12.0
         return mean, np.array(
-            [
-                [float(np.sum(p * off_n**2)) + within, across],
-                [across, float(np.sum(p * off_e**2)) + within],
-            ]
+            [[float(np.sum(p * off_n**2)) + within, across], [across, float(np.sum(p * off_e**2)) + within]]
         )
 
     @property

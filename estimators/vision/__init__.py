@@ -1,12 +1,7 @@
 """Tags in pictures: a camera's geometry, a detector of AprilTags, and the vehicle's pose at an exposure."""
 
 from estimators.vision.camera import CameraGeometry
-from estimators.vision.tag_detector import (
-    TagDetection,
-    TagDetector,
-    TagDetectorParameters,
-    draw_detections,
-)
+from estimators.vision.tag_detector import TagDetection, TagDetector, TagDetectorParameters, draw_detections
 from estimators.vision.vehicle_track import VehiclePose, VehicleTrack, ground_place
 
 __all__ = [

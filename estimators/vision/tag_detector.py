@@ -45,10 +45,7 @@ class TagDetectorParameters:
     corrected_bits: int = 1
 
     def __post_init__(self) -> None:
-        for name, size_m in (
-            ("size_m", self.size_m),
-            *(("sizes_m", size_m) for _, size_m in self.sizes_m),
-        ):
+        for name, size_m in (("size_m", self.size_m), *(("sizes_m", size_m) for _, size_m in self.sizes_m)):
             if not (math.isfinite(size_m) and size_m > 0.0):
                 raise EstimatorError(f"`{name}` {size_m:g} m is not possible; give more than 0")
         for tag_id in (*self.tag_ids, *(number for number, _ in self.sizes_m)):

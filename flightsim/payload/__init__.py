@@ -25,12 +25,7 @@ from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.imager import BrownDistortion, ImagerParameters
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
-from flightsim.payload.magnetic_spec import (
-    InducedDipole,
-    MagneticSpec,
-    SignatureSpec,
-    magnetic_field_of,
-)
+from flightsim.payload.magnetic_spec import InducedDipole, MagneticSpec, SignatureSpec, magnetic_field_of
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
@@ -48,12 +43,7 @@ from flightsim.payload.target_motion import (
     TargetMotion,
     Trajectory,
 )
-from flightsim.payload.target_sensor import (
-    ScanDisturbance,
-    TargetScan,
-    TargetSensor,
-    TargetSensorParameters,
-)
+from flightsim.payload.target_sensor import ScanDisturbance, TargetScan, TargetSensor, TargetSensorParameters
 from flightsim.payload.targets import NO_TAG, GroundTarget, GroundTargetParameters, GroundTargets
 from flightsim.payload.terrain import Terrain, TerrainSpec
 from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters

@@ -460,13 +460,7 @@ class Camera:
         ]
 
     def _detection(
-        self,
-        time_us: int,
-        u_px: float,
-        v_px: float,
-        size_rad: float,
-        target_id: int,
-        distance_m: float = 0.0,
+        self, time_us: int, u_px: float, v_px: float, size_rad: float, target_id: int, distance_m: float = 0.0
     ) -> Detection:
         u0_px, v0_px = self.parameters.model.centre_px
         angle_x_rad = math.atan2(u_px - u0_px, self._focal_px)

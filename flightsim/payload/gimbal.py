@@ -115,11 +115,7 @@ class GimbalParameters:
     @classmethod
     def two_axis(cls, **overrides: Any) -> "GimbalParameters":
         """A belly turret: all round, from a little over the horizon to straight down."""
-        numbers: dict[str, Any] = {
-            "axes": 2,
-            "pitch_min_rad": -0.5 * math.pi,
-            "pitch_max_rad": 10.0 * _DEG,
-        }
+        numbers: dict[str, Any] = {"axes": 2, "pitch_min_rad": -0.5 * math.pi, "pitch_max_rad": 10.0 * _DEG}
         return cls(**(numbers | overrides))
 
 

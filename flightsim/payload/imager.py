@@ -98,9 +98,7 @@ class ImagerParameters:
 
     def __post_init__(self) -> None:
         require_not_negative(
-            read_noise=self.read_noise,
-            shot_noise=self.shot_noise,
-            rolling_shutter_s=self.rolling_shutter_s,
+            read_noise=self.read_noise, shot_noise=self.shot_noise, rolling_shutter_s=self.rolling_shutter_s
         )
 
     @property

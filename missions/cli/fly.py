@@ -108,11 +108,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     is_flag=True,
     help="Look at the vehicle and ask before the flight, on links of this machine too.",
 )
-@_elsewhere(
-    "--regain",
-    type=SECONDS,
-    help="So long a lost link may take to come back, s. [default: 60]",
-)
+@_elsewhere("--regain", type=SECONDS, help="So long a lost link may take to come back, s. [default: 60]")
 @_flight(
     "--max-error",
     type=float,

@@ -250,13 +250,7 @@ def mutate(
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
 @key_option()
 def play(
-    path: Path,
-    dialect: str | None,
-    link: str,
-    speed: str,
-    loop: bool,
-    signing_key: Path | None,
-    **given: Any,
+    path: Path, dialect: str | None, link: str, speed: str, loop: bool, signing_key: Path | None, **given: Any
 ) -> None:
     """Play a telemetry log to a link, as if the vehicle were there; --from seeks."""
 

@@ -21,21 +21,9 @@ _COMMANDS: Final = {
     "fly": ("missions.cli.fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli.sitl", "sitl", "SITL for other people's clients."),
     "log": ("missions.cli.log", "log", "Look into logs, and make others of them."),
-    "estimate": (
-        "missions.cli.estimate",
-        "estimate",
-        "An estimator on a live link, a process of its own.",
-    ),
-    "replay": (
-        "missions.cli.replay",
-        "replay",
-        "Logs through an estimator, and how far off it was.",
-    ),
-    "vehicle": (
-        "missions.cli.vehicle",
-        "vehicle",
-        "Talk to a vehicle: info, parameters, logs, health.",
-    ),
+    "estimate": ("missions.cli.estimate", "estimate", "An estimator on a live link, a process of its own."),
+    "replay": ("missions.cli.replay", "replay", "Logs through an estimator, and how far off it was."),
+    "vehicle": ("missions.cli.vehicle", "vehicle", "Talk to a vehicle: info, parameters, logs, health."),
     "map": ("missions.cli.map", "magnetic_map", "Make magnetic maps from other files, and look into them."),
     "study": ("missions.cli.study", "study", "Monte Carlo: the papers' experiments."),
 }

@@ -79,11 +79,7 @@ def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
         speed_m_s=given["target_speed"],
     )
     return multi_target_world(
-        world,
-        options,
-        field,
-        terrain_relief_m=given["terrain"],
-        scan_period_s=given["scan_period"],
+        world, options, field, terrain_relief_m=given["terrain"], scan_period_s=given["scan_period"]
     )
 
 

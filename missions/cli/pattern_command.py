@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.mission_command import (
-    MISSION_GROUP,
-    FlightOption,
-    Given,
-    MissionCommand,
-    Scope,
-    option,
-)
+from missions.cli.mission_command import MISSION_GROUP, FlightOption, Given, MissionCommand, Scope, option
 from missions.cli.options import radians_of
 
 if TYPE_CHECKING:
@@ -102,9 +95,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
 
 _LISSAJOUS: Final = (
     option(
-        "--pattern",
-        default="L3",
-        help="Lissajous pattern: L1 (circle), L2, L3, L4." + _WINGS.format("L2"),
+        "--pattern", default="L3", help="Lissajous pattern: L1 (circle), L2, L3, L4." + _WINGS.format("L2")
     ),
     option(
         "--ratio",
@@ -117,10 +108,7 @@ _LISSAJOUS: Final = (
 _HEADING: Final = (option("--heading", type=float, default=0.0, help="First leg, degrees."),)
 _SPACING: Final = (
     option(
-        "--spacing",
-        type=float,
-        default=10.0,
-        help="Track spacing, m." + _WINGS.format("what its turns need"),
+        "--spacing", type=float, default=10.0, help="Track spacing, m." + _WINGS.format("what its turns need")
     ),
 )
 _EVERY: Final = (

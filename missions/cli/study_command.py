@@ -160,11 +160,7 @@ def _one_trial(study: "Study[Any, Any]", runs: int, seed: int, index: int) -> in
 
 
 def run_and_tell(
-    study: "Study[Any, Any]",
-    given: Given,
-    *,
-    repeat: "Callable[[Trial], str]",
-    arguments: Mapping[str, Any],
+    study: "Study[Any, Any]", given: Given, *, repeat: "Callable[[Trial], str]", arguments: Mapping[str, Any]
 ) -> int:
     """Run a study with the options of every study, and print its table; returns the exit code.
 

@@ -70,10 +70,7 @@ def run(work: Coroutine[Any, Any, T]) -> T:
 
 
 def with_client(
-    given: Mapping[str, Any],
-    work: "Callable[[VehicleClient], Coroutine[Any, Any, T]]",
-    *,
-    asks: bool = True,
+    given: Mapping[str, Any], work: "Callable[[VehicleClient], Coroutine[Any, Any, T]]", *, asks: bool = True
 ) -> T:
     """Run `work` with the vehicle that the options name; with `asks`, only if the vehicle answers."""
     link = address(given["connect"])

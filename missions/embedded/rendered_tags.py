@@ -92,11 +92,7 @@ class RenderedTagsReader:
         self._parameters = parameters
         self._model, self._imager = model, imager
         self._renderer = Renderer(
-            model,
-            aperture_px_m=blur_px_m,
-            scenery=parameters.scenery,
-            imager=imager,
-            seed=seed,
+            model, aperture_px_m=blur_px_m, scenery=parameters.scenery, imager=imager, seed=seed
         )
         self._zoom = 0.0
         self._detector = self._detector_at(1.0)

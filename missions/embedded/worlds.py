@@ -154,10 +154,7 @@ def orbit_world(world: WorldSpec, options: OrbitOptions, *, motion: MotionKind |
         return world
     target = GroundTargetParameters(
         motion=motion_of(
-            motion,
-            place_ne_m=options.target_ne_m,
-            speed_m_s=speed_m_s,
-            course_rad=options.target_heading_rad,
+            motion, place_ne_m=options.target_ne_m, speed_m_s=speed_m_s, course_rad=options.target_heading_rad
         ),
         size_m=_tag_size_m(options),
         tag_id=0,

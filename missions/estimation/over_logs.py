@@ -102,12 +102,7 @@ def _replay_one(
 ) -> EstimationResult:
     begun_s = wall_time_s()
     done = replay(
-        logs,
-        make,
-        system_id=request.system_id,
-        from_s=request.from_s,
-        to_s=request.to_s,
-        boot=request.boot,
+        logs, make, system_id=request.system_id, from_s=request.from_s, to_s=request.to_s, boot=request.boot
     )
     wall_s = wall_time_s() - begun_s
     failure = done.failure

@@ -50,10 +50,7 @@ class Area:
 
     def nearest(self, north_m: float, east_m: float) -> Place:
         """The place inside that is nearest to a place."""
-        return (
-            min(max(north_m, self.south_m), self.north_m),
-            min(max(east_m, self.west_m), self.east_m),
-        )
+        return (min(max(north_m, self.south_m), self.north_m), min(max(east_m, self.west_m), self.east_m))
 
     @property
     def centre_ne_m(self) -> Place:

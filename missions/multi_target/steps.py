@@ -69,10 +69,7 @@ class TrajectoryLaw:
         away_m = _norm(left)
         # the speed from which the rest of the way is enough to stop, with the time to take up a velocity
         lag_m = self._slowing_m_s2 * _RESPONSE_S
-        speed_m_s = min(
-            self._speed_m_s,
-            math.sqrt(lag_m * lag_m + 2.0 * self._slowing_m_s2 * away_m) - lag_m,
-        )
+        speed_m_s = min(self._speed_m_s, math.sqrt(lag_m * lag_m + 2.0 * self._slowing_m_s2 * away_m) - lag_m)
         wanted = _times(left, speed_m_s / away_m) if away_m > _AT_M else (0.0, 0.0, 0.0)
         change = _bounded(_times(_minus(wanted, self._velocity), 1.0 / _RESPONSE_S), self._most_m_s2)
         middle = _plus(self._velocity, _times(change, 0.5 * dt_s))

@@ -6,11 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from estimators.errors import EstimatorError
-from estimators.magnetic_identification.parameters import (
-    FALSE_ANOMALIES,
-    TARGETS,
-    IdentificationParameters,
-)
+from estimators.magnetic_identification.parameters import FALSE_ANOMALIES, TARGETS, IdentificationParameters
 from estimators.occupancy.detection import DetectionModel, MapError
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.tracking.grid import GridLayout

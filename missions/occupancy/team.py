@@ -167,13 +167,7 @@ class SearchTeam:
             await vehicle.wing.prepare_piloting()
 
     async def _wait(
-        self,
-        vehicle: "Vehicle",
-        ready: Callable[[], bool],
-        what: str,
-        one_s: float,
-        *,
-        flying: bool = False,
+        self, vehicle: "Vehicle", ready: Callable[[], bool], what: str, one_s: float, *, flying: bool = False
     ) -> None:
         """Wait for the other vehicles; the time limit grows with their number."""
 
@@ -282,9 +276,7 @@ def _investigation(options: Sequence[OccupancyOptions], survey_map: SurveyMap) -
     return Investigation(
         first.identify,
         Identifier(
-            first.identification,
-            map_error=map_error,
-            field_ned=field_direction(survey_map.home, _FIELD_YEAR),
+            first.identification, map_error=map_error, field_ned=field_direction(survey_map.home, _FIELD_YEAR)
         ),
         searchers=len(options),
         noise_nt=first.noise_nt,

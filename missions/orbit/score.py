@@ -65,10 +65,7 @@ def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
     at = np.column_stack([np.interp(time_s, target["time_usec"] * 1e-6, axis) for axis in theirs.T])
     offset = at - aircraft
     return OrbitTruth(
-        time_s=time_s,
-        aircraft_ned_m=aircraft,
-        target_ned_m=at,
-        radius_m=np.hypot(offset[:, 0], offset[:, 1]),
+        time_s=time_s, aircraft_ned_m=aircraft, target_ned_m=at, radius_m=np.hypot(offset[:, 0], offset[:, 1])
     )
 
 

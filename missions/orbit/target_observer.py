@@ -154,7 +154,4 @@ class TargetObserver:
             o.target_speed_m_s * math.sin(o.target_heading_rad),
         )
         since_s = (time_us - self._vehicle.link.first_heartbeat_us) * 1e-6
-        return (
-            o.target_ne_m[0] + since_s * velocity[0],
-            o.target_ne_m[1] + since_s * velocity[1],
-        ), velocity
+        return (o.target_ne_m[0] + since_s * velocity[0], o.target_ne_m[1] + since_s * velocity[1]), velocity

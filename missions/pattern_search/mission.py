@@ -87,10 +87,7 @@ class PatternMission(Mission[FlightOptions]):
         from missions.pattern_search.tag_watch import TagWatch
 
         search = TagWatch(
-            vehicle,
-            tag_id=options.tag_id,
-            altitude_m=options.own_altitude_m,
-            limit_s=options.search_time_s,
+            vehicle, tag_id=options.tag_id, altitude_m=options.own_altitude_m, limit_s=options.search_time_s
         )
         search.start()
         try:

@@ -6,8 +6,4 @@ Sans-IO: the functions compute commands from numbers.
 
 from missions.piloting.control import EnergyController, EnergyParameters, HeadingController
 
-__all__ = [
-    "EnergyController",
-    "EnergyParameters",
-    "HeadingController",
-]
+__all__ = ["EnergyController", "EnergyParameters", "HeadingController"]

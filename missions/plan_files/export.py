@@ -46,12 +46,7 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
     exported = _Exported(mission, path)
     with TemporaryDirectory() as folder:
         request_with_plan = replace(
-            request,
-            out=Path(folder) / "run",
-            picture=False,
-            confirm=None,
-            estimator=None,
-            max_error_m=None,
+            request, out=Path(folder) / "run", picture=False, confirm=None, estimator=None, max_error_m=None
         )
         result = fly(exported, request_with_plan)
     if result.outcome == INTERRUPTED:

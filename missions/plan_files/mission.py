@@ -211,10 +211,7 @@ def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, flo
         across = np.linalg.norm(offset, axis=1)
     else:
         across = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
-    return {
-        "cross_track_rms_m": round(rms(across), 3),
-        "cross_track_max_m": round(float(across.max()), 3),
-    }
+    return {"cross_track_rms_m": round(rms(across), 3), "cross_track_max_m": round(float(across.max()), 3)}
 
 
 def _home_text(document: MissionDocument) -> str | None:

@@ -87,8 +87,7 @@ def _check_item(document: MissionDocument, index: int) -> None:
         raise document.refuse(index, "has no position")
     elif not _is_place(item):
         raise document.refuse(
-            index,
-            f"position {item.x!r}, {item.y!r}; accepted: latitude -90..90, longitude -180..180 degrees",
+            index, f"position {item.x!r}, {item.y!r}; accepted: latitude -90..90, longitude -180..180 degrees"
         )
     if not (math.isfinite(item.z) and abs(item.z) <= _HIGHEST_M):
         raise document.refuse(index, f"altitude {item.z:g} m; accepted: a number up to {_HIGHEST_M:g}")

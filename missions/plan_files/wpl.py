@@ -46,9 +46,7 @@ def read_wpl(path: Path) -> document.MissionDocument:
     home = _home(rows[0]) if rows else None
     first = 0 if home is None else 1
     return document.MissionDocument(
-        path=path,
-        items=tuple(_item(row, first) for row in rows[first:]),
-        home=home,
+        path=path, items=tuple(_item(row, first) for row in rows[first:]), home=home
     )
 
 

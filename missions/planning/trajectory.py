@@ -79,11 +79,7 @@ class Trajectory:
 
 def _between(table: Array, k: int, f: float) -> tuple[float, float, float]:
     a, b = table[k], table[k + 1]
-    return (
-        float(a[0] + f * (b[0] - a[0])),
-        float(a[1] + f * (b[1] - a[1])),
-        float(a[2] + f * (b[2] - a[2])),
-    )
+    return (float(a[0] + f * (b[0] - a[0])), float(a[1] + f * (b[1] - a[1])), float(a[2] + f * (b[2] - a[2])))
 
 
 def plan_trajectory(

@@ -53,13 +53,7 @@ def sensors(snapshot: Snapshot) -> list[Finding]:
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")
     present = snapshot.whole("SYS_STATUS", "onboard_control_sensors_present")
     if enabled is None or health is None or present is None:
-        return [
-            problem(
-                "sensors",
-                "their health was not reported (SYS_STATUS)",
-                "wait, or look at the link",
-            )
-        ]
+        return [problem("sensors", "their health was not reported (SYS_STATUS)", "wait, or look at the link")]
     sick = enabled & present & ~health & ~_SAID_ELSEWHERE
     if not any(snapshot.parameters.get(name) for name in TERRAIN_PARAMETERS):
         sick &= ~_TERRAIN_BIT  # there is no terrain data here, and no use for it

@@ -205,7 +205,7 @@ def report_lines(summary: Mapping[str, Any]) -> Sequence[str]:
     lines = [
         f"{summary['lines']} lines and {summary['tie_lines']} tie "
         f"{'line' if summary['tie_lines'] == 1 else 'lines'}, {summary['line_km']:.1f} km, "
-        f"{summary['readings_on_lines']} readings with {_nt(summary['noise_nt'])} of noise",
+        f"{summary['readings_on_lines']} readings with {_nt(summary['noise_nt'])} of noise"
     ]
     if summary["crossings"]:
         lines.append(

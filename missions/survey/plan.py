@@ -118,11 +118,7 @@ def survey_path(
         along = np.concatenate(([0.0], lead_m + on_line, [whole_m]))
         straight = _followed(entry, (Arc(turn=0, length_m=whole_m),), turn_radius_m)
         c, s = math.cos(line.course_rad), math.sin(line.course_rad)
-        add(
-            straight,
-            np.column_stack((entry.north_m + along * c, entry.east_m + along * s)),
-            along,
-        )
+        add(straight, np.column_stack((entry.north_m + along * c, entry.east_m + along * s)), along)
     last_line = sum(map(len, arcs)) - 2
     points, course, bend = (np.concatenate(columns) for columns in zip(*pieces, strict=True))
     arc = _arc_m(points)
@@ -151,19 +147,12 @@ def _places(span_m: float, spacing_m: float) -> list[float]:
 
 
 def _line(
-    options: SurveyOptions,
-    name: str,
-    kind: LineKind,
-    start: tuple[float, float],
-    end: tuple[float, float],
+    options: SurveyOptions, name: str, kind: LineKind, start: tuple[float, float], end: tuple[float, float]
 ) -> SurveyLine:
     """A line between two places (along, across) of the area."""
     c, s = math.cos(options.direction_rad), math.sin(options.direction_rad)
     ends = [
-        (
-            options.area_ne_m[0] + along * c - across * s,
-            options.area_ne_m[1] + along * s + across * c,
-        )
+        (options.area_ne_m[0] + along * c - across * s, options.area_ne_m[1] + along * s + across * c)
         for along, across in (start, end)
     ]
     return SurveyLine(name=name, kind=kind, start_ne_m=ends[0], end_ne_m=ends[1])

@@ -114,13 +114,7 @@ class VehicleCommands:
         return self.link.heartbeat_us < self._arming_us + HEARTBEAT_AGE_US
 
     async def command_int(
-        self,
-        command: int,
-        frame: int,
-        params: tuple[float, float, float, float],
-        x: int,
-        y: int,
-        z: float,
+        self, command: int, frame: int, params: tuple[float, float, float, float], x: int, y: int, z: float
     ) -> None:
         """Send a COMMAND_INT repeatedly until it is answered; raises as `command`."""
         message = dialect.MAVLink_command_int_message(

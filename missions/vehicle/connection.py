@@ -348,11 +348,7 @@ class MessageStream:
     """
 
     def __init__(
-        self,
-        connection: Connection,
-        names: Iterable[str],
-        system_id: int | None,
-        component_id: int | None,
+        self, connection: Connection, names: Iterable[str], system_id: int | None, component_id: int | None
     ) -> None:
         self._queue: deque[Frame] = deque()
         self._loop: asyncio.AbstractEventLoop | None = None

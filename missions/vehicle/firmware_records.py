@@ -72,10 +72,7 @@ PX4_COPTER: Final = Firmware(
 )
 
 PX4_PLANE: Final = replace(
-    PX4_COPTER,
-    kind=VehicleKind.FIXED_WING,
-    **_tables("px4_plane"),
-    limits_from=_px4_plane_limits,
+    PX4_COPTER, kind=VehicleKind.FIXED_WING, **_tables("px4_plane"), limits_from=_px4_plane_limits
 )
 
 # ArduPilot

@@ -34,11 +34,7 @@ class HeadingFlight:
     """
 
     def __init__(
-        self,
-        commands: VehicleCommands,
-        adapter: Adapter,
-        pilot: AttitudePilot,
-        controller: HeadingController,
+        self, commands: VehicleCommands, adapter: Adapter, pilot: AttitudePilot, controller: HeadingController
     ) -> None:
         self.heading_rad = math.nan
         self._commands = commands

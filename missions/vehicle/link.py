@@ -232,10 +232,7 @@ class VehicleLink:
     async def position(self, timeout_s: float = 5.0) -> Position:
         """Newest global position; waits for one when there is none yet."""
         return await self.wait_until(
-            lambda: self.latest(Position),
-            what="position",
-            on=("GLOBAL_POSITION_INT",),
-            timeout_s=timeout_s,
+            lambda: self.latest(Position), what="position", on=("GLOBAL_POSITION_INT",), timeout_s=timeout_s
         )
 
     async def telemetry(self, kind: type[T]) -> AsyncIterator[T]:

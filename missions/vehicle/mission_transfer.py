@@ -139,11 +139,7 @@ async def _send_plan(
 
 
 async def _ask(
-    link: VehicleLink,
-    message: Any,
-    name: str,
-    mission_type: MissionType,
-    sequence: int | None = None,
+    link: VehicleLink, message: Any, name: str, mission_type: MissionType, sequence: int | None = None
 ) -> Any:
     """Send a request repeatedly until its answer is received."""
     with link.messages(name) as replies:

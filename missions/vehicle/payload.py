@@ -61,11 +61,7 @@ class Payload:
         )
 
     def _listen(
-        self,
-        name: str,
-        component_id: int,
-        convert: Callable[[Any], Any],
-        listener: Callable[[Any], None],
+        self, name: str, component_id: int, convert: Callable[[Any], Any], listener: Callable[[Any], None]
     ) -> Callable[[], None]:
         system_id = self._link.system_id
 

@@ -268,11 +268,7 @@ class Vehicle:
         await self.commands.set_mode(Mode.HOLD)
 
     async def goto(
-        self,
-        target: GeodeticPosition,
-        *,
-        tolerance_m: float = 1.0,
-        timeout_s: float | None = None,
+        self, target: GeodeticPosition, *, tolerance_m: float = 1.0, timeout_s: float | None = None
     ) -> None:
         """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow.
 

@@ -100,11 +100,7 @@ class FixedWing:
     """
 
     def __init__(
-        self,
-        commands: VehicleCommands,
-        adapter: Adapter,
-        parameters: VehicleParameters,
-        plans: VehiclePlans,
+        self, commands: VehicleCommands, adapter: Adapter, parameters: VehicleParameters, plans: VehiclePlans
     ) -> None:
         self.runway_heading_rad: float | None = None
         self.pilot: AttitudePilot | None = None

@@ -11,12 +11,7 @@ import numpy as np
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.plugins.param import ParamError, ParamResult
 
-from autopilot_bridge.parameter_files import (
-    MAVPROXY_SUFFIXES,
-    QGC_SUFFIX,
-    format_mavproxy,
-    format_qgc,
-)
+from autopilot_bridge.parameter_files import MAVPROXY_SUFFIXES, QGC_SUFFIX, format_mavproxy, format_qgc
 from autopilot_bridge.parameters import INTEGER_LIMITS, ParameterDefinition, ParameterType
 from missions.errors import CommandRejected, MissionError, PlanError, VehicleTimeout
 from missions.vehicle_client.client import VehicleClient

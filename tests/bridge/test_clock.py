@@ -9,13 +9,7 @@ import threading
 
 import pytest
 
-from autopilot_bridge.clock import (
-    LoopClock,
-    Pacer,
-    RealTimeClock,
-    run,
-    unix_time_us,
-)
+from autopilot_bridge.clock import LoopClock, Pacer, RealTimeClock, run, unix_time_us
 from autopilot_bridge.errors import ClockError
 from tests.bridge.clock_world import STEP_US, World
 

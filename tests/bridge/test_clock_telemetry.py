@@ -5,10 +5,7 @@ import random
 
 import pytest
 
-from autopilot_bridge.clock import (
-    TelemetryClock,
-    run,
-)
+from autopilot_bridge.clock import TelemetryClock, run
 from tests.bridge.clock_world import World
 
 

@@ -118,14 +118,8 @@ GOLDEN = [
         pymavlink_dialect.MAVLink_heartbeat_message(2, 12, 0x51, 0x00030000, 3, 3),
         "fd09000000010100000000000300020c510303ce72",
     ),
-    (
-        pymavlink_dialect.MAVLink_statustext_message(6, b"Takeoff"),
-        "fd080000010101fd00000654616b656f6666fe67",
-    ),
-    (
-        pymavlink_dialect.MAVLink_system_time_message(0, 0),
-        "fd010000020101020000006a3a",
-    ),
+    (pymavlink_dialect.MAVLink_statustext_message(6, b"Takeoff"), "fd080000010101fd00000654616b656f6666fe67"),
+    (pymavlink_dialect.MAVLink_system_time_message(0, 0), "fd010000020101020000006a3a"),
 ]
 
 

@@ -33,8 +33,7 @@ def sitl(vehicle: str, tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Pl
 
 
 @pytest.fixture(
-    scope="module",
-    params=["MAVSDK asyncio", pytest.param("MAVSDK synchronous", marks=pytest.mark.slow)],
+    scope="module", params=["MAVSDK asyncio", pytest.param("MAVSDK synchronous", marks=pytest.mark.slow)]
 )
 def client(request: pytest.FixtureRequest) -> str:
     return str(request.param)

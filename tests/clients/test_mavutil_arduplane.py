@@ -124,11 +124,7 @@ def test_roll_alone(guided: AircraftClient) -> None:
     guided.banks(-30.0, each=each)
     height_m = guided.next("GLOBAL_POSITION_INT").relative_alt * 1e-3
     guided.holds(
-        "height",
-        10.0,
-        "GLOBAL_POSITION_INT",
-        lambda m: abs(m.relative_alt * 1e-3 - height_m) < 10.0,
-        each,
+        "height", 10.0, "GLOBAL_POSITION_INT", lambda m: abs(m.relative_alt * 1e-3 - height_m) < 10.0, each
     )
     guided.banks(-30.0, each=each)
 

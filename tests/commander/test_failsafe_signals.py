@@ -181,14 +181,7 @@ CASES = (
         ("Battery 1 is critical", "Battery Failsafe"),
         bit=BATTERY,
     ),
-    Case(
-        "ground station",
-        "ardupilot",
-        silent(6.0),
-        received,
-        ("GCS Failsafe",),
-        ("GCS Failsafe Cleared",),
-    ),
+    Case("ground station", "ardupilot", silent(6.0), received, ("GCS Failsafe",), ("GCS Failsafe Cleared",)),
     Case(
         "sticks",
         "ardupilot",

@@ -10,12 +10,7 @@ from autopilot_bridge.commander.events import FailsafeKind, FenceBreached, Fence
 from autopilot_bridge.commander.fence_keeper import place_ahead
 from autopilot_bridge.commander.fence_watch import FenceWatch
 from autopilot_bridge.commander.geofence import Geofence
-from autopilot_bridge.commander.geofence_parameters import (
-    ALL_FENCES,
-    AutoEnable,
-    FenceParameters,
-    FenceType,
-)
+from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, AutoEnable, FenceParameters, FenceType
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flight.context import LandedState

@@ -126,10 +126,7 @@ def test_yaw_step_settles() -> None:
 @pytest.mark.parametrize("control", [MulticopterParameters(), PX4_DEFAULTS], ids=["iris", "px4"])
 @pytest.mark.parametrize(
     ("environment", "limit_m"),
-    [
-        (Environment(), 0.3),
-        (Environment(wind_ned_m_s=(5.0, 0.0, 0.0), turbulence=Turbulence.MODERATE), 0.6),
-    ],
+    [(Environment(), 0.3), (Environment(wind_ned_m_s=(5.0, 0.0, 0.0), turbulence=Turbulence.MODERATE), 0.6)],
     ids=["still", "windy"],
 )
 def test_lissajous_path_error(

@@ -147,10 +147,7 @@ def test_stamps_of_the_definitions_hold_more_than_an_hour():
         found = stamp_field(definition.name, definition.field_names)
         if found is not None:
             (field,) = [item for item in definition.wire_fields if item.name == found[0]]
-            assert (field.type, field.length) == (
-                "uint32_t" if found[0] == "time_boot_ms" else "uint64_t",
-                0,
-            )
+            assert (field.type, field.length) == ("uint32_t" if found[0] == "time_boot_ms" else "uint64_t", 0)
 
 
 @pytest.mark.parametrize(

@@ -40,10 +40,7 @@ class Flight:
     """A plan flown from a hover at the origin."""
 
     def __init__(
-        self,
-        *items: MissionItem,
-        rules: PlanRules = PX4_PLANS,
-        parameters: FlightParameters | None = None,
+        self, *items: MissionItem, rules: PlanRules = PX4_PLANS, parameters: FlightParameters | None = None
     ) -> None:
         self.rig = Rig(height_m=HEIGHT_M, parameters=parameters)
         self.store = MissionStore()

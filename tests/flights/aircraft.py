@@ -120,12 +120,7 @@ class AircraftFlight(Flight):
         return along_m * c - right_m * s, along_m * s + right_m * c
 
     def command_int(
-        self,
-        command: int,
-        params: Sequence[float],
-        north_m: float,
-        east_m: float,
-        height_m: float,
+        self, command: int, params: Sequence[float], north_m: float, east_m: float, height_m: float
     ) -> int | None:
         """COMMAND_INT at a place over home; its last answer within half a second."""
         lat, lon = self.geodetic(north_m, east_m)

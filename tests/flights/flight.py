@@ -100,12 +100,7 @@ class Flight:
             sensors=sensors,
         )
         self.sitl = Sitl(
-            WorldSpec(
-                vehicles=(specification,),
-                seed=seed,
-                air=environment or Environment(),
-                targets=targets,
-            )
+            WorldSpec(vehicles=(specification,), seed=seed, air=environment or Environment(), targets=targets)
         )
         self.flavour = flavour
         self.vehicle = self.sitl.vehicles[0]
@@ -178,11 +173,7 @@ class Flight:
         truth = self.truth
         north = (truth[t.LAT_RAD] - math.radians(home.lat_deg)) * _METRES_PER_RAD
         east = (truth[t.LON_RAD] - math.radians(home.lon_deg)) * _METRES_PER_RAD
-        return (
-            float(north),
-            float(east * math.cos(truth[t.LAT_RAD])),
-            float(home.alt_m - truth[t.ALT_M]),
-        )
+        return (float(north), float(east * math.cos(truth[t.LAT_RAD])), float(home.alt_m - truth[t.ALT_M]))
 
     @property
     def height_m(self) -> float:

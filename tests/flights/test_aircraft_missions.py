@@ -57,10 +57,7 @@ def fly_case(
     """Fly a mission to its touch."""
     heading_deg = 353.0 if case.flavour == "ardupilot" else 0.0
     wind = Environment.from_wind(
-        speed_m_s=6.0,
-        from_deg=heading_deg + case.wind_from_deg,
-        turbulence=turbulence,
-        profile=profile,
+        speed_m_s=6.0, from_deg=heading_deg + case.wind_from_deg, turbulence=turbulence, profile=profile
     )
     flight = AircraftFlight(
         case.flavour,
@@ -95,10 +92,7 @@ def mission(
 
 @pytest.mark.parametrize(
     "case",
-    [
-        Case("px4", None, tuple(RECTANGLE), 60.0, 0),
-        Case("ardupilot", "catapult", tuple(SHARP), -90.0, 1),
-    ],
+    [Case("px4", None, tuple(RECTANGLE), 60.0, 0), Case("ardupilot", "catapult", tuple(SHARP), -90.0, 1)],
     ids=lambda case: f"{case.flavour}-{case.launch or 'runway'}",
 )
 def test_mission_in_moderate_turbulence(case: Case) -> None:

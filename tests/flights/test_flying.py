@@ -248,8 +248,7 @@ def test_attitude_targets(flight: Flight) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flavour", "height_m"),
-    [("px4", 5.0), ("ardupilot", 45.0), slow("px4", 45.0), slow("ardupilot", 5.0)],
+    ("flavour", "height_m"), [("px4", 5.0), ("ardupilot", 45.0), slow("px4", 45.0), slow("ardupilot", 5.0)]
 )
 def test_return_from_afar(flavour: str, height_m: float) -> None:
     flight = Flight(flavour, seed=2)

@@ -66,11 +66,7 @@ def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     """A circle, flown with setpoints in a breeze."""
     folder = tmp_path_factory.mktemp("summary") / request.param
     options = FlightOptions(
-        pattern="L1",
-        width_m=2.0 * RADIUS_M,
-        height_m=2.0 * RADIUS_M,
-        altitude_m=HEIGHT_M,
-        via=Via.SETPOINTS,
+        pattern="L1", width_m=2.0 * RADIUS_M, height_m=2.0 * RADIUS_M, altitude_m=HEIGHT_M, via=Via.SETPOINTS
     )
     result = fly(
         find_mission("lissajous"),

@@ -17,10 +17,7 @@ OFF = np.zeros(MAX_ACTUATORS)
 
 def make(environment: Environment, home: Home | None = None, initial: InitialState | None = None) -> Vehicle:
     return Vehicle(
-        home=home or Home(),
-        environment=environment,
-        seed_sequence=np.random.SeedSequence(1),
-        initial=initial,
+        home=home or Home(), environment=environment, seed_sequence=np.random.SeedSequence(1), initial=initial
     )
 
 

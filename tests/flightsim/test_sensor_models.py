@@ -169,11 +169,7 @@ def test_imu_specimens_spread_as_specified() -> None:
     parameters = ImuParameters(
         **(
             QUIET_IMU
-            | {
-                "gyro_turn_on_bias_rad_s": 1e-3,
-                "accel_scale_error": 2e-3,
-                "accel_cross_axis_error": 5e-4,
-            }
+            | {"gyro_turn_on_bias_rad_s": 1e-3, "accel_scale_error": 2e-3, "accel_cross_axis_error": 5e-4}
         )
     )
     samples = np.array([record(parameters, truth, 1, seed)[0] for seed in range(600)])

@@ -200,8 +200,7 @@ def test_bad_descriptions_are_named(tmp_path: Path, old: str, new: str, message:
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
-    [("</fdm_config>", ""), ("<product>", "<produkt>"), ("<mass_balance>", "<mass_ballast>")],
+    ("old", "new"), [("</fdm_config>", ""), ("<product>", "<produkt>"), ("<mass_balance>", "<mass_ballast>")]
 )
 def test_bad_jsbsim_files_are_refused_quietly(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], old: str, new: str

@@ -126,10 +126,7 @@ def test_a_mission_that_is_reported_and_not_flown_has_failed(
     scripted.make = lambda *_: Idle()
     options = FlightOptions(pattern="sector", width_m=60.0, height_m=60.0, via=via)
     request = RunRequest(
-        options=options,
-        world=WorldSpec.of_team(autopilot=flavour),
-        picture=False,
-        out=tmp_path / "run",
+        options=options, world=WorldSpec.of_team(autopilot=flavour), picture=False, out=tmp_path / "run"
     )
     result = session.fly("sector", request)
     assert result.outcome == "failed"

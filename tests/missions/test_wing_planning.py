@@ -36,11 +36,7 @@ AEROSONDE = FixedWingLimits(
 )
 
 
-@given(
-    turn=st.floats(0.05, 2.9),
-    radius=st.floats(20.0, 800.0),
-    ramp_share=st.floats(0.01, 0.6),
-)
+@given(turn=st.floats(0.05, 2.9), radius=st.floats(20.0, 800.0), ramp_share=st.floats(0.01, 0.6))
 def test_a_corner_turns_as_commanded_and_no_tighter(turn: float, radius: float, ramp_share: float) -> None:
     corner = Corner.of(turn, radius, ramp_share * radius)
     assert corner.course_rad[-1] == pytest.approx(turn, abs=1e-9)
@@ -102,11 +98,7 @@ def flown(name: str, limits: FixedWingLimits, **chosen: object) -> FlightOptions
 
 
 @settings(deadline=None, max_examples=15)
-@given(
-    speed=st.floats(12.0, 45.0),
-    bank_deg=st.floats(30.0, 60.0),
-    wind_share=st.floats(0.0, 0.4),
-)
+@given(speed=st.floats(12.0, 45.0), bank_deg=st.floats(30.0, 60.0), wind_share=st.floats(0.0, 0.4))
 def test_defaults_are_flyable_for_any_aircraft(speed: float, bank_deg: float, wind_share: float) -> None:
     limits = FixedWingLimits(
         airspeed_min_m_s=0.7 * speed,

@@ -35,12 +35,7 @@ def turned(q: Array, theta_ned_rad: Array) -> Array:
     angle = float(np.linalg.norm(theta_ned_rad))
     axis = theta_ned_rad / angle if angle else np.zeros(3)
     x = np.array([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * axis)])
-    return np.array(
-        [
-            x[0] * q[0] - x[1:] @ q[1:],
-            *(x[0] * q[1:] + q[0] * x[1:] + np.cross(x[1:], q[1:])),
-        ]
-    )
+    return np.array([x[0] * q[0] - x[1:] @ q[1:], *(x[0] * q[1:] + q[0] * x[1:] + np.cross(x[1:], q[1:]))])
 
 
 @dataclass
@@ -182,16 +177,7 @@ def observation(case: Case, *, gate: float = WIDE_GATE) -> Array:
 
 def update(case: Case, obs: Array, has: int) -> int:
     return fusion.update(
-        case.p,
-        case.core,
-        case.history,
-        case.work,
-        obs,
-        np.zeros(covariance.PROCESS_SIZE),
-        has,
-        ROW,
-        ROW,
-        ROW,
+        case.p, case.core, case.history, case.work, obs, np.zeros(covariance.PROCESS_SIZE), has, ROW, ROW, ROW
     )
 
 
@@ -778,11 +764,7 @@ def test_prediction(size: int) -> None:
         q[first : first + 3] = (1.0 - math.exp(-2.0 * exponent)) * np.array(variance)
     tilt, cross, scale = of("TURN_TILT"), of("TURN_CROSS"), of("TURN_SCALE")
     q[att] = of("NOISE_ATT") * t + np.array(
-        [
-            tilt * turned[0] + cross * turned[2],
-            tilt * turned[1] + cross * turned[2],
-            scale * turned[2],
-        ]
+        [tilt * turned[0] + cross * turned[2], tilt * turned[1] + cross * turned[2], scale * turned[2]]
     )
     q[vel], q[pos] = of("NOISE_VEL") * t, of("NOISE_VEL") * t**3 / 3.0
     q[s.BARO_OFFSET] = of("BARO_WALK") * t

@@ -131,11 +131,7 @@ def pointing(world: World) -> SimpleNamespace:
 def test_heartbeats_streams_and_ids(world):
     world.run(10.0)
     kinds = {(f.system_id, f.component_id) for f in world.frames}
-    assert kinds == {
-        (SYSTEM, CAMERA_COMPONENT),
-        (SYSTEM, GIMBAL_COMPONENT),
-        (SYSTEM, MAGNETOMETER_COMPONENT),
-    }
+    assert kinds == {(SYSTEM, CAMERA_COMPONENT), (SYSTEM, GIMBAL_COMPONENT), (SYSTEM, MAGNETOMETER_COMPONENT)}
     for component, mav_type in [
         (CAMERA_COMPONENT, m.MAV_TYPE_CAMERA),
         (GIMBAL_COMPONENT, m.MAV_TYPE_GIMBAL),

@@ -21,11 +21,7 @@ from tests.services.parts_rig import parts_of, service_of
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 CAMERA, GIMBAL = 100, 154
 CONFIGURE, PITCHYAW = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-LOCATION, ROI, NO_ROI = (
-    m.MAV_CMD_DO_SET_ROI_LOCATION,
-    m.MAV_CMD_DO_SET_ROI,
-    m.MAV_CMD_DO_SET_ROI_NONE,
-)
+LOCATION, ROI, NO_ROI = (m.MAV_CMD_DO_SET_ROI_LOCATION, m.MAV_CMD_DO_SET_ROI, m.MAV_CMD_DO_SET_ROI_NONE)
 NEXT_WAYPOINT = m.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
 LAT, LON = 47.3986, 8.5456  # some 95 m north of the vehicle
 
@@ -233,8 +229,7 @@ def test_a_region_of_interest_ends(flavour: str, end: tuple[int, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "mode"),
-    [(1, RoiMode.NEXT_WAYPOINT), (2, RoiMode.WAYPOINT), (3, RoiMode.LOCATION), (0, None)],
+    ("kind", "mode"), [(1, RoiMode.NEXT_WAYPOINT), (2, RoiMode.WAYPOINT), (3, RoiMode.LOCATION), (0, None)]
 )
 def test_px4_distinguishes_the_kinds_of_regions_of_interest(kind: int, mode: RoiMode | None) -> None:
     """Only the kind 3 has a place; the index of a waypoint is in param2."""

@@ -17,12 +17,7 @@ from autopilot_bridge.mavlink.target_scan import (
 )
 from autopilot_bridge.payload import TARGET_SENSOR_COMPONENT
 from autopilot_bridge.sitl import Sitl
-from flightsim.payload import (
-    GroundTargetParameters,
-    PayloadParameters,
-    Static,
-    TargetSensorParameters,
-)
+from flightsim.payload import GroundTargetParameters, PayloadParameters, Static, TargetSensorParameters
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
 

@@ -49,10 +49,7 @@ def test_a_distorted_picture_undistorts_to_the_ideal_one():
 
 def test_motion_blur_is_the_mean_of_the_pictures_of_its_moments():
     moving = replace(
-        VIEW,
-        exposure_s=0.04,
-        velocity_ned_m_s=(6.0, 3.0, -1.0),
-        rotation_mount_rad_s=(0.5, -0.4, 0.3),
+        VIEW, exposure_s=0.04, velocity_ned_m_s=(6.0, 3.0, -1.0), rotation_mount_rad_s=(0.5, -0.4, 0.3)
     )
     blurred = grey(Renderer(SMALL).render(moving))
     renderer = Renderer(SMALL)

@@ -36,15 +36,7 @@ def quaternion(roll_deg: float, pitch_deg: float, yaw_deg: float) -> tuple[float
     return tuple(q.tolist())
 
 
-def camera_at(
-    place_ned_m,
-    attitude_deg,
-    targets,
-    *,
-    zoom=1.0,
-    time_us=4000,
-    detection=SURE,
-):
+def camera_at(place_ned_m, attitude_deg, targets, *, zoom=1.0, time_us=4000, detection=SURE):
     """A camera along the body's x axis of a vehicle there, what it detects, and its view."""
     truth = np.zeros(t.TRUTH_SIZE)
     lat_deg, lon_deg = HOME.offset(place_ned_m[0], place_ned_m[1])
@@ -52,12 +44,7 @@ def camera_at(
     truth[t.ALT_M] = HOME.alt_m - place_ned_m[2]
     truth[t.Q_NED_FROM_FRD] = quaternion(*attitude_deg)
     camera = Camera(
-        CameraParameters(
-            mount_pitch_rad=0.0,
-            position_frd_m=(0.2, 0.0, 0.1),
-            detection=detection,
-            **SHARP,
-        ),
+        CameraParameters(mount_pitch_rad=0.0, position_frd_m=(0.2, 0.0, 0.1), detection=detection, **SHARP),
         truth=truth,
         home=HOME,
         targets=GroundTargets(targets, seeds=lambda i: np.random.SeedSequence([1, i])),

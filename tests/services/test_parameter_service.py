@@ -20,9 +20,7 @@ from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.parameters.protocol import (
-    ParameterService,
-)
+from autopilot_bridge.services.parameters.protocol import ParameterService
 from autopilot_bridge.sitl import Sitl
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.services.dispatch import deliver

@@ -72,10 +72,7 @@ MODELS = {
         b'[vehicle]\nname = "u"\nkind = "fixed_wing"\njsbsim = "c172x"\nwings = 3\n',
         ("unknown.toml", "wings"),
     ),
-    "missing.toml": (
-        b'[vehicle]\nname = "m"\nkind = "fixed_wing"\njsbsim = "nosuch.xml"\n',
-        ("nosuch",),
-    ),
+    "missing.toml": (b'[vehicle]\nname = "m"\nkind = "fixed_wing"\njsbsim = "nosuch.xml"\n', ("nosuch",)),
     "bytes.toml": (b"\xff\xfe\x00\x01", ("bytes.toml", "cannot read")),
     "broken.xml": (b"<fdm_config", ("broken.xml", "JSBSim cannot load")),
 }

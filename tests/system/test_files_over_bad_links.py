@@ -30,8 +30,7 @@ class Station:
         self.files = MemoryStore(Quota(size_bytes=10_000_000, files=100))
         parameters = {"SDLOG_MODE": -1.0}
         self.sitl = Sitl(
-            WorldSpec(vehicles=(VehicleSpec(parameters=parameters),)),
-            cards=[MemoryCard(files=self.files)],
+            WorldSpec(vehicles=(VehicleSpec(parameters=parameters),)), cards=[MemoryCard(files=self.files)]
         )
         self.link = LossyLink(
             self.sitl.connect(0),

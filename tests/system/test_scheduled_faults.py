@@ -60,9 +60,7 @@ def test_a_flight_loses_gps_and_airspeed_for_a_time_and_its_motor_for_good() -> 
 
 def test_the_end_of_a_fault_leaves_the_one_that_replaced_it() -> None:
     stuck = FaultSpec(unit=FaultUnit.GPS, failure=FaultType.STUCK, start_s=0.4, duration_s=1.0)
-    sitl = Sitl(
-        WorldSpec(faults=(FaultSpec(unit=FaultUnit.GPS, start_s=0.2, duration_s=0.5), stuck)),
-    )
+    sitl = Sitl(WorldSpec(faults=(FaultSpec(unit=FaultUnit.GPS, start_s=0.2, duration_s=0.5), stuck)))
     faults = sitl.vehicles[0].sensors.faults
     advance(sitl, 0.3)
     assert faults.active == {SensorUnit.GPS: FaultType.OFF}

@@ -181,10 +181,7 @@ def test_a_radio_on_the_line_passes_unsigned() -> None:
 
 def test_payload_speaks_under_the_vehicles_key() -> None:
     carried = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
-    sitl = Sitl(
-        WorldSpec(vehicles=(VehicleSpec(payload=carried),)),
-        signing=SigningParameters(key=KEY),
-    )
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(payload=carried),)), signing=SigningParameters(key=KEY))
     link, mine = sitl.connect(0, reach=Reach.NETWORK), sitl.connect(0)
     checking = LinkSigning(SigningState(KEY, clock=lambda: 0), link_id=0)
     parser, components = FrameParser(), set()

@@ -114,10 +114,7 @@ def card() -> MemoryCard:
 
 @pytest.mark.parametrize(
     ("flavour", "first", "path"),
-    [
-        ("px4", 0, ("log", "2025-01-01", "00_00_00.tlog")),
-        ("ardupilot", 1, ("LOGS", "00000001.tlog")),
-    ],
+    [("px4", 0, ("log", "2025-01-01", "00_00_00.tlog")), ("ardupilot", 1, ("LOGS", "00000001.tlog"))],
 )
 def test_a_flight_is_logged_listed_and_downloaded(
     flavour: str, first: int, path: tuple[str, ...], tmp_path: Path

@@ -109,10 +109,7 @@ def test_ardupilot_streams_at_the_requested_rate() -> None:
     streams = ARDUPILOT_AT_4_HZ - NOT_ON_OUR_VEHICLE | ONLY_ON_OUR_VEHICLE
     client.request_streams(mavlink.MAV_DATA_STREAM_ALL, 4)
     client.run(1.0)
-    check(
-        client.rates_hz(),
-        {**dict.fromkeys(streams, 4.0), "HEARTBEAT": 1.0, "TIMESYNC": 0.1},
-    )
+    check(client.rates_hz(), {**dict.fromkeys(streams, 4.0), "HEARTBEAT": 1.0, "TIMESYNC": 0.1})
     client.request_streams(mavlink.MAV_DATA_STREAM_ALL, 0, 0)
     client.run(1.0)
     check(client.rates_hz(), {"HEARTBEAT": 1.0, "TIMESYNC": 0.1})
@@ -131,11 +128,7 @@ def test_ardupilot_stream_groups() -> None:
 INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
 GET_INTERVAL = mavlink.MAV_CMD_GET_MESSAGE_INTERVAL
-ACCEPTED, DENIED, FAILED = (
-    mavlink.MAV_RESULT_ACCEPTED,
-    mavlink.MAV_RESULT_DENIED,
-    mavlink.MAV_RESULT_FAILED,
-)
+ACCEPTED, DENIED, FAILED = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED)
 
 
 @pytest.mark.parametrize(

@@ -266,11 +266,7 @@ def test_arduplane_refuses_rates_beyond_its_loop(rate_hz: float, result: int) ->
     table = StreamTable(cache, channel, {}, physics_step_us=4000)  # type: ignore[arg-type]
     texts: list[str] = []
     service = MessageIntervalService(
-        PLANE_SERVICES.intervals,
-        {"one": table},
-        cache,
-        lambda severity, text: texts.append(text),
-        {},
+        PLANE_SERVICES.intervals, {"one": table}, cache, lambda severity, text: texts.append(text), {}
     )
     source = Source(channel, 255, 190)
     assert service.set_interval(source, definition("ATTITUDE").message_id, 1e6 / rate_hz) == result

@@ -10,14 +10,7 @@ from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
 from autopilot_bridge.firmware.px4 import services as px4_services
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, MAVLinkMessage, dialect
 from autopilot_bridge.sitl import Sitl
-from autopilot_bridge.telemetry.line import (
-    LATEST_S,
-    SLOW_US,
-    LineBudget,
-    RadioFlow,
-    fit,
-    thinned_us,
-)
+from autopilot_bridge.telemetry.line import LATEST_S, SLOW_US, LineBudget, RadioFlow, fit, thinned_us
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
 BAUD_57600 = 5760.0

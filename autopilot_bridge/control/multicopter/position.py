@@ -182,11 +182,7 @@ def _acceleration_axis(
     if not math.isfinite(error):
         s[c.VEL_INTEGRAL + axis] = 0.0
         return acc, 0.0, False
-    return (
-        acc + kp * error + s[c.VEL_INTEGRAL + axis] - kd * s[c.ACC_FILTERED + axis],
-        error,
-        True,
-    )
+    return (acc + kp * error + s[c.VEL_INTEGRAL + axis] - kd * s[c.ACC_FILTERED + axis], error, True)
 
 
 @kernel

@@ -66,10 +66,7 @@ class ArduPilotCommands(handlers.CommandHandlers):
         if mode is None:
             self.commander.emit(
                 ModeDenied(
-                    time_us=self.commander.time_us,
-                    mode=None,
-                    reason=Reason.MODE_UNKNOWN,
-                    custom_mode=number,
+                    time_us=self.commander.time_us, mode=None, reason=Reason.MODE_UNKNOWN, custom_mode=number
                 )
             )
             return Result.FAILED

@@ -12,12 +12,7 @@ import struct
 from collections.abc import Mapping
 from typing import Final
 
-from autopilot_bridge.parameters import (
-    ParameterDefinition,
-    ParameterError,
-    ParameterStore,
-    ParameterType,
-)
+from autopilot_bridge.parameters import ParameterDefinition, ParameterError, ParameterStore, ParameterType
 
 _HEADER: Final = struct.Struct("<HHH")
 _MAGIC: Final = 0x671B

@@ -154,9 +154,7 @@ def _log_times(parameters: ParameterStore) -> LogTimes | None:
         return None
     always = int(parameters.get("LOG_DISARMED")) != 0
     return LogTimes(
-        from_boot=always,
-        after_disarming=always,
-        new_at_disarming=bool(parameters.get("LOG_FILE_DSRMROT")),
+        from_boot=always, after_disarming=always, new_at_disarming=bool(parameters.get("LOG_FILE_DSRMROT"))
     )
 
 
@@ -179,10 +177,7 @@ def address_rule(system_id: int) -> AddressRule:
 
 
 def _microservices(
-    parts: AutopilotParts,
-    *,
-    manual: ManualRules,
-    actuators: Callable[[AutopilotParts], Microservice],
+    parts: AutopilotParts, *, manual: ManualRules, actuators: Callable[[AutopilotParts], Microservice]
 ) -> tuple[Microservice, ...]:
     return (
         MissionEquipment(parts),

@@ -40,7 +40,7 @@ _WALLS: Final = {
 _TERMINATING: Final = Notice(Severity.EMERGENCY, "Terminating due to GCS request")
 _EKF_MODES: Final = {FailsafeAction.LAND: FlightMode.LAND, FailsafeAction.ALTITUDE: FlightMode.ALTITUDE}
 _COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
-    (193, Reason.WRONG_MODE): Notice(Severity.INFO, "Failed to pause"),
+    (193, Reason.WRONG_MODE): Notice(Severity.INFO, "Failed to pause")
 }
 
 _ACTION_MODES: Final[Mapping[FailsafeAction, FlightMode]] = {

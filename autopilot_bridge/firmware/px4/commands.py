@@ -93,11 +93,7 @@ class Px4Commands(handlers.CommandHandlers):
             return Result.DENIED
         north_m, east_m, down_m = self.ned_from(command, relative=False)
         return self.commander.guidance.reposition(
-            north_m=north_m,
-            east_m=east_m,
-            down_m=down_m,
-            yaw_rad=command.p4,
-            speed_m_s=command.p1,
+            north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=command.p4, speed_m_s=command.p1
         ).result
 
     def orbit(self, command: handlers.Command, source: Source) -> Result:

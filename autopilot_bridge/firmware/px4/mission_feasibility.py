@@ -15,11 +15,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, is_geodetic
 
 VTOL_COMMANDS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
-        mavlink.MAV_CMD_NAV_VTOL_LAND,
-        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
-    )
+    (mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_DO_VTOL_TRANSITION)
 )
 _TAKEOFFS: Final = frozenset((mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF))
 _POSITION_COMMANDS: Final = frozenset(

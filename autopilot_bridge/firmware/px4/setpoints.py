@@ -9,10 +9,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.services.channel import MavlinkMessage
 from autopilot_bridge.services.inputs import setpoints as wire
 
-_GLOBAL_FRAMES: Final = {
-    mavlink.MAV_FRAME_GLOBAL_INT: False,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
-}
+_GLOBAL_FRAMES: Final = {mavlink.MAV_FRAME_GLOBAL_INT: False, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
 """Whether the altitude is over home."""
 
 

@@ -8,11 +8,7 @@ from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.manual import ManualMode, ManualTask
 from autopilot_bridge.flight.fixed_wing.mission import MissionTask
 from autopilot_bridge.flight.fixed_wing.offboard import OffboardTask
-from autopilot_bridge.flight.fixed_wing.parameters import (
-    FixedWingFlightParameters,
-    LaunchKind,
-    TurnInRule,
-)
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, LaunchKind, TurnInRule
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnPhase, ReturnTask
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffPhase, TakeoffTask

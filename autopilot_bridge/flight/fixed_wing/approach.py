@@ -41,10 +41,7 @@ class Approach:
     def entry_circle(self, radius_m: float) -> tuple[float, float]:
         """Centre (north, east) of the circle that leads into the approach; the radius has its sign."""
         north, east, _ = self.entry_ned_m
-        return (
-            north - radius_m * math.sin(self.course_rad),
-            east + radius_m * math.cos(self.course_rad),
-        )
+        return (north - radius_m * math.sin(self.course_rad), east + radius_m * math.cos(self.course_rad))
 
     def flare_shift_m(self, ground_speed_m_s: float, flare_height_m: float, flare_sink_m_s: float) -> float:
         """How far before the place the slope must aim, since the flare carries farther than the slope."""

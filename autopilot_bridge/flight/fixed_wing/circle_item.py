@@ -31,11 +31,7 @@ class CircleItem:
     """
 
     def __init__(
-        self,
-        item: MissionItem,
-        target: Array,
-        airspeed_m_s: float,
-        parameters: FixedWingFlightParameters,
+        self, item: MissionItem, target: Array, airspeed_m_s: float, parameters: FixedWingFlightParameters
     ) -> None:
         command = item.command
         self._turns = self._seconds = 0.0

@@ -179,11 +179,7 @@ class Flare:
         )
 
     def _touches(
-        self,
-        ctx: FlightContext,
-        state: AircraftState,
-        height_m: float,
-        parameters: FixedWingFlightParameters,
+        self, ctx: FlightContext, state: AircraftState, height_m: float, parameters: FixedWingFlightParameters
     ) -> bool:
         flare = parameters.flare
         near = height_m < 2.0 * flare.align_m or self._time_s > flare.long_s

@@ -148,11 +148,7 @@ class PrecisionLandTask:
         self._approach(ctx, motion, seen, sink)
 
     def _approach(
-        self,
-        ctx: FlightContext,
-        motion: SmoothMotion,
-        place: tuple[float, float],
-        sink_m_s: float,
+        self, ctx: FlightContext, motion: SmoothMotion, place: tuple[float, float], sink_m_s: float
     ) -> None:
         trajectory = motion.trajectory
         north = place[0] - float(trajectory.position_ned_m[0])

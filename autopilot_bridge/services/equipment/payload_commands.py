@@ -34,12 +34,7 @@ _NO_CLIENT: Final = (0, 0)
 _TAKE, _GIVE_UP = -2.0, -3.0
 
 _ROI: Final = frozenset(
-    (
-        mavlink.MAV_CMD_DO_SET_ROI,
-        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
-        mavlink.MAV_CMD_DO_SET_ROI_SYSID,
-        _NONE,
-    )
+    (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_SYSID, _NONE)
 )
 
 

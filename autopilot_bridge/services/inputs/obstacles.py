@@ -101,9 +101,6 @@ class ObstacleService(Microservice):
         width = float(message.horizontal_fov)
         width = width if 0.01 < width < math.tau else _SENSOR_WIDTH_RAD
         self._context.surroundings.obstacles.take(
-            direction_rad,
-            max(SECTOR_RAD, width),
-            math.inf if distance_m >= reach_m else distance_m,
-            time_us,
+            direction_rad, max(SECTOR_RAD, width), math.inf if distance_m >= reach_m else distance_m, time_us
         )
         return True

@@ -4,12 +4,7 @@ import contextlib
 from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
-from autopilot_bridge.parameter_files import (
-    QGC_SUFFIX,
-    format_mavproxy,
-    format_qgc,
-    parse_untyped_parameters,
-)
+from autopilot_bridge.parameter_files import QGC_SUFFIX, format_mavproxy, format_qgc, parse_untyped_parameters
 from autopilot_bridge.parameters import ParameterError, ParameterStore
 from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.storage import FileStore
@@ -91,12 +86,7 @@ class StoredParameters:
 
 
 def boot_parameters(
-    store: ParameterStore,
-    card: MemoryCard,
-    layout: CardLayout,
-    *,
-    system_id: int,
-    given: Collection[str],
+    store: ParameterStore, card: MemoryCard, layout: CardLayout, *, system_id: int, given: Collection[str]
 ) -> StoredParameters:
     """Load the values on a card into the parameters of an autopilot that boots.
 

@@ -102,13 +102,7 @@ class MissionDownloads:
         self._count(source, len(items), mission_type)
 
     def _next_of_list(
-        self,
-        message: MavlinkMessage,
-        source: Source,
-        time_us: int,
-        uploader: Source | None,
-        *,
-        as_int: bool,
+        self, message: MavlinkMessage, source: Source, time_us: int, uploader: Source | None, *, as_int: bool
     ) -> None:
         session = self._sessions.of(source.channel)
         download = session.download

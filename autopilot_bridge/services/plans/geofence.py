@@ -36,12 +36,7 @@ class ArdupilotGeofence(Microservice):
         broadcast: all channels.
     """
 
-    def __init__(
-        self,
-        commander: Commander,
-        parameters: ParameterStore,
-        broadcast: Broadcast,
-    ) -> None:
+    def __init__(self, commander: Commander, parameters: ParameterStore, broadcast: Broadcast) -> None:
         self._commander = commander
         self._parameters = parameters
         self._broadcast = broadcast

@@ -15,11 +15,7 @@ from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.plans.download import MissionDownloads
-from autopilot_bridge.services.plans.messages import (
-    ack_message,
-    plan_checksum,
-    send_extended,
-)
+from autopilot_bridge.services.plans.messages import ack_message, plan_checksum, send_extended
 from autopilot_bridge.services.plans.policy import CRITICAL, INFO, MissionPolicy, Text
 from autopilot_bridge.services.plans.progress_report import MissionProgress, MissionReport, NoProgress
 from autopilot_bridge.services.plans.rules import fence_excludes

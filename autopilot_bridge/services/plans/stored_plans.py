@@ -29,11 +29,7 @@ _FORMAT: Final = b"FSPLAN1\n"
 _ITEM: Final = struct.Struct("<HBB7d")
 _CRC: Final = struct.Struct("<I")
 _LARGEST: Final = 3.4e38  # of the wire's floats
-_NAMES: Final = {
-    MissionType.MISSION: "mission",
-    MissionType.FENCE: "fence",
-    MissionType.RALLY: "rally",
-}
+_NAMES: Final = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally"}
 
 
 def pack_plan(items: tuple[MissionItem, ...], kind: MissionType, plan_id: int) -> bytes:

@@ -119,10 +119,7 @@ class Entry:
         right = (from_m[1] - east) * math.cos(course) - (from_m[0] - north) * math.sin(course) >= 0.0
         side = 1.0 if right else -1.0
         return cls(
-            centre_m=(
-                north - side * radius_m * math.sin(course),
-                east + side * radius_m * math.cos(course),
-            ),
+            centre_m=(north - side * radius_m * math.sin(course), east + side * radius_m * math.cos(course)),
             radius_m=radius_m,
             clockwise=right,
             north_m=north,

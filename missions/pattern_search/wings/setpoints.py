@@ -66,10 +66,7 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight, effect: TurnEff
         return entry.leaving(vehicle, _ENTRY_S)
 
     await vehicle.link.wait_until(
-        leaving,
-        what="the way into the pattern",
-        on=("GLOBAL_POSITION_INT",),
-        timeout_s=240.0 + flight.away_s,
+        leaving, what="the way into the pattern", on=("GLOBAL_POSITION_INT",), timeout_s=240.0 + flight.away_s
     )
 
 

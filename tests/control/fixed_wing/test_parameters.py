@@ -16,10 +16,7 @@ from tests.control.fixed_wing.aerosonde import AEROSONDE
     [
         ({"airspeed_trim_m_s": math.nan}, "airspeed_trim_m_s = nan is not accepted: a finite number above 0"),
         ({"rate_roll_p": -0.1}, "rate_roll_p = -0.1 is not accepted: a finite number of at least 0"),
-        (
-            {"roll_time_constant_s": 0.0},
-            "roll_time_constant_s = 0.0 is not accepted: .* above 0",
-        ),
+        ({"roll_time_constant_s": 0.0}, "roll_time_constant_s = 0.0 is not accepted: .* above 0"),
         ({"throttle_max": 1.2}, "throttle_max = 1.2 is not in 0..1"),
         ({"trim_elevator": -1.5}, "trim_elevator = -1.5 is not in -1..1"),
         ({"airspeed_min_m_s": 21.0}, "airspeed_min_m_s = 21.0 is not below airspeed_max_m_s = 20.0"),
@@ -243,11 +240,7 @@ def test_limits_of_the_envelope_are_flown() -> None:
         aerosonde().trim_throttle,
         aerosonde().trim_throttle_min_speed,
         aerosonde().trim_throttle_max_speed,
-    ) == (
-        0.795,
-        0.596,
-        1.0,
-    )
+    ) == (0.795, 0.596, 1.0)
     assert aerosonde().trim_elevator == AEROSONDE.trim_elevator
     assert aerosonde().trim_pitch_rad == AEROSONDE.trim_pitch_rad
     glider = FixedWingParameters.for_envelope(replace(AEROSONDE, powered=False, throttle_max=0.4))

@@ -273,9 +273,7 @@ def airspeed_after(found, *messages):
 def test_airspeed_of_the_hud_becomes_true_airspeed():
     """1500 m of the standard atmosphere: 845.6 hPa, density ratio 0.8637 (ISO 2533)."""
     speed = airspeed_after(
-        wing(),
-        (10, made("SCALED_PRESSURE", press_abs=845.6)),
-        (20, made("VFR_HUD", airspeed=20.0)),
+        wing(), (10, made("SCALED_PRESSURE", press_abs=845.6)), (20, made("VFR_HUD", airspeed=20.0))
     )
     assert speed == pytest.approx(20.0 / math.sqrt(0.8637), rel=1e-3)
 

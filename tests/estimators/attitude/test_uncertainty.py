@@ -49,10 +49,7 @@ def test_steady_state_is_the_spread_of_many_runs():
     x = np.zeros(at.STATE_SIZE)
     for _ in range(6000):
         step = rng.normal(0.0, P[GYRO_NOISE] * math.sqrt(STEP_S), 2000)
-        tilt, bias = (
-            (1.0 - k) * tilt - STEP_S * bias + k * reference + step,
-            bias + ki * (tilt - reference),
-        )
+        tilt, bias = ((1.0 - k) * tilt - STEP_S * bias + k * reference + step, bias + ki * (tilt - reference))
         reference = fade * reference + rng.normal(0.0, sigma * math.sqrt(1.0 - fade**2), 2000)
         propagate(x, at.ROLL_COVARIANCE, P, STEP_S, k, ki, fade, sigma)
     assert math.sqrt(x[at.ROLL_COVARIANCE]) == pytest.approx(tilt.std(), rel=0.06)

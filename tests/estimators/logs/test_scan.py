@@ -94,8 +94,7 @@ stamps = st.one_of(
     st.just(b"\xfd\xfe\xfd\x00\x00\xfe\x01\x00"),
 )
 junk = st.one_of(
-    st.binary(max_size=40),
-    st.lists(st.sampled_from([0xFD, 0xFE, 0, 1, 9, 30]), max_size=60).map(bytes),
+    st.binary(max_size=40), st.lists(st.sampled_from([0xFD, 0xFE, 0, 1, 9, 30]), max_size=60).map(bytes)
 )
 with_stamp = st.tuples(stamps, st.one_of(frames(), frames(), frames(), invalid_frames())).map(b"".join)
 pieces = st.lists(

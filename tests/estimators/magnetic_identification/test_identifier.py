@@ -23,9 +23,7 @@ PARAMETERS = IdentificationParameters(particles=1500, noise_nt=0.2)
 
 def identifier(parameters=PARAMETERS):
     return Identifier(
-        parameters,
-        map_error=MapError(sigma_nt=MAP_NT, correlation_m=CORRELATION_M),
-        field_ned=DIRECTION,
+        parameters, map_error=MapError(sigma_nt=MAP_NT, correlation_m=CORRELATION_M), field_ned=DIRECTION
     )
 
 

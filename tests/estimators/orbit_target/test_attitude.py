@@ -138,12 +138,7 @@ def test_an_orbit_flown_with_it(tmp_path, autopilot):
     )
     result = fly(
         find_mission("orbit"),
-        RunRequest(
-            options=options,
-            world=orbit_world(world, options),
-            out=tmp_path / "run",
-            picture=False,
-        ),
+        RunRequest(options=options, world=orbit_world(world, options), out=tmp_path / "run", picture=False),
     )
     assert result.outcome == "completed", result.reason
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())

@@ -239,10 +239,7 @@ def test_white_noise_is_not_geology():
     [
         ("nonsense\n", "begins with 'nonsense'"),
         ("name,kind,start_north_m,start_east_m,end_north_m,end_east_m\n", "a header and no lines"),
-        (
-            "name,kind,start_north_m,start_east_m,end_north_m,end_east_m\nL1,road,0,0,1,1\n",
-            "line 2: 'road'",
-        ),
+        ("name,kind,start_north_m,start_east_m,end_north_m,end_east_m\nL1,road,0,0,1,1\n", "line 2: 'road'"),
         (
             "name,kind,start_north_m,start_east_m,end_north_m,end_east_m\nL1,line,0,0,0,0\n",
             "line 2: line L1 .* no length",

@@ -12,14 +12,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2, norm
 
 from estimators.tracking.association import assign
-from estimators.tracking.metrics import (
-    calibration_error,
-    crps,
-    inside_ellipse,
-    mean_square,
-    nees,
-    rms,
-)
+from estimators.tracking.metrics import calibration_error, crps, inside_ellipse, mean_square, nees, rms
 from estimators.tracking.ospa import gospa, ospa
 
 sets = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), max_size=5).map(

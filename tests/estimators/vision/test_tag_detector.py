@@ -17,10 +17,7 @@ MODEL = PinholeModel(width_px=1280, height_px=720, horizontal_fov_rad=math.radia
 LENS = BrownDistortion(k1=-0.12, k2=0.04, p1=0.0005, p2=-0.0004)
 IMAGER = ImagerParameters(distortion=LENS, read_noise=2.0, shot_noise=0.02)
 CAMERA = CameraGeometry.of_view(
-    width_px=1280,
-    height_px=720,
-    horizontal_fov_rad=MODEL.horizontal_fov_rad,
-    distortion=LENS.coefficients,
+    width_px=1280, height_px=720, horizontal_fov_rad=MODEL.horizontal_fov_rad, distortion=LENS.coefficients
 )
 
 
@@ -110,10 +107,7 @@ def empty_frames(count, seed):
     model = PinholeModel(width_px=640, height_px=360, horizontal_fov_rad=MODEL.horizontal_fov_rad)
     renderer = Renderer(model, imager=IMAGER, seed=seed)
     camera = CameraGeometry.of_view(
-        width_px=640,
-        height_px=360,
-        horizontal_fov_rad=MODEL.horizontal_fov_rad,
-        distortion=LENS.coefficients,
+        width_px=640, height_px=360, horizontal_fov_rad=MODEL.horizontal_fov_rad, distortion=LENS.coefficients
     )
     detector = TagDetector(camera)
     found = 0

@@ -133,8 +133,7 @@ def test_arduplanes_turns_begin_by_their_angle() -> None:
         mass = PointMass(parameters=p)
         bend = math.radians(bend_deg)
         store = store_of(
-            item((800.0, 0.0, 150.0)),
-            item((800.0 + 900.0 * math.cos(bend), 900.0 * math.sin(bend), 100.0)),
+            item((800.0, 0.0, 150.0)), item((800.0 + 900.0 * math.cos(bend), 900.0 * math.sin(bend), 100.0))
         )
         mass.fly(MissionTask(store))
         while store.current == 0:

@@ -23,10 +23,7 @@ from tests.flight.fixed_wing.kinematic import PointMass
 
 PX4 = FixedWingFlightParameters(return_altitude_m=150.0, return_descend_altitude_m=80.0)
 ARDUPILOT = FixedWingFlightParameters(
-    return_altitude_m=100.0,
-    return_climbs=False,
-    return_loiter_radius_m=-90.0,
-    acceptance_altitude_m=math.inf,
+    return_altitude_m=100.0, return_climbs=False, return_loiter_radius_m=-90.0, acceptance_altitude_m=math.inf
 )
 
 

@@ -362,8 +362,7 @@ def start_process(tmp_path, port, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("number", "arguments", "code"),
-    [(signal.SIGINT, (), 0), (signal.SIGTERM, ("--duration", "9999"), 130)],
+    ("number", "arguments", "code"), [(signal.SIGINT, (), 0), (signal.SIGTERM, ("--duration", "9999"), 130)]
 )
 def test_a_signal_ends_it_in_good_order(tmp_path, port, vehicle, number, arguments, code):
     vehicle()

@@ -21,11 +21,7 @@ from missions.runs.session import fly
 from tests.slow import slow
 
 SMALL = MultiTargetOptions(
-    altitude_m=8.0,
-    area_m=(-20.0, -20.0, 60.0, 60.0),
-    start_ne_m=(0.0, 0.0),
-    steps=12,
-    expected_targets=4.0,
+    altitude_m=8.0, area_m=(-20.0, -20.0, 60.0, 60.0), start_ne_m=(0.0, 0.0), steps=12, expected_targets=4.0
 )
 FIELD = TargetField(count=4, clusters=1, cluster_sigma_m=12.0)
 

@@ -96,9 +96,7 @@ def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_rep
 
 
 @pytest.mark.slow
-def test_a_search_that_identifies_names_the_target_and_its_log_gives_the_same_estimates(
-    tmp_path,
-):
+def test_a_search_that_identifies_names_the_target_and_its_log_gives_the_same_estimates(tmp_path):
     """Quadrotors; the estimator runs beside the flight, and over its log."""
     options = replace(SMALL, identify=Identify.BAYES, particles=1000)
     first, again = (

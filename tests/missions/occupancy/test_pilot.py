@@ -14,11 +14,7 @@ from missions.occupancy.search import Search, SearchParameters
 from tests.missions.occupancy.point_mass import Aircraft
 
 
-@given(
-    course=st.floats(-10.0, 10.0),
-    wind_n=st.floats(-15.0, 15.0),
-    wind_e=st.floats(-15.0, 15.0),
-)
+@given(course=st.floats(-10.0, 10.0), wind_n=st.floats(-15.0, 15.0), wind_e=st.floats(-15.0, 15.0))
 def test_heading_makes_the_course_over_ground(course, wind_n, wind_e):
     heading = heading_for_course(course, 25.0, (wind_n, wind_e))
     north, east = 25.0 * math.cos(heading) + wind_n, 25.0 * math.sin(heading) + wind_e

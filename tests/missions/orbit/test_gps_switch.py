@@ -69,10 +69,7 @@ def test_a_simulated_ardupilot_that_does_not_know_the_command_gets_its_parameter
 
 @pytest.mark.parametrize(
     ("flavour", "values"),
-    [
-        ("px4", {"EKF2_GPS_CTRL": 7.0}),
-        ("ardupilot", {"EK3_SRC1_POSXY": 3.0, "EK3_SRC1_VELXY": 3.0}),
-    ],
+    [("px4", {"EKF2_GPS_CTRL": 7.0}), ("ardupilot", {"EK3_SRC1_POSXY": 3.0, "EK3_SRC1_VELXY": 3.0})],
 )
 def test_a_filter_that_leaves_gps_out_is_requested_and_restored(flown, flavour, values) -> None:
     seen = []

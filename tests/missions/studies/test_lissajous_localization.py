@@ -80,9 +80,7 @@ def test_there_are_twenty_cells_beside_the_papers(cells) -> None:
 def test_medians_are_those_of_an_independent_program(cells, cell: tuple[float, float]) -> None:
     """Within five standard errors of ours and theirs."""
     found = cells[cell]
-    expected = dict(
-        zip(("n", "k", "sign_as_printed_p", "p"), REPRODUCED[cell], strict=True),
-    )
+    expected = dict(zip(("n", "k", "sign_as_printed_p", "p"), REPRODUCED[cell], strict=True))
     if cell in AS_PRINTED:
         expected |= dict(zip(("as_printed_n", "as_printed_k", "as_printed_p"), AS_PRINTED[cell], strict=True))
     for key, median in expected.items():

@@ -50,8 +50,7 @@ def test_dubins_paths_end_where_they_should_and_none_is_longer_than_a_detour():
 
 
 @pytest.mark.parametrize(
-    ("apart_m", "expected_m"),
-    [(200.0, math.pi * 100.0), (500.0, math.pi * 100.0 + 300.0)],
+    ("apart_m", "expected_m"), [(200.0, math.pi * 100.0), (500.0, math.pi * 100.0 + 300.0)]
 )
 def test_turns_between_lines_are_half_circles(apart_m, expected_m):
     arcs = shortest_path(

@@ -5,12 +5,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from autopilot_bridge.commander.events import FailsafeAction
-from autopilot_bridge.commander.geofence_parameters import (
-    ALL_FENCES,
-    AutoEnable,
-    FenceParameters,
-    FenceType,
-)
+from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, AutoEnable, FenceParameters, FenceType
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters

@@ -24,14 +24,7 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = by_member(
 )
 
 REFUSED_NAMES: Final[Mapping[int, str]] = MappingProxyType(
-    {
-        14: "FLIP",
-        15: "AUTOTUNE",
-        22: "FLOWHOLD",
-        25: "SYSTEMID",
-        27: "AUTO RTL",
-        28: "TURTLE",
-    }
+    {14: "FLIP", 15: "AUTOTUNE", 22: "FLOWHOLD", 25: "SYSTEMID", 27: "AUTO RTL", 28: "TURTLE"}
 )
 """Known numbers that the firmware refuses on a copter: "Mode change to X failed", not "No such mode N"."""
 

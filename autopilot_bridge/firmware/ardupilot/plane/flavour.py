@@ -88,10 +88,7 @@ ARDUPILOT_PLANE: Final = replace(
     base_mode=ardupilot_plane_modes.base_mode,
     policy=POLICY,
     notices=plane_notices,
-    banner=(
-        Notice(Severity.INFO, IDENTITY.product),
-        Notice(Severity.INFO, "flightstack SITL"),
-    ),
+    banner=(Notice(Severity.INFO, IDENTITY.product), Notice(Severity.INFO, "flightstack SITL")),
     identity=IDENTITY,
     parameter_definitions=lambda: ARDUPILOT_PLANE_PARAMETERS,
     airframe=MappingProxyType({}),

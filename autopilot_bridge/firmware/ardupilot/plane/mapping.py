@@ -17,14 +17,7 @@ from autopilot_bridge.firmware import mapping
 from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
-from autopilot_bridge.firmware.mapping import (
-    build,
-    clamp,
-    field_values,
-    integer,
-    load_tables,
-    scaled_values,
-)
+from autopilot_bridge.firmware.mapping import build, clamp, field_values, integer, load_tables, scaled_values
 from autopilot_bridge.firmware.navigation_noise import ardupilot_noise
 from autopilot_bridge.firmware.plane_limits import (
     controller_values,
@@ -33,11 +26,7 @@ from autopilot_bridge.firmware.plane_limits import (
     tuned_controller,
     tuned_flight,
 )
-from autopilot_bridge.flight.fixed_wing.parameters import (
-    FixedWingFlightParameters,
-    LaunchKind,
-    TurnInRule,
-)
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, LaunchKind, TurnInRule
 from autopilot_bridge.flight.parameters import ReturnDestination
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore

@@ -12,14 +12,7 @@ from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.firmware import mapping
-from autopilot_bridge.firmware.mapping import (
-    build,
-    clamp,
-    field_values,
-    integer,
-    load_tables,
-    scaled_values,
-)
+from autopilot_bridge.firmware.mapping import build, clamp, field_values, integer, load_tables, scaled_values
 from autopilot_bridge.firmware.navigation_noise import px4_noise
 from autopilot_bridge.firmware.plane_limits import (
     controller_values,
@@ -30,11 +23,7 @@ from autopilot_bridge.firmware.plane_limits import (
 )
 from autopilot_bridge.firmware.px4.copter import mapping as px4_mapping
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
-from autopilot_bridge.flight.fixed_wing.parameters import (
-    FixedWingFlightParameters,
-    LaunchKind,
-    TurnInRule,
-)
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, LaunchKind, TurnInRule
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope

@@ -17,11 +17,7 @@ from autopilot_bridge.telemetry.streams import Builder, Values
 _M = mavlink
 
 ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
-    {
-        **px4.ONBOARD_RATES_HZ,
-        _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 10,
-        _M.MAVLINK_MSG_ID_WIND_COV: 10,
-    }
+    {**px4.ONBOARD_RATES_HZ, _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 10, _M.MAVLINK_MSG_ID_WIND_COV: 10}
 )
 """PX4's ONBOARD mode (UDP 14540; docs/firmware/px4.md, section 6)."""
 
