@@ -43,13 +43,13 @@ class CameraGeometry:
     def __post_init__(self) -> None:
         if self.width_px < 1 or self.height_px < 1:
             raise EstimatorError(
-                f"`width_px, height_px` {self.width_px} x {self.height_px} is no picture; give 1 or more"
+                f"width_px, height_px {self.width_px} x {self.height_px} is no picture; give 1 or more"
             )
         if not all(math.isfinite(f) and f > 0.0 for f in self.focal_px):
-            raise EstimatorError(f"`focal_px` {self.focal_px} is not possible; give numbers above 0")
+            raise EstimatorError(f"focal_px {self.focal_px} is not possible; give numbers above 0")
         if len(self.distortion) not in (0, 5) or not all(map(math.isfinite, self.distortion)):
             raise EstimatorError(
-                f"`distortion` {self.distortion} is not possible; give none, or k1, k2, p1, p2, k3"
+                f"distortion {self.distortion} is not possible; give none, or k1, k2, p1, p2, k3"
             )
 
     @classmethod
@@ -58,7 +58,7 @@ class CameraGeometry:
     ) -> "CameraGeometry":
         """Square pixels, and the optical axis in the middle of the image."""
         if not 0.0 < horizontal_fov_rad < math.pi:
-            raise EstimatorError(f"`horizontal_fov_rad` {horizontal_fov_rad:g} is not within 0..pi")
+            raise EstimatorError(f"horizontal_fov_rad {horizontal_fov_rad:g} is not within 0..pi")
         focal_px = 0.5 * width_px / math.tan(0.5 * horizontal_fov_rad)
         return cls(
             width_px=width_px,

@@ -47,12 +47,12 @@ class TagDetectorParameters:
     def __post_init__(self) -> None:
         for name, size_m in (("size_m", self.size_m), *(("sizes_m", size_m) for _, size_m in self.sizes_m)):
             if not (math.isfinite(size_m) and size_m > 0.0):
-                raise EstimatorError(f"`{name}` {size_m:g} m is not possible; give more than 0")
+                raise EstimatorError(f"{name} {size_m:g} m is not possible; give more than 0")
         for tag_id in (*self.tag_ids, *(number for number, _ in self.sizes_m)):
             if not 0 <= tag_id < TAGS:
                 raise EstimatorError(f"tag {tag_id} is not in 0..{TAGS - 1}, the family 36h11")
         if not 0 <= self.corrected_bits <= 5:
-            raise EstimatorError(f"`corrected_bits` {self.corrected_bits} is not in 0..5")
+            raise EstimatorError(f"corrected_bits {self.corrected_bits} is not in 0..5")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

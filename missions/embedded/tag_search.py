@@ -64,7 +64,7 @@ class TagTarget:
         if not 0.01 <= self.size_m <= 100.0:
             raise PlanError(f"`tag_size_m` {self.size_m:g} m is not in 0.01..100 m")
         if not (math.isfinite(self.free_m) and self.free_m >= 0.0):
-            raise PlanError(f"`free_m` {self.free_m:g} m is not possible; ask for 0 or more")
+            raise PlanError(f"free_m {self.free_m:g} m is not possible; ask for 0 or more")
 
     def motion(self, options: FlightOptions, rng: np.random.Generator) -> TargetMotion:
         """Its motion in the area of a pattern: the start is uniform in it, but for the free square.

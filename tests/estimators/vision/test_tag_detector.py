@@ -178,18 +178,18 @@ def test_rays_and_pixels_of_a_distorted_camera_are_inverse():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: TagDetectorParameters(size_m=0.0), "`size_m` 0 m"),
+        (lambda: TagDetectorParameters(size_m=0.0), "size_m 0 m"),
         (lambda: TagDetectorParameters(tag_ids=(587,)), "tag 587 is not in 0..586"),
-        (lambda: TagDetectorParameters(corrected_bits=6), "`corrected_bits` 6"),
+        (lambda: TagDetectorParameters(corrected_bits=6), "corrected_bits 6"),
         (
             lambda: CameraGeometry.of_view(width_px=9, height_px=9, horizontal_fov_rad=4.0),
-            "`horizontal_fov_rad` 4",
+            "horizontal_fov_rad 4",
         ),
         (
             lambda: CameraGeometry(
                 width_px=9, height_px=9, focal_px=(1.0, 1.0), centre_px=(4.0, 4.0), distortion=(0.1,)
             ),
-            "`distortion`",
+            "distortion",
         ),
     ],
 )
