@@ -190,7 +190,7 @@ def summarise(results: Results) -> dict[str, Any]:
         }
         errors_m = results.values("error_m")[k, :, PASSES - 1]
         block["error_m_median_two_passes"] = round(float(np.nanmedian(errors_m)), 2)
-        block["undetected"] = int(np.sum(2 - results.values("detected")[k]))
+        block["undetected"] = int(np.nansum(2 - results.values("detected")[k]))
         conditions[str(cell["condition"])] = block
     nominal = conditions.get("nominal", next(iter(conditions.values())))
     return {
