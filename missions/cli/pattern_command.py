@@ -89,7 +89,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         via=Via(given["via"]),
         acceptance_m=given["acceptance"],
         search=given["search"],
-        tag_id=given["tag"],
+        tag_id=given["tag_id"],
     )
 
 
@@ -156,7 +156,9 @@ _EVERY: Final = (
         show_default=False,
         help="Fly until the camera has detected a tag; --search-time is the limit, 1800 s if not given.",
     ),
-    option("--tag", type=int, default=0, help="Number of the tag (AprilTag 36h11) that --search looks for."),
+    option(
+        "--tag-id", type=int, default=0, help="Number of the tag (AprilTag 36h11) that --search looks for."
+    ),
     FlightOption(
         ("--target-speed",),
         group=MISSION_GROUP,
@@ -197,7 +199,6 @@ def _pattern(help_text: str, own: tuple[FlightOption, ...]) -> MissionCommand:
                 "amplitude_y": ("height_m",),
                 "ratio": ("ratio", "pattern"),
                 "rate": ("rate_hz",),
-                "tag": ("tag_id",),
             }
         ),
     )
