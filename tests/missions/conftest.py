@@ -429,6 +429,9 @@ class FakeSitl:
         self.closed = False
         self.loop = VirtualTimeLoop(self.advance, lambda: self.time_us, max_time_us=4_000_000_000)
 
+    def pictures(self):
+        return {}
+
     def advance(self):
         self.time_us += STEP_US
         for autopilot in self.autopilots:

@@ -55,7 +55,7 @@ def test_payload_speaks_on_the_vehicles_links_and_targets_are_in_the_log(tmp_pat
         (("--camera", "--target", "1e9,0"), "not within 50000 m of home"),
         (("--camera", "--target", "0,0,-3,90"), "target speed -3 m/s"),
         (("--map-target", "1,2"), "--map-target needs a --map"),
-        (("--map", "nowhere.npz"), "nowhere.npz is not a magnetic map"),
+        (("--map", "nowhere.npz"), "nowhere.npz can't be read"),
     ],
 )
 def test_payload_that_can_not_be_is_refused_by_name(arguments, reported):
