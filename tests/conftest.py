@@ -37,8 +37,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One worker more than there are cores: tests with processes and other people's clients mostly wait."""
-    return (os.cpu_count() or 1) + 1
+    """Two workers more than there are cores: tests with processes and other people's clients mostly wait."""
+    return (os.cpu_count() or 1) + 2
 
 
 ORDER: Final = (

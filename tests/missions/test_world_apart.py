@@ -110,7 +110,7 @@ class Spy(Mission[Any]):
         await vehicle.land()
 
 
-@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize("autopilot", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
 def test_a_flight_keeps_its_world_from_mission_and_estimator(autopilot: str, tmp_path: Any) -> None:
     world = occupancy_world(
         WorldSpec.of_team(

@@ -84,6 +84,7 @@ def test_a_replay_of_the_log_has_the_same_numbers(run):
                 assert np.array_equal(file[column], table[column], equal_nan=True)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_is_off_stops_the_search_and_the_vehicle_waits(tmp_path):
     """Off for a minute from 30 s: the vehicle holds its place and goes on afterwards."""
     pause = ScanDisturbance(start_s=30.0, duration_s=60.0)

@@ -33,7 +33,7 @@ def search(
     return fly(find_mission(name), request)
 
 
-@pytest.mark.parametrize("via", list(Via))
+@pytest.mark.parametrize("via", [Via.SETPOINTS, pytest.param(Via.WAYPOINTS, marks=pytest.mark.slow)])
 def test_a_flight_ends_when_the_tag_is_found(tmp_path, via):
     result = search(tmp_path, via=via, picture=via is Via.WAYPOINTS)
     assert (result.outcome, result.reason) == ("completed", "")
@@ -49,6 +49,7 @@ def test_a_flight_ends_when_the_tag_is_found(tmp_path, via):
         assert (picture == (0, 255, 0)).all(axis=2).any()  # the outline
 
 
+@pytest.mark.slow
 def test_a_tag_of_another_number_is_not_found(tmp_path):
     result = search(tmp_path, name="expanding-square", seen_id=4)
     found = result.summary["search"]
