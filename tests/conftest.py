@@ -37,8 +37,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Two workers more than there are cores: tests with processes and other people's clients mostly wait."""
-    return (os.cpu_count() or 1) + 2
+    """One worker more than there are cores: tests with processes and other people's clients mostly wait. Two
+    more take longer: each compiles what another one is compiling."""
+    return (os.cpu_count() or 1) + 1
 
 
 ORDER: Final = (

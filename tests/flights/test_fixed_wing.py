@@ -10,7 +10,7 @@ from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from tests.flights.aircraft import AircraftFlight, Item
 from tests.flights.flight import FLAVOURS
-from tests.slow import slow_after
+from tests.slow import slow, slow_after
 
 WIND = Environment(wind_ned_m_s=(3.0, -2.0, 0.0), turbulence=Turbulence.LIGHT)
 IN_AIR, LANDING, ON_GROUND = 2, 4, 1
@@ -108,8 +108,10 @@ def test_circles_to_the_left(flavour: str) -> None:
     assert flight.distance_m(100.0, 200.0) == pytest.approx(120.0, abs=6.0)
 
 
-@pytest.mark.parametrize("launch", ["catapult", "hand"])
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize(
+    ("flavour", "launch"),
+    [("px4", "catapult"), ("ardupilot", "hand"), slow("px4", "hand"), slow("ardupilot", "catapult")],
+)
 def test_launched(flavour: str, launch: str) -> None:
     flight = AircraftFlight(flavour, launch=launch, environment=WIND)
     flight.get_ready()

@@ -10,6 +10,7 @@ from autopilot_bridge.navigation import layout as n
 from flightsim.environment import Environment, Turbulence
 from flightsim.flight_envelope import FlightEnvelope, flight_envelope
 from tests.control.fixed_wing.rig import Rig
+from tests.slow import slow_after
 
 ROLL, PITCH, YAW = 25, 26, 27
 HEIGHT_M = 1000.0
@@ -39,7 +40,7 @@ def test_height_airspeed_and_heading_are_held(name: str) -> None:
     assert np.ptp(log[:, PITCH]) < SLACK.get(name, math.radians(0.2))
 
 
-@pytest.mark.parametrize("name", (*POWERED, "sgs126"))
+@pytest.mark.parametrize("name", ("sgs126", *slow_after(2, POWERED)))
 def test_bank_steps_are_coordinated(name: str) -> None:
     flown = rig(name)
     bank = 0.7 * flown.envelope.bank_max_rad
@@ -53,7 +54,7 @@ def test_bank_steps_are_coordinated(name: str) -> None:
         assert np.abs(log[:, n.AIRSPEED_M_S] - flown.envelope.airspeed_trim_m_s).max() < 1.0
 
 
-@pytest.mark.parametrize("name", POWERED)
+@pytest.mark.parametrize("name", slow_after(2, POWERED))
 def test_height_step(name: str) -> None:
     flown = rig(name)
     flown.set(heading_rad=0.0, down_m=-HEIGHT_M - 30.0)
@@ -63,7 +64,7 @@ def test_height_step(name: str) -> None:
     assert np.abs(log[-100:, 12] + HEIGHT_M + 30.0).max() < 1.5
 
 
-@pytest.mark.parametrize("name", (*POWERED, "sgs126"))
+@pytest.mark.parametrize("name", ("sgs126", *slow_after(2, POWERED)))
 def test_airspeeds_between_the_limits(name: str) -> None:
     flown = rig(name)
     envelope = flown.envelope

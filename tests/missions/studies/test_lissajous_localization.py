@@ -114,6 +114,7 @@ def test_without_uncertainty_k_p_and_f_are_one_filter(cells) -> None:
         assert cell["k_wins"] == cell["wins"]
 
 
+@pytest.mark.slow
 def test_workers_and_runs_change_no_run(tmp_path) -> None:
     corrected = Equations.CORRECTED
     alone = errors_of(localized(tmp_path / "alone", runs=3, equations="corrected"))[corrected]
