@@ -20,6 +20,7 @@ _DISMISS: Final = 0.03
 _LARGEST_SIGMA_M: Final = 25.0  # of the place of a target that is named
 _MOST_PASSES: Final = 5  # a suspect that is still open then is decided by the more probable
 _LEAST_GAIN_NATS: Final = 0.02
+_MOST_ASSIGNED: Final = 8  # so many passes, which may detect nothing, are flown over one suspect at most
 _ELSEWHERE_S: Final = 60.0  # worth of the time that a searcher does not search
 _RADIUS_M: Final = 100.0  # usual turn, for the time to the begin of a pass
 _LEAST_SPEED_M_S: Final = 5.0
@@ -53,12 +54,14 @@ class Suspect:
         verdict: what is decided.
         probability: that it is the target.
         anomalies: (searcher, loudest measurement) of each pass, in the order of time.
+        assigned: number of passes that were assigned over it.
     """
 
     identified: Anomaly
     verdict: Verdict = Verdict.OPEN
     probability: float = 0.5
     anomalies: list[tuple[int, detection.Anomaly]] = field(default_factory=list)
+    assigned: int = 0
 
     @property
     def passes(self) -> int:
@@ -242,7 +245,7 @@ class Investigation:
         best: tuple[float, int, Pass] | None = None
         free = [k for k, sample in enumerate(self._samples) if sample is not None and not self._assigned[k]]
         heights_m = [sample.height_m for sample in self._samples if sample is not None]
-        if not free:
+        if not free or suspect.assigned >= _MOST_ASSIGNED:
             return
         passes = candidate_passes(
             anomaly, noise_nt=self._noise_nt, map_error=self._map_error, height_m=min(heights_m)
@@ -258,6 +261,7 @@ class Investigation:
             return
         _, searcher, chosen = best
         self._assigned[searcher] = suspect
+        suspect.assigned += 1
         self._legs[searcher] = [chosen.entry_ne_m, chosen.exit_ne_m]
         self._fresh[searcher] = True
         self.passes_flown += 1

@@ -31,11 +31,11 @@ from flightsim.payload import (
     synthetic_map,
 )
 from flightsim.payload.survey_grid import map_from_survey
+from tests.measured_survey import SURVEY, with_measured_survey
 
 Array = NDArray[np.float64]
 
 HOME = Home()
-RIO = Path(__file__).parents[3] / "shared" / "data" / "rio-magnetic.csv.xz"
 
 
 def small_map(**changes: object) -> MagneticMap:
@@ -341,9 +341,9 @@ def test_gaps_in_a_survey_have_no_data() -> None:
         map_from_survey(places[:1, 0], places[:1, 1], np.zeros(1), home=HOME, height_m=100.0)
 
 
-@pytest.mark.skipif(not RIO.exists(), reason="the Rio de Janeiro survey is not beside the checkout")
+@with_measured_survey
 def test_a_real_survey_becomes_a_map() -> None:
-    with lzma.open(RIO, "rt") as file:
+    with lzma.open(SURVEY, "rt") as file:
         lon_deg, lat_deg, anomaly_nt = np.genfromtxt(
             file, delimiter=",", skip_header=1, usecols=(0, 1, 2), unpack=True
         )

@@ -2,7 +2,6 @@
 
 import lzma
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from flightsim.foundation.magnetic_map_file import read_map_file
 from flightsim.foundation.magnetics import FieldModel
 from flightsim.foundation.main_field import MainField
 from missions.cli import main as cli
+from tests.measured_survey import SURVEY, with_measured_survey
 
 rasterio = pytest.importorskip("rasterio")
 netcdf = pytest.importorskip("netCDF4")
@@ -23,7 +23,6 @@ pytest.importorskip("ppigrf")
 UTM = "EPSG:32632"  # zone 32 north: Zurich
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.55, alt_m=400.0)
 HOW = MapImport(home=HOME, spacing_m=50.0, height_m=80.0)
-SURVEYED = Path(__file__).parents[4] / "shared" / "data" / "rio-magnetic.csv.xz"
 
 
 def field_nt(lat_deg, lon_deg):
@@ -218,14 +217,14 @@ def test_the_command_makes_a_map_and_names_its_options(tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not SURVEYED.is_file(), reason="the measured survey (../shared/data) is not here")
+@with_measured_survey
 def test_the_measured_survey_is_a_map(tmp_path):
     grid = imported_map(
-        SURVEYED, MapImport(values=Values.ANOMALY_IGRF, decimal_year=1978.3, line_spacing_m=1000.0)
+        SURVEY, MapImport(values=Values.ANOMALY_IGRF, decimal_year=1978.3, line_spacing_m=1000.0)
     )
     assert np.isfinite(grid.total_field_nt).mean() > 0.95
     assert np.ptp(grid.north_m) > 50_000.0 and np.ptp(grid.east_m) > 55_000.0
-    with lzma.open(SURVEYED, "rt") as file:
+    with lzma.open(SURVEY, "rt") as file:
         table = np.genfromtxt(file, delimiter=",", names=True, dtype=None, encoding="utf-8")
     per_lat, per_lon = LocalFrame(grid.home).metres_per_degree
     row = np.rint(((table["latitude"] - grid.home.lat_deg) * per_lat - grid.north_m[0]) / 100.0).astype(int)

@@ -9,6 +9,7 @@ from estimators.magnetic_identification.identifier import Identifier
 from estimators.magnetic_identification.parameters import IdentificationParameters
 from estimators.occupancy.detection import MapError
 from estimators.tracking.grid import GridLayout
+from missions.occupancy import investigation
 from missions.occupancy.decision import DecisionParameters
 from missions.occupancy.investigation import Identify, Investigation, Verdict
 from missions.occupancy.next_pass import candidate_passes, mixture_information
@@ -125,6 +126,20 @@ def test_a_suspect_found_while_every_searcher_was_on_a_pass_gets_one_later():
     leg = found.next_leg(0, 500_000_000, done=False)
     assert leg is not None
     assert math.dist(leg, waiting[1].place_ne_m) < 400.0
+
+
+def test_passes_that_detect_nothing_end_some_time(monkeypatch):
+    """A suspect that stays a probable target without a place keeps no searcher for ever."""
+    monkeypatch.setattr(investigation.Investigation, "_decide", lambda _, suspect: None)
+    rng = np.random.default_rng(3)
+    found = search(searchers=1)
+    fly(found, rng, target(rng), offset_m=60.0)
+    (suspect,) = found.investigation.suspects.values()
+    suspect.probability = 0.99
+    legs = [found.next_leg(0, (100 + k) * 1_000_000, done=k > 0) for k in range(60)]
+    assert 2 < suspect.assigned < 12
+    assert legs[0] is not None and legs[-30:] == [None] * 30
+    assert found.investigation.passes_flown == suspect.assigned
 
 
 def test_a_boat_is_dismissed_and_its_cell_lowered():

@@ -5,7 +5,6 @@ import json
 import lzma
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,11 +34,11 @@ from missions.survey.mission import SurveyMission
 from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
 from missions.survey.outcome import COMPENSATION
 from missions.survey.records import flight_readings
+from tests.measured_survey import SURVEY, with_measured_survey
 
 SMALL = SurveyOptions(width_m=500.0, height_m=600.0, spacing_m=250.0, tie_spacing_m=500.0, map_error_nt=0.0)
 AIR = Environment.from_wind(speed_m_s=5.0, from_deg=270.0, turbulence="light")
 NOISE_NT = 0.2  # of the default magnetometer
-SURVEYED = Path(__file__).parents[4] / "shared" / "data" / "rio-magnetic.csv.xz"
 
 
 def request(out, options=SMALL, *, picture=False, seed=8, world=None, autopilot="px4", home=None, **values):
@@ -222,10 +221,10 @@ def test_a_compensated_survey_is_as_good_as_one_without_an_aircraft(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.skipif(not SURVEYED.is_file(), reason="the measured survey (../shared/data) is not here")
+@with_measured_survey
 def test_a_survey_over_the_measured_map(tmp_path):
     """The noise where nothing is, the targets, and the map from the flight against its source."""
-    with lzma.open(SURVEYED, "rt") as file:
+    with lzma.open(SURVEY, "rt") as file:
         table = np.genfromtxt(file, delimiter=",", names=True, dtype=None, encoding="utf-8")
     home = Home(lat_deg=-22.252, lon_deg=-42.297, alt_m=0.0)
     source = map_from_survey(
