@@ -47,7 +47,9 @@ class AreaBelief(Protocol):
 
     @property
     def entropy_nats(self) -> float:
-        """Differential entropy of the place in square metres: of a uniform belief the logarithm of the area."""
+        """Differential entropy of the place in square metres: of a uniform belief the logarithm of the
+        area.
+        """
         ...
 
     def shares(self, layout: GridLayout) -> Array:

@@ -1,13 +1,13 @@
 """The likelihood of a camera's frame at places on the ground, with or without a detection.
 
-Source: Tisdale et al. 2008, equations 3 to 7, corrected (docs/vision_search.md). The probability of a detection
-at the image coordinates z, given the place x of the target, is
+Source: Tisdale et al. 2008, equations 3 to 7, corrected (docs/vision_search.md). The probability of a
+detection at the image coordinates z, given the place x of the target, is
 
     p(D, z | x) = N(z; U(x), S(x)) p(D, V | x) + P_false (1 - p(D, V | x)) / A
 
 with the projection U, its covariance S by first-order propagation of the errors of pose and detector, and the
-image area A. Kernels return it relative to what a target far away would give: P_false / A with a detection and
-1 - P_false without. So a frame changes a belief only where its camera looks, and the likelihood without a
+image area A. Kernels return it relative to what a target far away would give: P_false / A with a detection
+and 1 - P_false without. So a frame changes a belief only where its camera looks, and the likelihood without a
 detection is 1 - p(D, V | x).
 """
 
@@ -22,10 +22,9 @@ from scipy.special import ndtr
 from estimators.tracking.camera_sight import CameraSight, SightModel
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["FrameLikelihood", "Numbers", "ground_spread", "image_spread", "relative_likelihood"]
+__all__ = ["FrameLikelihood", "ground_spread", "image_spread", "relative_likelihood"]
 
 Array = NDArray[np.float64]
-Numbers = tuple[float, ...]
 Box = tuple[float, float, float, float]
 
 NORTH: Final = 0
@@ -76,7 +75,7 @@ def _fold(distortion: tuple[float, ...]) -> float:
 
 
 @kernel
-def _of_place(a: float, b: float, inverse_depth: float, s: Numbers) -> tuple[float, float, float]:
+def _of_place(a: float, b: float, inverse_depth: float, s: Array) -> tuple[float, float, float]:
     """Covariance of the image coordinates (aa, ab, bb) by the errors of the place, which enter by H / depth
     with H = [[-a, 1, 0], [-b, 0, 1]]: one half of S of equation 4, first order.
     """
@@ -89,7 +88,7 @@ def _of_place(a: float, b: float, inverse_depth: float, s: Numbers) -> tuple[flo
 
 
 @kernel
-def _of_turn(a: float, b: float, s: Numbers) -> tuple[float, float, float]:
+def _of_turn(a: float, b: float, s: Array) -> tuple[float, float, float]:
     """The same by the errors of the attitude: rotations enter by H [q]x with q = (1, a, b), whose rows are
     (b, ab, -1 - a^2) and (-a, 1 + b^2, -ab).
     """
@@ -128,7 +127,7 @@ def _within(value: float, half: float, sigma: float) -> float:
 
 
 @kernel
-def relative_likelihood(north: float, east: float, s: Numbers, detections: Array) -> float:
+def relative_likelihood(north: float, east: float, s: Array, detections: Array) -> float:
     """The likelihood of a frame for a target at a place, relative to one far away."""
     dn, de, h = north - s[NORTH], east - s[EAST], s[HEIGHT]
     k = ROTATION
@@ -186,7 +185,7 @@ def relative_likelihood(north: float, east: float, s: Numbers, detections: Array
 
 
 @kernel
-def likelihoods(north: Array, east: Array, s: Numbers, detections: Array, out: Array) -> None:
+def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Array) -> None:
     """Relative likelihoods of a frame at places (n,)."""
     for i in range(north.size):
         out[i] = relative_likelihood(north[i], east[i], s, detections)
@@ -197,13 +196,12 @@ class FrameLikelihood:
     """The likelihood of one frame, ready for the kernels.
 
     Attributes:
-        numbers: what the kernels read of the frame and of the team's model. A tuple: machine code keeps it in
-            registers.
+        numbers: what the kernels read of the frame and of the team's model.
         detections: (m, 2) image coordinates.
         box: south, west, north, east; outside the relative likelihood is 1. None: it is 1 everywhere.
     """
 
-    numbers: Numbers
+    numbers: Array
     detections: Array
     box: Box | None
 
@@ -220,9 +218,7 @@ class FrameLikelihood:
         box = None
         if sight.height_m > 0.0:
             box = _box(sight, model, s, reach_m)
-        return cls(
-            numbers=tuple(s.tolist()), detections=np.ascontiguousarray(sight.detections, float), box=box
-        )
+        return cls(numbers=s, detections=np.ascontiguousarray(sight.detections, float), box=box)
 
     def at(self, north_m: Array, east_m: Array) -> Array:
         """Relative likelihoods at places (n,)."""
@@ -257,7 +253,7 @@ def _numbers(sight: CameraSight, model: SightModel) -> Array:
 
 def image_spread(ray: tuple[float, float], sight: CameraSight, model: SightModel) -> Array:
     """(2, 2) covariance of the image coordinates of a place that is seen at (a, b), by the pose alone."""
-    s = tuple(_numbers(sight, model).tolist())
+    s = _numbers(sight, model)
     down = float(sight.r_mount_from_ned.T[2] @ (1.0, *ray))
     aa, ab, bb = np.add(_of_place(*ray, down / sight.height_m, s), _of_turn(*ray, s))
     return np.array([[aa, ab], [ab, bb]])
@@ -285,7 +281,7 @@ def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box
     for _ in range(3):  # the errors are larger outside of the picture than in it
         if bounds is None:
             break
-        wide, tall = _largest_sigmas(bounds, tuple(s.tolist()), rotation, sight.height_m)
+        wide, tall = _largest_sigmas(bounds, s, rotation, sight.height_m)
         more = _FAR / slope * np.array([-wide, -tall, wide, tall])
         bounds = border + more if math.isfinite(wide) else None
     north, east = sight.place_ned_m[:2]
@@ -301,14 +297,18 @@ def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box
 
 
 def _least_slope(distortion: tuple[float, ...], most: float) -> float:
-    """Least growth of the distorted radius up to this squared radius: errors are computed without distortion."""
+    """Least growth of the distorted radius up to this squared radius: errors are computed without
+    distortion.
+    """
     k1, k2, _, _, k3 = distortion
     q = np.linspace(0.0, most, 16)
     return float(np.clip((1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * 7.0 * k3))).min(), 0.2, 1.0))
 
 
-def _largest_sigmas(bounds: Array, s: Numbers, rotation: Array, height_m: float) -> tuple[float, float]:
-    """Largest standard deviations of image coordinates in a rectangle of rays; infinity: it has the horizon."""
+def _largest_sigmas(bounds: Array, s: Array, rotation: Array, height_m: float) -> tuple[float, float]:
+    """Largest standard deviations of image coordinates in a rectangle of rays; infinity: it has the
+    horizon.
+    """
     wide = tall = 0.0
     a0, b0, a1, b1 = bounds.tolist()
     for a in (a0, 0.5 * (a0 + a1), a1):

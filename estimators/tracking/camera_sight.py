@@ -1,8 +1,8 @@
 """What a searching camera's frame says about a target on level ground: its parameters and their checks.
 
 Source: Tisdale, Ryan, Kim, Tornqvist and Hedrick 2008, "A multiple UAV system for vision-based search and
-localization", section III, as docs/vision_search.md corrects it. `estimators.tracking.camera_likelihood` computes
-the likelihood from these.
+localization", section III, as docs/vision_search.md corrects it. `estimators.tracking.camera_likelihood`
+computes the likelihood from these.
 
 North and east are metres in the area's frame. Camera axes: x along the optical axis, y to the right of the
 picture, z down. Image coordinates are those of the ray, a = y / x and b = z / x, without lens distortion.
@@ -31,8 +31,9 @@ _MOST_WEIGHT: Final = 1e6
 class DetectionRate:
     """Probability that a target in view is detected, by the resolution r: the pixels that its side covers.
 
-    P(D | V, r) = peak / (1 + exp(-(constant + linear r + quadratic r^2))): Bayes' rule on Gaussian resolutions
-    of detected and of missed targets (equation 6) has this form; with equal variances it is a logistic curve.
+    P(D | V, r) = peak / (1 + exp(-(constant + linear r + quadratic r^2))): Bayes' rule on Gaussian
+    resolutions of detected and of missed targets (equation 6) has this form; with equal variances it is a
+    logistic curve.
 
     Attributes:
         peak: bound of the probability.
@@ -91,8 +92,8 @@ class SightModel:
     Attributes:
         rate: probability of detection by the resolution.
         target_size_m: side of the target.
-        false_rate: probability that a frame in which the target is not detected has a false detection, anywhere
-            in the picture with the same density (P_false of the paper).
+        false_rate: probability that a frame in which the target is not detected has a false detection,
+            anywhere in the picture with the same density (P_false of the paper).
         pixel_sigma_px: error of a detection's place in the picture, per axis.
         border_sides: a target is detected when its centre is farther than this from the border, in sides of
             the target: 0.5 where all of it must be in the picture.
@@ -114,8 +115,8 @@ class SightModel:
                 raise EstimatorError(f"`{name}` {value:g} is not possible; give more than 0")
         if not 0.0 < self.false_rate < 1.0:
             raise EstimatorError(
-                f"`false_rate` {self.false_rate:g} is not between 0 and 1; without false detections one wrong "
-                "detection would be the end of the belief"
+                f"`false_rate` {self.false_rate:g} is not between 0 and 1; without false detections one "
+                "wrong detection would be the end of the belief"
             )
         if not 0.0 <= self.border_sides <= 10.0:
             raise EstimatorError(f"`border_sides` {self.border_sides:g} is not in 0..10")
@@ -135,8 +136,8 @@ class PoseErrors:
         height_m: of the height above ground.
         yaw_rad, pitch_rad, roll_rad: of the attitude.
         mount_rad: of the camera's attitude on the vehicle, about each of its axes.
-        place_time_s, attitude_time_s: correlation times of place and height, and of all angles; 0: independent
-            frames, as in the paper.
+        place_time_s, attitude_time_s: correlation times of place and height, and of all angles; 0:
+            independent frames, as in the paper.
     """
 
     forward_m: float = 0.3
@@ -163,9 +164,7 @@ class PoseErrors:
         """
         return _weight(since_s, self.place_time_s), _weight(since_s, self.attitude_time_s)
 
-    def covariances(
-        self, q_ned_from_frd: Quaternion, q_frd_from_mount: Quaternion
-    ) -> tuple[Array, Array]:
+    def covariances(self, q_ned_from_frd: Quaternion, q_frd_from_mount: Quaternion) -> tuple[Array, Array]:
         """Covariances of a pose, without weights.
 
         Returns:
@@ -204,8 +203,8 @@ class CameraSight:
         q_ned_from_mount: attitude of the camera's axes.
         place_m2: (3, 3) covariance of the place, NED.
         rotation_rad2: (3, 3) covariance of the rotation about the camera's axes.
-        weights: factors of both variances in the likelihood of a detection's place (`PoseErrors.weights`); not
-            in that of being in view.
+        weights: factors of both variances in the likelihood of a detection's place (`PoseErrors.weights`);
+            not in that of being in view.
         width_px, height_px: size of the picture; its centre is on the optical axis.
         focal_px: focal length.
         distortion: k1, k2, p1, p2, k3 of Brown's model.
@@ -232,7 +231,7 @@ class CameraSight:
             raise EstimatorError("a camera's pose or geometry is not finite")
         if not (self.width_px > 0 and self.height_px > 0 and self.focal_px > 0.0):
             raise EstimatorError(
-                f"a picture of {self.width_px} x {self.height_px} px, focal length {self.focal_px:g} px, is none"
+                f"{self.width_px} x {self.height_px} px, focal length {self.focal_px:g} px is no picture"
             )
         if len(self.distortion) != 5:
             raise EstimatorError(f"distortion {self.distortion} is not k1, k2, p1, p2, k3")
@@ -250,8 +249,8 @@ class CameraSight:
         return rotation_matrix(conjugate(self.q_ned_from_mount))
 
     def blurred(self, variance_m2: float) -> "CameraSight":
-        """The same frame with a further variance of the place, north and east: of a target that has walked since,
-        or of the place in a cell.
+        """The same frame with a further variance of the place, north and east: of a target that has walked
+        since, or of the place in a cell.
         """
         if not variance_m2 > 0.0:
             return self
@@ -261,4 +260,3 @@ class CameraSight:
 def rotation_matrix(q: Quaternion) -> Array:
     """(3, 3) matrix whose columns are the rotated axes."""
     return np.array([rotate(q, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]).T
-

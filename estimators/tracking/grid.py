@@ -50,8 +50,8 @@ class GridLayout:
             )
         if self.rows * self.columns > self.most_cells:
             raise EstimatorError(
-                f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than {self.most_cells}; "
-                "ask for larger cells or a smaller `width_m, height_m`"
+                f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than "
+                f"{self.most_cells}; ask for larger cells or a smaller `width_m, height_m`"
             )
 
     @classmethod

@@ -1,8 +1,8 @@
 """The Bayes filter of a target's place on a grid, updated where a camera looks.
 
-Source: Tisdale et al. 2008, sections II and IV-A. A frame changes the cells of its footprint only, because the
-likelihood is relative to that of a place far away (`camera_likelihood`). The sum over all cells is kept up to date
-by what changed, and read anew when it has lost digits.
+Source: Tisdale et al. 2008, sections II and IV-A. A frame changes the cells of its footprint only, because
+the likelihood is relative to that of a place far away (`camera_likelihood`). The sum over all cells is kept
+up to date by what changed, and read anew when it has lost digits.
 """
 
 import math
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from estimators.errors import EstimatorError
-from estimators.tracking.camera_likelihood import FrameLikelihood, Numbers, relative_likelihood
+from estimators.tracking.camera_likelihood import FrameLikelihood, relative_likelihood
 from estimators.tracking.camera_sight import CameraSight, SightModel
 from estimators.tracking.grid import GridLayout
 from flightsim.foundation.kernels import kernel
@@ -192,12 +192,12 @@ class SearchGrid:
         total, row1, column1, row2, column2, cross = _index_moments(p, per_column)
         mean_row, mean_column = row1 / total, column1 / total
         side = layout.cell_m
-        mean = np.array([layout.south_m + (mean_row + 0.5) * side, layout.west_m + (mean_column + 0.5) * side])
+        mean = np.array(
+            [layout.south_m + (mean_row + 0.5) * side, layout.west_m + (mean_column + 0.5) * side]
+        )
         across = cross / total
         within = 1.0 / 12.0
-        covariance = side**2 * np.array(
-            [[row2 / total + within, across], [across, column2 / total + within]]
-        )
+        covariance = side**2 * np.array([[row2 / total + within, across], [across, column2 / total + within]])
         return mean, covariance
 
     @property
@@ -210,12 +210,8 @@ class SearchGrid:
         p = self.probability()
         own = self.layout
         north, east = own.centres()
-        rows = np.clip(
-            ((north[:, 0] - layout.south_m) / layout.cell_m).astype(np.int64), 0, layout.rows - 1
-        )
-        columns = np.clip(
-            ((east[0] - layout.west_m) / layout.cell_m).astype(np.int64), 0, layout.columns - 1
-        )
+        rows = np.clip(((north[:, 0] - layout.south_m) / layout.cell_m).astype(np.int64), 0, layout.rows - 1)
+        columns = np.clip(((east[0] - layout.west_m) / layout.cell_m).astype(np.int64), 0, layout.columns - 1)
         by_rows = np.zeros((layout.rows, own.columns))
         np.add.at(by_rows, rows, p)
         out = np.zeros((layout.columns, layout.rows))
@@ -235,7 +231,7 @@ def _spread_by_three(p: Array, variance: float) -> Array:
 
 @kernel
 def _multiply(
-    cells: Cells, south_m: float, west_m: float, cell_m: float, s: Numbers, detections: Array
+    cells: Cells, south_m: float, west_m: float, cell_m: float, s: Array, detections: Array
 ) -> tuple[float, float, float]:
     """Multiply cells by the likelihood of a frame; returns their sum before and after, and the largest."""
     before, after, largest = 0.0, 0.0, 0.0
@@ -257,7 +253,7 @@ def _multiply(
 
 @kernel
 def _add_logs(
-    cells: Cells, south_m: float, west_m: float, cell_m: float, s: Numbers, detections: Array, offset: float
+    cells: Cells, south_m: float, west_m: float, cell_m: float, s: Array, detections: Array, offset: float
 ) -> tuple[float, float, float]:
     """Add the logarithm of the likelihood to cells; returns their sum before and after, and the largest, all
     of exp(cell - offset).
