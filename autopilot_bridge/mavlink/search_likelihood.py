@@ -28,7 +28,11 @@ SEARCH_LIKELIHOOD_PAYLOAD: Final = 0xF518
 _VERSION: Final = 1
 _LAYOUT: Final = struct.Struct("<BBHIQiif3f4f6f2eHHf5f4f")
 _MOST_WEIGHT: Final = 65_000.0  # of a half-precision number
+_MOST_M2: Final = 1e8
+_MOST_RAD2: Final = 10.0
+_MOST_IMAGE: Final = 10.0  # image coordinates and distortion
 _UNIT_NEAR: Final = 1e-3
+_ROUNDING: Final = 1e-5  # of products of single-precision numbers
 
 Pair = tuple[float, float]
 
@@ -120,7 +124,13 @@ def read_search_likelihood(payload_type: int, length: int, payload: Sequence[int
         return None
     if not (_covariance(*place[:3]) and place[3] >= 0.0 and min(weights) >= 1.0):
         return None
-    if min(rotation[0], rotation[3], rotation[5]) < 0.0:
+    if max(place) > _MOST_M2 or max(rotation) > _MOST_RAD2 or max(map(abs, numbers)) > _MOST_IMAGE:
+        return None
+    xx, xy, xz, yy, yz, zz = rotation
+    if not (_covariance(xx, xy, yy) and _covariance(xx, xz, zz) and _covariance(yy, yz, zz)):
+        return None
+    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    if determinant < -_ROUNDING * xx * yy * zz:
         return None
     return SearchLikelihood(
         tag_id=tag_id,
@@ -143,4 +153,4 @@ def read_search_likelihood(payload_type: int, length: int, payload: Sequence[int
 
 def _covariance(xx: float, xy: float, yy: float) -> bool:
     """Whether the entries are those of a covariance, to the precision of single numbers."""
-    return xx >= 0.0 and yy >= 0.0 and xy * xy <= xx * yy * (1.0 + 1e-5)
+    return xx >= 0.0 and yy >= 0.0 and xy * xy <= xx * yy * (1.0 + _ROUNDING)

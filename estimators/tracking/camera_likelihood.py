@@ -13,6 +13,7 @@ detection is 1 - p(D, V | x).
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -59,9 +60,10 @@ _NORMAL: Final = ndtr(np.arange(-_FAR * _STEPS_PER_SIGMA, _FAR * _STEPS_PER_SIGM
 _GATE: Final = 60.0  # squared distance; beyond it a likelihood is below 1e-13 of its peak
 _FOLD_STEP: Final = 1.02
 _FARTHEST: Final = 3.0  # image radius up to which the distortion is examined
-_LEAST_RATE: Final = 1e-6
+_LEAST_RATE: Final = 1e-4
 
 
+@lru_cache(maxsize=64)
 def _fold(distortion: tuple[float, ...]) -> float:
     """Squared radius up to which the radial distortion grows."""
     k1, k2, _, _, k3 = distortion
@@ -159,9 +161,9 @@ def relative_likelihood(north: float, east: float, s: Array, detections: Array) 
         paa, pab, pbb = _of_place(a, b, inverse, s)
         taa, tab, tbb = _of_turn(a, b, s)
         if not inside:
-            seen = _within(u, half_u, s[FOCAL] * math.sqrt(paa + taa + s[NOISE]))
+            seen = _within(u, half_u, s[FOCAL] * math.sqrt(max(0.0, paa + taa) + s[NOISE]))
             if seen > 0.0:
-                seen *= _within(v, half_v, s[FOCAL] * math.sqrt(pbb + tbb + s[NOISE]))
+                seen *= _within(v, half_v, s[FOCAL] * math.sqrt(max(0.0, pbb + tbb) + s[NOISE]))
             if seen == 0.0:
                 return 1.0
     odds = s[CONSTANT] + resolution * (s[LINEAR] + resolution * s[QUADRATIC])
@@ -172,6 +174,8 @@ def relative_likelihood(north: float, east: float, s: Array, detections: Array) 
     ab = s[PLACE_WEIGHT] * pab + s[TURN_WEIGHT] * tab
     bb = s[PLACE_WEIGHT] * pbb + s[TURN_WEIGHT] * tbb + s[NOISE]
     determinant = aa * bb - ab * ab
+    if not determinant > 0.0:  # the rounding of single-precision numbers
+        return 1.0 - detected
     gate = _GATE * determinant
     density = 0.0
     for i in range(count):
@@ -222,9 +226,10 @@ class FrameLikelihood:
 
     def at(self, north_m: Array, east_m: Array) -> Array:
         """Relative likelihoods at places (n,)."""
-        out = np.ones(len(north_m))
+        north, east = (np.ascontiguousarray(values, dtype=np.float64) for values in (north_m, east_m))
+        out = np.ones(north.size)
         if self.box is not None:
-            likelihoods(north_m, east_m, self.numbers, self.detections, out)
+            likelihoods(north, east, self.numbers, self.detections, out)
         return out
 
 
@@ -273,15 +278,14 @@ def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightMode
 def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box:
     """The box; sets the distances in `s` at which a border does not matter."""
     rotation = sight.r_mount_from_ned
-    low, high = _rays_of_border(sight)
-    border = np.array([*low, *high])
-    slope = _least_slope(sight.distortion, float((np.abs(border).reshape(2, 2).max(axis=0) ** 2).sum()))
+    edges, slope = _border_of(sight.width_px, sight.height_px, sight.focal_px, sight.distortion)
+    border = np.array(edges)
     bounds: Array | None = border
     wide = tall = math.inf
     for _ in range(3):  # the errors are larger outside of the picture than in it
         if bounds is None:
             break
-        wide, tall = _largest_sigmas(bounds, s, rotation, sight.height_m)
+        wide, tall = _largest_sigmas(bounds[0], bounds[1], bounds[2], bounds[3], s)
         more = _FAR / slope * np.array([-wide, -tall, wide, tall])
         bounds = border + more if math.isfinite(wide) else None
     north, east = sight.place_ned_m[:2]
@@ -296,38 +300,40 @@ def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box
     return north - reach_m, east - reach_m, north + reach_m, east + reach_m
 
 
-def _least_slope(distortion: tuple[float, ...], most: float) -> float:
-    """Least growth of the distorted radius up to this squared radius: errors are computed without
-    distortion.
-    """
-    k1, k2, _, _, k3 = distortion
-    q = np.linspace(0.0, most, 16)
-    return float(np.clip((1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * 7.0 * k3))).min(), 0.2, 1.0))
-
-
-def _largest_sigmas(bounds: Array, s: Array, rotation: Array, height_m: float) -> tuple[float, float]:
+@kernel
+def _largest_sigmas(a0: float, b0: float, a1: float, b1: float, s: Array) -> tuple[float, float]:
     """Largest standard deviations of image coordinates in a rectangle of rays; infinity: it has the
     horizon.
     """
-    wide = tall = 0.0
-    a0, b0, a1, b1 = bounds.tolist()
-    for a in (a0, 0.5 * (a0 + a1), a1):
-        for b in (b0, 0.5 * (b0 + b1), b1):
-            down = float(rotation.T[2] @ (1.0, a, b))
+    wide, tall = 0.0, 0.0
+    k = ROTATION
+    for i in range(3):
+        a = a0 + 0.5 * i * (a1 - a0)
+        for j in range(3):
+            b = b0 + 0.5 * j * (b1 - b0)
+            down = s[k + 2] + a * s[k + 5] + b * s[k + 8]
             if not down > _LEAST_DEPTH:
                 return math.inf, math.inf
-            aa, _, bb = np.add(_of_place(a, b, down / height_m, s), _of_turn(a, b, s))
-            wide, tall = max(wide, math.sqrt(aa + s[NOISE])), max(tall, math.sqrt(bb + s[NOISE]))
+            paa, _, pbb = _of_place(a, b, down / s[HEIGHT], s)
+            taa, _, tbb = _of_turn(a, b, s)
+            wide = max(wide, math.sqrt(max(0.0, paa + taa) + s[NOISE]))
+            tall = max(tall, math.sqrt(max(0.0, pbb + tbb) + s[NOISE]))
     return wide, tall
 
 
-def _rays_of_border(sight: CameraSight) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Least and largest a and b of the rays that the picture's border shows, by fixed-point iteration."""
+@lru_cache(maxsize=64)
+def _border_of(
+    width_px: int, height_px: int, focal_px: float, distortion: tuple[float, ...]
+) -> tuple[tuple[float, float, float, float], float]:
+    """Least a and b, largest a and b of the rays that a picture's border shows (by fixed-point iteration),
+    and
+    the least growth of the distorted radius in it: errors are computed without distortion.
+    """
     along = np.linspace(-1.0, 1.0, 9)
     edge = np.concatenate([np.column_stack((along, np.full(9, k))) for k in (-1.0, 1.0)])
-    seen = np.vstack((edge, edge[:, ::-1])) * (0.5 * sight.width_px, 0.5 * sight.height_px) / sight.focal_px
-    k1, k2, p1, p2, k3 = sight.distortion
-    fold = _fold(sight.distortion)
+    seen = np.vstack((edge, edge[:, ::-1])) * (0.5 * width_px, 0.5 * height_px) / focal_px
+    k1, k2, p1, p2, k3 = distortion
+    fold = _fold(distortion)
     rays = seen.copy()
     for _ in range(20):
         a, b = rays.T
@@ -338,7 +344,9 @@ def _rays_of_border(sight: CameraSight) -> tuple[tuple[float, float], tuple[floa
         )
         rays = (seen - tangential) / radial[:, None]
     low, high = rays.min(axis=0), rays.max(axis=0)
-    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+    q = np.linspace(0.0, float((rays**2).sum(axis=1).max()), 16)
+    slope = float(np.clip((1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * 7.0 * k3))).min(), 0.2, 1.0))
+    return (float(low[0]), float(low[1]), float(high[0]), float(high[1])), slope
 
 
 def _reach(sight: CameraSight, model: SightModel) -> float:

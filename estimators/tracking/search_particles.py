@@ -100,12 +100,13 @@ class SearchParticles:
     def _reflect(self) -> None:
         """Particles that have left the area come back, as at a wall."""
         for places, rates, low, high in zip(self._places, self._rates, self._low, self._high, strict=True):
-            below, above = places < low, places > high
-            if below.any() or above.any():
-                places[below] = 2.0 * low - places[below]
-                places[above] = 2.0 * high - places[above]
-                np.clip(places, low, high, out=places)
-                rates[below | above] *= -1.0
+            outside = (places < low) | (places > high)
+            if outside.any():
+                span = high - low
+                folded = np.mod(places[outside] - low, 2.0 * span)
+                back = folded > span
+                places[outside] = low + np.where(back, 2.0 * span - folded, folded)
+                rates[outside] *= np.where(back, -1.0, 1.0)
 
     def update(self, sight: CameraSight) -> float:
         reach_m = math.dist(self._low, self._high) + math.dist(sight.place_ned_m[:2], self._low)

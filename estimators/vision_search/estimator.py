@@ -35,6 +35,8 @@ _FIDUCIAL: Final = int(dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL)
 _MOST_TAG: Final = 255
 _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
 _CLOCKS_APART_S: Final = 0.25  # from exposure to the newest attitude, beyond what a detector takes
+_AHEAD_S: Final = 5.0  # a likelihood whose exposure is farther in the future, or ...
+_OLD_S: Final = 600.0  # ... older, is not possible
 _CLOCK_FRAMES: Final = 20  # of which the median is taken
 
 
@@ -177,6 +179,10 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
             return Outcome.IGNORED
         if self._origin() is None:
             return Outcome.WAITING
+        age_s = (time_us - likelihood.time_us - camera.offset_us) * 1e-6
+        if camera.position is not None and not -_AHEAD_S <= age_s <= _OLD_S:
+            camera.counts["impossible"] += 1
+            return Outcome.IMPLAUSIBLE
         if not camera.is_new(likelihood.number, likelihood.time_us):
             camera.counts["repeated"] += 1
             return Outcome.REPEATED
