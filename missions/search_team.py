@@ -183,6 +183,10 @@ class SearchTeam(Generic[Options]):
         self._frame = LocalFrame(vehicles[0].home)
         self._scan_us = -1
 
+    def _heading_rad(self, index: int) -> float | None:
+        """Heading of a multicopter on its way to its goal; None: as before."""
+        return None
+
     def scanned(self) -> None:
         """A scan was processed: the sensor is not silent."""
         self._scan_us = self._vehicles[0].clock.time_us
@@ -332,9 +336,9 @@ class SearchTeam(Generic[Options]):
             if time_s >= _TURN_S:
                 if searcher.began_us < 0:
                     self._begin(index)
-                    law.aim(from_home(searcher.goal))
+                    law.aim(from_home(searcher.goal), self._heading_rad(index))
                 elif self._advance(index, (here[0] + north_m, here[1] + east_m)):
-                    law.aim(from_home(searcher.goal))
+                    law.aim(from_home(searcher.goal), self._heading_rad(index))
             return law.setpoint(time_s, here, velocity)
 
         async with vehicle.guided(own.rate_hz) as session:

@@ -60,8 +60,8 @@ class CameraParameters:
         false_detections_per_frame: mean of a Poisson number, anywhere in the image.
         false_size_px: (least, most) size of a false detection, uniform.
         mount_roll_rad, mount_pitch_rad, mount_yaw_rad: of a camera without gimbal, against the body.
-        misalignment_rad: roll, pitch and yaw by which the camera itself is turned against the mount that these
-            angles describe; what the vehicle reports does not have it.
+        misalignment_rad: roll, pitch and yaw by which the camera itself is turned against the mount that
+            these angles describe; what the vehicle reports does not have it.
         position_frd_m: place on the vehicle, from its centre of gravity.
         max_zoom: longest focal length, in focal lengths of the model.
         blur_px_m: of the lens at zoom 1: diameter of the circle of confusion in pixels, for each 1/m between

@@ -18,7 +18,7 @@ from estimators.tracking.grid import GridLayout
 from estimators.vision_search.estimate import AreaEstimate
 from flightsim.foundation.vectors import from_euler, product
 from missions.multi_target.planner import Area, Place, PlannerParameters, SweepPlanner
-from missions.multi_target.search import HEADING_RAD, sweep_path
+from missions.multi_target.search import sweep_path
 from missions.patterns.lissajous import named_lissajous
 from missions.patterns.polyline import Polyline
 from missions.vision_search.options import LocalizeKind, SearchPlannerKind, VisionSearchOptions
@@ -85,20 +85,13 @@ class HorizonPlanner:
         area: places outside are not flown to.
         model: detector and target.
         altitude_m: of the flight.
-        heading_rad: heading of the vehicle while it searches; None: along the step.
     """
 
     def __init__(
-        self,
-        parameters: PlannerParameters,
-        area: Area,
-        model: SightModel,
-        *,
-        altitude_m: float,
-        heading_rad: float | None,
+        self, parameters: PlannerParameters, area: Area, model: SightModel, *, altitude_m: float
     ) -> None:
         self._parameters, self._area, self._model = parameters, area, model
-        self._altitude_m, self._heading_rad = altitude_m, heading_rad
+        self._altitude_m = altitude_m
         self._layout = GridLayout.over(
             width_m=area.width_m,
             height_m=area.height_m,
@@ -161,12 +154,15 @@ class HorizonPlanner:
         return grown
 
     def _missed(self, place: Place, direction_rad: float, camera: CameraSight) -> Array:
-        """Probability in each cell that a frame of a level camera does not detect the target."""
-        heading_rad = direction_rad if self._heading_rad is None else self._heading_rad
+        """Probability in each cell that a frame of a level camera, which flies ahead, does not detect the
+        target.
+        """
         sight = replace(
             camera,
             place_ned_m=(place[0], place[1], -self._altitude_m),
-            q_ned_from_mount=product(from_euler(0.0, 0.0, heading_rad), from_euler(0.0, -0.5 * math.pi, 0.0)),
+            q_ned_from_mount=product(
+                from_euler(0.0, 0.0, direction_rad), from_euler(0.0, -0.5 * math.pi, 0.0)
+            ),
             detections=np.zeros((0, 2)),
         )
         reach_m = self._area.height_m + self._area.width_m
@@ -229,13 +225,11 @@ def planner_of(options: VisionSearchOptions) -> AreaPlanner:
     """The planner that one vehicle's options describe."""
     area = options.area
     if options.planner is SearchPlannerKind.HORIZON:
-        level = options.turn_limit_rad == math.pi
         return HorizonPlanner(
             options.planner_parameters,
             area,
             options.estimator_parameters.sight_model,
             altitude_m=options.own_altitude_m,
-            heading_rad=HEADING_RAD if level else None,  # an aircraft flies where it looks
         )
     if options.planner is SearchPlannerKind.LISSAJOUS:
         curve = named_lissajous(options.pattern, width_m=area.width_m, height_m=area.height_m)

@@ -55,6 +55,7 @@ class VisionSearch:
         layout: cells of the moments.
         states: estimates of each vehicle, in order.
         moments: beliefs of the first vehicle at evenly spread times.
+        directions: of each vehicle's way to its goal, rad; None: it has none.
         steps: number of decisions of each vehicle.
         began_us: time at which the first vehicle began; -1: none has.
         localized_us: time at which the first belief was narrow; -1: none was.
@@ -86,7 +87,7 @@ class VisionSearch:
         self._localizers = [Localizer(own) for own in options]
         self._localizing = [False] * count
         self._goals: list[Place | None] = [None] * count
-        self._directions: list[float | None] = [None] * count
+        self.directions: list[float | None] = [None] * count
         self._frames_at_step = [0] * count
         self._flying = [False] * count
         self._every, self._left_out = 1, 0
@@ -120,6 +121,7 @@ class VisionSearch:
         planner, estimator = self._planners[index], self._estimators[index]
         goal = planner.next_place(estimator.belief, (0.0, 0.0), None, self._camera(index))
         self._goals[index] = goal
+        self.directions[index] = math.atan2(goal[1], goal[0])
         return goal
 
     def _camera(self, index: int) -> CameraSight | None:
@@ -188,12 +190,12 @@ class VisionSearch:
             there = self._localizers[index].next_place(self.states[index][-1], here)
         else:
             there = self._planners[index].next_place(
-                estimator.belief, here, self._directions[index], self._camera(index)
+                estimator.belief, here, self.directions[index], self._camera(index)
             )
         if self.passes >= options.passes:
             self.reason = "all passes are flown"
             return here
-        self._directions[index] = math.atan2(there[1] - here[1], there[0] - here[0])
+        self.directions[index] = math.atan2(there[1] - here[1], there[0] - here[0])
         self._goals[index] = there
         return there
 

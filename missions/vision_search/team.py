@@ -72,6 +72,12 @@ class VisionSearchTeam(SearchTeam[VisionSearchOptions]):
         self.scanned()
         self.search.observed(index, estimate, self._places)
 
+    def _heading_rad(self, index: int) -> float | None:
+        """Along the way: the longer side of the picture is across it, and errors of the camera's mount turn
+        with the direction of a pass.
+        """
+        return self.search.directions[index]
+
     def _places(self) -> tuple[tuple[float, float, float] | None, ...]:
         origin = self.watch.origin
         if origin is None:
