@@ -36,7 +36,7 @@ COMMAND: Final = MissionCommand(
             "--area",
             type=coordinates("SOUTH,WEST,NORTH,EAST"),
             default="-150,-150,150,150",
-            help="Of the search, m. [default for aircraft: 1 km x 1 km]",
+            help="Of the search, m.",
         ),
         option(
             "--planner",

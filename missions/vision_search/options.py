@@ -16,7 +16,6 @@ MAX_STEPS: Final = 20_000
 LARGEST_SIDE_M: Final = 20_000.0
 _WINGS_ALTITUDE_M: Final = 90.0
 _WINGS_SEPARATION_M: Final = 10.0
-_WINGS_SIDE_M: Final = 1000.0
 _TURNS: Final = 2.5  # step of an aircraft, in turn radii
 
 
@@ -233,14 +232,7 @@ class VisionSearchOptions(MissionOptions):
         own = self.unless_none(
             step_m=step_m, speed_m_s=speed_m_s, acceptance_m=0.4 * step_m, turn_limit_rad=0.5 * math.pi
         )
-        half_m = 0.5 * _WINGS_SIDE_M
-        changes: dict[str, Any] = {
-            "altitude_m": _WINGS_ALTITUDE_M,
-            "separation_m": _WINGS_SEPARATION_M,
-            "tag_size_m": 3.0,
-            "area_m": (-half_m, -half_m, half_m, half_m),
-        }
-        return own.unless_chosen(**changes)
+        return own.unless_chosen(altitude_m=_WINGS_ALTITUDE_M, separation_m=_WINGS_SEPARATION_M)
 
     def unless_none(self, **values: float) -> "VisionSearchOptions":
         """The same options, with values for fields that are None."""

@@ -238,6 +238,11 @@ def planner_of(options: VisionSearchOptions) -> AreaPlanner:
         path = Polyline(tuple((n, e) for n, e in (places + area.centre_ne_m).tolist()))
         return PathPlanner(path, options.step_length_m)
     share = area if options.vehicles == 1 else area.strip(options.index, options.vehicles)
-    # the outermost legs see half a spacing beyond themselves
+    # legs end half a spacing before the side, but the picture is shorter along them than across
+    more_m = max(0.0, 0.5 * options.own_spacing_m - 0.4 * _ALONG_SHARE * options.seen_across_m)
+    if share.height_m >= share.width_m:
+        share = replace(share, south_m=share.south_m - more_m, north_m=share.north_m + more_m)
+    else:
+        share = replace(share, west_m=share.west_m - more_m, east_m=share.east_m + more_m)
     path = sweep_path(share, (0.0, 0.0), math.inf, options.own_spacing_m)
     return PathPlanner(path, options.step_length_m)
