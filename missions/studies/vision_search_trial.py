@@ -15,7 +15,7 @@ from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
 from flightsim.world_spec import WorldSpec
-from missions.embedded.vision_search_world import vision_search_world
+from missions.embedded.hidden_tag import vision_search_world
 from missions.runs.request import RunRequest
 from missions.studies.flights import fly_trial
 from missions.studies.study import run_of

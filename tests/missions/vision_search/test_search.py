@@ -55,17 +55,17 @@ def detection_probability_after(planner, steps, options=OPTIONS):
 def test_the_planner_with_a_horizon_detects_sooner_than_the_greedy_one_and_the_curve():
     found = {}
     for name, changes in {
-        "horizon": {"planner": SearchPlannerKind.HORIZON, "horizon": 3},
+        "horizon": {"planner": SearchPlannerKind.HORIZON, "horizon": 2},
         "greedy": {"planner": SearchPlannerKind.HORIZON, "horizon": 1},
         "lissajous": {"planner": SearchPlannerKind.LISSAJOUS},
         "sweep": {"planner": SearchPlannerKind.SWEEP},
     }.items():
         options = replace(OPTIONS, **changes)
-        found[name] = detection_probability_after(planner_of(options), 25, options)
-    assert found["horizon"] > 0.8
+        found[name] = detection_probability_after(planner_of(options), 14, options)
+    assert found["horizon"] > 0.6
     assert found["horizon"] >= found["greedy"] - 0.02
     assert found["greedy"] > found["lissajous"]
-    assert found["sweep"] > 0.6
+    assert found["sweep"] > 0.4
 
 
 def test_a_sweep_sees_the_whole_area_and_each_vehicle_its_strip():
@@ -82,11 +82,11 @@ def test_a_sweep_sees_the_whole_area_and_each_vehicle_its_strip():
 
 def test_the_planner_of_an_aircraft_turns_by_90_degrees_at_most():
     options = VisionSearchOptions(
-        area_m=(-600.0, -600.0, 600.0, 600.0), planner=SearchPlannerKind.HORIZON, horizon=2
+        area_m=(-600.0, -600.0, 600.0, 600.0), planner=SearchPlannerKind.HORIZON, horizon=1
     ).for_vehicle(FixedWingLimits())
     belief, planner = options.estimator_parameters.new_belief(), planner_of(options)
     here, direction = (0.0, 0.0), 0.0
-    for _ in range(20):
+    for _ in range(10):
         there = planner.next_place(belief, here, direction, frame(here, direction, options))
         new = math.atan2(there[1] - here[1], there[0] - here[0])
         at_edge = max(map(abs, here)) > 600.0 - options.step_m
@@ -205,7 +205,7 @@ def test_a_vehicle_waits_for_a_frame_before_each_decision():
 def test_moments_stay_few():
     search, _ = search_of()
     search.begin(0, 0)
-    for k in range(500):
+    for k in range(250):
         search.observed(0, estimate(time_us=k * 1_000_000), nowhere)
     assert 40 < len(search.moments) < 100
     assert np.all(np.diff([moment.time_us for moment in search.moments]) > 0)
