@@ -44,7 +44,7 @@ COMMAND: Final = MissionCommand(
             default="sweep",
             help="Legs, a Lissajous curve, or where the next steps detect most probably.",
         ),
-        option("--pattern", default="L4", help="The Lissajous curve, L1 to L4."),
+        option("--curve", default="L4", help="The Lissajous curve, L1 to L4."),
         option("--spacing", type=float, help="Of the sweep's legs, m. [default: 0.8 of what is seen across]"),
         option(
             "--view", type=degrees, default=70.0, help="Angle across the picture that is expected, degrees."

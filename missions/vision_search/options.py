@@ -48,7 +48,7 @@ class VisionSearchOptions(MissionOptions):
     Attributes:
         area_m: edges of the searched area: south, west, north, east; the target is in it.
         planner: how the target is searched for.
-        pattern: of the Lissajous curve, L1 to L4.
+        curve: the Lissajous curve, L1 to L4.
         spacing_m: of the sweep's legs; None: 0.8 of the ground that a camera sees across the flight.
         view_rad: angle across the picture that `spacing_m` and the planner expect.
         step_m: distance between the places that are planned; None: 20 m, and 2.5 turn radii for an aircraft.
@@ -83,7 +83,7 @@ class VisionSearchOptions(MissionOptions):
     separation_m: float = 6.0
     area_m: tuple[float, float, float, float] = (-150.0, -150.0, 150.0, 150.0)
     planner: SearchPlannerKind = SearchPlannerKind.SWEEP
-    pattern: str = "L4"
+    curve: str = "L4"
     spacing_m: float | None = None
     view_rad: float = math.radians(70.0)
     step_m: float | None = None

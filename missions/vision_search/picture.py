@@ -38,15 +38,15 @@ def draw_search(path: Path, title: str, team: "VisionSearchTeam", debriefing: "D
         debriefing: debriefing of the run.
     """
     place = true_place(team, debriefing, team.search.moments[-1].time_us)
-    figure = Figure(figsize=(13.0, 9.6), dpi=120, layout="constrained", facecolor="white")
+    figure = Figure(figsize=(14.0, 7.2), dpi=120, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
-    grid = figure.add_gridspec(3, 4, height_ratios=(3.0, 3.0, 2.4))
+    grid = figure.add_gridspec(2, 4, height_ratios=(3.4, 2.8))
     for k, moment in enumerate(_four(team)):
-        _draw_moment(figure.add_subplot(grid[k // 2, 2 * (k % 2) : 2 * (k % 2) + 2]), moment, team, place)
-    _draw_detection(figure.add_subplot(grid[2, 0]), team)
-    _draw_covariance(figure.add_subplot(grid[2, 1:3]), team, place)
-    _draw_ellipses(figure.add_subplot(grid[2, 3]), team, place)
+        _draw_moment(figure.add_subplot(grid[0, k]), moment, team, place)
+    _draw_detection(figure.add_subplot(grid[1, 0]), team)
+    _draw_covariance(figure.add_subplot(grid[1, 1:3]), team, place)
+    _draw_ellipses(figure.add_subplot(grid[1, 3]), team, place)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
 

@@ -232,7 +232,7 @@ def planner_of(options: VisionSearchOptions) -> AreaPlanner:
             altitude_m=options.own_altitude_m,
         )
     if options.planner is SearchPlannerKind.LISSAJOUS:
-        curve = named_lissajous(options.pattern, width_m=area.width_m, height_m=area.height_m)
+        curve = named_lissajous(options.curve, width_m=area.width_m, height_m=area.height_m)
         start = options.index / options.vehicles
         places = curve.points(np.linspace(start, start + 1.0, 400) * curve.end)
         path = Polyline(tuple((n, e) for n, e in (places + area.centre_ne_m).tolist()))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimators.tracking.camera_sight import CameraSight
 from estimators.tracking.grid import GridLayout
-from estimators.vision_search import AreaEstimate, VisionSearchEstimator
+from estimators.vision_search import AreaEstimate, BeliefKind, VisionSearchEstimator
 from missions.multi_target.planner import Place
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.planner import Localizer, planner_of
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _MOMENTS: Final = 48
 _CELLS: Final = 120  # of a moment's map, along the longer side
+_CELLS_OF_PARTICLES: Final = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,10 +72,11 @@ class VisionSearch:
         self._system_ids = tuple(system_ids)
         self._estimators, self._options = tuple(estimators), tuple(options)
         area = options[0].area
+        cells = _CELLS_OF_PARTICLES if options[0].belief is BeliefKind.PARTICLES else _CELLS
         self.layout = GridLayout.over(
             width_m=area.width_m,
             height_m=area.height_m,
-            cell_m=max(area.height_m, area.width_m) / _CELLS,
+            cell_m=max(area.height_m, area.width_m) / cells,
             centre_ne_m=area.centre_ne_m,
         )
         count = len(options)

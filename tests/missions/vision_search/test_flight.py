@@ -16,7 +16,7 @@ from missions.runs.session import fly
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
 
-SMALL = {"altitude_m": 25.0, "area_m": (-40.0, -40.0, 40.0, 40.0), "step_m": 12.0, "tag_size_m": 1.0}
+SMALL = {"altitude_m": 25.0, "area_m": (-30.0, -30.0, 30.0, 30.0), "step_m": 12.0, "tag_size_m": 1.0}
 
 
 def flown(out, *, hidden=None, picture=False, mission=None, **changes):
@@ -29,9 +29,9 @@ def flown(out, *, hidden=None, picture=False, mission=None, **changes):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     mission = VisionSearchMission()
-    hidden = HiddenTag(place_ne_m=(12.0, -20.0))
+    hidden = HiddenTag(place_ne_m=(12.0, -8.0))
     out = tmp_path_factory.mktemp("runs") / "run"
-    return flown(out, hidden=hidden, picture=True, mission=mission, passes=2), mission
+    return flown(out, hidden=hidden, picture=True, mission=mission, passes=1), mission
 
 
 def test_the_target_is_found_and_localized(run):
@@ -41,8 +41,8 @@ def test_the_target_is_found_and_localized(run):
     assert summary["localized"] and summary["search_end"] == "all passes are flown"
     assert summary["error_m"] < 1.0
     assert summary["sigma_m"] < 1.0
-    assert (summary["target_north_m"], summary["target_east_m"]) == pytest.approx((12.0, -20.0), abs=0.5)
-    assert summary["beliefs"][0]["detections"] > 5
+    assert (summary["target_north_m"], summary["target_east_m"]) == pytest.approx((12.0, -8.0), abs=0.5)
+    assert summary["beliefs"][0]["detections"] >= 3
     assert 0.0 < summary["pose_errors"]["1"]["pitch_rad"] < 0.01
     assert {path.name for path in result.folder.iterdir()} >= {"flight.tlog", "summary.json", "track.png"}
     json.dumps(summary, allow_nan=False)
@@ -56,7 +56,7 @@ def test_the_mission_and_the_estimator_beside_it_and_a_replay_have_the_same_numb
     rows = np.array([state.row() for state in states])
     names = states[0].COLUMNS
     index = np.searchsorted(recorded["time_us"], [state.time_us for state in states])
-    assert len(states) > 20
+    assert len(states) > 8
     for name, values in zip(names, rows.T, strict=True):
         assert np.array_equal(recorded[name][index], values)
     settings = result.summary["estimator"]["settings"]
