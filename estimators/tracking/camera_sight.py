@@ -115,11 +115,11 @@ class SightModel:
                 raise EstimatorError(f"`{name}` {value:g} is not possible; give more than 0")
         if not 0.0 < self.false_rate < 1.0:
             raise EstimatorError(
-                f"`false_rate` {self.false_rate:g} is not between 0 and 1; without false detections one "
+                f"false_rate {self.false_rate:g} is not between 0 and 1; without false detections one "
                 "wrong detection would be the end of the belief"
             )
         if not 0.0 <= self.border_sides <= 10.0:
-            raise EstimatorError(f"`border_sides` {self.border_sides:g} is not in 0..10")
+            raise EstimatorError(f"border_sides {self.border_sides:g} is not in 0..10")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -77,7 +77,7 @@ class SearchGrid:
         if not np.all(np.isfinite(start)) or np.any(start < 0.0) or not start.sum() > 0.0:
             raise EstimatorError("the prior is no probability: finite, not negative, and not all 0 is one")
         if not (math.isfinite(walk_m_sqrt_s) and walk_m_sqrt_s >= 0.0):
-            raise EstimatorError(f"`walk_m_sqrt_s` {walk_m_sqrt_s:g} is not possible; give 0 or more")
+            raise EstimatorError(f"walk_m_sqrt_s {walk_m_sqrt_s:g} is not possible; give 0 or more")
         self.layout, self.model, self.scale = layout, model, scale
         start = start / start.max()
         with np.errstate(divide="ignore"):

@@ -58,7 +58,7 @@ class SearchParticles:
         if not 10 <= count <= 10_000_000:
             raise EstimatorError(f"`particles` {count} is not in 10..10000000")
         if not 0.0 < resample_share <= 1.0:
-            raise EstimatorError(f"`resample_share` {resample_share:g} is not in 0..1, or is 0")
+            raise EstimatorError(f"resample_share {resample_share:g} is not in 0..1, or is 0")
         self.layout, self.model = layout, model
         self.motion = motion or Motion()
         self.resample_share = resample_share

@@ -243,9 +243,9 @@ def test_moving_particles_keep_their_velocity():
         (lambda: SearchGrid(FINE, MODEL, dtype=np.int32), "dtype int32"),
         (lambda: SearchGrid(FINE, MODEL, prior=np.zeros((200, 300))), "not all 0"),
         (lambda: SearchGrid(FINE, MODEL, prior=np.ones((2, 3))), r"\(2, 3\) cells, the map \(200, 300\)"),
-        (lambda: SearchGrid(FINE, MODEL, walk_m_sqrt_s=-1.0), "`walk_m_sqrt_s` -1"),
+        (lambda: SearchGrid(FINE, MODEL, walk_m_sqrt_s=-1.0), "walk_m_sqrt_s -1"),
         (lambda: SearchParticles(FINE, MODEL, seed=SEED, count=3), "`particles` 3"),
-        (lambda: SearchParticles(FINE, MODEL, seed=SEED, resample_share=0.0), "`resample_share` 0"),
+        (lambda: SearchParticles(FINE, MODEL, seed=SEED, resample_share=0.0), "resample_share 0"),
     ],
 )
 def test_impossible_values_are_named(make, reported):

@@ -207,7 +207,7 @@ def test_correlated_detections_have_the_information_of_a_gauss_markov_process():
 @pytest.mark.parametrize(
     ("make", "reported"),
     [
-        (lambda: SightModel(rate=PAPER_RATE, target_size_m=2.0, false_rate=0.0), "`false_rate` 0"),
+        (lambda: SightModel(rate=PAPER_RATE, target_size_m=2.0, false_rate=0.0), "false_rate 0"),
         (lambda: SightModel(rate=PAPER_RATE, target_size_m=0.0), "`target_size_m` 0"),
         (lambda: DetectionRate(peak=1.1), "peak 1.1"),
         (lambda: PoseErrors(forward_m=-1.0), "`forward_m` -1"),

@@ -288,7 +288,7 @@ def test_a_reset_discards_the_belief():
         ({"tag_id": 300}, "tag_id 300 is not in 0..254"),
         ({"north_m": -200.0}, "north_m must be above south_m"),
         ({"cell_m": 0.01}, "more than 16000000"),
-        ({"false_rate": 0.0}, "`false_rate` 0 is not between 0 and 1"),
+        ({"false_rate": 0.0}, "false_rate 0 is not between 0 and 1"),
         ({"frame_period_s": -1.0}, "frame_period_s -1"),
         ({"cell_m": math.nan}, "cell_m nan is not a finite number"),
         ({"own_vehicle": 256}, "own_vehicle 256"),
