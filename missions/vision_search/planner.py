@@ -5,6 +5,7 @@ Tisdale et al. 2008 name for their paths. Without I/O.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
@@ -27,6 +28,9 @@ __all__ = ["AreaPlanner", "HorizonPlanner", "Localizer", "PathPlanner", "planner
 
 Array = NDArray[np.float64]
 
+Way = tuple[Place, float]
+"""A goal, and the direction in which it is flown to."""
+
 _GOLDEN_RAD: Final = math.pi * (math.sqrt(5.0) - 1.0) / 2.0  # between passes: any number is evenly spread
 _CELLS: Final = 48  # of the planner's map, along the longer side
 _ORBIT_RAD: Final = math.radians(60.0)
@@ -38,7 +42,12 @@ class AreaPlanner(Protocol):
     """Chooses the next place of one vehicle while the target is searched for."""
 
     def next_place(
-        self, belief: AreaBelief, here: Place, direction_rad: float | None, camera: CameraSight | None
+        self,
+        belief: AreaBelief,
+        here: Place,
+        direction_rad: float | None,
+        camera: CameraSight | None,
+        others: Sequence[Way] = (),
     ) -> Place:
         """The next place.
 
@@ -47,6 +56,7 @@ class AreaPlanner(Protocol):
             here: its place.
             direction_rad: direction of its last step; None: it has none.
             camera: its newest frame; None: there was none.
+            others: ways of the other vehicles.
         """
         ...
 
@@ -58,7 +68,12 @@ class PathPlanner:
         self._sweep = SweepPlanner(path, step_m)
 
     def next_place(
-        self, belief: AreaBelief, here: Place, direction_rad: float | None, camera: CameraSight | None
+        self,
+        belief: AreaBelief,
+        here: Place,
+        direction_rad: float | None,
+        camera: CameraSight | None,
+        others: Sequence[Way] = (),
     ) -> Place:
         return self._sweep.along(here)
 
@@ -102,12 +117,20 @@ class HorizonPlanner:
         self._north, self._east = north.ravel(), east.ravel()
 
     def next_place(
-        self, belief: AreaBelief, here: Place, direction_rad: float | None, camera: CameraSight | None
+        self,
+        belief: AreaBelief,
+        here: Place,
+        direction_rad: float | None,
+        camera: CameraSight | None,
+        others: Sequence[Way] = (),
     ) -> Place:
         if camera is None:
             return self._area.nearest(*here)
         shares = belief.shares(self._layout).ravel()
         p = self._parameters
+        for goal, direction in others:  # what these are about to see is theirs
+            for k in range(p.horizon):
+                shares = shares * self._missed(_at(goal, direction, k * p.step_m), direction, camera)
         branches = self._grown(_Branch(0.0, here, here, 0.0, shares), direction_rad, 0, camera)
         if not branches:  # outside the area, or before its edge: back to its middle
             return self._area.nearest(*self._inward(here))

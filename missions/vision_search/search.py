@@ -121,7 +121,9 @@ class VisionSearch:
             self.began_us = time_us
         self._flying[index] = True
         planner, estimator = self._planners[index], self._estimators[index]
-        goal = planner.next_place(estimator.belief, (0.0, 0.0), None, self._camera(index))
+        goal = planner.next_place(
+            estimator.belief, (0.0, 0.0), None, self._camera(index), self._others(index)
+        )
         self._goals[index] = goal
         self.directions[index] = math.atan2(goal[1], goal[0])
         return goal
@@ -129,6 +131,14 @@ class VisionSearch:
     def _camera(self, index: int) -> CameraSight | None:
         """The vehicle's newest frame."""
         return self._estimators[index].newest.get(self._system_ids[index])
+
+    def _others(self, index: int) -> list[tuple[Place, float]]:
+        """Ways of the other vehicles in the air."""
+        return [
+            (goal, direction)
+            for other, (goal, direction) in enumerate(zip(self._goals, self.directions, strict=True))
+            if other != index and self._flying[other] and goal is not None and direction is not None
+        ]
 
     def observed(
         self,
@@ -192,7 +202,7 @@ class VisionSearch:
             there = self._localizers[index].next_place(self.states[index][-1], here)
         else:
             there = self._planners[index].next_place(
-                estimator.belief, here, self.directions[index], self._camera(index)
+                estimator.belief, here, self.directions[index], self._camera(index), self._others(index)
             )
         if self.passes >= options.passes:
             self.reason = "all passes are flown"

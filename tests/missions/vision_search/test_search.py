@@ -68,6 +68,16 @@ def test_the_planner_with_a_horizon_detects_sooner_than_the_greedy_one_and_the_c
     assert found["sweep"] > 0.4
 
 
+def test_vehicles_that_plan_by_the_same_belief_part():
+    options = replace(OPTIONS, planner=SearchPlannerKind.HORIZON, horizon=2)
+    belief, planner, camera = PARAMETERS.new_belief(), planner_of(options), frame((0.0, 0.0), 0.0)
+    first = planner.next_place(belief, (0.0, 0.0), None, camera)
+    direction = math.atan2(first[1], first[0])
+    second = planner.next_place(belief, (0.0, 0.0), None, camera, [(first, direction)])
+    assert first == planner.next_place(belief, (0.0, 0.0), None, camera)
+    assert abs(math.remainder(math.atan2(second[1], second[0]) - direction, math.tau)) > math.radians(40.0)
+
+
 def test_a_sweep_sees_the_whole_area_and_each_vehicle_its_strip():
     assert detection_probability_after(planner_of(OPTIONS), 60) > 0.97
     for index, (low, high) in enumerate(((-100.0, 0.0), (0.0, 100.0))):
