@@ -179,6 +179,10 @@ class Anomaly:
             self._loudest = sample
         self._note(sample, confidence)
 
+    def restore(self, kept: "Anomaly") -> None:
+        """Return to the state of an earlier copy (`copy.deepcopy`), which must not be used any more."""
+        self.__dict__.update(kept.__dict__)
+
     def _before(self, first: Sample, last: Sample | None, threshold_nt: float) -> Before | None:
         """The measurement before the first one beyond the threshold, if the track entered the anomaly
         between them.
@@ -247,6 +251,12 @@ class Anomaly:
         logs = self._log_prior + self.log_evidence
         shares: Array = np.exp(logs - logs.max())
         return shares / shares.sum()
+
+    @property
+    def log_density(self) -> float:
+        """Logarithm of the density of all its measurements, whichever hypothesis is right."""
+        logs = self._log_prior + self.log_evidence
+        return float(logs.max() + np.log(np.exp(logs - logs.max()).sum()))
 
     @property
     def probability(self) -> float:

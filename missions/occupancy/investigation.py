@@ -113,7 +113,6 @@ class Investigation:
         self._fresh = [False] * searchers
         self._samples: list[Sample | None] = [None] * searchers
         self._speeds_m_s = [25.0] * searchers
-        self._loudest: dict[tuple[int, int], Sample] = {}
 
     def take(self, searcher: int, reading: PlacedReading, map_nt: float) -> Progress | None:
         """Process a reading of a searcher."""
@@ -127,23 +126,23 @@ class Investigation:
                 _LEAST_SPEED_M_S, moved_m * 1e6 / (sample.time_us - last.time_us)
             )
         self._samples[searcher] = sample
-        if progress.anomaly is not None:
-            key = (searcher, progress.anomaly.number)
-            loudest = self._loudest.get(key)
-            if loudest is None or abs(sample.residual_nt) > abs(loudest.residual_nt):
-                self._loudest[key] = sample
         return progress
 
     def in_pass(self, searcher: int) -> bool:
         """Whether a searcher is at an anomaly."""
         return self.identifier.in_pass(searcher)
 
-    def conclude(self, searcher: int, anomaly: Anomaly) -> Suspect:
-        """Decide after a pass of a searcher over an anomaly, and assign the next pass if it is open."""
+    def conclude(self, searcher: int, anomaly: Anomaly, loudest: Sample | None = None) -> Suspect:
+        """Decide after a pass of a searcher over an anomaly, and assign the next pass if it is open.
+
+        Args:
+            searcher: number of the searcher.
+            anomaly: the anomaly.
+            loudest: largest measurement of the pass; None: nothing was detected.
+        """
         suspect = self.suspects.get(anomaly.number)
         if suspect is None:
             suspect = self.suspects[anomaly.number] = Suspect(identified=anomaly)
-        loudest = self._loudest.pop((searcher, anomaly.number), None)
         if loudest is not None:
             suspect.anomalies.append(
                 (
@@ -162,6 +161,10 @@ class Investigation:
         self._release(suspect)
         self._assign_waiting()
         return suspect
+
+    def flies_pass(self, searcher: int) -> bool:
+        """Whether a searcher is assigned a pass."""
+        return self._assigned[searcher] is not None
 
     def next_leg(self, searcher: int, *, done: bool) -> tuple[tuple[float, float] | None, Suspect | None]:
         """The next goal of a searcher that flies a pass.
