@@ -28,7 +28,7 @@ from estimators.magnetic_identification.parameters import IdentificationParamete
 from estimators.occupancy.detection import MapError
 from estimators.tracking.modes import Mode, find_modes
 
-__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly", "Sample", "TracePoint"]
+__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly", "Place", "Sample", "TracePoint"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,7 @@ _BACKGROUND_PRIOR: Final = 0.3  # of what is no target
 _UNKNOWN_PRIOR: Final = 0.1
 _LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
 _TRACE_SIGMAS: Final = 1.0
+_SHIFTS: Final = 8  # of a place to the mean around it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +86,20 @@ class TracePoint:
     confidence: float
     probability: float
     evidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A place from the map's home.
+
+    Attributes:
+        north_m, east_m: the place.
+        share: of the belief near it.
+    """
+
+    north_m: float
+    east_m: float
+    share: float
 
 
 class Anomaly:
@@ -275,17 +290,29 @@ class Anomaly:
                 self._place_ne_m = self._in_map(float(forward_m), float(right_m))
         return self._place_ne_m
 
-    @property
-    def place_sigma_m(self) -> float:
-        """Standard deviation of the place of the most probable target, the larger of both axes."""
+    def likeliest_place(self, radius_m: float) -> Place:
+        """Where the most probable target is, if it is somewhere at all: the place with the largest share of the
+        belief within a radius. It is found by mean shift from each mode (Fukunaga and Hostetler 1975), so
+        mirror modes are not averaged to a place where the target is not.
+        """
         best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
         hypothesis = self._hypotheses[best]
         if not isinstance(hypothesis, ParticleHypothesis):
-            return math.inf
-        places, weights = hypothesis.sources()[:, :2], hypothesis.weights
-        off = places - weights @ places
-        covariance = (off * weights[:, None]).T @ off
-        return math.sqrt(float(np.linalg.eigvalsh(covariance)[-1]))
+            return Place(north_m=self._loudest.north_m, east_m=self._loudest.east_m, share=0.0)
+        sources, weights = hypothesis.sources(), hypothesis.weights
+        found = []
+        for mode in find_modes(sources, weights):
+            centre = np.array(mode.mean[:2])
+            for _ in range(_SHIFTS):
+                inside = np.sum((sources[:, :2] - centre) ** 2, axis=1) <= radius_m * radius_m
+                share = float(weights[inside].sum())
+                if share <= 0.0:
+                    break
+                centre = weights[inside] @ sources[inside, :2] / share
+            found.append((share, *centre.tolist()))
+        share, forward_m, right_m = max(found, default=(0.0, 0.0, 0.0))
+        north_m, east_m = self._in_map(forward_m, right_m)
+        return Place(north_m=north_m, east_m=east_m, share=share)
 
     def modes(self) -> list[Mode]:
         """The modes under the most probable target: north and east from the map's home, axis from north."""

@@ -180,7 +180,7 @@ class ParticleHypothesis(ABC):
         self.particles: Array = np.zeros((count, width))
         self.weights: Array = np.full(count, 1.0 / count)
         self._other = np.empty_like(self.particles)
-        self._noise = np.empty((2, count))
+        self._noise = np.empty((2, (count + 1) // 2))
         self._fits = np.empty((count, 2))
         self._chosen = np.empty(count, dtype=np.int64)
         self._rng = rng

@@ -242,7 +242,7 @@ class Search:
         if self.investigation is None or self.found is not None:
             return
         suspect = self.investigation.most_probable()
-        if suspect is not None and self.map.layout.contains(*suspect.place_ne_m):
+        if suspect is not None:
             self.found, self.found_us = suspect, time_us
 
     def _report_pass(

@@ -279,6 +279,7 @@ def _investigation(options: Sequence[OccupancyOptions], survey_map: SurveyMap) -
             first.identification, map_error=map_error, field_ned=field_direction(survey_map.home, _FIELD_YEAR)
         ),
         searchers=len(options),
+        layout=first.layout,
         noise_nt=first.noise_nt,
         map_error=map_error,
     )

@@ -31,12 +31,13 @@ def search(identify=Identify.BAYES, searchers=2):
     identifier = Identifier(
         IdentificationParameters(particles=1500, noise_nt=0.2), map_error=MAP_ERROR, field_ned=DIRECTION
     )
+    layout = GridLayout(south_m=-800.0, west_m=-800.0, cell_m=200.0, rows=8, columns=8)
     return Search(
-        GridLayout(south_m=-800.0, west_m=-800.0, cell_m=200.0, rows=8, columns=8),
+        layout,
         SearchParameters(noise_nt=0.2),
         [DecisionParameters()] * searchers,
         investigation=Investigation(
-            identify, identifier, searchers=searchers, noise_nt=0.2, map_error=MAP_ERROR
+            identify, identifier, searchers=searchers, layout=layout, noise_nt=0.2, map_error=MAP_ERROR
         ),
     )
 
