@@ -41,13 +41,15 @@ class Progress:
         sample: the measurement.
         anomaly: the anomaly it belongs to; None: to none.
         pass_ended: an anomaly whose pass has ended with it.
-        loudest: the largest measurement of the ended pass.
+        loudest: the largest measurement of that pass, or of the one in progress.
+        doubted: at present, another source explains the pass in progress better, or the level is doubtful.
     """
 
     sample: Sample
     anomaly: Anomaly | None
     pass_ended: Anomaly | None = None
     loudest: Sample | None = None
+    doubted: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,7 +220,7 @@ class Identifier:
         loud = abs(sample.residual_nt) > self._threshold_nt
         present, passed = self._within_reach(sample), vehicle.anomaly
         ended: Anomaly | None = None
-        loudest = vehicle.loudest
+        loudest, doubted = vehicle.loudest, vehicle.detector.level_doubtful
         if passed is not None and present is not passed:
             ended = self._end_pass(vehicle)
             # a quiet measurement beside the anomaly of the pass is about neither
@@ -233,10 +235,12 @@ class Identifier:
                 vehicle.doubtful.append(present)
         if vehicle.anomaly is not None:
             largest = vehicle.note(sample, last, small_nt=_SMALL * self._threshold_nt)
+            doubted = doubted or (vehicle.rival is not None and vehicle.rival.wins(vehicle.anomaly))
+            loudest = loudest if ended is not None else largest
             if vehicle.small_m >= _ENDS_AFTER_M:
-                ended, loudest = self._end_pass(vehicle), largest
+                ended = self._end_pass(vehicle)
         return Progress(
-            sample=sample, anomaly=present, pass_ended=ended, loudest=None if ended is None else loudest
+            sample=sample, anomaly=present, pass_ended=ended, loudest=loudest, doubted=doubted
         )
 
     def _take(self, vehicle: _Vehicle, known: Anomaly, sample: Sample, last: Sample | None) -> None:

@@ -138,6 +138,17 @@ class Investigation:
         self._samples[searcher] = sample
         return progress
 
+    def certain(self, searcher: int, progress: Progress) -> bool:
+        """Whether the anomaly of a pass in progress is the target already: a probability may be looked at after
+        every measurement, the output of the classifier at the end of a pass only.
+        """
+        anomaly = progress.anomaly
+        if self.identify is not Identify.BAYES or anomaly is None or progress.doubted:
+            return False
+        if anomaly.probability < _ACCEPT or not self.in_pass(searcher):
+            return False
+        return self._placed(anomaly.likeliest_place(_PLACED_WITHIN_M))
+
     def in_pass(self, searcher: int) -> bool:
         """Whether a searcher is at an anomaly."""
         return self.identifier.in_pass(searcher)
@@ -232,10 +243,8 @@ class Investigation:
             features = trace_features(anomaly.trace)
             suspect.probability = float(shipped_classifier().probability(features))
         suspect.likeliest = anomaly.likeliest_place(_PLACED_WITHIN_M)
-        # a place outside the searched area is not that of the target, but perhaps of its mirror image
+        placed, last_chance = self._placed(suspect.likeliest), anomaly.passes >= _MOST_PASSES
         inside = self._layout.contains(*suspect.place_ne_m)
-        placed = inside and suspect.likeliest.share >= _PLACED
-        last_chance = anomaly.passes >= _MOST_PASSES
         if (suspect.probability >= _ACCEPT and placed) or (
             last_chance and inside and suspect.probability >= 0.5
         ):
@@ -244,6 +253,12 @@ class Investigation:
             suspect.verdict = Verdict.DISMISSED
         elif suspect.probability >= _REOPEN:
             suspect.verdict = Verdict.OPEN
+
+    def _placed(self, place: Place) -> bool:
+        """Whether a place is known well enough. The target is in the searched area: a place outside may be that
+        of its mirror image.
+        """
+        return place.share >= _PLACED and self._layout.contains(place.north_m, place.east_m)
 
     def _release(self, suspect: Suspect) -> None:
         """End the passes that are assigned over a suspect."""

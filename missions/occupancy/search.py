@@ -218,8 +218,13 @@ class Search:
             reading.east_m,
             anomalous=investigation.in_pass(searcher),
         )
-        if progress is not None and progress.pass_ended is not None:
+        if progress is None:
+            return
+        if progress.pass_ended is not None:
             self._report_pass(searcher, progress.pass_ended, reading.time_us, progress.loudest)
+        elif self.found is None and progress.anomaly is not None and investigation.certain(searcher, progress):
+            # the rest of the pass would not change it
+            self._report_pass(searcher, progress.anomaly, reading.time_us, progress.loudest)
 
     def next_leg(self, searcher: int, time_us: int, *, done: bool) -> tuple[float, float] | None:
         """The next goal of a searcher that is assigned a pass over a suspect; None: it searches on."""
