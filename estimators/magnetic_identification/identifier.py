@@ -274,6 +274,7 @@ class Identifier:
             vehicle.end_pass()
         self.anomalies = [anomaly for anomaly in self.anomalies if anomaly not in vehicle.doubtful]
         vehicle.doubtful.clear()
+        vehicle.began_us, vehicle.last = -1, None  # measurements with that level
 
     def _end_pass(self, vehicle: _Vehicle) -> Anomaly:
         """The anomaly whose pass of a vehicle ends: the known one, or its rival."""
