@@ -7,7 +7,7 @@ evidences (Bayes). The paper's filter, with white noise and a fixed signature, r
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -17,18 +17,21 @@ from estimators.magnetic_identification.classes import AnomalyClass, GaussianCla
 from estimators.magnetic_identification.hypotheses import (
     Before,
     Control,
-    DipoleHypothesis,
-    GaussianHypothesis,
     Hypothesis,
     Measurement,
-    ParticleHypothesis,
     ShapelessHypothesis,
 )
 from estimators.magnetic_identification.parameters import IdentificationParameters
+from estimators.magnetic_identification.particle_hypotheses import (
+    DipoleHypothesis,
+    GaussianHypothesis,
+    ParticleHypothesis,
+)
+from estimators.magnetic_identification.samples import Place, Sample, TracePoint
 from estimators.occupancy.detection import MapError
 from estimators.tracking.modes import Mode, find_modes
 
-__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly", "Place", "Sample", "TracePoint"]
+__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly"]
 
 Array = NDArray[np.float64]
 
@@ -41,65 +44,6 @@ _UNKNOWN_PRIOR: Final = 0.1
 _LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
 _TRACE_SIGMAS: Final = 1.0
 _SHIFTS: Final = 8  # of a place to the mean around it
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """Averaged readings of one vehicle.
-
-    Attributes:
-        time_us: vehicle time of the middle.
-        vehicle: number of the vehicle.
-        north_m, east_m, height_m: mean place from the map's home.
-        course_rad: course of the vehicle over ground.
-        residual_nt: mean of reading less map, less level.
-        readings: number of readings.
-    """
-
-    time_us: int
-    vehicle: int
-    north_m: float
-    east_m: float
-    height_m: float
-    course_rad: float
-    residual_nt: float
-    readings: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TracePoint:
-    """The state after one measurement.
-
-    Attributes:
-        time_us: vehicle time.
-        number: number of the pass, from 0.
-        residual_nt: the measurement.
-        confidence: the paper's C_t, per particle and over its greatest value; NaN: no class has it.
-        probability: that the anomaly is one of the targets.
-        evidence: logarithm of the evidence of the most probable target, less that of the most probable other
-            explanation.
-    """
-
-    time_us: int
-    number: int
-    residual_nt: float
-    confidence: float
-    probability: float
-    evidence: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """A place from the map's home.
-
-    Attributes:
-        north_m, east_m: the place.
-        share: of the belief near it.
-    """
-
-    north_m: float
-    east_m: float
-    share: float
 
 
 class Anomaly:
@@ -291,7 +235,7 @@ class Anomaly:
         return self._place_ne_m
 
     def likeliest_place(self, radius_m: float) -> Place:
-        """Where the most probable target is, if it is somewhere at all: the place with the largest share of the
+        """Where the anomaly is if it is the most probable target: the place with the largest share of the
         belief within a radius. It is found by mean shift from each mode (Fukunaga and Hostetler 1975), so
         mirror modes are not averaged to a place where the target is not.
         """

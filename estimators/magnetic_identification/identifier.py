@@ -17,8 +17,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.magnetic_identification.anomaly import Anomaly, Sample
+from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.parameters import IdentificationParameters
+from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import AnomalyDetector, MapError
 from estimators.occupancy.placed_readings import PlacedReading
 from flightsim.foundation.random_streams import RandomStreams
@@ -239,9 +240,7 @@ class Identifier:
             loudest = loudest if ended is not None else largest
             if vehicle.small_m >= _ENDS_AFTER_M:
                 ended = self._end_pass(vehicle)
-        return Progress(
-            sample=sample, anomaly=present, pass_ended=ended, loudest=loudest, doubted=doubted
-        )
+        return Progress(sample=sample, anomaly=present, pass_ended=ended, loudest=loudest, doubted=doubted)
 
     def _take(self, vehicle: _Vehicle, known: Anomaly, sample: Sample, last: Sample | None) -> None:
         """One more measurement of a known anomaly.

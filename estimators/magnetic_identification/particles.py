@@ -62,8 +62,8 @@ def move(
     """Motion model, equation 3: the control of a step with its noise, equation 4, for each particle.
 
     Drawing normal numbers is most of the cost of a step. Each therefore serves two particles, with either
-    sign (antithetic variates, Hammersley and Morton 1956); resampling puts copies of one particle side by side,
-    so that these two are seldom alike.
+    sign (antithetic variates, Hammersley and Morton 1956); resampling puts copies of one particle side by
+    side, so these two are seldom alike.
 
     Args:
         particles: (n, width), changed in place.

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
-from estimators.magnetic_identification.anomaly import Anomaly, Place, Sample
+from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.classifier import shipped_classifier, trace_features
 from estimators.magnetic_identification.identifier import Identifier, Progress
+from estimators.magnetic_identification.samples import Place, Sample
 from estimators.occupancy import detection
 from estimators.occupancy.detection import MapError
 from estimators.occupancy.placed_readings import PlacedReading
@@ -139,8 +140,8 @@ class Investigation:
         return progress
 
     def certain(self, searcher: int, progress: Progress) -> bool:
-        """Whether the anomaly of a pass in progress is the target already: a probability may be looked at after
-        every measurement, the output of the classifier at the end of a pass only.
+        """Whether the anomaly of a pass in progress is the target already. A probability may be looked at
+        after every measurement, the output of the classifier at the end of a pass only.
         """
         anomaly = progress.anomaly
         if self.identify is not Identify.BAYES or anomaly is None or progress.doubted:
@@ -255,8 +256,8 @@ class Investigation:
             suspect.verdict = Verdict.OPEN
 
     def _placed(self, place: Place) -> bool:
-        """Whether a place is known well enough. The target is in the searched area: a place outside may be that
-        of its mirror image.
+        """Whether a place is known well enough. The target is in the searched area: a place outside may be
+        that of its mirror image.
         """
         return place.share >= _PLACED and self._layout.contains(place.north_m, place.east_m)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.magnetic_identification.anomaly import Anomaly as Identified
-from estimators.magnetic_identification.anomaly import Sample
+from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.localisation import gaussian_centre
 from estimators.occupancy.occupancy_map import OccupancyMap
@@ -222,8 +222,9 @@ class Search:
             return
         if progress.pass_ended is not None:
             self._report_pass(searcher, progress.pass_ended, reading.time_us, progress.loudest)
-        elif self.found is None and progress.anomaly is not None and investigation.certain(searcher, progress):
+        elif self.found is None and investigation.certain(searcher, progress):
             # the rest of the pass would not change it
+            assert progress.anomaly is not None
             self._report_pass(searcher, progress.anomaly, reading.time_us, progress.loudest)
 
     def next_leg(self, searcher: int, time_us: int, *, done: bool) -> tuple[float, float] | None:

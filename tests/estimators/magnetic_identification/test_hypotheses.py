@@ -8,13 +8,8 @@ from scipy.stats import multivariate_normal
 
 from estimators.magnetic_identification import particles as p
 from estimators.magnetic_identification.classes import DipoleClass, GaussianClass
-from estimators.magnetic_identification.hypotheses import (
-    Before,
-    Control,
-    DipoleHypothesis,
-    GaussianHypothesis,
-    ShapelessHypothesis,
-)
+from estimators.magnetic_identification.hypotheses import Before, Control, ShapelessHypothesis
+from estimators.magnetic_identification.particle_hypotheses import DipoleHypothesis, GaussianHypothesis
 from estimators.tracking.modes import find_modes
 from flightsim.payload import DipoleSignature
 from tests.estimators.magnetic_identification.encounters import (

@@ -101,12 +101,11 @@ def fly_pass(search, *, until_s=60.0, wind=(0.0, 5.0)):
         velocity = 25.0 * np.array([math.cos(heading_rad), math.sin(heading_rad)]) + wind
         place = place + 0.1 * velocity
         track.append(place)
-        command = pilot.update(
-            Motion(
-                time_us=k * 100_000, north_m=place[0], east_m=place[1], vel_ne_m_s=tuple(velocity),
-                yaw_rad=heading_rad, airspeed_m_s=25.0, wind_ne_m_s=wind,
-            )  # fmt: skip
-        )
+        now = Motion(
+            time_us=k * 100_000, north_m=place[0], east_m=place[1], vel_ne_m_s=tuple(velocity),
+            yaw_rad=heading_rad, airspeed_m_s=25.0, wind_ne_m_s=wind,
+        )  # fmt: skip
+        command = pilot.update(now)
         if command is not None:
             wanted_rad = command.heading_rad
     return pilot, np.array(track)
@@ -114,7 +113,7 @@ def fly_pass(search, *, until_s=60.0, wind=(0.0, 5.0)):
 
 @pytest.mark.parametrize("side_m", [-40.0, 40.0])
 def test_a_pass_is_flown_over_its_suspect_though_a_turn_precedes_it(side_m):
-    """The turn back leaves the aircraft two radii beside the line; a single heading would pass that far off."""
+    """The turn back leaves the aircraft two radii beside the line; one heading would pass that far off."""
     pilot, track = fly_pass(Passes([(20.0, side_m), (-580.0, 0.0)]))
     suspect = (-280.0, 0.5 * side_m)
     assert np.hypot(*(track - suspect).T).min() < 90.0

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu
 
-from estimators.magnetic_identification.anomaly import TracePoint
 from estimators.magnetic_identification.classifier import (
     FEATURES,
     TraceClassifier,
     shipped_classifier,
     trace_features,
 )
+from estimators.magnetic_identification.samples import TracePoint
 from missions.embedded.magnetic_encounters import EncounterConditions, encounters
 from missions.studies import run_trial
 from missions.studies.magnetic_identification import area_under_curve, study
