@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from missions.studies.magnetic_passes import DiagonalPass
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 _COLOURS: Final = ("#9ca3af", "#c2410c", "#1769aa", "#15803d")
 _INK: Final = "#1f2937"
@@ -92,7 +93,7 @@ def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, 
     )
     for sign in (-1.0, 1.0):
         for angle in (math.degrees(DIAGONAL_RAD), 180.0 - math.degrees(DIAGONAL_RAD)):
-            angles.axvline(sign * angle, color=_TRUTH_COLOUR, linewidth=0.9, linestyle="--", zorder=0)
+            angles.axvline(sign * angle, color=_TRUTH_COLOUR, linewidth=0.9, linestyle="--")
     angles.set_xticks(range(-180, 181, 60))
     _title(angles, "course relative to the target's axis", "psi, degrees", "weight")
     for is_target, trace in traces:
@@ -107,9 +108,7 @@ def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, 
         figure.savefig(file, format="png", metadata={"Software": None})
 
 
-def _draw_in_target(
-    axes: Any, flown: "DiagonalPass", shown: NDArray[np.int64], chosen: NDArray[np.int64]
-) -> None:
+def _draw_in_target(axes: Any, flown: "DiagonalPass", shown: Indices, chosen: Indices) -> None:
     """Figure 4: the particles at the first measurement and at the end, on the target's signature."""
     side = np.linspace(-_FAR_M, _FAR_M, 200)
     square = (side[:, None] / TARGET.sigma_along_m) ** 2 + (side / TARGET.sigma_across_m) ** 2
@@ -117,19 +116,16 @@ def _draw_in_target(
         side, side, TARGET.amplitude_nt * np.exp(-0.5 * square), levels=[3.0, 10.0, 30.0, 80.0],
         colors="#9ca3af", linewidths=0.7,
     )  # fmt: skip
-    # the spread of the level curve's particles over the whole ellipse is left out by their weights
     axes.plot(
         flown.began[shown, 1], flown.began[shown, 0], ".", color="#9ca3af", markersize=2, alpha=0.4,
         label="first measurement",
     )  # fmt: skip
     ended = flown.ended[chosen]
-    axes.plot(
-        ended[:, 1], ended[:, 0], ".", color=_TARGET_COLOUR, markersize=2, alpha=0.4, label="end of the pass"
-    )
+    axes.plot(ended[:, 1], ended[:, 0], ".", color=_TARGET_COLOUR, markersize=2, alpha=0.4, label="end")
     along_m = np.array([flown.began_along_m, BEYOND_M])
     axes.plot(
-        along_m * math.sin(DIAGONAL_RAD), along_m * math.cos(DIAGONAL_RAD), color=_TRUTH_COLOUR, linewidth=1.2,
-        label="track",
+        along_m * math.sin(DIAGONAL_RAD), along_m * math.cos(DIAGONAL_RAD), color=_TRUTH_COLOUR,
+        linewidth=1.2, label="track",
     )  # fmt: skip
     axes.set_aspect("equal")
     axes.set_xlim(-3000.0, 3000.0)

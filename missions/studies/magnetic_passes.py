@@ -1,5 +1,5 @@
-"""The passes of figures 4 to 6 of Lum et al. 2005, flown again: what the filter knows after a diagonal pass over
-a target, and the confidence along a pass over a target and over a false anomaly.
+"""The passes of figures 4 to 6 of Lum et al. 2005, flown again: what the filter knows after a diagonal pass
+over a target, and the confidence along a pass over a target and over a false anomaly.
 """
 
 import math
@@ -48,8 +48,8 @@ class DiagonalPass:
     """The filter in a pass over the target's centre.
 
     Attributes:
-        began: (n, 3) x and y in the frame of the target, m, and psi, of the particles at the first measurement
-            beyond the threshold.
+        began: (n, 3) x and y in the frame of the target, m, and psi, of the particles at the first
+            measurement beyond the threshold.
         hypothesis: the filter at the end.
         began_along_m: place of that measurement along the track, from the centre.
     """

@@ -1,4 +1,4 @@
-"""One trial of the study `magnetic-identification`: passes over a target and over a false anomaly of one map."""
+"""One trial of the study `magnetic-identification`: passes over a target and a false anomaly of one map."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -29,8 +29,8 @@ CONDITIONS: Final[Mapping[str, EncounterConditions]] = MappingProxyType(
         "noisy": EncounterConditions(noise_nt=1.0),
     }
 )
-"""By name: passes up to 30 % farther off, 30 % more noise than stated, targets 30 % deeper than their class, all
-three; passes up to 150 m off, and three times the noise, as stated.
+"""By name: passes up to 30 % farther off, 30 % more noise than stated, targets 30 % deeper than their class,
+all three; passes up to 150 m off, and three times the noise, as stated.
 """
 PASSES: Final = 2
 _YEAR: Final = 2026.0
