@@ -30,7 +30,7 @@ from flightsim.payload import (
     synthetic_map,
 )
 
-__all__ = ["Encounter", "EncounterConditions", "encounters"]
+__all__ = ["Encounter", "EncounterConditions", "as_published", "encounters"]
 
 Array = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def encounters(seed: int, conditions: EncounterConditions, *, passes: int = 2) -
                 break
         yield Encounter(
             is_target=is_target,
-            survey_map=_as_published(published),
+            survey_map=as_published(published),
             place_ne_m=(source.north_m, source.east_m),
             passes=tuple(
                 _readings(rng, field, places, conditions, start_s=k * (_TURN_S + 2.0 * _PASS_M / 25.0))
@@ -219,7 +219,8 @@ def _readings(
     )
 
 
-def _as_published(published: MagneticMap) -> SurveyMap:
+def as_published(published: MagneticMap) -> SurveyMap:
+    """A published map as a search reads it from its file."""
     gradient = published.vertical_gradient_nt_m
     home = published.home
     return SurveyMap(
