@@ -1,5 +1,5 @@
 """The Monte Carlo study `magnetic-search`: a team searches for a magnetic target among false anomalies, and
-names it by passes that detect an anomaly, by the trace of the paper's confidence, or by the evidence of classes.
+names it by passes that detect an anomaly, by the trace of the confidence, or by the evidence of classes.
 
 The worlds are those of `fly occupancy` with the same seeds. The aircraft are points (`point_searchers`), so a
 search takes seconds.
