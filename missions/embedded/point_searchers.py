@@ -15,7 +15,7 @@ from estimators.occupancy.placed_readings import PlacedReading
 from estimators.occupancy.survey_map import SurveyMap
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
-from flightsim.payload import MagneticField, magnetic_field_of
+from flightsim.payload import MagneticField, MagneticSpec, magnetic_field_of
 from flightsim.world_spec import WorldSpec
 from missions.embedded.magnetic_encounters import as_published
 from missions.embedded.worlds import drawn_target, occupancy_world
@@ -155,7 +155,7 @@ def search_with_points(options: OccupancyOptions, seed: int, *, false_count: int
     spec = occupancy_world(
         WorldSpec.of_team(options.vehicles, seed=seed), options, false_count=false_count
     ).magnetic_field
-    assert spec is not None
+    assert isinstance(spec, MagneticSpec)
     field, published = magnetic_field_of(spec, home=Home(), seed=seed, decimal_year=_YEAR)
     survey_map = as_published(published)
     search = Search(
