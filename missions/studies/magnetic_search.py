@@ -132,7 +132,7 @@ def study() -> Study[Cell, SearchRow]:
         trial=trial,
         parameters=Cell,
         row=SearchRow,
-        design=grid(identify=tuple(Identify)),
+        design=grid(identify=tuple(way.value for way in Identify)),
         runs=100,
         success="target_named",
         metrics=("time_s", "error_m", "passes"),

@@ -62,3 +62,9 @@ def test_the_evidence_names_the_target_among_five_false_anomalies(run):
     row = run_trial(study(), index, runs=4)
     assert (row["identify"], row["target_named"], row["false_anomaly_named"]) == ("bayes", True, False)
     assert row["error_m"] < 40.0
+
+
+def test_its_cells_can_be_stored():
+    """Rows are written with the parameters of their cells: plain numbers and texts."""
+    assert [type(cell["identify"]) for cell in study().design.cells] == [str] * 3
+    assert study().schema.table_schema(study().design.cells[0]) is not None
