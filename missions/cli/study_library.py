@@ -45,6 +45,12 @@ def _multi_target(given: Given) -> "Study[Any, Any]":
     return study(given["horizon"], given["alpha"], Exploration(given["exploration"]))
 
 
+def _vision_search(given: Given) -> "Study[Any, Any]":
+    from missions.studies.vision_search import study
+
+    return study(given["model"], given["side"], given["passes"])
+
+
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
     {
         "lissajous-localization": StudyCommand(
@@ -141,6 +147,28 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_multi_target,
+        ),
+        "vision-search": StudyCommand(
+            help=(
+                "One and two aircraft search a square for a tag with downward cameras, and localize it: "
+                "Tisdale et al. 2008, as flights on SITL.\n\n"
+                "A fine grid, a coarse grid and particles over the same flights, with their error, sigma and "
+                "consistency; the measured pose errors; the error budget of Table II. The folder gets "
+                "errors.png."
+            ),
+            options=(
+                click.Option(["--model"], default="aerosonde", help="Of the vehicles."),
+                click.Option(
+                    ["--side"],
+                    type=FiniteRange(min=100.0, max=5000.0),
+                    default=1000.0,
+                    help="Of the searched square, m.",
+                ),
+                click.Option(
+                    ["--passes"], type=click.IntRange(1, 100), default=6, help="Over the target, of all."
+                ),
+            ),
+            build=_vision_search,
         ),
     }
 )
