@@ -124,7 +124,7 @@ def test_the_confidence_of_the_paper_stays_for_a_target_and_drops_for_a_boat():
         ({"targets": ("a:gaussian:1:2:3",), "false_anomalies": ("a:dipole:1:2:3",)}, "a name of their own"),
         ({"target_prior": 1.0}, "target_prior 1 is not between 0 and 1"),
         ({"particles": 10}, "particles 10 is not in 100..1000000"),
-        ({"interval_s": math.nan}, "interval_s nan is not accepted"),
+        ({"interval_s": math.nan}, "interval_s = nan is not accepted"),
     ],
 )
 def test_impossible_parameters_are_refused(values, said):
