@@ -32,6 +32,12 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
     return study(train=given["train"])
 
 
+def _magnetic_search(given: Given) -> "Study[Any, Any]":
+    from missions.studies.magnetic_search import study
+
+    return study()
+
+
 def _multi_target(given: Given) -> "Study[Any, Any]":
     from missions.multi_target.objective import Exploration
     from missions.studies.multi_target_search import study
@@ -94,7 +100,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "Magnetic targets and false anomalies after one and two passes: Lum et al. 2005.\n\n"
                 "Areas under the ROC of the threshold, the paper's confidence, the classifier and the "
                 "evidence of classes, on maps and targets that the classifier was not fitted to, and with "
-                "larger offsets, more noise and deeper targets. The folder gets roc.png."
+                "larger offsets, more noise and deeper targets. The folder gets roc.png, and passes.png with "
+                "figures 4 to 6."
             ),
             options=(
                 click.Option(
@@ -104,6 +111,17 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_magnetic_identification,
+        ),
+        "magnetic-search": StudyCommand(
+            help=(
+                "Three searchers name a magnetic target among five false anomalies: Lum et al. 2005, "
+                "figure 8.\n\n"
+                "By passes that detect an anomaly, by the trace of the paper's confidence, and by the "
+                "evidence of classes, in the worlds of fly occupancy. The searchers are points that turn at "
+                "one rate."
+            ),
+            options=(),
+            build=_magnetic_search,
         ),
         "multi-target": StudyCommand(
             help=(
