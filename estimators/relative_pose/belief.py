@@ -93,19 +93,13 @@ class PoseMode:
     def from_tracker(self, forward_m: float, right_m: float) -> tuple[float, float]:
         """A horizontal place of the tracker's level frame, in the handoff aircraft's (equation 33)."""
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        return (
-            self.forward_m + c * forward_m + s * right_m,
-            self.right_m - s * forward_m + c * right_m,
-        )
+        return (self.forward_m + c * forward_m + s * right_m, self.right_m - s * forward_m + c * right_m)
 
     def place_covariance(self, forward_m: float, right_m: float) -> Array:
         """(2, 2) covariance of `from_tracker`, to first order."""
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
         jacobian = np.array(
-            [
-                [1.0, 0.0, 0.0, -s * forward_m + c * right_m],
-                [0.0, 1.0, 0.0, -c * forward_m - s * right_m],
-            ]
+            [[1.0, 0.0, 0.0, -s * forward_m + c * right_m], [0.0, 1.0, 0.0, -c * forward_m - s * right_m]]
         )
         found: Array = jacobian @ self.covariance @ jacobian.T
         return found
@@ -227,7 +221,8 @@ def joined_modes(
         least_weight: lighter modes are left out; the remaining weights add up to one.
     """
     parts = [
-        (float(weights[k]), means[k].copy(), covariances[k].copy()) for k in np.argsort(-weights, kind="stable")
+        (float(weights[k]), means[k].copy(), covariances[k].copy())
+        for k in np.argsort(-weights, kind="stable")
     ]
     joined = True
     while joined:

@@ -186,7 +186,9 @@ def _fuse(weights: Array, means: Array, covariances: Array, measured: Array, var
             # the negative central weight may make the spread too small: never below the linear one
             linear = 0.0
             for c in range(4):
-                along = (mean[0] * root[0, c] + mean[1] * root[1, c] + mean[2] * root[2, c]) / max(centre, 1e-9)
+                along = (mean[0] * root[0, c] + mean[1] * root[1, c] + mean[2] * root[2, c]) / max(
+                    centre, 1e-9
+                )
                 linear += along * along
             own = max(second - predicted * predicted, linear)
             total = own + variances[0]

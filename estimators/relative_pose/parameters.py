@@ -3,7 +3,12 @@
 from dataclasses import dataclass
 from typing import Final
 
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive, require_probability
+from flightsim.foundation.checks import (
+    check_fields,
+    require_not_negative,
+    require_positive,
+    require_probability,
+)
 
 _MOST: Final = 1_000_000
 
@@ -22,7 +27,9 @@ class RelativePoseParameters:
             motion adds: errors of both airspeeds, sideslip, differences of the wind.
         climb_walk_m_sqrt_s: the same vertically.
         heading_walk_rad_sqrt_s: the same of the relative heading, from both gyros.
-        particles: number of particles.
+        particles: number of particles of a converged pose.
+        start_particles: number of particles before. The first measurements select by range, depth and
+            heading, and leave some 6 % of the particles: too few of a thousand to cover all bearings.
         resample_below: share of effective particles below which they are resampled.
         jitter: standard deviation of the noise that resampled particles get, over the belief's own: of depth,
             heading and range. Copies that differ in nothing but the noise of later steps lose bearings before
@@ -46,6 +53,7 @@ class RelativePoseParameters:
     climb_walk_m_sqrt_s: float = 1.0
     heading_walk_rad_sqrt_s: float = 0.01
     particles: int = 1000
+    start_particles: int = 10_000
     resample_below: float = 0.5
     jitter: float = 0.2
     components: int = 64
@@ -67,7 +75,7 @@ class RelativePoseParameters:
             },
             unchecked=("seed",),
         )
-        for name, least in (("particles", 10), ("components", 8)):
+        for name, least in (("particles", 10), ("start_particles", self.particles), ("components", 8)):
             if not least <= getattr(self, name) <= _MOST:
                 raise ValueError(f"{name} = {getattr(self, name)} is not accepted: {least} to {_MOST} are")
         if self.reset_after < 1.0:

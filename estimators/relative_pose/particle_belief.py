@@ -1,6 +1,7 @@
 """The relative pose as particles (Tolman et al. 2021, section III)."""
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 
+_NARROW: Final = 0.5  # of the standard deviation of a converged pose
+
 
 class ParticlePose(RelativePoseBelief):
     """Particles with low-variance, selective resampling.
@@ -36,15 +39,11 @@ class ParticlePose(RelativePoseBelief):
     def __init__(self, parameters: RelativePoseParameters | None = None) -> None:
         super().__init__(parameters)
         p = self.parameters
-        n = p.particles
-        self.poses: Array = np.zeros((kernels.POSE, n))
-        self.weights: Array = np.full(n, 1.0 / n)
+        self.poses: Array = np.zeros((kernels.POSE, 0))
+        self.weights: Array = np.zeros(0)
         self.resamplings = 0
         self._random = RandomStreams(p.seed).generator("relative_pose")
-        self._next = np.empty_like(self.poses)
-        self._noise = np.empty((kernels.NOISES, n))
-        self._fits = np.empty(n)
-        self._chosen = np.empty(n, dtype=np.int64)
+        self._make_room(p.start_particles)
         self._measured, self._spreads = np.empty(3), np.empty(3)
         self._sigmas = np.array([p.range_sigma_m, p.height_sigma_m, p.heading_sigma_rad])
         self._walks = np.array([p.walk_m_sqrt_s, p.climb_walk_m_sqrt_s, p.heading_walk_rad_sqrt_s])
@@ -54,8 +53,17 @@ class ParticlePose(RelativePoseBelief):
             np.empty((kernels.BINS, STATES, STATES)),
         )
 
+    def _make_room(self, count: int) -> None:
+        self._next = np.empty((kernels.POSE, count))
+        self._noise = np.empty((kernels.NOISES, count))
+        self._fits = np.empty(count)
+        self._chosen = np.empty(count, dtype=np.int64)
+
     def _start(self, measured: PoseMeasurement) -> None:
-        n, noise = self.parameters.particles, self._random.standard_normal((3, self.parameters.particles))
+        n = self.parameters.start_particles
+        self._make_room(n)
+        self.poses, self.weights = np.empty((kernels.POSE, n)), np.full(n, 1.0 / n)
+        noise = self._random.standard_normal((3, n))
         bearing = math.tau * (np.arange(n) + self._random.random(n)) / n
         down = measured.down_m + self._sigmas[1] * noise[1]
         slant = measured.range_m + self._sigmas[0] * noise[0]
@@ -64,29 +72,46 @@ class ParticlePose(RelativePoseBelief):
         self.poses[kernels.FORWARD], self.poses[kernels.RIGHT] = rho * np.cos(bearing), rho * np.sin(bearing)
         self.poses[kernels.DOWN] = down
         self.poses[kernels.COS], self.poses[kernels.SIN] = np.cos(heading), np.sin(heading)
-        self.weights[:] = 1.0 / n
 
     def _move(self, dt_s: float, own: LevelMotion, other: LevelMotion) -> None:
         self._random.standard_normal(out=self._noise)
         kernels.move(
-            self.poses, motion_array(own), motion_array(other), dt_s, self._noise, math.sqrt(dt_s) * self._walks
+            self.poses,
+            motion_array(own),
+            motion_array(other),
+            dt_s,
+            self._noise,
+            math.sqrt(dt_s) * self._walks,
         )
 
     def _fuse(self, measured: PoseMeasurement) -> float:
         self._measured[:] = measured.range_m, measured.down_m, measured.heading_rad
         nis = kernels.weigh(self.poses, self.weights, self._measured, self._sigmas, self._fits)
-        if effective_count(self.weights) < self.parameters.resample_below * self.parameters.particles:
-            self._resample()
+        p, count = self.parameters, self.weights.size
+        if effective_count(self.weights) < p.resample_below * count:
+            self._resample(p.particles if count > p.particles and self._narrow() else count)
         return nis
 
-    def _resample(self) -> None:
-        systematic(self.weights, self._random.random(), self._chosen)
+    def _narrow(self) -> bool:
+        """Whether the smaller number of particles is enough."""
+        best, p = self.best, self.parameters
+        return self.converged and best is not None and best.horizontal_sigma_m < _NARROW * p.converged_sigma_m
+
+    def _resample(self, count: int) -> None:
         kernels.spreads(self.poses, self.weights, self._spreads)
+        if count != self.weights.size:
+            self._make_room(count)
+        systematic(self.weights, self._random.random(), self._chosen)
         noise = self._random.standard_normal(out=self._noise)
-        # a noise of the range's spread keeps particles on their circle as well as one along it would
+        # noise of the range's spread in all directions: across the circle as much as it may, along it less
         noise *= self.parameters.jitter * self._spreads[[0, 0, 1, 2]][:, None]
-        kernels.copy_chosen(self._chosen, self.poses, self.weights, noise, self._next)
-        self.poses, self._next = self._next, self.poses
+        if count != self.weights.size:
+            self.weights = np.empty(count)
+        before = self.poses
+        kernels.copy_chosen(self._chosen, before, self.weights, noise, self._next)
+        self.poses = self._next
+        self._next = before if before.shape == self.poses.shape else np.empty_like(self.poses)
+        self._modes = None
         self.resamplings += 1
 
     def _find_modes(self) -> tuple[PoseMode, ...]:

@@ -34,7 +34,7 @@ MOTION: Final = _motion.size
 
 NOISES: Final = 4
 BINS: Final = 72
-_EMPTY: Final = 1e-3  # of the densest bin: bins below it separate groups
+_EMPTY: Final = 0.02  # of the densest bin: bins below it separate groups
 
 
 @kernel
