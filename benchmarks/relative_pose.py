@@ -42,13 +42,8 @@ class Problem:
     def __init__(self, count: int) -> None:
         rng = self.rng = np.random.default_rng(1)
         angles = rng.normal(0.7, 0.02, count)
-        self.poses = np.array(
-            [
-                *(rng.normal(0.0, 4.0, (3, count)) + [[300.0], [-120.0], [30.0]]),
-                np.cos(angles),
-                np.sin(angles),
-            ]
-        )
+        places = rng.normal(0.0, 4.0, (3, count)) + np.array([[300.0], [-120.0], [30.0]])
+        self.poses = np.array([*places, np.cos(angles), np.sin(angles)])
         self.weights = np.full(count, 1.0 / count)
         self.noise = np.empty((kernels.NOISES, count))
         self.fits = np.empty(count)
@@ -138,7 +133,10 @@ def main() -> int:
     say(f"NumPy  {numpy_ms:8.4f} ms, {numpy_ms / kernel_ms:5.1f} times the kernel")
     say(f"largest difference of a coordinate or weight: {off:.1e}")
     parameters = RelativePoseParameters(particles=given.particles, start_particles=given.particles)
-    for name, belief in {"particles": ParticlePose(parameters), "Gaussians": GaussianBank(parameters)}.items():
+    for name, belief in {
+        "particles": ParticlePose(parameters),
+        "Gaussians": GaussianBank(parameters),
+    }.items():
         say(f"a whole step by {name}: {whole_step_us(belief, given.repeats):.0f} us")
     return 0
 

@@ -55,8 +55,8 @@ class Match:
         alignment: of both windows.
         rotation_error_rad: e_theta with its sign: rotation of the alignment less relative heading, -pi..pi.
         translation_error_m: e_t: distance between the middle of the track and the middle of the target's
-            window, taken to the handoff aircraft by the relative pose. The translation of the alignment itself
-            would carry the error of its rotation over the distance to the target.
+            window, taken to the handoff aircraft by the relative pose. The translation of the alignment
+            itself would carry the error of its rotation over the distance to the target.
         matches: m of equation 47.
     """
 

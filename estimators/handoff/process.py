@@ -1,7 +1,7 @@
-"""The handoff aircraft's part of a handoff: relative pose, own tracks, comparison, and where the target is."""
+"""The handoff aircraft's part of a handoff: relative pose, own tracks, comparison, place of the target."""
 
-from dataclasses import dataclass, field
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +104,8 @@ class HandoffProcess:
             own: motion since then.
             report: of the tracker, of this time.
             measured: range, depth and relative heading.
-            frame: places (n, 2) and covariances (n, 2, 2) of moving objects, in the present level frame; None:
-                there is no frame of this time.
+            frame: places (n, 2) and covariances (n, 2, 2) of moving objects, in the present level frame;
+                None: there is no frame of this time.
         """
         dt_s = 0.0 if self._time_us is None else (time_us - self._time_us) * 1e-6
         self._time_us, self._report = time_us, report
@@ -142,7 +142,8 @@ class HandoffProcess:
         }
         target = reported.pop(_TARGET, None)
         self.comparison.update(
-            TrackWindows(time_us=time_us, times_us=times_us, handoff=own, target=target, others=reported), best
+            TrackWindows(time_us=time_us, times_us=times_us, handoff=own, target=target, others=reported),
+            best,
         )
         if self.comparison.decided is not None and self.decided_us is None:
             self.decided_us = time_us

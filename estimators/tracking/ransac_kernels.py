@@ -1,5 +1,5 @@
-"""Kernels of recursive RANSAC (`estimators.tracking.recursive_ransac`): Kalman filters, and the search for new
-hypotheses in the window.
+"""Kernels of recursive RANSAC (`estimators.tracking.recursive_ransac`): Kalman filters, and the search for
+new hypotheses in the window.
 
 States are polynomials of time: position, velocity, acceleration, two axes each (x, y, vx, vy, ax, ay); the
 order is 0 (position only), 1 or 2.

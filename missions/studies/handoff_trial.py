@@ -1,4 +1,4 @@
-"""One trial of the study `handoff`: two aircraft fly until one track is decided for, or 15 minutes are over."""
+"""One trial of the study `handoff`: two aircraft fly until a track is decided for, or for 15 minutes."""
 
 import math
 from dataclasses import dataclass, field
@@ -164,7 +164,9 @@ class HandoffTrial:
             windows,
         )
         # opposite orbits: the relative pose is easiest to observe in them
-        pilots = [OrbitGuidance(OrbitParameters(radius_m=self.setting.radius_m, direction=d)) for d in (1, -1)]
+        pilots = [
+            OrbitGuidance(OrbitParameters(radius_m=self.setting.radius_m, direction=d)) for d in (1, -1)
+        ]
         rolls = (0.0, 0.0)
         report = TrackerReport(motion=LevelMotion(forward_m_s=self.setting.airspeed_m_s))
         while world.time_us < 1e6 * self.timeout_s and process.decided_us is None:
@@ -221,7 +223,9 @@ class HandoffTrial:
             seed=seed,
         )
         return (
-            ParticlePose(parameters) if PoseBelief(cell.belief) is PoseBelief.PARTICLES else GaussianBank(parameters)
+            ParticlePose(parameters)
+            if PoseBelief(cell.belief) is PoseBelief.PARTICLES
+            else GaussianBank(parameters)
         )
 
 

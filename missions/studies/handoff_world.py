@@ -77,7 +77,9 @@ class HandoffSetting:
         check_fields(
             self,
             require_not_negative,
-            but=dict.fromkeys(("airspeed_m_s", "radius_m", "rate_hz", "targets", "tilt_time_s"), require_positive),
+            but=dict.fromkeys(
+                ("airspeed_m_s", "radius_m", "rate_hz", "targets", "tilt_time_s"), require_positive
+            ),
         )
 
 
@@ -191,7 +193,9 @@ class HandoffWorld:
         return PoseMeasurement(
             range_m=math.nan if missing else slant + s.range_sigma_m * noise[0],
             down_m=down + s.height_sigma_m * (noise[1] - noise[2]),
-            heading_rad=handoff.heading_rad - tracker.heading_rad + s.heading_sigma_rad * (noise[3] - noise[4]),
+            heading_rad=handoff.heading_rad
+            - tracker.heading_rad
+            + s.heading_sigma_rad * (noise[3] - noise[4]),
         )
 
     def frame(self, which: int, pointing: tuple[float, float]) -> tuple[Array, Array]:

@@ -95,9 +95,7 @@ def test_a_history_gives_windows_of_complete_tracks_only():
 
 
 @given(
-    st.floats(-3.1, 3.1),
-    st.tuples(st.floats(-300.0, 300.0), st.floats(-300.0, 300.0)),
-    st.integers(0, 1000),
+    st.floats(-3.1, 3.1), st.tuples(st.floats(-300.0, 300.0), st.floats(-300.0, 300.0)), st.integers(0, 1000)
 )
 def test_alignment_finds_rotation_and_translation(heading, translation, seed):
     rng = np.random.default_rng(seed)
@@ -113,7 +111,9 @@ def test_alignment_finds_rotation_and_translation(heading, translation, seed):
     flat = [np.column_stack((p - p.mean(axis=0), np.zeros(50))) for p in (noisy, tracker)]
     rotation, residual = Rotation.align_vectors(*flat)
     # scipy may turn out of the plane, by which nothing is gained: its rotation about the vertical is ours
-    assert math.remainder(-rotation.as_euler("ZYX")[0] - found.heading_rad, math.tau) == pytest.approx(0, abs=1e-6)
+    assert math.remainder(-rotation.as_euler("ZYX")[0] - found.heading_rad, math.tau) == pytest.approx(
+        0, abs=1e-6
+    )
     assert found.residual_m == pytest.approx(residual)
     assert found.rms_m == pytest.approx(residual / math.sqrt(50))
 
@@ -147,7 +147,7 @@ def test_each_threshold_refuses_a_match():
         return comparison.newest[1]
 
     assert match(own).matches
-    far = match(own + (25.0, 0.0))
+    far = match(own + np.array([25.0, 0.0]))
     assert not far.matches and far.translation_error_m == pytest.approx(25.0)
     for angle in (0.6, -0.6):  # the sign that acos loses
         c, s = math.cos(angle), math.sin(angle)
@@ -260,7 +260,7 @@ def test_two_targets_side_by_side_are_not_decided_between():
     """Both walk alike, half a metre apart: neither may get a high probability."""
     rng = np.random.default_rng(6)
     target = walk(rng, 100)
-    own = {1: seen_by_handoff(target) + (0.3, 0.0), 2: seen_by_handoff(target) - (0.3, 0.0)}
+    own = {k: seen_by_handoff(target) + np.array([x, 0.0]) for k, x in ((1, 0.3), (2, -0.3))}
     comparison = EvidenceComparison()
     comparison.update(windows(own, target), POSE)
     assert max(comparison.scores.values()) < 0.6

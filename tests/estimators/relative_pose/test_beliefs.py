@@ -1,10 +1,9 @@
-"""Beliefs about a relative pose: equations against flights over the ground, convergence, modes, consistency."""
+"""Beliefs about a relative pose: equations against flights over the ground, convergence, consistency."""
 
 import math
 
 import numpy as np
 import pytest
-from encounters import RATE_HZ, Encounter, pose_error
 
 from estimators.relative_pose import (
     GaussianBank,
@@ -15,6 +14,7 @@ from estimators.relative_pose import (
 )
 from estimators.relative_pose import particles as kernels
 from estimators.relative_pose.particle_belief import motion_array
+from tests.estimators.relative_pose.encounters import RATE_HZ, Encounter, pose_error
 
 KINDS = (ParticlePose, GaussianBank)
 DT = 1.0 / RATE_HZ
@@ -63,7 +63,7 @@ def test_it_converges_within_30_s_in_95_percent_of_200_starts(kind):
 
 
 def test_particles_move_as_the_aircraft_do_over_the_ground():
-    """The pose from two paths in NED, with the turn of the tracker that the paper's equation 26 leaves out."""
+    """The pose from two paths in NED, with the tracker's turn, which equation 26 as printed leaves out."""
     encounter = Encounter(3)
     encounter.tracker.rate, encounter.handoff.rate = 0.15, -0.15  # orbits of 100 m at 15 m/s, opposite
     forward, right, down, heading = encounter.true_pose()
@@ -86,9 +86,8 @@ def test_weights_are_products_of_gaussian_likelihoods():
     rng = np.random.default_rng(5)
     n = 500
     angles = rng.normal(0.4, 0.02, n)
-    particles = np.array(
-        [*(rng.normal(0.0, 5.0, (3, n)) + [[80.0], [60.0], [20.0]]), np.cos(angles), np.sin(angles)]
-    )
+    places = rng.normal(0.0, 5.0, (3, n)) + np.array([[80.0], [60.0], [20.0]])
+    particles = np.array([*places, np.cos(angles), np.sin(angles)])
     weights = rng.random(n)
     weights /= weights.sum()
     measured, sigmas = np.array([104.0, 19.0, 0.41]), np.array([3.0, 1.5, 0.0141])
@@ -98,7 +97,9 @@ def test_weights_are_products_of_gaussian_likelihoods():
     mean = weights @ off[0]
     variance = weights @ off[0] ** 2 - mean**2 + 9.0
     nis = kernels.weigh(particles, weights, measured, sigmas, np.empty(n))
-    assert weights == pytest.approx(expected / expected.sum(), rel=2e-2, abs=1e-9)  # von Mises is a little wider
+    assert weights == pytest.approx(
+        expected / expected.sum(), rel=2e-2, abs=1e-9
+    )  # von Mises is a little wider
     assert nis == pytest.approx(mean**2 / variance)
     before = weights.copy()
     assert math.isnan(kernels.weigh(particles, weights, np.full(3, math.nan), sigmas, np.empty(n)))

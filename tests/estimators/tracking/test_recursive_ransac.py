@@ -104,7 +104,9 @@ def test_tracks_follow_targets_in_clutter():
 @pytest.mark.parametrize("model", TargetModel)
 def test_every_model_follows_a_target(model):
     rng = np.random.default_rng(7)
-    tracker = RecursiveRansac(RansacParameters(model=model, window=20, noise_density=0.5, clutter_per_m2=1e-4))
+    tracker = RecursiveRansac(
+        RansacParameters(model=model, window=20, noise_density=0.5, clutter_per_m2=1e-4)
+    )
     for k in range(100):
         t = 0.1 * k
         place = np.array([[1.2 * t, 8.0 * math.sin(0.2 * t)]])
