@@ -38,7 +38,7 @@ class MatchingParameters:
     residual_m: float = 15.0
     rotation_rad: float = 0.35
     translation_m: float = 20.0
-    forgetting: float = 0.02
+    forgetting: float = 0.05
     decision: float = 0.95
 
     def __post_init__(self) -> None:

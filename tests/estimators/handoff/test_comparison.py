@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 from scipy.stats import multivariate_normal
 
 from estimators.handoff import (
@@ -108,12 +107,13 @@ def test_alignment_finds_rotation_and_translation(heading, translation, seed):
     assert found.residual_m < 1e-6
     noisy = exact + rng.standard_normal(exact.shape)
     found = align(noisy, tracker)
-    flat = [np.column_stack((p - p.mean(axis=0), np.zeros(50))) for p in (noisy, tracker)]
-    rotation, residual = Rotation.align_vectors(*flat)
-    # scipy may turn out of the plane, by which nothing is gained: its rotation about the vertical is ours
-    assert math.remainder(-rotation.as_euler("ZYX")[0] - found.heading_rad, math.tau) == pytest.approx(
-        0, abs=1e-6
-    )
+    # equations 42 and 43 as printed, by the singular value decomposition
+    h, r = (p - p.mean(axis=0) for p in (noisy, tracker))
+    u, _, vt = np.linalg.svd(h.T @ r)
+    rotation = u @ np.diag([1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    turned = math.atan2(rotation[0, 1], rotation[0, 0])
+    assert math.remainder(turned - found.heading_rad, math.tau) == pytest.approx(0.0, abs=1e-9)
+    residual = np.linalg.norm(h.T - rotation @ r.T)
     assert found.residual_m == pytest.approx(residual)
     assert found.rms_m == pytest.approx(residual / math.sqrt(50))
 
