@@ -214,11 +214,14 @@ class HandoffWorld:
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
         directions = camera.directions(np.vstack((points, false)))
-        directions = directions + np.cross([*a.tilt, 0.0], directions)
+        roll, pitch = a.tilt.tolist()
+        # directions + tilt x directions, of a small tilt about forward and right
+        tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
+        tilted[:, 2] -= pitch * directions[:, 0]
         height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
         # only the part of the tilt's error that changes from frame to frame is noise to the tracker
         sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
-        places, covariances = on_ground(directions, height_m, sigma)
+        places, covariances = on_ground(tilted, height_m, sigma)
         below = np.isfinite(places).all(axis=1) & (np.hypot(*places.T) < 6.0 * a.height_m)
         return places[below], covariances[below]
 
