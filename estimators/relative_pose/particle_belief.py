@@ -89,7 +89,8 @@ class ParticlePose(RelativePoseBelief):
         nis = kernels.weigh(self.poses, self.weights, self._measured, self._sigmas, self._fits)
         p, count = self.parameters, self.weights.size
         if effective_count(self.weights) < p.resample_below * count:
-            self._resample(p.particles if count > p.particles and self._narrow() else count)
+            fewer = count > p.particles and self._narrow()
+            self._resample(p.particles if fewer else count, ranged=math.isfinite(nis))
         return nis
 
     def _narrow(self) -> bool:
@@ -97,8 +98,10 @@ class ParticlePose(RelativePoseBelief):
         best, p = self.best, self.parameters
         return self.converged and best is not None and best.horizontal_sigma_m < _NARROW * p.converged_sigma_m
 
-    def _resample(self, count: int) -> None:
+    def _resample(self, count: int, *, ranged: bool) -> None:
         kernels.spreads(self.poses, self.weights, self._spreads)
+        if not ranged:  # nothing selects places then, and noise on them would only add up
+            self._spreads[0] = 0.0
         if count != self.weights.size:
             self._make_room(count)
         systematic(self.weights, self._random.random(), self._chosen)
