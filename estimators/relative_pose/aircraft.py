@@ -54,6 +54,12 @@ class AircraftState:
                 purpose="pressure altitude and airspeed",
             ),
             Need(messages=("HEARTBEAT",), rate_hz=0.0, purpose="whether it is armed"),
+            Need(
+                messages=("PARAM_VALUE",),
+                rate_hz=0.0,
+                purpose="the trim of the board (AHRS_TRIM_X, AHRS_TRIM_Y)",
+                optional=True,
+            ),
         )
 
     def reset(self) -> None:
@@ -140,10 +146,13 @@ class AircraftState:
     def _yaw_since_rad(self) -> float:
         return self._turned_rad - self._compass_turned_rad
 
-    def motion(self) -> LevelMotion | None:
-        """Mean motion since the last call; None: no sample has been received since."""
-        if not self._span_s > 0.0:
-            return None
+    @property
+    def moved(self) -> bool:
+        """Whether there is a motion since the last call of `motion`."""
+        return self._span_s > 0.0
+
+    def motion(self) -> LevelMotion:
+        """Mean motion since the last call, of an aircraft that has `moved`."""
         span_s, path_m, turned_rad = self._span_s, self._path_m, self._turned_rad
         since_rad = self._yaw_since_rad()
         self._start_motion()

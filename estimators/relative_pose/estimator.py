@@ -35,7 +35,7 @@ class RelativePoseSettings(RelativePoseParameters):
     """
 
     heading_sigma_rad: float = 0.1
-    walk_m_sqrt_s: float = 1.0
+    walk_m_sqrt_s: float = 2.0
     reset_nis: float = 6.0
     vehicle: int = 1
     other: int = 2
@@ -126,9 +126,9 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
         for aircraft in (own, other):
             if aircraft.newest_us is None or time_us - aircraft.newest_us > _OLD_US:
                 return Outcome.WAITING
-        own_motion, other_motion = own.motion(), other.motion()
-        if own_motion is None or other_motion is None:
+        if not (own.moved and other.moved):
             return Outcome.WAITING
+        own_motion, other_motion = own.motion(), other.motion()
         if self._moved_us is not None:
             self.pose.predict((time_us - self._moved_us) * 1e-6, own_motion, other_motion)
         self._moved_us = time_us

@@ -15,9 +15,8 @@ HOME = Home()
 
 
 def truth_at(north_m, east_m, height_m):
-    place = HOME.offset(north_m, east_m)
     truth = np.zeros(t.TRUTH_SIZE)
-    truth[t.LAT_RAD], truth[t.LON_RAD] = math.radians(place.lat_deg), math.radians(place.lon_deg)
+    truth[t.LAT_RAD], truth[t.LON_RAD] = np.radians(HOME.offset(north_m, east_m))
     truth[t.ALT_M] = HOME.alt_m + height_m
     return truth
 
