@@ -30,7 +30,6 @@ _STALL_STEP: Final = 0.93
 _STALL_RESOLUTION: Final = 0.01
 # Default speeds of an aircraft, as multiples of its stall speed.
 _SLOWEST, _CRUISE, _FASTEST = 1.2, 1.6, 2.2
-_LEAST_ROLL_RATE_RAD_S: Final = 0.05
 _LEAST_ACCELERATION_RAD_S2: Final = 0.02
 
 

@@ -165,6 +165,8 @@ class FlightOptions(MissionOptions):
                 raise PlanError(
                     f"`{name}` {side_m:g} m is too small to be flown; ask for {MIN_SIDE_M:g} m or more"
                 )
+        if self.ratio is not None and not min(self.ratio) > 0.0:
+            raise PlanError(f"`ratio` {self.ratio[0]:g}:{self.ratio[1]:g} is not above 0, as in `ratio=3:4`")
         for name, phase_rad in (("phase_x_rad", self.phase_x_rad), ("phase_y_rad", self.phase_y_rad)):
             if phase_rad is not None and not abs(phase_rad) <= MAX_PHASE_RAD:
                 raise PlanError(f"`{name}` {math.degrees(phase_rad):g} degrees is not in -3600..3600 degrees")
@@ -188,7 +190,7 @@ class FlightOptions(MissionOptions):
         if not self.chosen("separation_m"):
             separation_m = min(_SEPARATION_M, room_m / max(1, gaps))
         return self.unless_chosen(
-            pattern="L2",
+            pattern="L2" if self.ratio is None else self.pattern,
             via=Via.SETPOINTS,
             width_m=WINGS_SIDE_M,
             height_m=WINGS_SIDE_M,
@@ -214,30 +216,6 @@ def parse_wind(text: str) -> tuple[float, float]:
     if not (0.0 <= speed_m_s <= 40.0 and math.isfinite(from_deg)):
         raise PlanError(f"wind {text!r}: the speed must be in 0..40 m/s, the direction a number of degrees")
     return speed_m_s, from_deg % 360.0
-
-
-def parse_pair(text: str, name: str, separators: str) -> tuple[float, float]:
-    """Parse two numbers like "3:4" or "100x80"; a single number is used for both.
-
-    Args:
-        text: the user's text.
-        name: name of the option, for the error.
-        separators: characters that may separate the numbers; the first is shown in the error.
-
-    Raises:
-        PlanError: the text is not of this form.
-    """
-    cleaned = text.strip().lower()
-    for separator in separators:
-        cleaned = cleaned.replace(separator, " ")
-    parts = cleaned.split()
-    try:
-        numbers = [float(part) for part in parts]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (1, 2) or not all(math.isfinite(n) for n in numbers):
-        raise PlanError(f"{name} {text!r} is not one or two numbers without units, such as 3{separators[0]}4")
-    return numbers[0], numbers[-1]
 
 
 def parameters_from_file(path: str | Path) -> dict[str, float]:

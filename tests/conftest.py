@@ -9,6 +9,8 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import pytest
@@ -42,18 +44,17 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
-ORDER: Final = (
-    ("test_static_checks.py",),
+BEGUN_FIRST: Final = (
+    "test_static_checks.py",
     # In a fresh clone this compiles the flight code. Meanwhile the others run what needs none of it, so that
     # not every process compiles everything.
-    ("test_warm_up.py",),
-    ("bridge", "logs", "preflight", "storage", "vehicle_client", "test_architecture.py"),
-    # These take longest or wait most: begun early, no worker is left alone with them.
-    ("clients", "test_tutorial.py", "test_examples.py"),
-    ("system",),
-    ("flights",),
+    "test_warm_up.py",
+    *("bridge", "logs", "preflight", "storage", "vehicle_client", "test_architecture.py"),
 )
-"""Files and folders whose tests are begun first."""
+"""Files and folders whose tests are begun first, in this order."""
+WAITING: Final = ("test_tutorial.py", "test_examples.py", "test_live.py", "test_ray.py", "clients", "studies")
+"""Files and folders whose tests mostly wait for processes, what takes longest first. They are begun one by
+one among the others, so that some worker always computes."""
 
 
 def pytest_collection_finish() -> None:
@@ -63,11 +64,21 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    def rank(item: pytest.Item) -> int:
-        parts = item.path.parts
-        return next((k for k, names in enumerate(ORDER) if set(names) & set(parts)), len(ORDER))
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
 
-    items.sort(key=rank)
+    def in_order(names: Sequence[str]) -> list[Path]:
+        """The files of these names or in folders of these names, in the order of the names."""
+        return list(dict.fromkeys(path for name in names for path in files if name in path.parts))
+
+    first, waiting = in_order(BEGUN_FIRST), in_order(WAITING)
+    others = [path for path in files if path not in {*first, *waiting}]
+    between = -(-len(others) // max(1, len(waiting)))
+    order = first
+    for k in range(max(1, len(waiting))):
+        order += [*waiting[k : k + 1], *others[k * between : (k + 1) * between]]
+    items[:] = [item for path in order for item in files[path]]
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -74,7 +74,7 @@ def module_name(path, root=ROOT):
 def imported(source, name, is_package=False):
     """Full names of everything a module imports, anywhere in it; type-checking imports count as well."""
     found = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(parsed(source)):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -88,13 +88,23 @@ def imported(source, name, is_package=False):
     return found
 
 
+def found_by_module(find, within=PACKAGES, without=()):
+    """What a function finds in each module, by its name, where it finds something."""
+    found = {name: find(name) for name in MODULES if is_in(name, within) and not is_in(name, without)}
+    return {name: wrong for name, wrong in found.items() if wrong}
+
+
+def source_of(name):
+    return MODULES[name].read_text(encoding="utf-8")
+
+
+parsed = cache(ast.parse)
 MODULES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
 
 
 @cache
 def imports_of(name):
-    path = MODULES[name]
-    return imported(path.read_text(encoding="utf-8"), name, path.name == "__init__.py")
+    return imported(source_of(name), name, MODULES[name].name == "__init__.py")
 
 
 def is_embedding(name):
@@ -135,43 +145,37 @@ def complaints(name, imports):
     return sorted(wrong | forbidden)
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_imports_point_one_way(name):
-    assert complaints(name, imports_of(name)) == []
+def imported_from(packages):
+    return lambda name: sorted(item for item in imports_of(name) if is_in(item, packages))
 
 
-@pytest.mark.parametrize("name", sorted(name for name in MODULES if is_in(name, SANS_IO)))
-def test_cores_do_no_io(name):
-    assert sorted(item for item in imports_of(name) if is_in(item, SANS_IO_FORBIDDEN)) == []
+def test_imports_point_one_way():
+    assert found_by_module(lambda name: complaints(name, imports_of(name))) == {}
 
 
-@pytest.mark.parametrize("name", sorted(name for name in MODULES if is_in(name, KNOW_NO_FIRMWARE)))
-def test_firmwares_stand_above_what_they_configure(name):
-    assert sorted(item for item in imports_of(name) if is_in(item, ("autopilot_bridge.firmware",))) == []
+def test_cores_do_no_io():
+    assert found_by_module(imported_from(SANS_IO_FORBIDDEN), SANS_IO) == {}
+
+
+def test_firmwares_stand_above_what_they_configure():
+    assert found_by_module(imported_from(("autopilot_bridge.firmware",)), KNOW_NO_FIRMWARE) == {}
 
 
 def flavour_tests(source):
     """Comparisons with the name of a firmware."""
     return [
         ast.unparse(node)
-        for node in ast.walk(ast.parse(source))
+        for node in ast.walk(parsed(source))
         if isinstance(node, ast.Compare | ast.match_case)
         for part in ast.walk(node.pattern if isinstance(node, ast.match_case) else node)
         if isinstance(part, ast.Constant) and part.value in ("px4", "ardupilot")
     ]
 
 
-@pytest.mark.parametrize(
-    "name",
-    sorted(
-        name
-        for name in MODULES
-        if is_in(name, ("autopilot_bridge",)) and not is_in(name, ("autopilot_bridge.firmware",))
-    ),
-)
-def test_only_firmware_tests_for_a_firmware(name):
+def test_only_firmware_tests_for_a_firmware():
     """Elsewhere a firmware's difference is data of its `Flavour` or its `SimulatorDefaults`."""
-    assert flavour_tests(MODULES[name].read_text(encoding="utf-8")) == []
+    elsewhere = ("autopilot_bridge",), ("autopilot_bridge.firmware",)
+    assert found_by_module(lambda name: flavour_tests(source_of(name)), *elsewhere) == {}
 
 
 def test_the_test_sees_flavours():
@@ -185,7 +189,7 @@ def test_only_the_emulated_backend_reaches_into_the_emulated_autopilot():
         name
         for name, path in MODULES.items()
         if is_in(name, ("autopilot_bridge.sitl", "autopilot_bridge.video", "missions", "estimators"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Attribute) and node.attr == "commander"
     }
     # the warm-up flies an emulated vehicle to compile what it uses
@@ -222,7 +226,7 @@ def test_kernels_have_the_cache_that_notices_other_modules():
 def needed(name):
     """The modules of ours that a module imports; `from package import module` needs only the module."""
     found = set()
-    for node in ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(source_of(name))):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -258,7 +262,7 @@ FLAG = re.compile(r"(?<![\w-])--[a-z]")
 
 def texts(source):
     """The string literals of a module, without docstrings."""
-    tree = ast.parse(source)
+    tree = parsed(source)
     documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     return [
         node.value
@@ -267,10 +271,13 @@ def texts(source):
     ]
 
 
-@pytest.mark.parametrize("name", sorted(name for name in MODULES if not is_in(name, ("missions.cli",))))
-def test_only_the_command_line_knows_options(name):
+def test_only_the_command_line_knows_options():
     """Errors elsewhere name fields in backquotes; `missions.cli.options` puts the options in their place."""
-    assert [text for text in texts(MODULES[name].read_text(encoding="utf-8")) if FLAG.search(text)] == []
+
+    def options(name):
+        return [text for text in texts(source_of(name)) if FLAG.search(text)]
+
+    assert found_by_module(options, without=("missions.cli",)) == {}
 
 
 def test_the_test_sees_options():
@@ -283,7 +290,7 @@ def earth_constants(source):
     return sorted(
         {
             node.value
-            for node in ast.walk(ast.parse(source))
+            for node in ast.walk(parsed(source))
             if isinstance(node, ast.Constant) and isinstance(node.value, int | float)
             for constant in EARTH_CONSTANTS
             if abs(node.value - constant) < 1e-5 * constant
@@ -302,7 +309,7 @@ def test_the_foundation_alone_defines_the_earth_and_the_atmosphere():
 def bare_places(source):
     """Numbers and number ranges that index an array with a layout of its own."""
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(parsed(source)):
         if not isinstance(node, ast.Subscript):
             continue
         array = node.value.attr if isinstance(node.value, ast.Attribute) else getattr(node.value, "id", "")
@@ -312,11 +319,9 @@ def bare_places(source):
     return found
 
 
-@pytest.mark.parametrize(
-    "name", sorted(name for name in MODULES if is_in(name, ("flightsim", "autopilot_bridge")))
-)
-def test_places_of_shared_arrays_have_names(name):
-    assert bare_places(MODULES[name].read_text(encoding="utf-8")) == []
+def test_places_of_shared_arrays_have_names():
+    within = ("flightsim", "autopilot_bridge")
+    assert found_by_module(lambda name: bare_places(source_of(name)), within) == {}
 
 
 def test_the_test_sees_bare_places():
@@ -329,7 +334,7 @@ def test_one_module_wraps_angles_and_one_multiplies_quaternions():
     defined = {
         (node.name, name)
         for name, path in MODULES.items()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef) and node.name.strip("_") in ANGLE_FUNCTIONS
     }
     assert {module.rpartition(".")[0] for _, module in defined} == {"flightsim.foundation"}

@@ -3,8 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[1]
 AVOIDED = ("heard", "told", "somebody", "nobody", "anybody", "believe", "believes", "believed")
 """Words of the list that have no other meaning here."""
@@ -22,9 +20,9 @@ def avoided(text: str) -> list[str]:
     return [line.strip() for line in text.splitlines() if WORD.search(line)]
 
 
-@pytest.mark.parametrize("file", [file for file in FILES if file != "docs/contributing.md"])
-def test_words_of_the_field(file: str) -> None:
-    assert avoided((ROOT / file).read_text(encoding="utf-8")) == []
+def test_words_of_the_field() -> None:
+    found = {file: avoided((ROOT / file).read_text(encoding="utf-8")) for file in FILES}
+    assert {file: lines for file, lines in found.items() if lines}.keys() == {"docs/contributing.md"}
 
 
 def test_the_test_sees_words() -> None:

@@ -113,6 +113,8 @@ class _WorldSelector(selectors.DefaultSelector):
         yielding = self._rounds >= _MAX_ROUNDS_WITHOUT_STEP
         self._rounds = 0
         advance, time_us, ready, pacer = self._advance, self._time_us, self.ready, self.pacer
+        if self._broken is not None:
+            raise self._broken
         now_us = time_us()
         while True:
             if now_us >= self._limit_us:
@@ -124,8 +126,6 @@ class _WorldSelector(selectors.DefaultSelector):
                 ahead_s = pacer.ahead_s(now_us)
                 if ahead_s > _MIN_SLEEP_S and (events := super().select(ahead_s)):
                     return events
-            if self._broken is not None:
-                raise self._broken
             try:
                 advance()
             except BaseException as error:

@@ -76,7 +76,6 @@ _RATES: Final = SETPOINT_RATES.start
 _HELD: Final = HELD.start
 _ERROR: Final = ERROR.start
 _DRIVE: Final = DRIVE.start
-_LIMIT: Final = AT_LIMIT.start
 
 
 @kernel

@@ -30,7 +30,6 @@ _CONSTANTS: Final = 8
 
 _DRIFT: Final = 0
 _LAGGED: Final = 1  # NaN before the first sample
-_STATE: Final = 2
 _NORMALS: Final = 2
 
 

@@ -1,12 +1,10 @@
 """The command lines of files: a user's own mission in Python, and a ground station's mission file."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import click
 
-from missions.cli.mission_command import Given, MissionCommand, option
+from missions.cli.mission_command import MissionCommand, option
 
 
 def arguments_of(pairs: tuple[str, ...]) -> dict[str, str]:
@@ -26,19 +24,6 @@ def arguments_of(pairs: tuple[str, ...]) -> dict[str, str]:
     return values
 
 
-def _own_options(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.options import FlightOptions
-
-    return FlightOptions(
-        **common,
-        arguments=arguments_of(given["arg"]),
-        altitude_m=given["altitude"],
-        speed_m_s=given["speed"],
-        rate_hz=given["rate"],
-        separation_m=given["separation"],
-    )
-
-
 OWN: Final = MissionCommand(
     help=(
         "Fly a mission of your own: a Python file with `async def fly(vehicle, options)`.\n\n"
@@ -56,19 +41,9 @@ OWN: Final = MissionCommand(
             "--separation", type=float, default=4.0, help="Between the altitudes of a team, m. Aircraft: 20."
         ),
     ),
-    build=_own_options,
-    fields=MappingProxyType({"rate": ("rate_hz",)}),
+    made=("missions.options", "FlightOptions"),
+    values=lambda given: {"arguments": arguments_of(given["arg"])},
 )
-
-
-def _file_options(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.plan_files.options import FileOptions, Then
-
-    return FileOptions(
-        **common,
-        then=None if given["then"] is None else Then(given["then"]),
-        time_limit_s=given["time_limit"],
-    )
 
 
 FILE: Final = MissionCommand(
@@ -87,6 +62,5 @@ FILE: Final = MissionCommand(
         ),
         option("--time-limit", type=float, help="End the mission after so many seconds, with --then."),
     ),
-    build=_file_options,
-    fields=MappingProxyType({}),
+    made=("missions.plan_files.options", "FileOptions"),
 )

@@ -187,8 +187,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
     chosen = chosen_names(context)
     world = _world(given, mission, chosen)
     count = len(given["connect"]) if world is None else len(world.vehicles)
-    common = {"vehicles": given["vehicles"] or count, "given": declared.chosen_fields(chosen)}
-    options = declared.build(given, common)
+    options = declared.build(given, chosen, vehicles=given["vehicles"] or count)
     if world is not None:
         world = declared.world(given, options, world)
     check_positive(expect_wind=given["expect_wind"] or None, max_error=given["max_error"])

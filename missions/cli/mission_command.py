@@ -1,11 +1,14 @@
 """Declaration of the command-line options of a mission."""
 
+import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass, fields
+from enum import Enum, StrEnum
+from typing import TYPE_CHECKING, Any, Final, get_args, get_type_hints
 
 import click
+
+from missions.cli.options import option_of
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
@@ -34,6 +37,7 @@ class FlightOption(click.Option):
         group: heading under which the help lists it.
         scope: the flights it has an effect on; it is refused for the others.
         replaces: names of options that have no effect beside it; they are refused beside it.
+        sets: the field of the mission's options that it sets; None: the one of its name (`option_of`).
     """
 
     def __init__(
@@ -42,12 +46,14 @@ class FlightOption(click.Option):
         group: str,
         scope: Scope = Scope.ANY,
         replaces: tuple[str, ...] = (),
+        sets: str | None = None,
         **attributes: Any,
     ) -> None:
         super().__init__(*arguments, **attributes)
         self.group = group
         self.scope = scope
         self.replaces = replaces
+        self.sets = sets
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,26 +63,54 @@ class MissionCommand:
     Attributes:
         help: first text of `flightstack fly NAME --help`.
         options: command-line options in addition to those of every mission. The mission accepts no others.
-        build: creates the mission's options from the given values. `chosen` names the fields that the user
-            specified; common values are passed unchanged.
+            Those that are not of the embedded world set fields of the mission's options.
+        made: module and name of the class of the mission's options.
+        values: values of fields that are not simply that of an option.
         world: adds to an embedded world what the mission is for, such as targets and payload.
-        fields: the fields of the mission's options that each command-line option sets, when the names differ.
     """
 
     help: str
     options: tuple[FlightOption, ...]
-    build: Callable[[Given, Mapping[str, Any]], "MissionOptions"]
-    fields: Mapping[str, tuple[str, ...]]
+    made: tuple[str, str]
+    values: Callable[[Given], Mapping[str, Any]] = lambda _given: {}
     world: Callable[[Given, Any, "WorldSpec"], "WorldSpec"] = lambda _given, _options, world: world
 
-    def chosen_fields(self, chosen: frozenset[str]) -> frozenset[str]:
-        """Fields of the mission's options that the user specified on the command line."""
-        found: set[str] = set()
-        for name in chosen:
-            found.update(
-                self.fields.get(name, (name, f"{name}_m", f"{name}_m_s", f"{name}_s", f"{name}_rad"))
-            )
-        return frozenset(found)
+    def build(self, given: Given, chosen: frozenset[str], *, vehicles: int) -> "MissionOptions":
+        """The mission's options.
+
+        Args:
+            given: values of the command line's options. One without a value leaves the field's default.
+            chosen: names of the options that the user specified.
+            vehicles: size of the team.
+
+        Raises:
+            click.UsageError, PlanError: a value is not accepted.
+        """
+        module, name = self.made
+        made = getattr(importlib.import_module(module), name)
+        hints = get_type_hints(made)
+        values: dict[str, Any] = {}
+        specified: set[str] = set()
+        for option in self.options:
+            if option.scope is Scope.EMBEDDED or option.name is None:
+                continue
+            own = [f.name for f in fields(made) if option_of(f.name) == option.opts[0]]
+            names = own if option.sets is None else [option.sets]
+            specified.update(names if option.name in chosen else ())
+            value = given[option.name]
+            if value is None or value == ():
+                continue
+            parts = value if len(names) > 1 else (value,) * len(names)
+            values |= {name: _typed(hints[name], part) for name, part in zip(names, parts, strict=True)}
+        values |= self.values(given)
+        options: MissionOptions = made(**values, vehicles=vehicles, given=frozenset(specified))
+        return options
+
+
+def _typed(hint: Any, value: Any) -> Any:
+    """A text as a member of an enumeration, if the field has one; another value as it is."""
+    kinds = [kind for kind in (hint, *get_args(hint)) if isinstance(kind, type) and issubclass(kind, Enum)]
+    return kinds[0](value) if kinds else value
 
 
 def option(*declarations: str, **attributes: Any) -> FlightOption:

@@ -1,72 +1,14 @@
 """The command-line options of the search for an unknown number of targets."""
 
-import math
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
+from missions.cli.options import PLACE, coordinates, degrees, pair
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
-
-
-def _numbers(name: str, text: str, count: int, shown: str) -> tuple[float, ...]:
-    parts = text.split(",")
-    try:
-        found = tuple(float(part) for part in parts)
-    except ValueError:
-        found = ()
-    if len(found) != count or not all(map(math.isfinite, found)):
-        raise click.UsageError(f"{name} {text!r} is not {shown}, metres from home")
-    return found
-
-
-def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from estimators.multi_target.parameters import Belief
-    from estimators.tracking.intensity import MotionKind
-    from missions.multi_target.objective import Exploration
-    from missions.multi_target.options import MultiTargetOptions, PlannerKind, StepLawKind
-    from missions.options import parse_pair
-
-    area = _numbers("--area", given["area"], 4, "SOUTH,WEST,NORTH,EAST")
-    start = _numbers("--start", given["start"], 2, "NORTH,EAST")
-    return MultiTargetOptions(
-        **common,
-        altitude_m=given["altitude"],
-        separation_m=given["separation"],
-        rate_hz=given["rate"],
-        area_m=(area[0], area[1], area[2], area[3]),
-        start_ne_m=(start[0], start[1]),
-        planner=PlannerKind(given["planner"]),
-        step_m=given["step"],
-        alpha=given["alpha"],
-        exploration=Exploration(given["exploration"]),
-        horizon=given["horizon"],
-        beam=given["beam"],
-        spacing_m=given["spacing"],
-        steps=given["steps"],
-        search_time_s=given["search_time"],
-        undetected=given["undetected"],
-        speed_m_s=given["speed"],
-        law=StepLawKind(given["law"]),
-        acceptance_m=given["acceptance"],
-        belief=Belief(given["belief"]),
-        expected_targets=given["expected_targets"],
-        motion=MotionKind(given["motion"]),
-        gain=given["gain"],
-        field_of_view_m=parse_pair(given["field_of_view"], "--field-of-view", "x,"),
-        range_sigma_m=given["range_sigma"],
-        bearing_sigma_rad=math.radians(given["bearing_sigma"]),
-        clutter_per_scan=given["clutter"],
-        found_width_m=given["found_width"],
-        found_mass=given["found_mass"],
-        found_distance_m=given["found_distance"],
-        sensor_limit_s=given["sensor_limit"],
-        search_seed=given["search_seed"],
-    )
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -92,9 +34,12 @@ COMMAND: Final = MissionCommand(
     ),
     options=(
         option(
-            "--area", default="-30,-30,270,270", metavar="SOUTH,WEST,NORTH,EAST", help="Of the search, m."
+            "--area",
+            type=coordinates("SOUTH,WEST,NORTH,EAST"),
+            default="-30,-30,270,270",
+            help="Of the search, m.",
         ),
-        option("--start", default="10,10", metavar="NORTH,EAST", help="Place of the first scan, m."),
+        option("--start", type=PLACE, default="10,10", help="Place of the first scan, m."),
         option(
             "--planner",
             type=click.Choice(["exploring", "information", "sweep"]),
@@ -145,10 +90,13 @@ COMMAND: Final = MissionCommand(
         ),
         option("--gain", type=float, default=0.98, help="Probability to detect a target below the vehicle."),
         option(
-            "--field-of-view", default="15", metavar="FORWARD[xRIGHT]", help="Scales of the sensor's fall, m."
+            "--field-of-view",
+            type=pair("FORWARD[,RIGHT]", "x,"),
+            default="15",
+            help="Scales of the sensor's fall, m.",
         ),
         option("--range-sigma", type=float, default=0.5, help="Noise of the sensor's range, m."),
-        option("--bearing-sigma", type=float, default=1.7, help="Noise of its bearing, degrees."),
+        option("--bearing-sigma", type=degrees, default=1.7, help="Noise of its bearing, degrees."),
         option("--clutter", type=float, default=0.0, help="False detections per scan, on average."),
         option("--found-width", type=float, default=0.5, help="A found target is narrower, m."),
         option("--found-mass", type=float, default=0.9, help="And has at least this expected number."),
@@ -174,14 +122,6 @@ COMMAND: Final = MissionCommand(
         ),
         option("--scan-period", scope=Scope.EMBEDDED, type=float, default=1.0, help="Between scans, s."),
     ),
-    build=_build,
+    made=("missions.multi_target.options", "MultiTargetOptions"),
     world=_world,
-    fields=MappingProxyType(
-        {
-            "area": ("area_m",),
-            "start": ("start_ne_m",),
-            "field_of_view": ("field_of_view_m",),
-            "clutter": ("clutter_per_scan",),
-        }
-    ),
 )

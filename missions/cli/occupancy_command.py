@@ -1,66 +1,34 @@
 """The command-line options of the search with an occupancy map."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
+from missions.cli.options import PLACE, SIDES
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
 
 
-def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from estimators.magnetic_identification.parameters import FALSE_ANOMALIES, TARGETS
-    from missions.occupancy.investigation import Identify
-    from missions.occupancy.options import OccupancyOptions
-    from missions.options import parse_pair
-
+def _values(given: Given) -> Mapping[str, Any]:
     if given["connect"] and given["map"] is None:
         raise click.UsageError(
             "a search needs the published magnetic map of its place; give it with --map FILE "
             "(numpy .npz, format flightstack-magnetic-map-1)"
         )
-    width_m, height_m = parse_pair(given["size"], "--size", "x,")
-    return OccupancyOptions(
-        **common,
-        altitude_m=given["altitude"],
-        separation_m=given["separation"],
-        rate_hz=given["rate"],
-        width_m=width_m,
-        height_m=height_m,
-        area_ne_m=_place("--area", given["area"]) or (0.0, 0.0),
-        cell_m=given["cell"],
-        neighbourhood=given["neighbourhood"],
-        heading_penalty=given["heading_penalty"],
-        detection_probability=given["detection_probability"],
-        detection_range_m=given["detection_range"],
-        threshold_nt=given["threshold"],
-        noise_nt=given["noise"],
-        map_error_nt=given["map_error"],
-        confirmations=given["confirmations"],
-        raise_radius_m=given["raise_radius"],
-        search_time_s=given["search_time"],
-        speed_m_s=given["speed"],
-        identify=Identify(given["identify"]),
-        targets=tuple(given["class"]) or TARGETS,
-        false_anomalies=tuple(given["false_class"]) or FALSE_ANOMALIES,
-        particles=given["particles"],
-        map_file=given["map"],
-    )
+    return {}
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
     from missions.embedded import occupancy_world
-    from missions.options import parse_pair
 
-    along_m, across_m = parse_pair(given["sigma"], "--sigma", "x,")
+    along_m, across_m = given["sigma"]
     return occupancy_world(
         world,
         options,
-        target_ne_m=_place("--target", given["target"]),
+        target_ne_m=given["target"],
         amplitude_nt=given["amplitude"],
         sigma_along_m=along_m,
         sigma_across_m=across_m,
@@ -68,18 +36,6 @@ def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
         depth_m=given["depth"],
         false_count=given["false_anomalies"],
     )
-
-
-def _place(name: str, text: str | None) -> tuple[float, float] | None:
-    from missions.options import parse_pair
-
-    if text is None:
-        return None
-    if "," not in text:
-        raise click.UsageError(
-            f"{name} {text!r} is not a place; give NORTH,EAST in metres, for example 300,-150"
-        )
-    return parse_pair(text, name, ",")
 
 
 COMMAND: Final = MissionCommand(
@@ -91,9 +47,12 @@ COMMAND: Final = MissionCommand(
     ),
     options=(
         option(
-            "--size", default="2400", help="Of the searched area, m: SIDE or WIDTHxHEIGHT (east x north)."
+            "--size",
+            type=SIDES,
+            default="2400",
+            help="Of the searched area, m: SIDE or WIDTHxHEIGHT (east x north).",
         ),
-        option("--area", metavar="NORTH,EAST", help="Centre of the area, m. [default: the map's home]"),
+        option("--area", type=PLACE, help="Centre of the area, m. [default: the map's home]"),
         option("--cell", type=float, default=200.0, help="Side of a cell, m."),
         option("--neighbourhood", type=int, default=1, help="Cells a decision looks at, in each direction."),
         option(
@@ -124,6 +83,7 @@ COMMAND: Final = MissionCommand(
         ),
         option(
             "--class",
+            sets="targets",
             multiple=True,
             metavar="NAME:FORM:...",
             help="Class that is sought, with --identify: NAME:gaussian:NT:ALONG:ACROSS or "
@@ -131,6 +91,7 @@ COMMAND: Final = MissionCommand(
         ),
         option(
             "--false-class",
+            sets="false_anomalies",
             multiple=True,
             metavar="NAME:FORM:...",
             help="Known class that is not sought. [default: boat:dipole:15:50:150]",
@@ -153,7 +114,7 @@ COMMAND: Final = MissionCommand(
         option(
             "--target",
             scope=Scope.EMBEDDED,
-            metavar="NORTH,EAST",
+            type=PLACE,
             help="Where the embedded world's target is, m. [default: drawn from --seed]",
         ),
         option(
@@ -184,28 +145,14 @@ COMMAND: Final = MissionCommand(
             help="Boats and wrecks in the embedded world, drawn from --seed.",
         ),
         option(
-            "--sigma", scope=Scope.EMBEDDED, default="80x60", help="Its extent, m: one sigma along x across."
+            "--sigma",
+            type=SIDES,
+            scope=Scope.EMBEDDED,
+            default="80x60",
+            help="Its extent, m: one sigma along x across.",
         ),
     ),
-    build=_build,
+    made=("missions.occupancy.options", "OccupancyOptions"),
+    values=_values,
     world=_world,
-    fields=MappingProxyType(
-        {
-            "size": ("width_m", "height_m"),
-            "area": ("area_ne_m",),
-            "threshold": ("threshold_nt",),
-            "noise": ("noise_nt",),
-            "map_error": ("map_error_nt",),
-            "moment": ("moment_a_m2",),
-            "depth": ("depth_m",),
-            "rate": ("rate_hz",),
-            "map": ("map_file",),
-            "class": ("targets",),
-            "false_class": ("false_anomalies",),
-            "false_anomalies": ("false_count",),
-            "target": ("target_ne_m",),
-            "amplitude": ("amplitude_nt",),
-            "sigma": ("sigma_along_m", "sigma_across_m"),
-        }
-    ),
 )

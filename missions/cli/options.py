@@ -3,7 +3,7 @@
 import math
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -29,18 +29,66 @@ SECONDS: Final = FiniteRange(min=0.0, max=86_400.0)
 """A time of up to a day."""
 
 
-def radians_of(name: str, degrees: float) -> float:
-    """An angle, radians, from an option in degrees."""
-    if not math.isfinite(degrees):
-        raise click.UsageError(f"{name} {degrees} is not a direction; give degrees, such as 90")
-    return math.radians(degrees)
+def degrees(value: str | float) -> float:
+    """An angle in degrees, as radians: a type of options."""
+    found = _numbers([str(value)])
+    if not found:
+        raise click.BadParameter(f"{value} is not an angle; give degrees, such as 90.")
+    return math.radians(found[0])
 
+
+def coordinates(names: str) -> Callable[[str], tuple[float, ...]]:
+    """The type of options that give so many coordinates, metres, separated by commas."""
+
+    def convert(text: str) -> tuple[float, ...]:
+        found = _numbers(text.split(","))
+        if len(found) != names.count(",") + 1:
+            raise click.BadParameter(f"{text!r} is not a place; give {names} in metres.")
+        return found
+
+    convert.__name__ = names
+    return convert
+
+
+def pair(names: str, separators: str, second: float | None = None) -> Callable[[str], tuple[float, float]]:
+    """The type of options that give two numbers, such as 100x80 or 3:4.
+
+    Args:
+        names: of the numbers, for the help.
+        separators: characters that may separate them.
+        second: the second number where one is given; None: the same as the first.
+    """
+
+    def convert(text: str) -> tuple[float, float]:
+        found = _numbers(re.split(f"[{separators}]", text.lower()))
+        if len(found) not in (1, 2):
+            raise click.BadParameter(
+                f"{text!r} is not one or two numbers without units, such as 3{separators[0]}4."
+            )
+        return found[0], found[1] if len(found) == 2 else found[0] if second is None else second
+
+    convert.__name__ = names
+    return convert
+
+
+def _numbers(texts: Sequence[str]) -> tuple[float, ...]:
+    """The finite numbers that the texts are; none, if one is not."""
+    try:
+        found = tuple(map(float, texts))
+    except ValueError:
+        return ()
+    return found if all(map(math.isfinite, found)) else ()
+
+
+PLACE: Final = coordinates("NORTH,EAST")
+SIDES: Final = pair("SIDE[,SIDE]", "x,")
 
 _FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:-]+))?`")
 _UNIT: Final = re.compile(r"_(ne_m|m_s|a_m2|nt|hz|rad|deg|m|s)$")
 _NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "arguments": "--arg",
+        "clutter_per_scan": "--clutter",
         "compensation_file": "--compensation",
         "false_count": "--false-anomalies",
         "gps_fault=False": "--no-gps-fault",

@@ -1,57 +1,23 @@
 """The command-line options of the orbit."""
 
-import math
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
-from missions.cli.options import radians_of
+from missions.cli.options import PLACE, degrees
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
 
 
-def _place(text: str) -> tuple[float, float]:
-    north, comma, east = text.partition(",")
-    try:
-        place = float(north), float(east)
-    except ValueError:
-        place = math.nan, math.nan
-    if not comma or not all(map(math.isfinite, place)):
-        raise click.UsageError(
-            f"--target {text!r} is not NORTH,EAST in metres from home, for example 500,300"
-        )
-    return place
-
-
-def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.orbit.options import AttitudeFrom, GpsOff, OrbitOptions
-
-    heading = given["entry_heading"]
-    return OrbitOptions(
-        **common,
-        altitude_m=given["altitude"],
-        separation_m=given["separation"],
-        radius_m=given["radius"],
-        direction=1 if given["direction"] == "cw" else -1,
-        duration_s=given["duration"],
-        airspeed_m_s=given["airspeed"],
-        target_ne_m=_place(given["target"]),
-        target_speed_m_s=given["target_speed"],
-        target_heading_rad=radians_of("--target-heading", given["target_heading"]),
-        target_wanders=given["target_motion"] in ("circle", "random-walk"),
-        target_ground_m=given["target_ground"],
-        entry_bearing_rad=radians_of("--entry-bearing", given["entry_bearing"]),
-        entry_distance_m=given["entry_distance"],
-        entry_heading_rad=None if heading is None else radians_of("--entry-heading", heading),
-        gps_fault=not given["no_gps_fault"],
-        gps_off=GpsOff(given["gps_off"]),
-        lost_limit_s=given["lost_limit"],
-        attitude=AttitudeFrom(given["attitude"]),
-    )
+def _values(given: Given) -> Mapping[str, Any]:
+    return {
+        "direction": 1 if given["direction"] == "cw" else -1,
+        "target_wanders": given["target_motion"] in ("circle", "random-walk"),
+        "gps_fault": not given["no_gps_fault"],
+    }
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -76,12 +42,12 @@ COMMAND: Final = MissionCommand(
         option("--airspeed", type=float, help="m/s. [default: the aircraft's own]"),
         option(
             "--target",
+            type=PLACE,
             default="500,300",
-            metavar="NORTH,EAST",
             help="Where the target is at the beginning, m from home, as reported before the flight.",
         ),
         option("--target-speed", type=float, default=0.0, help="Of the target, m/s."),
-        option("--target-heading", type=float, default=0.0, help="It moves there, degrees."),
+        option("--target-heading", type=degrees, default=0.0, help="It moves there, degrees."),
         option(
             "--target-motion",
             scope=Scope.EMBEDDED,
@@ -90,11 +56,14 @@ COMMAND: Final = MissionCommand(
         ),
         option("--target-ground", type=float, default=0.0, help="Height of its ground above home, m."),
         option(
-            "--entry-bearing", type=float, default=180.0, help="GPS is lost there: from the target, degrees."
+            "--entry-bearing",
+            type=degrees,
+            default=180.0,
+            help="GPS is lost there: from the target, degrees.",
         ),
         option("--entry-distance", type=float, default=400.0, help="And so far from it, m."),
         option(
-            "--entry-heading", type=float, help="Of the nose there, degrees. [default: towards the target]"
+            "--entry-heading", type=degrees, help="Of the nose there, degrees. [default: towards the target]"
         ),
         option("--no-gps-fault", is_flag=True, help="Leave GPS on; the orbit doesn't use it."),
         option(
@@ -115,7 +84,7 @@ COMMAND: Final = MissionCommand(
         ),
         option("--separation", type=float, default=20.0, help="Between the altitudes of a team, m."),
     ),
-    build=_build,
+    made=("missions.orbit.options", "OrbitOptions"),
+    values=_values,
     world=_world,
-    fields=MappingProxyType({}),
 )

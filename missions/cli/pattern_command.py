@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import MISSION_GROUP, FlightOption, Given, MissionCommand, Scope, option
-from missions.cli.options import radians_of
+from missions.cli.options import SIDES, degrees, pair
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
@@ -17,45 +16,16 @@ SEARCH_LIMIT_S: Final = 1800.0
 _WINGS: Final = " Aircraft: {}."
 
 
-def ratio_of(text: str) -> tuple[float, float]:
-    """Parse "3:4"; a single number is the ratio to one."""
-    from missions.options import parse_pair
-
-    x, y = parse_pair(text, "--ratio", ":/,")
-    if not any(mark in text for mark in ":/,"):
-        y = 1.0
-    for frequency in (x, y):
-        if frequency <= 0.0:
-            raise click.UsageError(f"--ratio {text}: frequency {frequency:g} is not above 0; try --ratio 3:4")
-    return x, y
-
-
-def _shape(given: Given) -> dict[str, Any]:
-    """Options that apply to only one pattern."""
-    from missions.options import parse_pair
-
-    if "pattern" not in given:
-        shape = {"heading_rad": radians_of("--heading", given["heading"])}
-        return shape | ({"spacing_m": given["spacing"]} if "spacing" in given else {})
-    phase_x_deg = phase_y_deg = None
-    if given["phase"] is not None:
-        phase_x_deg, phase_y_deg = parse_pair(given["phase"], "--phase", ",")
-        if "," not in given["phase"]:
-            phase_y_deg = 0.0  # a single number is the difference of the two phases
-    return {
-        "pattern": given["pattern"],
-        "ratio": None if given["ratio"] is None else ratio_of(given["ratio"]),
-        "phase_x_rad": None if phase_x_deg is None else math.radians(phase_x_deg),
-        "phase_y_rad": None if phase_y_deg is None else math.radians(phase_y_deg),
-        "period_s": given["period"],
-    }
-
-
-def _limit_s(given: Given) -> float | None:
+def _values(given: Given) -> Mapping[str, Any]:
+    values: dict[str, Any] = {}
+    if given.get("phase") is not None:
+        values["phase_x_rad"], values["phase_y_rad"] = map(math.radians, given["phase"])
+    for half, side in (("amplitude_x", "width_m"), ("amplitude_y", "height_m")):
+        if given[half] is not None:
+            values[side] = 2.0 * given[half]
     if given["search_time"] is None and given["search"]:
-        return SEARCH_LIMIT_S
-    limit_s: float | None = given["search_time"]
-    return limit_s
+        values["search_time_s"] = SEARCH_LIMIT_S
+    return values
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -67,45 +37,22 @@ def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
     return tag_search_world(world, options, target)
 
 
-def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.options import FlightOptions, Via, parse_pair
-
-    width_m, height_m = parse_pair(given["size"], "--size", "x,")
-    if given["amplitude_x"] is not None:
-        width_m = 2.0 * given["amplitude_x"]
-    if given["amplitude_y"] is not None:
-        height_m = 2.0 * given["amplitude_y"]
-    return FlightOptions(
-        **common,
-        **_shape(given),
-        altitude_m=given["altitude"],
-        separation_m=given["separation"],
-        rate_hz=given["rate"],
-        width_m=width_m,
-        height_m=height_m,
-        speed_m_s=given["speed"],
-        periods=given["periods"],
-        search_time_s=_limit_s(given),
-        via=Via(given["via"]),
-        acceptance_m=given["acceptance"],
-        search=given["search"],
-        tag_id=given["tag_id"],
-    )
-
-
 _LISSAJOUS: Final = (
     option(
         "--pattern", default="L3", help="Lissajous pattern: L1 (circle), L2, L3, L4." + _WINGS.format("L2")
     ),
     option(
         "--ratio",
+        type=pair("X:Y", ":/,", second=1.0),
         replaces=("pattern",),
         help="Frequencies X:Y of a Lissajous pattern of your own, e.g. 3:4 or 1.4.",
     ),
-    option("--phase", help="Phases of x and y, degrees: X,Y or their difference."),
+    option(
+        "--phase", type=pair("X,Y", ",", second=0.0), help="Phases of x and y, degrees, or their difference."
+    ),
     option("--period", type=float, replaces=("speed",), help="Seconds once round, in place of --speed."),
 )
-_HEADING: Final = (option("--heading", type=float, default=0.0, help="First leg, degrees."),)
+_HEADING: Final = (option("--heading", type=degrees, default=0.0, help="First leg, degrees."),)
 _SPACING: Final = (
     option(
         "--spacing", type=float, default=10.0, help="Track spacing, m." + _WINGS.format("what its turns need")
@@ -114,14 +61,21 @@ _SPACING: Final = (
 _EVERY: Final = (
     option(
         "--size",
+        type=SIDES,
         default="100",
         help="Size of the pattern, m: SIDE or WIDTHxHEIGHT (east x north)."
         + _WINGS.format("1000 or more, as its turns need"),
     ),
     option(
-        "--amplitude-x", type=float, replaces=("size",), help="Half the width, m (east), in place of --size."
+        "--amplitude-x",
+        sets="width_m",
+        type=float,
+        replaces=("size",),
+        help="Half the width, m (east), in place of --size.",
     ),
-    option("--amplitude-y", type=float, replaces=("size",), help="Half the height, m (north)."),
+    option(
+        "--amplitude-y", sets="height_m", type=float, replaces=("size",), help="Half the height, m (north)."
+    ),
     option("--altitude", type=float, default=10.0, help="Above home, m." + _WINGS.format("100")),
     option(
         "--speed",
@@ -190,17 +144,9 @@ def _pattern(help_text: str, own: tuple[FlightOption, ...]) -> MissionCommand:
     return MissionCommand(
         help=help_text,
         options=(*own, *_EVERY),
-        build=_build,
+        made=("missions.options", "FlightOptions"),
+        values=_values,
         world=_world,
-        fields=MappingProxyType(
-            {
-                "size": ("width_m", "height_m"),
-                "amplitude_x": ("width_m",),
-                "amplitude_y": ("height_m",),
-                "ratio": ("ratio", "pattern"),
-                "rate": ("rate_hz",),
-            }
-        ),
     )
 
 

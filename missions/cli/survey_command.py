@@ -1,55 +1,22 @@
 """The command-line options of a magnetic survey."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
-from missions.cli.options import FiniteRange, radians_of
+from missions.cli.options import PLACE, SIDES, FiniteRange, degrees
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
 
 
-def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.options import parse_pair
-    from missions.survey.options import SurveyOptions
+def _values(given: Given) -> Mapping[str, Any]:
+    from missions.survey.options import CALIBRATION_ALTITUDE_M
 
-    width_m, height_m = parse_pair(given["size"], "--size", "x,")
-    area = given["area"]
-    if area is not None and "," not in area:
-        raise click.UsageError(
-            f"--area {area!r} is not a place; give NORTH,EAST in metres, for example 300,-150"
-        )
-    return SurveyOptions(
-        **common,
-        altitude_m=_altitude_m(given),
-        width_m=width_m,
-        height_m=height_m,
-        area_ne_m=(0.0, 0.0) if area is None else parse_pair(area, "--area", ","),
-        direction_rad=radians_of("--direction", given["direction"]),
-        spacing_m=given["spacing"],
-        tie_spacing_m=given["tie_spacing"],
-        speed_m_s=given["speed"],
-        map_file=given["map"],
-        map_error_nt=given["map_error"],
-        terrain_file=given["terrain"],
-        climb=given["climb"],
-        calibrate=given["calibrate"],
-        compensation_file=given["compensation"],
-        grid_m=given["grid"],
-        level=not given["no_levelling"],
-    )
-
-
-def _altitude_m(given: Given) -> float:
-    from missions.survey.options import ALTITUDE_M, CALIBRATION_ALTITUDE_M
-
-    if given["altitude"] is not None:
-        return float(given["altitude"])
-    return CALIBRATION_ALTITUDE_M if given["calibrate"] else ALTITUDE_M
+    high = given["altitude"] is None and given["calibrate"]
+    return {"level": not given["no_levelling"]} | ({"altitude_m": CALIBRATION_ALTITUDE_M} if high else {})
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -76,11 +43,12 @@ COMMAND: Final = MissionCommand(
     options=(
         option(
             "--size",
+            type=SIDES,
             default="2000",
             help="Of the area, m: SIDE or WIDTHxHEIGHT (across the lines x along them).",
         ),
-        option("--area", metavar="NORTH,EAST", help="Centre of the area, m. [default: the map's home]"),
-        option("--direction", type=float, default=0.0, help="Of the lines, degrees from north."),
+        option("--area", type=PLACE, help="Centre of the area, m. [default: the map's home]"),
+        option("--direction", type=degrees, default=0.0, help="Of the lines, degrees from north."),
         option("--spacing", type=float, default=200.0, help="Between the lines, m."),
         option(
             "--tie-spacing",
@@ -146,22 +114,7 @@ COMMAND: Final = MissionCommand(
             help="The embedded world's field is the map's, without the error of a survey.",
         ),
     ),
-    build=_build,
+    made=("missions.survey.options", "SurveyOptions"),
+    values=_values,
     world=_world,
-    fields=MappingProxyType(
-        {
-            "size": ("width_m", "height_m"),
-            "area": ("area_ne_m",),
-            "direction": ("direction_rad",),
-            "tie_spacing": ("tie_spacing_m",),
-            "map": ("map_file",),
-            "map_error": ("map_error_nt",),
-            "terrain": ("terrain_file",),
-            "compensation": ("compensation_file",),
-            "grid": ("grid_m",),
-            "no_levelling": ("level",),
-            "uncompensated": ("vehicle_field",),
-            "daily_variation": ("daily_nt",),
-        }
-    ),
 )

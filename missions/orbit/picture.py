@@ -17,7 +17,6 @@ _INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"
 _BLUE: Final = "#1769aa"
 _RED: Final = "#c2410c"
-_SHADE: Final = "#f3f4f6"
 _GPS_LOST: Final = "#fee2e2"
 
 

@@ -353,7 +353,7 @@ class VehicleLink:
         system_id = self._system_id
 
         def on_frame(frame: Frame) -> None:
-            if frame[2:4] != (system_id, AUTOPILOT_COMPONENT) or over.done():
+            if frame.system_id != system_id or frame.component_id != AUTOPILOT_COMPONENT or over.done():
                 return
             try:
                 if handle(frame):

@@ -115,10 +115,11 @@ class VehiclePlans:
 
         def there() -> bool:
             nonlocal reported
-            for index, _ in tracker.reached[reported:]:
+            while reported < len(tracker.reached):
+                index, _ = tracker.reached[reported]
+                reported += 1
                 if progress is not None:
                     progress(tracker.first + index)
-            reported = len(tracker.reached)
             return tracker.behind > wanted
 
         def handle(frame: Frame) -> bool:

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
+from tests.slow import slow
 
 SPEEDUP = 8.0
 CAMERA, GIMBAL = 100, 154
@@ -19,7 +20,7 @@ HEIGHT_M = 15.0
 TARGET = "8,1"  # m; a gimbal that looks down by 60 degrees from that height has it in the picture
 
 
-@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+@pytest.fixture(scope="module", params=["px4", slow("ardupilot")])
 def parked(request: pytest.FixtureRequest) -> Iterator[int]:
     """The port of an aircraft's link."""
     port = free_port()
@@ -28,7 +29,7 @@ def parked(request: pytest.FixtureRequest) -> Iterator[int]:
         yield port
 
 
-@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+@pytest.fixture(scope="module", params=[slow("px4"), "ardupilot"])
 def hovering(request: pytest.FixtureRequest) -> Iterator[tuple[Client, int]]:
     """A mavutil client of a multicopter beside a target, and the port of the multicopter's other link."""
     port, other_port = free_port(), free_port()

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from tests.clients.compatibility import not_offered
 from tests.clients.mavutil_client import UPLOADS, Client
 from tests.clients.sitl_process import free_port, running_sitl
+from tests.slow import slow
 
 SPEEDUP: Final = 5.0
 TRANSFER_S: Final = 15
@@ -19,6 +20,11 @@ UNASKED: Final = 65535
 FOLDER: Final = {"px4": "/fs/microsd", "ardupilot": "/APM"}
 
 compatibility = pytest.mark.compatibility
+
+
+@pytest.fixture(scope="module", params=["px4", *map(slow, ("ardupilot", "px4-plane", "ardupilot-plane"))])
+def vehicle(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from autopilot_bridge.tlog import TlogReader
 from tests.clients.forked_process import flightstack_done
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
+from tests.slow import slow
 
 FLOAT = {"px4": "MPC_XY_CRUISE", "ardupilot": "WPNAV_SPEED"}
 INTEGER = {"px4": "NAV_DLL_ACT", "ardupilot": "FS_GCS_ENABLE"}
@@ -50,7 +51,7 @@ class User:
         return json.loads(done.stdout)
 
 
-@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+@pytest.fixture(scope="module", params=["px4", slow("ardupilot")])
 def user(request: pytest.FixtureRequest) -> Iterator[User]:
     port, script_port = free_port(), free_port()
     links = [f"udpout:127.0.0.1:{number}" for number in (port, script_port)]

@@ -26,6 +26,7 @@ from tests.flights.aircraft_figures import (
     settled_after_m,
 )
 from tests.flights.turn_geometry import Place
+from tests.slow import slow_after
 
 RECTANGLE: list[Place] = [(850.0, 0.0), (850.0, -600.0), (-600.0, -600.0), (-600.0, 0.0)]
 SHARP: list[Place] = [(850.0, 0.0), (300.0, -450.0), (-650.0, -450.0), (100.0, -50.0), (-650.0, 50.0)]
@@ -92,7 +93,10 @@ def mission(
 
 @pytest.mark.parametrize(
     "case",
-    [Case("px4", None, tuple(RECTANGLE), 60.0, 0), Case("ardupilot", "catapult", tuple(SHARP), -90.0, 1)],
+    slow_after(
+        1,
+        [Case("px4", None, tuple(RECTANGLE), 60.0, 0), Case("ardupilot", "catapult", tuple(SHARP), -90.0, 1)],
+    ),
     ids=lambda case: f"{case.flavour}-{case.launch or 'runway'}",
 )
 def test_mission_in_moderate_turbulence(case: Case) -> None:

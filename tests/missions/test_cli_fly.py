@@ -10,10 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from autopilot_bridge.clock import Clock
-from missions.cli.fly import fly
+from missions.cli.fly import flight_of, fly
 from missions.cli.fly_report import Pace, print_result
 from missions.cli.mission_command import FlightOption
-from missions.cli.pattern_command import ratio_of
 from missions.errors import PlanError
 from missions.library import MISSIONS
 from missions.mission import Debriefing
@@ -196,7 +195,8 @@ def test_turns_are_planned_for_the_wind_the_user_expects(
     ("text", "ratio"), [("3:4", (3.0, 4.0)), ("1.4", (1.4, 1.0)), ("2/3", (2.0, 3.0)), ("5,6", (5.0, 6.0))]
 )
 def test_ratios(text: str, ratio: tuple[float, float]) -> None:
-    assert ratio_of(text) == ratio
+    context = fly.make_context("fly", ["lissajous", "--ratio", text])
+    assert flight_of(context)[1].options.ratio == ratio
 
 
 @pytest.mark.parametrize("text", ["0:0", "1:0", "-1:2", "0", "x:y", ""])

@@ -18,6 +18,7 @@ from missions.vehicle import Vehicle
 from missions.vehicle.connection import ONBOARD_COMPUTER, Connection
 from missions.vehicle.peers import MAX_COMPONENTS
 from tests.clients.sitl_process import free_port
+from tests.slow import slow
 
 
 class Recording:
@@ -202,8 +203,9 @@ class Elsewhere(threading.Thread):
         self.autopilot.link.close()
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.parametrize("kind", ["udp", "tcp"])
+@pytest.mark.parametrize(
+    ("kind", "flavour"), [("udp", "px4"), ("tcp", "ardupilot"), slow("udp", "ardupilot"), slow("tcp", "px4")]
+)
 def test_the_same_mission_flies_a_vehicle_elsewhere(make_sitl, tmp_path, kind, flavour):
     port = free_port(socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM)
     theirs, ours = {

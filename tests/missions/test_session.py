@@ -20,10 +20,11 @@ from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.world_spec import WorldSpec
 from missions.cli import fly as cli_fly
 from missions.cli import main as cli
+from missions.cli.options import SIDES
 from missions.errors import MissionError, PlanError
 from missions.library import MISSIONS, find_mission
 from missions.mission import Mission
-from missions.options import FlightOptions, Via, parameters_from_file, parse_pair, parse_wind
+from missions.options import FlightOptions, Via, parameters_from_file, parse_wind
 from missions.pattern_search.mission import PatternMission
 from missions.runs import session
 from missions.runs.records import FlightRecords
@@ -415,7 +416,7 @@ def test_warnings_are_reported_once(scripted, tmp_path, capsys):
         (["fly", "lissajous", "--speed", "11", "--autopilot", "ardupilot"], "0..10 m/s"),
         (["fly", "lissajous", "--altitude", "1000"], "altitude 1000 m is not in 1.5..120 m"),
         (["fly", "lissajous", "--size", "0"], "is empty"),
-        (["fly", "lissajous", "--size", "tall"], "--size 'tall' is not one or two numbers"),
+        (["fly", "lissajous", "--size", "tall"], "'--size': 'tall' is not one or two numbers"),
         (["fly", "parallel-sweep", "--size", "20", "--spacing", "30"], "spacing below 20 m"),
         (["fly", "lissajous", "--pattern", "L7"], "'L7' is not known; there are L1"),
         (["fly", "lissajous", "--via", "setpoints", "--period", "5"], "ask for --period"),
@@ -478,9 +479,9 @@ def test_bad_parameter_files_name_the_line(tmp_path, text):
 def test_small_parsers():
     assert parse_wind("5@270") == (5.0, 270.0)
     assert parse_wind("3.5") == (3.5, 0.0)
-    assert parse_pair("100x80", "--size", "x,") == (100.0, 80.0)
-    assert parse_pair("3:4", "--ratio", ":/,") == (3.0, 4.0)
-    assert parse_pair("60", "--size", "x,") == (60.0, 60.0)
+    assert SIDES("100x80") == (100.0, 80.0)
+    assert SIDES(" 100 X 80") == (100.0, 80.0)
+    assert SIDES("60") == (60.0, 60.0)
 
 
 def test_help_does_not_import_what_flying_needs():

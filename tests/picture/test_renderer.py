@@ -23,6 +23,7 @@ from flightsim.payload import (
 )
 from flightsim.picture import Renderer, Scenery
 from tests.rotations import rotation_matrix
+from tests.slow import slow
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 MODEL = PinholeModel()
@@ -110,7 +111,7 @@ def test_a_tag_is_read_by_opencv_where_the_detection_says(place, attitude, targe
     assert centre == pytest.approx((found.u_px, found.v_px), abs=1.5)
 
 
-@pytest.mark.parametrize(("attitude", "axis"), [((0.0, -20.0, 0.0), 0), ((25.0, -30.0, 60.0), 1)])
+@pytest.mark.parametrize(("attitude", "axis"), [slow((0.0, -20.0, 0.0), 0), ((25.0, -30.0, 60.0), 1)])
 def test_a_tag_is_read_until_the_edge_of_the_picture_cuts_it_off(attitude, axis):
     """A large, flat tag moves out of the picture: the model loses it where OpenCV does, within a cell."""
     size_m = 3.0

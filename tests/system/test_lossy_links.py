@@ -129,7 +129,7 @@ def test_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("seed", slow_after(1, range(6)))
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_nothing_is_done_by_half_over_a_bad_radio(flavour: str, seed: int) -> None:
     radio = Radio(flavour, BAD, 100 + seed)
     speed, _ = SPEEDS[flavour]

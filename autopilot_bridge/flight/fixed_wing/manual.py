@@ -13,7 +13,6 @@ from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 
 _LEVEL_WINGS_RAD: Final = math.radians(8.0)  # banked less than this, released sticks lock the course
 _LOCK_WAIT_S: Final = 0.5  # ArduPlane CRUISE: so long after the stick is released
-_NO_PILOT_THROTTLE: Final = -1.0
 
 
 class ManualMode(IntEnum):

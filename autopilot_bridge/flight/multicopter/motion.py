@@ -18,7 +18,7 @@ from autopilot_bridge.flight.multicopter.trajectory import (
 from autopilot_bridge.flight.multicopter.yaw import YawSteering
 from autopilot_bridge.flight.parameters import YawBehaviour
 from autopilot_bridge.flight.region_of_interest import roi_heading
-from autopilot_bridge.flight.task import SpeedKind, clear_setpoint
+from autopilot_bridge.flight.task import SpeedKind
 from autopilot_bridge.navigation import layout as nav_layout
 
 _CONTINUE_WITHIN_M: Final = 2.0  # a running trajectory this close to the vehicle is taken over as it is
@@ -190,7 +190,6 @@ class SmoothMotion:
     def write(self, ctx: FlightContext) -> None:
         """Write the control setpoint, without the quantities that the filter does not know."""
         setpoint = ctx.setpoint
-        clear_setpoint(setpoint, sp.TRAJECTORY)
         self.trajectory.write(setpoint)
         setpoint[sp.YAW_RAD] = self.heading.yaw_rad
         setpoint[sp.YAW_RATE_RAD_S] = self.heading.rate_rad_s

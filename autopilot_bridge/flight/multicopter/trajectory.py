@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.parameters import FlightParameters
-from flightsim.foundation.kernels import kernel
+from flightsim.foundation.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 
-# state: position, velocity, acceleration in NED
-_SIZE: Final = 9
 # limits
 SPEED: Final = 0  # along a leg, horizontal
 SPEED_UP: Final = 1
@@ -164,7 +162,7 @@ def _join_leg(
 
 @kernel
 def _follow_leg(
-    s: Array, start: Array, end: Array, end_speed: float, turn_in: float, lim: Array, dt: float
+    s: Array, start: Array, end: Array, lim: Array, end_speed: float, turn_in: float, dt: float
 ) -> None:
     """One tick along the straight leg start -> end, to be left at `end_speed`, `turn_in` before its end."""
     lx, ly, lz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
@@ -233,11 +231,18 @@ class TrajectoryGenerator:
     """
 
     def __init__(self, parameters: FlightParameters, *, speed_m_s: float | None = None) -> None:
-        self._state: Array = np.zeros(_SIZE)
+        self._setpoint: Array = np.full(sp.SETPOINT_SIZE, math.nan)  # with the state in its place
+        self._setpoint[sp.LEVEL] = sp.TRAJECTORY
+        self._state: Array = self._setpoint[sp.MOTION]
+        self._state[:] = 0.0
         self.position_ned_m: Array = self._state[0:3]
         self.velocity_ned_m_s: Array = self._state[3:6]
         self.acceleration_ned_m_s2: Array = self._state[6:9]
         self.limits: Array = np.zeros(LIMITS_SIZE)
+        self._start_ned_m, self._end_ned_m = np.zeros(3), np.zeros(3)
+        self._follow_leg = bound(
+            _follow_leg, self._state, self._start_ned_m, self._end_ned_m, self.limits, then=(0.0, 0.0, 0.0)
+        )
         self.stretch = 1.0
         self.set_limits(parameters, speed_m_s=speed_m_s)
 
@@ -276,9 +281,7 @@ class TrajectoryGenerator:
         """Slow the next tick down when the vehicle lags behind, to a stop at `error_max_m` (PX4
         MPC_XY_ERR_MAX).
         """
-        north = float(vehicle_ned_m[0]) - float(self._state[0])
-        east = float(vehicle_ned_m[1]) - float(self._state[1])
-        error = math.hypot(north, east)
+        error = math.dist(vehicle_ned_m[0:2].tolist(), self._state[0:2].tolist())
         free = 0.4 * error_max_m
         self.stretch = min(1.0, max(0.0, (error_max_m - error) / (error_max_m - free)))
 
@@ -299,17 +302,17 @@ class TrajectoryGenerator:
             dt_s: length of the tick.
             turn_in_m: distance before the end at which that speed is reached and the turn begins.
         """
-        _follow_leg(
-            self._state, start_ned_m, end_ned_m, end_speed_m_s, turn_in_m, self.limits, dt_s * self.stretch
-        )
+        self._start_ned_m[:] = start_ned_m
+        self._end_ned_m[:] = end_ned_m
+        self._follow_leg(end_speed_m_s, turn_in_m, dt_s * self.stretch)
 
     def track_velocity(self, north_m_s: float, east_m_s: float, down_m_s: float, dt_s: float) -> None:
         """One tick towards a velocity."""
         _track_velocity(self._state, north_m_s, east_m_s, down_m_s, self.limits, dt_s)
 
     def write(self, setpoint: Array) -> None:
-        """Write position, velocity and acceleration into the trajectory fields of a control setpoint."""
-        setpoint[sp.MOTION] = self._state
+        """Write a control setpoint of position, velocity and acceleration alone."""
+        setpoint[:] = self._setpoint
         if self.stretch < 1.0:
             setpoint[sp.VEL_HORIZONTAL] *= self.stretch
             setpoint[sp.ACC_HORIZONTAL] *= self.stretch

@@ -25,7 +25,6 @@ _RELEASE_MORE: Final = 65534  # the same for channels 9 to 18, where 0 does not 
 _FIRST_CHANNELS: Final = 8
 _INVALID_AXIS: Final = 32767  # MANUAL_CONTROL: axis not sent
 _RSSI_UNKNOWN: Final = 255
-_NO_RADIO_S: Final = 1.0  # PX4: the radio counts as lost after this time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

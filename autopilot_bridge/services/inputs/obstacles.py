@@ -17,8 +17,6 @@ from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 
-_OBSTACLES: Final = mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
-_SENSOR: Final = mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR
 _AVOIDANCE: Final = int(mavlink.FAILURE_UNIT_SYSTEM_AVOIDANCE)
 _UNKNOWN_CM: Final = 65535
 _AUTOPILOT: Final = 1

@@ -26,6 +26,7 @@ from tests.estimators.magnetic_identification.encounters import (
     measurement,
     straight,
 )
+from tests.slow import slow_after
 
 STEP_M = 20.0
 COUNT = 15
@@ -198,7 +199,7 @@ def diagonal_pass(seed: int, count: int, *, by_roulette: bool = False) -> Gaussi
     return hypothesis
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", slow_after(1, range(2)))
 def test_a_diagonal_pass_leaves_four_modes(seed):
     """Figures 4 and 5 with 200,000 particles: the modes that the paper's pair merged are separate."""
     hypothesis = diagonal_pass(seed, 200_000)

@@ -22,6 +22,7 @@ from flightsim.foundation.vectors import from_euler
 from missions.cli.main import run_command_line
 from tests.clients.forked_process import flightstack
 from tests.clients.sitl_process import free_port
+from tests.slow import slow
 
 LONG = "40"
 """Duration, s: a machine that stands still for a second takes ten of them away from whoever plays so fast."""
@@ -183,7 +184,7 @@ def assert_replay_is_the_same(tmp_path):
     return ours
 
 
-@pytest.mark.parametrize("system", [1, 42])
+@pytest.mark.parametrize("system", [slow(1), 42])
 def test_it_asks_hears_tells_and_its_log_gives_the_same_estimates(tmp_path, port, vehicle, system):
     there = vehicle(system=system, repeat=True)
     assert estimate(tmp_path, port, "--duration", LONG) == 0
@@ -362,7 +363,8 @@ def start_process(tmp_path, port, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("number", "arguments", "code"), [(signal.SIGINT, (), 0), (signal.SIGTERM, ("--duration", "9999"), 130)]
+    ("number", "arguments", "code"),
+    [slow(signal.SIGINT, (), 0), (signal.SIGTERM, ("--duration", "9999"), 130)],
 )
 def test_a_signal_ends_it_in_good_order(tmp_path, port, vehicle, number, arguments, code):
     vehicle()

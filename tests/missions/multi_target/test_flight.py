@@ -1,6 +1,9 @@
 """Whole searches in embedded worlds: found targets, the same numbers on every way, a silent sensor."""
 
 import json
+import socket
+import threading
+import time
 from dataclasses import replace
 from functools import partial
 
@@ -8,16 +11,19 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.tlog import TlogReader
 from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
 from flightsim.payload import ScanDisturbance
 from flightsim.world_spec import WorldSpec
+from missions.cli.main import run_command_line
 from missions.embedded import TargetField, multi_target_world
 from missions.multi_target.mission import MultiTargetMission
 from missions.multi_target.options import MultiTargetOptions, StepLawKind
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
+from tests.clients.sitl_process import free_port
 from tests.slow import slow
 
 SMALL = MultiTargetOptions(
@@ -123,3 +129,36 @@ def test_a_vehicle_without_the_sensor_is_refused_on_the_ground(tmp_path):
     assert result.outcome == "failed"
     assert "no target sensor (26)" in result.reason
     assert dialect.MAV_COMP_ID_USER2 == 26
+
+
+def send_again(log, port):
+    """Send the vehicle's own frames of a log to a UDP port, 20 times as fast as they were received."""
+    own = {1, dialect.MAV_COMP_ID_USER2}
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        sent_us = 0
+        for time_us, frame in TlogReader(log):
+            if frame.component_id not in own:
+                continue
+            if time_us - sent_us > 20_000:
+                sent_us = time_us
+                time.sleep(0.001)
+            link.sendto(frame.raw, ("127.0.0.1", port))
+
+
+@pytest.mark.slow
+def test_live_on_a_link_and_replayed_it_has_the_same_numbers_too(run, tmp_path):
+    result, _ = run
+    port, live, again = free_port(), tmp_path / "live", tmp_path / "again"
+    settings = [f"--set={setting}" for setting in result.summary["estimator"]["settings"]]
+    sender = threading.Thread(target=send_again, args=(result.folder / "flight.tlog", port), daemon=True)
+    sender.start()
+    link = ["--connect", f"udpin:127.0.0.1:{port}", "--silence", "3"]
+    run_command_line(["estimate", "multi-target", *link, *settings, "--no-picture", "--out", str(live)])
+    sender.join()
+    log = [str(live / "flight.tlog"), "--estimator", "multi-target"]
+    assert run_command_line(["replay", *log, *settings, "--no-picture", "--out", str(again)]) == 0
+    name = "estimates-MultiTargetEstimate.npz"
+    embedded, *others = (np.load(folder / name) for folder in (result.folder, live, again))
+    for column in embedded.files:
+        for other in others:
+            assert np.array_equal(other[column], embedded[column], equal_nan=True), column

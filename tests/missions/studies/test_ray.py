@@ -115,6 +115,7 @@ def test_a_users_files_travel_with_the_job(cluster: Cluster, tmp_path: Path) -> 
     assert result.results.values("height_m")[:, 3].tolist() == [3.003, 6.003]
 
 
+@pytest.mark.slow
 def test_a_trial_that_never_ends_becomes_a_row(cluster: Cluster, tmp_path: Path) -> None:
     result = run_study(
         troubled(tmp_path, endless=(1,)), runs=3, engine=RayCluster(cluster.address), out=tmp_path / "study",
