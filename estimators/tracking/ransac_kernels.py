@@ -53,10 +53,16 @@ def associate(
     gate_squared: float,
     detected: float,
     clutter: float,
+    rivals: Flags,
     found: Flags,
     explained: Flags,
 ) -> None:
     """Update each hypothesis by the measurements in its gate, by probabilistic data association.
+
+    A measurement in the gates of several tracks is shared out among them: its weight for track k is
+    G_k / (S_k + R + B) with the likelihoods G, their sum S over k's measurements, their sum R over the other
+    tracks, and B for none (the "cheap JPDA" of Fitzgerald 1986, "Development of practical PDA logic for
+    multitarget tracking by microprocessor"). Targets that cross would attract each other's tracks otherwise.
 
     Args:
         count: number of hypotheses.
@@ -65,16 +71,15 @@ def associate(
         gate_squared: of the Mahalanobis distance.
         detected: probability of detection.
         clutter: density of false measurements, per area.
+        rivals: (m,) whether a hypothesis is a track, with which others share measurements.
         found: (m,) result: whether a hypothesis has a measurement in its gate.
         explained: (n,) result: whether a measurement is in any gate.
     """
     size, total = means.shape[1], places.shape[0]
-    scores, offs = np.empty(total), np.empty((total, 2))
+    scores, shared = np.zeros((count, total)), np.zeros(total)
     for k in range(count):
         found[k] = False
         mean, covariance = means[k], covariances[k]
-        summed = 0.0
-        best = -1
         for i in range(total):
             x, y = places[i, 0] - mean[0], places[i, 1] - mean[1]
             a = covariance[0, 0] + noises[i, 0, 0]
@@ -82,28 +87,35 @@ def associate(
             d = covariance[1, 1] + noises[i, 1, 1]
             determinant = a * d - b * b
             squared = (d * x * x - 2.0 * b * x * y + a * y * y) / determinant
-            scores[i] = 0.0
             if squared <= gate_squared:
-                scores[i] = detected * math.exp(-0.5 * squared) / (math.tau * math.sqrt(determinant))
-                offs[i, 0], offs[i, 1] = x, y
+                scores[k, i] = detected * math.exp(-0.5 * squared) / (math.tau * math.sqrt(determinant))
                 explained[i] = True
                 found[k] = True
-                summed += scores[i]
-                if best < 0 or scores[i] > scores[best]:
-                    best = i
-        if best < 0:
+                if rivals[k]:
+                    shared[i] += scores[k, i]
+    for k in range(count):
+        if not found[k]:
             continue
-        missed = clutter * (1.0 - detected * (1.0 - math.exp(-0.5 * gate_squared)))
-        summed += missed
-        x = y = xx = xy = yy = 0.0
+        mean, covariance = means[k], covariances[k]
+        summed = 0.0
+        best = 0
         for i in range(total):
-            share = scores[i] / summed
-            x += share * offs[i, 0] if share > 0.0 else 0.0
-            y += share * offs[i, 1] if share > 0.0 else 0.0
-            if share > 0.0:
-                xx += share * offs[i, 0] * offs[i, 0]
-                xy += share * offs[i, 0] * offs[i, 1]
-                yy += share * offs[i, 1] * offs[i, 1]
+            summed += scores[k, i]
+            if scores[k, i] > scores[k, best]:
+                best = i
+        missed = clutter * (1.0 - detected * (1.0 - math.exp(-0.5 * gate_squared)))
+        any_true = x = y = xx = xy = yy = 0.0
+        for i in range(total):
+            others = shared[i] - (scores[k, i] if rivals[k] else 0.0)
+            share = scores[k, i] / (summed + others + missed)
+            if scores[k, i] > 0.0:
+                off_x, off_y = places[i, 0] - mean[0], places[i, 1] - mean[1]
+                any_true += share
+                x += share * off_x
+                y += share * off_y
+                xx += share * off_x * off_x
+                xy += share * off_x * off_y
+                yy += share * off_y * off_y
         xx, xy, yy = xx - x * x, xy - x * y, yy - y * y  # spread of the innovations
         # the gain is that of the likeliest measurement: those of one gate have nearly the same noise
         a = covariance[0, 0] + noises[best, 0, 0]
@@ -115,7 +127,6 @@ def associate(
             gain[i, 0] = (covariance[i, 0] * d - covariance[i, 1] * b) / determinant
             gain[i, 1] = (covariance[i, 1] * a - covariance[i, 0] * b) / determinant
             mean[i] += gain[i, 0] * x + gain[i, 1] * y
-        any_true = 1.0 - missed / summed
         for i in range(size):
             for j in range(size):
                 # W S W' of the part that is an update, W (spread) W' of not knowing which it was

@@ -201,6 +201,7 @@ class RecursiveRansac:
             p.gate_squared,
             p.detected,
             p.clutter_per_m2,
+            self._numbers[:count] > 0,
             self._found,
             explained,
         )

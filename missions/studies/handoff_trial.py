@@ -201,7 +201,7 @@ class HandoffTrial:
         rate = s.rate_hz
         return RecursiveRansac(
             RansacParameters(
-                noise_density=0.5,
+                noise_density=0.2,
                 clutter_per_m2=max(s.false_points, 0.1) / 40_000.0,
                 window=round(2.0 * rate),
                 good_age=round(1.0 * rate),

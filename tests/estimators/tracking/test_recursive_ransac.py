@@ -177,3 +177,33 @@ def test_parameters_name_what_is_wrong():
         RansacParameters(model=TargetModel.CONSTANT_ACCELERATION, seed_support=1)
     with pytest.raises(ValueError, match="detected"):
         RansacParameters(detected=1.5)
+
+
+def test_the_update_of_one_hypothesis_is_that_of_probabilistic_data_association():
+    """Against the textbook's sums (Bar-Shalom, Li and Kirubarajan 2001, section 3.4), and the sharing."""
+    rng = np.random.default_rng(6)
+    roots = rng.normal(0.0, 1.0, (4, 4))
+    before, prior = rng.normal(0.0, 1.0, 4), roots @ roots.T + np.eye(4)
+    places, noises = before[:2] + rng.normal(0.0, 1.0, (3, 2)), np.tile(0.8 * np.eye(2), (3, 1, 1))
+    gate, detected, clutter = 9.2, 0.9, 0.01
+    innovation = prior[:2, :2] + 0.8 * np.eye(2)
+    offs = places - before[:2]
+    squared = np.einsum("ni,ij,nj->n", offs, np.linalg.inv(innovation), offs)
+    assert (squared < gate).all()
+    density = detected * np.exp(-0.5 * squared) / (math.tau * math.sqrt(np.linalg.det(innovation)))
+    none = clutter * (1.0 - detected * (1.0 - math.exp(-0.5 * gate)))
+    gain = prior[:, :2] @ np.linalg.inv(innovation)
+    for copies in (1, 2):  # two tracks at one place share the measurements
+        shares = density / (density.sum() + (copies - 1) * density + none)
+        mean_off = shares @ offs
+        spread = np.einsum("n,ni,nj->ij", shares, offs, offs) - np.outer(mean_off, mean_off)
+        expected = prior - shares.sum() * gain @ innovation @ gain.T + gain @ spread @ gain.T
+        means, covariances = np.tile(before, (copies, 1)), np.tile(prior, (copies, 1, 1))
+        found, explained = np.zeros(copies, dtype=bool), np.zeros(3, dtype=bool)
+        rivals = np.ones(copies, dtype=bool)
+        kernels.associate(
+            *(copies, means, covariances, places, noises, gate, detected, clutter, rivals, found, explained)
+        )
+        assert found.all() and explained.all()
+        assert means[0] == pytest.approx(before + gain @ mean_off)
+        assert covariances[0] == pytest.approx(expected)
