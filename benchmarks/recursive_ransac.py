@@ -122,7 +122,7 @@ def by_stone_soup(scans: list[Array], false: float, *, joint: bool) -> Iterator[
         DistanceHypothesiser(predictor, updater, Mahalanobis(), missed_distance=math.sqrt(9.2))
     )
     deleter = CompositeDeleter(
-        [UpdateTimeStepsDeleter(15), CovarianceBasedDeleter(100.0, mapping=(0, 2))], intersect=False
+        [UpdateTimeStepsDeleter(15), CovarianceBasedDeleter(100.0, mapping=[0, 2])], intersect=False
     )
     initiator = MultiMeasurementInitiator(
         prior_state=GaussianState([[0.0], [0.0], [0.0], [0.0]], np.diag([1.0, 4.0, 1.0, 4.0])),

@@ -93,10 +93,10 @@ class EvidenceComparison(TrackComparison):
     def _probabilities(self, windows: TrackWindows, target: Array, pose: PoseMode) -> dict[int, float]:
         p = self.parameters
         chosen = _sampled(windows.times_us, round(1e6 * p.sample_s))
-        times_s = (windows.times_us[chosen] - windows.time_us) * 1e-6
+        times_s = 1e-6 * (windows.times_us[chosen] - windows.time_us).astype(np.float64)
         handoff = {number: window[chosen] for number, window in windows.handoff.items()}
         others = [window[chosen] for window in windows.others.values()]
-        prior = pose.covariance[np.ix_(_POSE, _POSE)] + np.diag(
+        prior: Array = pose.covariance[np.ix_(_POSE, _POSE)] + np.diag(
             [p.pose_sigma_m**2, p.pose_sigma_m**2, p.pose_sigma_rad**2]
         )
         nothing, logs = np.zeros(3), {}
@@ -169,7 +169,7 @@ def _log_evidence(off: Array, design: Array, prior: Array, sigma: float) -> tupl
     """
     weight = 1.0 / (sigma * sigma)
     information = np.linalg.inv(prior) + weight * design.T @ design
-    covariance = np.linalg.inv(information)
+    covariance: Array = np.linalg.inv(information).astype(np.float64)
     vector = weight * design.T @ off
     mean = covariance @ vector
     log = -0.5 * (

@@ -157,8 +157,9 @@ class HandoffProcess:
         if self.pose.converged and best is not None and self._report is not None and self._report.target:
             relative = best.from_tracker(*self._report.target)
         own = self.tracks.level()
-        if self.comparison.decided in own:
-            return own[self.comparison.decided]
+        decided = self.comparison.decided
+        if decided is not None and decided in own:
+            return own[decided]
         scores = {number: score for number, score in self.comparison.scores.items() if number in own}
         if relative is None or not scores:
             return relative

@@ -126,7 +126,7 @@ class _Tracker:
 
     def _choose(self, target: Array) -> None:
         world, places = self._world, self.tracks.places
-        if self._number in places:
+        if self._number is not None and self._number in places:
             self._place, self._seen_us = places[self._number], world.time_us
             return
         lost_s = (world.time_us - self._seen_us) * 1e-6
