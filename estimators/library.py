@@ -27,6 +27,7 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
         "relative-pose": "estimators.relative_pose",
         "survey": "estimators.survey",
         "target-fusion": "estimators.target_fusion",
+        "vision-search": "estimators.vision_search",
     }
 )
 """Module of each estimator that has a name; it is imported only when it is used."""

@@ -27,6 +27,7 @@ class GridLayout:
         south_m, west_m: corner of the rectangle, north and east of home.
         cell_m: side of a cell.
         rows, columns: number of rows and columns.
+        most_cells: largest number of cells that is accepted.
 
     Raises:
         EstimatorError: the size gives no map.
@@ -37,6 +38,7 @@ class GridLayout:
     cell_m: float
     rows: int
     columns: int
+    most_cells: int = MAX_CELLS
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
@@ -46,15 +48,21 @@ class GridLayout:
                 f"`cell_m` {self.cell_m:g} m leaves {self.rows} x {self.columns} cells in the area; "
                 "ask for smaller cells or a larger `width_m, height_m`: at least 2 x 2 make a map"
             )
-        if self.rows * self.columns > MAX_CELLS:
+        if self.rows * self.columns > self.most_cells:
             raise EstimatorError(
-                f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than {MAX_CELLS}; "
-                "ask for larger cells or a smaller `width_m, height_m`"
+                f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than "
+                f"{self.most_cells}; ask for larger cells or a smaller `width_m, height_m`"
             )
 
     @classmethod
     def over(
-        cls, *, width_m: float, height_m: float, cell_m: float, centre_ne_m: tuple[float, float]
+        cls,
+        *,
+        width_m: float,
+        height_m: float,
+        cell_m: float,
+        centre_ne_m: tuple[float, float],
+        most_cells: int = MAX_CELLS,
     ) -> "GridLayout":
         """Cells over `width_m` (east) by `height_m` (north) around a centre; partial cells are left out."""
         if not (math.isfinite(cell_m) and cell_m > 0.0):
@@ -66,6 +74,7 @@ class GridLayout:
             cell_m=cell_m,
             rows=rows,
             columns=columns,
+            most_cells=most_cells,
         )
 
     @property

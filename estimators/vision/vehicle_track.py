@@ -84,7 +84,13 @@ class VehicleTrack:
         elif name == "LOCAL_POSITION_NED":
             place = (message.x, message.y, message.z)
             if all(map(math.isfinite, place)):
-                self._places.add(message.time_boot_ms * 1000, place)
+                self.place(message.time_boot_ms * 1000, place)
+
+    def place(self, time_us: int, pos_ned_m: Vector) -> None:
+        """Take a place of the vehicle from elsewhere, such as GLOBAL_POSITION_INT in a frame of the
+        caller.
+        """
+        self._places.add(time_us, pos_ned_m)
 
     def at(self, time_us: int) -> VehiclePose | None:
         """The pose at a time; None: no attitude or no position near it is known."""

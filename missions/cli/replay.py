@@ -22,7 +22,7 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     required=True,
     metavar="NAME|FILE.py",
     help="attitude, lissajous, magnetic-identification, multi-target, orbit-target, relative-pose, "
-    "survey, target-fusion, or a Python file with an Estimator of your own.",
+    "survey, target-fusion, vision-search, or a Python file with an Estimator of your own.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
 @click.option(
@@ -60,7 +60,8 @@ def replay(**given: Any) -> int:
     """Run an estimator over each LOG and compare it with the autopilot and, where the log has it, the truth.
 
     Each log gets a run folder: summary.json, estimates.npz, estimates.csv, errors.png. Errors are those of
-    the part in the air. For an estimator of a team (magnetic-identification, multi-target, target-fusion)
+    the part in the air. For an estimator of a team (magnetic-identification, multi-target, target-fusion,
+    vision-search)
     the logs are those of one team.
 
     Exit codes: 0 done, 1 a log could not be read or lacks what the estimator needs, 2 usage.

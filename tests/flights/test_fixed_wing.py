@@ -60,7 +60,7 @@ def test_gusts_that_swing_a_parked_aircraft_are_not_taken_for_the_gyros_bias(see
     assert abs(math.degrees(error_rad)) < 5.0
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)
     flight.start()
@@ -143,7 +143,7 @@ def test_no_crew_launches_an_aircraft_that_does_not_ask(flavour: str) -> None:
     assert flight.speed_m_s < 0.1 and flight.armed
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS[::-1]))
 def test_mission_from_the_ground_to_the_ground(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)
     flight.get_ready()
@@ -187,7 +187,7 @@ def test_mission_from_the_ground_to_the_ground(flavour: str) -> None:
     assert {first + k for k in range(5)} <= seen
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_returns_home(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)
     flight.take_off(60.0, (400.0, 300.0))

@@ -57,7 +57,7 @@ def test_arduplane_goes_on_in_guided_without_a_ground_station() -> None:
     assert flight.mode == "guided"
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_gps_lost_while_circling(flavour: str) -> None:
     """Dead reckoning on airspeed and wind: the mode stays, the reported accuracy grows as the true error."""
     flight = circling(flavour)
@@ -158,7 +158,7 @@ def test_motor_fails(flavour: str) -> None:
     assert abs(flight.roll_deg) < 60.0 and flight.actuators_finite
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS[::-1]))
 def test_geofence(flavour: str) -> None:
     fence = (
         {"GF_ACTION": 3}

@@ -16,6 +16,7 @@ from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
 from tests.rotations import rotation_matrix
+from tests.slow import slow
 from tests.system.logs import known_name
 
 RADIUS_M = 20.0
@@ -61,7 +62,7 @@ class Recorded:
         return time_s, np.array(place), np.array([m.attitude_quaternion for m in rows])
 
 
-@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+@pytest.fixture(scope="module", params=["px4", slow("ardupilot")])
 def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     """A circle, flown with setpoints in a breeze."""
     folder = tmp_path_factory.mktemp("summary") / request.param

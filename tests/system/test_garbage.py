@@ -231,7 +231,7 @@ TERMINATING = (
 
 
 @pytest.mark.parametrize("seed", slow_after(1, range(3)))
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", slow_after(1, ["ardupilot", "px4"]))
 def test_any_message_with_any_content(flavour: str, seed: int) -> None:
     """Valid frames of every message, every command and every parameter, with absurd fields, for the vehicle
     itself: it may go anywhere and refuse anything, but nothing raises, and all motor commands are numbers.

@@ -18,6 +18,7 @@ from autopilot_bridge.sitl.sitl import TruthListener
 from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT, TruthEncoder
 from flightsim import truth as t
 from missions.cli.main import run_command_line
+from tests.slow import slow
 from tests.system.logs import counts, known_name, mavutil_counts, records
 from tests.system.runs import SHORT, Run, fly_all
 
@@ -29,7 +30,7 @@ SUMMARY_KEYS = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+@pytest.fixture(scope="module", params=[slow("px4"), "ardupilot"])
 def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Run:
     folder = tmp_path_factory.mktemp(request.param) / "run"
     arguments = [*SHORT, "--autopilot", request.param, "--seed", "3"]

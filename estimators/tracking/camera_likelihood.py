@@ -1,0 +1,362 @@
+"""The likelihood of a camera's frame at places on the ground, with or without a detection.
+
+Source: Tisdale et al. 2008, equations 3 to 7, corrected (docs/vision_search.md). The probability of a
+detection at the image coordinates z, given the place x of the target, is
+
+    p(D, z | x) = N(z; U(x), S(x)) p(D, V | x) + P_false (1 - p(D, V | x)) / A
+
+with the projection U, its covariance S by first-order propagation of the errors of pose and detector, and the
+image area A. Kernels return it relative to what a target far away would give: P_false / A with a detection
+and 1 - P_false without. So a frame changes a belief only where its camera looks, and the likelihood without a
+detection is 1 - p(D, V | x).
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from estimators.tracking.camera_sight import CameraSight, SightModel
+from flightsim.foundation.kernels import kernel
+
+__all__ = ["FrameLikelihood", "ground_spread", "image_spread", "relative_likelihood"]
+
+Array = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+NORTH: Final = 0
+EAST: Final = 1
+HEIGHT: Final = 2
+ROTATION: Final = 3  # 9 numbers, rows of r_mount_from_ned
+PLACE: Final = 12  # 6 numbers, covariance of the place in camera axes: xx, xy, xz, yy, yz, zz
+TURN: Final = 18  # 6 numbers, covariance of the rotation
+PLACE_WEIGHT: Final = 24
+TURN_WEIGHT: Final = 25
+FOCAL: Final = 26
+HALF_WIDTH: Final = 27
+HALF_HEIGHT: Final = 28
+BROWN: Final = 29  # 5 numbers
+FOLD: Final = 34  # squared radius up to which the distortion is monotonic
+TARGET_PX: Final = 35  # resolution times sqrt(depth^3)
+BORDER: Final = 36
+PEAK: Final = 37
+CONSTANT: Final = 38
+LINEAR: Final = 39
+QUADRATIC: Final = 40
+NOISE: Final = 41  # variance of a detection's place in image coordinates
+DENSITY: Final = 42  # A / P_false
+FAR_U: Final = 43  # pixels; a border farther away does not matter
+FAR_V: Final = 44
+SIZE: Final = 45
+
+_LEAST_DEPTH: Final = 1e-3  # of the height
+_FAR: Final = 4.5  # standard deviations; a border so far away does not matter (3e-6)
+_STEPS_PER_SIGMA: Final = 256
+_NORMAL: Final = ndtr(np.arange(-_FAR * _STEPS_PER_SIGMA, _FAR * _STEPS_PER_SIGMA + 2) / _STEPS_PER_SIGMA)
+_GATE: Final = 60.0  # squared distance; beyond it a likelihood is below 1e-13 of its peak
+_FOLD_STEP: Final = 1.02
+_FARTHEST: Final = 3.0  # image radius up to which the distortion is examined
+_LEAST_RATE: Final = 1e-4
+
+
+@lru_cache(maxsize=64)
+def _fold(distortion: tuple[float, ...]) -> float:
+    """Squared radius up to which the radial distortion grows."""
+    k1, k2, _, _, k3 = distortion
+    radius = 0.1
+    while radius < _FARTHEST:
+        q = radius * radius
+        if 1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * 7.0 * k3)) <= 0.05:
+            break
+        radius *= _FOLD_STEP
+    return radius * radius
+
+
+@kernel
+def _of_place(a: float, b: float, inverse_depth: float, s: Array) -> tuple[float, float, float]:
+    """Covariance of the image coordinates (aa, ab, bb) by the errors of the place, which enter by H / depth
+    with H = [[-a, 1, 0], [-b, 0, 1]]: one half of S of equation 4, first order.
+    """
+    k = PLACE
+    w = inverse_depth * inverse_depth
+    aa = w * (a * (a * s[k] - 2.0 * s[k + 1]) + s[k + 3])
+    ab = w * (a * (b * s[k] - s[k + 2]) - b * s[k + 1] + s[k + 4])
+    bb = w * (b * (b * s[k] - 2.0 * s[k + 2]) + s[k + 5])
+    return aa, ab, bb
+
+
+@kernel
+def _of_turn(a: float, b: float, s: Array) -> tuple[float, float, float]:
+    """The same by the errors of the attitude: rotations enter by H [q]x with q = (1, a, b), whose rows are
+    (b, ab, -1 - a^2) and (-a, 1 + b^2, -ab).
+    """
+    k = TURN
+    cross = a * b
+    p, r = -1.0 - a * a, 1.0 + b * b
+    x = b * s[k] + cross * s[k + 1] + p * s[k + 2]
+    y = b * s[k + 1] + cross * s[k + 3] + p * s[k + 4]
+    z = b * s[k + 2] + cross * s[k + 4] + p * s[k + 5]
+    aa = b * x + cross * y + p * z
+    ab = -a * x + r * y - cross * z
+    x = r * s[k + 1] - a * s[k] - cross * s[k + 2]
+    y = r * s[k + 3] - a * s[k + 1] - cross * s[k + 4]
+    z = r * s[k + 4] - a * s[k + 2] - cross * s[k + 5]
+    return aa, ab, -a * x + r * y - cross * z
+
+
+@kernel
+def _above(value: float, sigma: float) -> float:
+    """Probability that a Gaussian about a value is above 0: one of equation 5's steps, smoothed; to 1e-6 by a
+    table, which takes a fifth of the time of the error function.
+    """
+    if value >= _FAR * sigma:
+        return 1.0
+    if value <= -_FAR * sigma:
+        return 0.0
+    at = (value / sigma + _FAR) * _STEPS_PER_SIGMA
+    k = int(at)
+    return _NORMAL[k] + (at - k) * (_NORMAL[k + 1] - _NORMAL[k])
+
+
+@kernel
+def _within(value: float, half: float, sigma: float) -> float:
+    """Probability that a Gaussian about a value lies within -half..half."""
+    return max(0.0, _above(half - value, sigma) + _above(half + value, sigma) - 1.0)
+
+
+@kernel
+def relative_likelihood(north: float, east: float, s: Array, detections: Array) -> float:
+    """The likelihood of a frame for a target at a place, relative to one far away."""
+    dn, de, h = north - s[NORTH], east - s[EAST], s[HEIGHT]
+    k = ROTATION
+    depth = s[k] * dn + s[k + 1] * de + s[k + 2] * h
+    if not depth > _LEAST_DEPTH * h:
+        return 1.0
+    inverse = 1.0 / depth
+    a = (s[k + 3] * dn + s[k + 4] * de + s[k + 5] * h) * inverse
+    b = (s[k + 6] * dn + s[k + 7] * de + s[k + 8] * h) * inverse
+    # Brown's distortion, in pixels from the middle
+    q = a * a + b * b
+    near = min(q, s[FOLD])
+    k = BROWN
+    radial = 1.0 + near * (s[k] + near * (s[k + 1] + near * s[k + 4]))
+    u = s[FOCAL] * (a * radial + 2.0 * s[k + 2] * a * b + s[k + 3] * (q + 2.0 * a * a))
+    v = s[FOCAL] * (b * radial + s[k + 2] * (q + 2.0 * b * b) + 2.0 * s[k + 3] * a * b)
+    resolution = s[TARGET_PX] * inverse * math.sqrt(inverse)
+    half_u = s[HALF_WIDTH] - s[BORDER] * resolution
+    half_v = s[HALF_HEIGHT] - s[BORDER] * resolution
+    inside = min(half_u - abs(u) - s[FAR_U], half_v - abs(v) - s[FAR_V]) > 0.0
+    count = detections.shape[0]
+    seen = 1.0
+    paa, pab, pbb, taa, tab, tbb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if count > 0 or not inside:
+        if half_u <= 0.0 or half_v <= 0.0:
+            return 1.0
+        if abs(u) - half_u > s[FAR_U] or abs(v) - half_v > s[FAR_V]:
+            return 1.0
+        paa, pab, pbb = _of_place(a, b, inverse, s)
+        taa, tab, tbb = _of_turn(a, b, s)
+        if not inside:
+            seen = _within(u, half_u, s[FOCAL] * math.sqrt(max(0.0, paa + taa) + s[NOISE]))
+            if seen > 0.0:
+                seen *= _within(v, half_v, s[FOCAL] * math.sqrt(max(0.0, pbb + tbb) + s[NOISE]))
+            if seen == 0.0:
+                return 1.0
+    odds = s[CONSTANT] + resolution * (s[LINEAR] + resolution * s[QUADRATIC])
+    detected = seen * s[PEAK] / (1.0 + math.exp(-min(700.0, max(-700.0, odds))))
+    if count == 0:
+        return 1.0 - detected
+    aa = s[PLACE_WEIGHT] * paa + s[TURN_WEIGHT] * taa + s[NOISE]
+    ab = s[PLACE_WEIGHT] * pab + s[TURN_WEIGHT] * tab
+    bb = s[PLACE_WEIGHT] * pbb + s[TURN_WEIGHT] * tbb + s[NOISE]
+    determinant = aa * bb - ab * ab
+    if not determinant > 0.0:  # the rounding of single-precision numbers
+        return 1.0 - detected
+    gate = _GATE * determinant
+    density = 0.0
+    for i in range(count):
+        da, db = detections[i, 0] - a, detections[i, 1] - b
+        distance = da * da * bb - 2.0 * da * db * ab + db * db * aa
+        if distance < gate:
+            density += math.exp(-0.5 * distance / determinant)
+    if density > 0.0:
+        density /= count * math.tau * math.sqrt(determinant)
+    return 1.0 - detected + detected * density * s[DENSITY]
+
+
+@kernel
+def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Array) -> None:
+    """Relative likelihoods of a frame at places (n,)."""
+    for i in range(north.size):
+        out[i] = relative_likelihood(north[i], east[i], s, detections)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrameLikelihood:
+    """The likelihood of one frame, ready for the kernels.
+
+    Attributes:
+        numbers: what the kernels read of the frame and of the team's model.
+        detections: (m, 2) image coordinates.
+        box: south, west, north, east; outside the relative likelihood is 1. None: it is 1 everywhere.
+    """
+
+    numbers: Array
+    detections: Array
+    box: Box | None
+
+    @classmethod
+    def of(cls, sight: CameraSight, model: SightModel, reach_m: float) -> "FrameLikelihood":
+        """The likelihood of a frame.
+
+        Args:
+            sight: the frame.
+            model: what the team knows about detector and target.
+            reach_m: largest distance on the ground that matters, for a camera that sees the horizon.
+        """
+        s = _numbers(sight, model)
+        box = None
+        if sight.height_m > 0.0:
+            box = _box(sight, model, s, reach_m)
+        return cls(numbers=s, detections=np.ascontiguousarray(sight.detections, float), box=box)
+
+    def at(self, north_m: Array, east_m: Array) -> Array:
+        """Relative likelihoods at places (n,)."""
+        north, east = (np.ascontiguousarray(values, dtype=np.float64) for values in (north_m, east_m))
+        out = np.ones(north.size)
+        if self.box is not None:
+            likelihoods(north, east, self.numbers, self.detections, out)
+        return out
+
+
+def _numbers(sight: CameraSight, model: SightModel) -> Array:
+    s = np.zeros(SIZE)
+    rotation = sight.r_mount_from_ned
+    s[NORTH], s[EAST], s[HEIGHT] = sight.place_ned_m[0], sight.place_ned_m[1], sight.height_m
+    s[ROTATION : ROTATION + 9] = rotation.ravel()
+    upper = np.triu_indices(3)
+    s[PLACE : PLACE + 6] = (rotation @ sight.place_m2 @ rotation.T)[upper]
+    s[TURN : TURN + 6] = sight.rotation_rad2[upper]
+    s[PLACE_WEIGHT], s[TURN_WEIGHT] = sight.weights
+    s[FOCAL] = sight.focal_px
+    s[HALF_WIDTH], s[HALF_HEIGHT] = 0.5 * sight.width_px, 0.5 * sight.height_px
+    s[BROWN : BROWN + 5] = sight.distortion
+    s[FOLD] = _fold(sight.distortion)
+    s[TARGET_PX] = model.target_size_m * sight.focal_px * math.sqrt(max(0.0, sight.height_m))
+    s[BORDER] = model.border_sides
+    rate = model.rate
+    s[PEAK], s[CONSTANT], s[LINEAR], s[QUADRATIC] = rate.peak, rate.constant, rate.linear, rate.quadratic
+    s[NOISE] = (model.pixel_sigma_px / sight.focal_px) ** 2
+    s[DENSITY] = sight.width_px * sight.height_px / sight.focal_px**2 / model.false_rate
+    s[FAR_U] = s[FAR_V] = math.inf
+    return s
+
+
+def image_spread(ray: tuple[float, float], sight: CameraSight, model: SightModel) -> Array:
+    """(2, 2) covariance of the image coordinates of a place that is seen at (a, b), by the pose alone."""
+    s = _numbers(sight, model)
+    down = float(sight.r_mount_from_ned.T[2] @ (1.0, *ray))
+    aa, ab, bb = np.add(_of_place(*ray, down / sight.height_m, s), _of_turn(*ray, s))
+    return np.array([[aa, ab], [ab, bb]])
+
+
+def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightModel) -> Array:
+    """(2, 2) covariance, north and east, of the place on the ground that a ray (a, b) meets. An error budget
+    (Table II) is this for one error at a time.
+    """
+    rotation = sight.r_mount_from_ned
+    depth = sight.height_m / float(rotation.T[2] @ (1.0, *ray))
+    image_from_ground = np.array([[-ray[0], 1.0, 0.0], [-ray[1], 0.0, 1.0]]) @ rotation[:, :2] / depth
+    ground_from_image = np.linalg.inv(image_from_ground)
+    return np.asarray(ground_from_image @ image_spread(ray, sight, model) @ ground_from_image.T)
+
+
+def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box:
+    """The box; sets the distances in `s` at which a border does not matter."""
+    rotation = sight.r_mount_from_ned
+    edges, slope = _border_of(sight.width_px, sight.height_px, sight.focal_px, sight.distortion)
+    border = np.array(edges)
+    bounds: Array | None = border
+    wide = tall = math.inf
+    for _ in range(3):  # the errors are larger outside of the picture than in it
+        if bounds is None:
+            break
+        wide, tall = _largest_sigmas(bounds[0], bounds[1], bounds[2], bounds[3], s)
+        more = _FAR / slope * np.array([-wide, -tall, wide, tall])
+        bounds = border + more if math.isfinite(wide) else None
+    north, east = sight.place_ned_m[:2]
+    if bounds is not None:
+        corners = np.array([[1.0, a, b] for a in bounds[::2] for b in bounds[1::2]]) @ rotation
+        if np.all(corners[:, 2] * reach_m > sight.height_m):
+            s[FAR_U], s[FAR_V] = _FAR * sight.focal_px * wide, _FAR * sight.focal_px * tall
+            places = corners[:, :2] * (sight.height_m / corners[:, 2:])
+            (south, west), (far_n, far_e) = places.min(axis=0).tolist(), places.max(axis=0).tolist()
+            return north + south, east + west, north + far_n, east + far_e
+    reach_m = min(reach_m, _reach(sight, model))
+    return north - reach_m, east - reach_m, north + reach_m, east + reach_m
+
+
+@kernel
+def _largest_sigmas(a0: float, b0: float, a1: float, b1: float, s: Array) -> tuple[float, float]:
+    """Largest standard deviations of image coordinates in a rectangle of rays; infinity: it has the
+    horizon.
+    """
+    wide, tall = 0.0, 0.0
+    k = ROTATION
+    for i in range(3):
+        a = a0 + 0.5 * i * (a1 - a0)
+        for j in range(3):
+            b = b0 + 0.5 * j * (b1 - b0)
+            down = s[k + 2] + a * s[k + 5] + b * s[k + 8]
+            if not down > _LEAST_DEPTH:
+                return math.inf, math.inf
+            paa, _, pbb = _of_place(a, b, down / s[HEIGHT], s)
+            taa, _, tbb = _of_turn(a, b, s)
+            wide = max(wide, math.sqrt(max(0.0, paa + taa) + s[NOISE]))
+            tall = max(tall, math.sqrt(max(0.0, pbb + tbb) + s[NOISE]))
+    return wide, tall
+
+
+@lru_cache(maxsize=64)
+def _border_of(
+    width_px: int, height_px: int, focal_px: float, distortion: tuple[float, ...]
+) -> tuple[tuple[float, float, float, float], float]:
+    """Least a and b, largest a and b of the rays that a picture's border shows (by fixed-point iteration),
+    and
+    the least growth of the distorted radius in it: errors are computed without distortion.
+    """
+    along = np.linspace(-1.0, 1.0, 9)
+    edge = np.concatenate([np.column_stack((along, np.full(9, k))) for k in (-1.0, 1.0)])
+    seen = np.vstack((edge, edge[:, ::-1])) * (0.5 * width_px, 0.5 * height_px) / focal_px
+    k1, k2, p1, p2, k3 = distortion
+    fold = _fold(distortion)
+    rays = seen.copy()
+    for _ in range(20):
+        a, b = rays.T
+        q = np.minimum(a * a + b * b, fold)
+        radial = 1.0 + q * (k1 + q * (k2 + q * k3))
+        tangential = np.column_stack(
+            (2.0 * p1 * a * b + p2 * (q + 2.0 * a * a), p1 * (q + 2.0 * b * b) + 2.0 * p2 * a * b)
+        )
+        rays = (seen - tangential) / radial[:, None]
+    low, high = rays.min(axis=0), rays.max(axis=0)
+    q = np.linspace(0.0, float((rays**2).sum(axis=1).max()), 16)
+    slope = float(np.clip((1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * 7.0 * k3))).min(), 0.2, 1.0))
+    return (float(low[0]), float(low[1]), float(high[0]), float(high[1])), slope
+
+
+def _reach(sight: CameraSight, model: SightModel) -> float:
+    """Distance on the ground from which on the resolution is too low for a detection; infinity: none is."""
+    resolution_px = np.geomspace(0.01, 1e4, 400)
+    enough = model.rate.probability(resolution_px) > _LEAST_RATE
+    if enough[0]:
+        return math.inf
+    least_px = float(resolution_px[int(np.argmax(enough))]) if enough.any() else math.inf
+    # at the border of the picture the depth is less than the distance by this factor at most
+    widest = 1.0 + math.hypot(sight.width_px, sight.height_px) / sight.focal_px
+    depth = (model.target_size_m * sight.focal_px / least_px) ** (2.0 / 3.0) * sight.height_m ** (1.0 / 3.0)
+    return max(sight.height_m, widest * depth)

@@ -1,0 +1,262 @@
+"""What a searching camera's frame says about a target on level ground: its parameters and their checks.
+
+Source: Tisdale, Ryan, Kim, Tornqvist and Hedrick 2008, "A multiple UAV system for vision-based search and
+localization", section III, as docs/vision_search.md corrects it. `estimators.tracking.camera_likelihood`
+computes the likelihood from these.
+
+North and east are metres in the area's frame. Camera axes: x along the optical axis, y to the right of the
+picture, z down. Image coordinates are those of the ray, a = y / x and b = z / x, without lens distortion.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import EstimatorError
+from flightsim.foundation.vectors import Quaternion, Vector, conjugate, euler_of, rotate
+
+__all__ = ["CameraSight", "DetectionRate", "PoseErrors", "SightModel", "rotation_matrix"]
+
+Array = NDArray[np.float64]
+
+MAX_DETECTIONS: Final = 2
+"""Detections of the target in one frame that a likelihood counts; of one target at most one is true."""
+_MOST_WEIGHT: Final = 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionRate:
+    """Probability that a target in view is detected, by the resolution r: the pixels that its side covers.
+
+    P(D | V, r) = peak / (1 + exp(-(constant + linear r + quadratic r^2))): Bayes' rule on Gaussian
+    resolutions of detected and of missed targets (equation 6) has this form; with equal variances it is a
+    logistic curve.
+
+    Attributes:
+        peak: bound of the probability.
+        constant, linear, quadratic: of the logarithm of the odds.
+    """
+
+    peak: float = 1.0
+    constant: float = 0.0
+    linear: float = 0.0
+    quadratic: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.peak <= 1.0:
+            raise EstimatorError(f"peak {self.peak:g} is not in 0..1, or is 0")
+        if not all(map(math.isfinite, (self.constant, self.linear, self.quadratic))):
+            raise EstimatorError("constant, linear, quadratic are not finite numbers")
+
+    @classmethod
+    def of_gaussians(
+        cls, *, detected: tuple[float, float], missed: tuple[float, float], rate: float
+    ) -> "DetectionRate":
+        """Equation 6.
+
+        Args:
+            detected, missed: mean and standard deviation of the resolution of detected and of missed targets.
+            rate: share of the targets in view that was detected.
+        """
+        (m1, s1), (m0, s0) = detected, missed
+        if not (s1 > 0.0 and s0 > 0.0 and 0.0 < rate < 1.0):
+            raise EstimatorError(f"rate {rate:g} is not between 0 and 1, or a deviation is not above 0")
+        return cls(
+            constant=math.log(rate / (1.0 - rate) * s0 / s1) - 0.5 * (m1 / s1) ** 2 + 0.5 * (m0 / s0) ** 2,
+            linear=m1 / s1**2 - m0 / s0**2,
+            quadratic=0.5 / s0**2 - 0.5 / s1**2,
+        )
+
+    @classmethod
+    def rising(cls, *, half_px: float, width_px: float, peak: float) -> "DetectionRate":
+        """A logistic curve: half of the peak at `half_px`, 73 % of it `width_px` later."""
+        if not width_px > 0.0:
+            raise EstimatorError(f"width_px {width_px:g} is not possible; give more than 0")
+        return cls(peak=peak, constant=-half_px / width_px, linear=1.0 / width_px)
+
+    def probability(self, resolution_px: Array | float) -> Array:
+        """The probability at resolutions."""
+        r = np.asarray(resolution_px, dtype=np.float64)
+        odds = self.constant + r * (self.linear + r * self.quadratic)
+        found: Array = self.peak / (1.0 + np.exp(-np.clip(odds, -700.0, 700.0)))
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SightModel:
+    """What a team knows about its detector and its target.
+
+    Attributes:
+        rate: probability of detection by the resolution.
+        target_size_m: side of the target.
+        false_rate: probability that a frame in which the target is not detected has a false detection,
+            anywhere in the picture with the same density (P_false of the paper).
+        pixel_sigma_px: error of a detection's place in the picture, per axis.
+        border_sides: a target is detected when its centre is farther than this from the border, in sides of
+            the target: 0.5 where all of it must be in the picture.
+
+    Raises:
+        EstimatorError: a value is not possible.
+    """
+
+    rate: DetectionRate
+    target_size_m: float
+    false_rate: float = 0.004
+    pixel_sigma_px: float = 1.0
+    border_sides: float = 0.6
+
+    def __post_init__(self) -> None:
+        for name in ("target_size_m", "pixel_sigma_px"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise EstimatorError(f"`{name}` {value:g} is not possible; give more than 0")
+        if not 0.0 < self.false_rate < 1.0:
+            raise EstimatorError(
+                f"false_rate {self.false_rate:g} is not between 0 and 1; without false detections one "
+                "wrong detection would be the end of the belief"
+            )
+        if not 0.0 <= self.border_sides <= 10.0:
+            raise EstimatorError(f"border_sides {self.border_sides:g} is not in 0..10")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseErrors:
+    """Standard deviations of a vehicle's own pose, and how long the errors last.
+
+    The errors of successive frames are correlated. `n` detections with errors of a first-order Gauss-Markov
+    process have the information 1 + (n - 1) (1 - rho) / (1 + rho) about a constant, in units of that of one,
+    with rho = exp(-dt / tau). So the likelihood of each detection but the first gets the variance times
+    (1 + rho) / (1 - rho): together they have the right information, whoever receives them.
+
+    Attributes:
+        forward_m, right_m: of the place, along and across the heading.
+        height_m: of the height above ground.
+        yaw_rad, pitch_rad, roll_rad: of the attitude.
+        mount_rad: of the camera's attitude on the vehicle, about each of its axes.
+        place_time_s, attitude_time_s: correlation times of place and height, and of all angles; 0:
+            independent frames, as in the paper.
+    """
+
+    forward_m: float = 0.3
+    right_m: float = 0.3
+    height_m: float = 0.5
+    yaw_rad: float = 0.02
+    pitch_rad: float = 0.005
+    roll_rad: float = 0.005
+    mount_rad: float = 0.0
+    place_time_s: float = 0.0
+    attitude_time_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise EstimatorError(f"`{name}` {value:g} is not possible; give 0 or more")
+
+    def weights(self, since_s: float | None) -> tuple[float, float]:
+        """Factors of the variances of place and of angles.
+
+        Args:
+            since_s: time since the vehicle's last detection; None: there was none.
+        """
+        return _weight(since_s, self.place_time_s), _weight(since_s, self.attitude_time_s)
+
+    def covariances(self, q_ned_from_frd: Quaternion, q_frd_from_mount: Quaternion) -> tuple[Array, Array]:
+        """Covariances of a pose, without weights.
+
+        Returns:
+            (3, 3) of the place, NED, m^2, and (3, 3) of the rotation about the camera's axes, rad^2.
+        """
+        roll, _, yaw = euler_of(q_ned_from_frd)
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        place = turn @ np.diag([self.forward_m**2, self.right_m**2, self.height_m**2]) @ turn.T
+        to_camera = conjugate(q_frd_from_mount)
+        axes = (
+            (self.roll_rad, (1.0, 0.0, 0.0)),
+            (self.pitch_rad, (0.0, math.cos(roll), -math.sin(roll))),
+            (self.yaw_rad, rotate(conjugate(q_ned_from_frd), (0.0, 0.0, 1.0))),
+        )
+        rotation = self.mount_rad**2 * np.eye(3)
+        for sigma_rad, axis_frd in axes:
+            axis = np.array(rotate(to_camera, axis_frd))
+            rotation += sigma_rad**2 * np.outer(axis, axis)
+        return place, rotation
+
+
+def _weight(since_s: float | None, time_s: float) -> float:
+    if since_s is None or time_s == 0.0:
+        return 1.0
+    rho = math.exp(-max(0.0, since_s) / time_s)
+    return min(_MOST_WEIGHT, (1.0 + rho) / max(1.0 - rho, 1.0 / _MOST_WEIGHT))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraSight:
+    """One frame: where a camera was, how well this is known, and what it detected.
+
+    Attributes:
+        place_ned_m: of the camera; the ground is at down = 0.
+        q_ned_from_mount: attitude of the camera's axes.
+        place_m2: (3, 3) covariance of the place, NED.
+        rotation_rad2: (3, 3) covariance of the rotation about the camera's axes.
+        weights: factors of both variances in the likelihood of a detection's place (`PoseErrors.weights`);
+            not in that of being in view.
+        width_px, height_px: size of the picture; its centre is on the optical axis.
+        focal_px: focal length.
+        distortion: k1, k2, p1, p2, k3 of Brown's model.
+        detections: (m, 2) a and b of the detections of the target; m = 0: none.
+
+    Raises:
+        EstimatorError: a value is not possible.
+    """
+
+    place_ned_m: Vector
+    q_ned_from_mount: Quaternion
+    place_m2: Array
+    rotation_rad2: Array
+    weights: tuple[float, float] = (1.0, 1.0)
+    width_px: int
+    height_px: int
+    focal_px: float
+    distortion: tuple[float, ...] = (0.0,) * 5
+    detections: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        numbers = (*self.place_ned_m, *self.q_ned_from_mount, self.focal_px, *self.distortion)
+        if not all(map(math.isfinite, numbers)):
+            raise EstimatorError("a camera's pose or geometry is not finite")
+        if not (self.width_px > 0 and self.height_px > 0 and self.focal_px > 0.0):
+            raise EstimatorError(
+                f"{self.width_px} x {self.height_px} px, focal length {self.focal_px:g} px is no picture"
+            )
+        if len(self.distortion) != 5:
+            raise EstimatorError(f"distortion {self.distortion} is not k1, k2, p1, p2, k3")
+        if self.detections.ndim != 2 or self.detections.shape[1] != 2:
+            raise EstimatorError(f"detections have the shape {self.detections.shape}, not (m, 2)")
+
+    @property
+    def height_m(self) -> float:
+        """Height of the camera above the ground."""
+        return -self.place_ned_m[2]
+
+    @property
+    def r_mount_from_ned(self) -> Array:
+        """(3, 3) rotation."""
+        return rotation_matrix(conjugate(self.q_ned_from_mount))
+
+    def blurred(self, variance_m2: float) -> "CameraSight":
+        """The same frame with a further variance of the place, north and east: of a target that has walked
+        since, or of the place in a cell.
+        """
+        if not variance_m2 > 0.0:
+            return self
+        return replace(self, place_m2=self.place_m2 + np.diag([variance_m2, variance_m2, 0.0]))
+
+
+def rotation_matrix(q: Quaternion) -> Array:
+    """(3, 3) matrix whose columns are the rotated axes."""
+    return np.array([rotate(q, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]).T

@@ -1,0 +1,309 @@
+"""The Bayes filter of a target's place on a grid, updated where a camera looks.
+
+Source: Tisdale et al. 2008, sections II and IV-A. A frame changes the cells of its footprint only, because
+the likelihood is relative to that of a place far away (`camera_likelihood`). The sum over all cells is kept
+up to date by what changed, and read anew when it has lost digits.
+"""
+
+import math
+from enum import StrEnum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from estimators.errors import EstimatorError
+from estimators.tracking.camera_likelihood import FrameLikelihood, relative_likelihood
+from estimators.tracking.camera_sight import CameraSight, SightModel
+from estimators.tracking.grid import GridLayout
+from flightsim.foundation.kernels import kernel
+
+__all__ = ["Scale", "SearchGrid"]
+
+Array = NDArray[np.float64]
+Cells = NDArray[Any]
+
+_LARGEST: Final = 1e25  # of a cell of the linear scale, before all are divided: float32 ends at 3e38
+_SMALLEST: Final = 1e-30  # below it a cell is 0: subnormal numbers are slow
+_LARGEST_LOG: Final = 50.0
+_LOST: Final = 1e-4  # share of the sum at which it has lost four digits
+_LEAST_STEP: Final = 0.1  # of a walk, in cells squared
+_THREE_CELLS: Final = 0.5  # variance in cells squared up to which three weights have the right one
+
+
+class Scale(StrEnum):
+    """What a cell's number is."""
+
+    LINEAR = "linear"
+    """The probability times a factor common to all cells; what falls below 1e-30 of the largest is lost."""
+    LOG = "log"
+    """Its logarithm, with the same precision for improbable cells; slower."""
+
+
+class SearchGrid:
+    """Probability of a target's place in square cells.
+
+    The place within a cell is one more error of the projection, with variance cell^2 / 12.
+
+    Args:
+        layout: the cells.
+        model: detector and target.
+        prior: (rows, columns), relative probability of each cell, finite, not negative; None: all equal.
+        scale: what the cells store.
+        dtype: float32 or float64.
+        walk_m_sqrt_s: standard deviation per axis of the target's walk in one second; it stays in the area.
+
+    Raises:
+        EstimatorError: the prior is no probability, or the type is another.
+    """
+
+    def __init__(
+        self,
+        layout: GridLayout,
+        model: SightModel,
+        *,
+        prior: Array | None = None,
+        scale: Scale = Scale.LINEAR,
+        dtype: Any = np.float64,
+        walk_m_sqrt_s: float = 0.0,
+    ) -> None:
+        if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
+            raise EstimatorError(f"dtype {np.dtype(dtype)} is not float32 or float64")
+        shape = (layout.rows, layout.columns)
+        start = np.ones(shape) if prior is None else np.asarray(prior, dtype=np.float64)
+        if start.shape != shape:
+            raise EstimatorError(f"the prior has {start.shape} cells, the map {shape}")
+        if not np.all(np.isfinite(start)) or np.any(start < 0.0) or not start.sum() > 0.0:
+            raise EstimatorError("the prior is no probability: finite, not negative, and not all 0 is one")
+        if not (math.isfinite(walk_m_sqrt_s) and walk_m_sqrt_s >= 0.0):
+            raise EstimatorError(f"walk_m_sqrt_s {walk_m_sqrt_s:g} is not possible; give 0 or more")
+        self.layout, self.model, self.scale = layout, model, scale
+        start = start / start.max()
+        with np.errstate(divide="ignore"):
+            self._cells: Cells = (np.log(start) if scale is Scale.LOG else start).astype(dtype)
+        self._within_m2 = layout.cell_m**2 / 12.0
+        self._walk_cells2_s = (walk_m_sqrt_s / layout.cell_m) ** 2
+        self._walked_cells2 = 0.0
+        self._offset = 0.0  # of the logarithms
+        self._sum = self._full_sum = self._summed()
+        self._undetected = 1.0
+        self._detected = False
+
+    def predict(self, dt_s: float) -> None:
+        """Diffuse the belief; short times are added up until they matter."""
+        self._walked_cells2 += self._walk_cells2_s * max(0.0, dt_s)
+        if self._walked_cells2 < _LEAST_STEP:
+            return
+        variance, self._walked_cells2 = self._walked_cells2, 0.0
+        p = self.probability()
+        if variance <= _THREE_CELLS:
+            p = _spread_by_three(_spread_by_three(p, variance).T, variance).T
+        else:
+            p = gaussian_filter(p, math.sqrt(variance), mode="reflect", truncate=5.0)
+        p = p / p.max()
+        self._offset = 0.0
+        with np.errstate(divide="ignore"):
+            self._cells[:] = np.log(p) if self.scale is Scale.LOG else p
+        self._sum = self._full_sum = self._summed()
+
+    def update(self, sight: CameraSight) -> float:
+        layout = self.layout
+        reach_m = (layout.rows + layout.columns) * layout.cell_m + math.dist(
+            sight.place_ned_m[:2], (layout.south_m, layout.west_m)
+        )
+        frame = FrameLikelihood.of(sight.blurred(self._within_m2), self.model, reach_m)
+        box = frame.box
+        if box is None:
+            return 1.0
+        first_row = max(0, math.floor((box[0] - layout.south_m) / layout.cell_m))
+        first_column = max(0, math.floor((box[1] - layout.west_m) / layout.cell_m))
+        rows = min(layout.rows, math.ceil((box[2] - layout.south_m) / layout.cell_m)) - first_row
+        columns = min(layout.columns, math.ceil((box[3] - layout.west_m) / layout.cell_m)) - first_column
+        if rows <= 0 or columns <= 0:
+            return 1.0
+        part = self._cells[first_row : first_row + rows, first_column : first_column + columns]
+        south_m = layout.south_m + (first_row + 0.5) * layout.cell_m
+        west_m = layout.west_m + (first_column + 0.5) * layout.cell_m
+        if self.scale is Scale.LOG:
+            before, after, largest = _add_logs(
+                part, south_m, west_m, layout.cell_m, frame.numbers, frame.detections, self._offset
+            )
+        else:
+            before, after, largest = _multiply(
+                part, south_m, west_m, layout.cell_m, frame.numbers, frame.detections
+            )
+        evidence = max(0.0, 1.0 + (after - before) / self._sum)
+        self._sum += after - before
+        self._count(sight, evidence)
+        self._keep_in_range(largest)
+        return evidence
+
+    def _count(self, sight: CameraSight, evidence: float) -> None:
+        self._detected = self._detected or bool(len(sight.detections))
+        if not self._detected:
+            self._undetected *= evidence
+
+    def _keep_in_range(self, largest: float) -> None:
+        """Read the sum anew when it has lost digits, and divide all cells when they become too large."""
+        too_large = largest > (math.exp(_LARGEST_LOG) if self.scale is Scale.LOG else _LARGEST)
+        if not too_large and self._sum > _LOST * self._full_sum:
+            self._full_sum = max(self._full_sum, self._sum)
+            return
+        most = float(self._cells.max())
+        if not math.isfinite(most) or (self.scale is Scale.LINEAR and most <= 0.0):
+            # nothing is left: what was observed has contradicted every place
+            self._cells[:] = 0.0 if self.scale is Scale.LOG else 1.0
+            self._offset = 0.0
+        elif self.scale is Scale.LOG:
+            self._offset = most
+        else:
+            self._cells /= most
+        self._sum = self._full_sum = self._summed()
+
+    def _summed(self) -> float:
+        if self.scale is Scale.LOG:
+            return float(np.exp(self._cells.astype(np.float64) - self._offset).sum())
+        return float(self._cells.sum(dtype=np.float64))
+
+    def probability(self) -> Array:
+        """(rows, columns), sum one."""
+        if self.scale is Scale.LOG:
+            cells = self._cells.astype(np.float64)
+            p: Array = np.exp(cells - cells.max())
+        else:
+            p = self._cells.astype(np.float64)
+        return np.asarray(p / p.sum())
+
+    @property
+    def probability_of_detection(self) -> float:
+        return 1.0 - self._undetected
+
+    @property
+    def mode_ne_m(self) -> tuple[float, float]:
+        """Centre of the most probable cell."""
+        row, column = np.unravel_index(int(np.argmax(self._cells)), self._cells.shape)
+        return self.layout.centre_of((int(row), int(column)))
+
+    def moments(self) -> tuple[Array, Array]:
+        p = self.probability() if self.scale is Scale.LOG else self._cells
+        layout = self.layout
+        per_column = np.zeros(layout.columns)
+        total, row1, column1, row2, column2, cross = _index_moments(p, per_column)
+        mean_row, mean_column = row1 / total, column1 / total
+        side = layout.cell_m
+        mean = np.array(
+            [layout.south_m + (mean_row + 0.5) * side, layout.west_m + (mean_column + 0.5) * side]
+        )
+        across = cross / total
+        within = 1.0 / 12.0
+        covariance = side**2 * np.array([[row2 / total + within, across], [across, column2 / total + within]])
+        return mean, covariance
+
+    @property
+    def entropy_nats(self) -> float:
+        p = self.probability()
+        p = p[p > 0.0]
+        return float(-np.sum(p * np.log(p))) + 2.0 * math.log(self.layout.cell_m)
+
+    def shares(self, layout: GridLayout) -> Array:
+        p = self.probability()
+        own = self.layout
+        north, east = own.centres()
+        rows = np.clip(((north[:, 0] - layout.south_m) / layout.cell_m).astype(np.int64), 0, layout.rows - 1)
+        columns = np.clip(((east[0] - layout.west_m) / layout.cell_m).astype(np.int64), 0, layout.columns - 1)
+        by_rows = np.zeros((layout.rows, own.columns))
+        np.add.at(by_rows, rows, p)
+        out = np.zeros((layout.columns, layout.rows))
+        np.add.at(out, columns, by_rows.T)
+        return np.ascontiguousarray(out.T)
+
+
+def _spread_by_three(p: Array, variance: float) -> Array:
+    """One step of a walk along the first axis, with the weights v/2, 1 - v, v/2; the area's edges reflect."""
+    moved: Array = (1.0 - variance) * p
+    moved[1:] += 0.5 * variance * p[:-1]
+    moved[:-1] += 0.5 * variance * p[1:]
+    moved[0] += 0.5 * variance * p[0]
+    moved[-1] += 0.5 * variance * p[-1]
+    return moved
+
+
+@kernel
+def _multiply(
+    cells: Cells, south_m: float, west_m: float, cell_m: float, s: Array, detections: Array
+) -> tuple[float, float, float]:
+    """Multiply cells by the likelihood of a frame; returns their sum before and after, and the largest."""
+    before, after, largest = 0.0, 0.0, 0.0
+    for i in range(cells.shape[0]):
+        north = south_m + i * cell_m
+        for j in range(cells.shape[1]):
+            old = float(cells[i, j])
+            if old == 0.0:
+                continue
+            new = old * relative_likelihood(north, west_m + j * cell_m, s, detections)
+            if new < _SMALLEST:
+                new = 0.0
+            cells[i, j] = new
+            before += old
+            after += new
+            largest = max(largest, new)
+    return before, after, largest
+
+
+@kernel
+def _add_logs(
+    cells: Cells, south_m: float, west_m: float, cell_m: float, s: Array, detections: Array, offset: float
+) -> tuple[float, float, float]:
+    """Add the logarithm of the likelihood to cells; returns their sum before and after, and the largest, all
+    of exp(cell - offset).
+    """
+    before, after, largest = 0.0, 0.0, 0.0
+    for i in range(cells.shape[0]):
+        north = south_m + i * cell_m
+        for j in range(cells.shape[1]):
+            likelihood = relative_likelihood(north, west_m + j * cell_m, s, detections)
+            if likelihood == 1.0:
+                continue
+            old = math.exp(cells[i, j] - offset)
+            cells[i, j] += math.log(likelihood) if likelihood > 0.0 else -1e30
+            new = old * likelihood
+            before += old
+            after += new
+            largest = max(largest, new)
+    return before, after, largest
+
+
+@kernel
+def _index_moments(p: Cells, per_column: Array) -> tuple[float, float, float, float, float, float]:
+    """Sum, sums of p times row and column, and central second moments: of rows, of columns, and of both.
+
+    Args:
+        p: (rows, columns), not negative.
+        per_column: (columns,) zeros; gets the sum of each column.
+    """
+    rows, columns = p.shape
+    per_row = np.zeros(rows)
+    along = np.zeros(rows)
+    for i in range(rows):
+        total, first = 0.0, 0.0
+        for j in range(columns):
+            value = float(p[i, j])
+            per_column[j] += value
+            total += value
+            first += value * j
+        per_row[i], along[i] = total, first
+    total = per_row.sum()
+    row1, column1 = 0.0, along.sum()
+    for i in range(rows):
+        row1 += per_row[i] * i
+    mean_row, mean_column = row1 / total, column1 / total
+    row2, column2, cross = 0.0, 0.0, 0.0
+    for i in range(rows):
+        off = i - mean_row
+        row2 += per_row[i] * off * off
+        cross += off * (along[i] - mean_column * per_row[i])
+    for j in range(columns):
+        off = j - mean_column
+        column2 += per_column[j] * off * off
+    return total, row1, column1, row2, column2, cross

@@ -1,0 +1,144 @@
+"""Frames of cameras from their messages: placed by the vehicle's own pose, thinned, and known by their
+numbers.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.mavlink.camera_scan import CameraScan
+from autopilot_bridge.mavlink.search_likelihood import SearchLikelihood
+from estimators.messages import Message
+from estimators.tracking.camera_sight import MAX_DETECTIONS, CameraSight, PoseErrors
+from estimators.vision.vehicle_track import VehicleTrack
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.vectors import from_euler, product, rotate
+
+__all__ = ["Camera", "likelihood_of", "sight_of"]
+
+_KEPT: Final = 8  # exposures with detections whose frame has not ended
+_REMEMBERED: Final = 20_000  # frames by number
+
+
+@dataclass(slots=True)
+class Camera:
+    """One vehicle and its camera.
+
+    Attributes:
+        track: its pose over time, in the area's frame.
+        home: its home.
+        position: its newest position.
+        offset_us: from its vehicle time to the time common to all.
+        counts: frames by what became of them.
+        last_used_us: exposure of the last frame that was used.
+        last_detected_us: exposure of the last detection that was used.
+    """
+
+    track: VehicleTrack = field(default_factory=VehicleTrack)
+    home: GeodeticPosition | None = None
+    position: Message | None = None
+    attitude_us: int = -1
+    offset_us: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    last_used_us: int | None = None
+    last_detected_us: int | None = None
+    _pending: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    _known: dict[tuple[int, int], None] = field(default_factory=dict)
+
+    def take_detection(self, exposed_us: int, angle_x_rad: float, angle_y_rad: float) -> None:
+        """Keep a detection until the frame's end is received; one that is received twice counts once."""
+        pairs = self._pending.setdefault(exposed_us, [])
+        pair = (math.tan(angle_x_rad), math.tan(angle_y_rad))
+        if pair not in pairs:
+            pairs.append(pair)
+        while len(self._pending) > _KEPT:
+            del self._pending[min(self._pending)]
+
+    def detections(self, exposed_us: int) -> tuple[tuple[float, float], ...]:
+        """The detections of a frame that has ended."""
+        found = self._pending.pop(exposed_us, [])
+        for older in [time_us for time_us in self._pending if time_us < exposed_us]:
+            del self._pending[older]
+        return tuple(found[:MAX_DETECTIONS])
+
+    def is_new(self, number: int, exposed_us: int) -> bool:
+        """Whether a frame was not received before, by whatever message; it is remembered."""
+        key = (number, exposed_us)
+        if key in self._known:
+            return False
+        self._known[key] = None
+        if len(self._known) > _REMEMBERED:
+            del self._known[next(iter(self._known))]
+        return True
+
+    def is_due(self, exposed_us: int, period_s: float) -> bool:
+        """Whether enough time has passed since the last used frame; after a reboot it has."""
+        last_us = self.last_used_us
+        return last_us is None or exposed_us < last_us or (exposed_us - last_us) >= 1e6 * period_s - 1e3
+
+    def since_detection_s(self, exposed_us: int) -> float | None:
+        """Time since the vehicle's last detection; None: there was none."""
+        if self.last_detected_us is None or exposed_us < self.last_detected_us:
+            return None
+        return (exposed_us - self.last_detected_us) * 1e-6
+
+
+def likelihood_of(
+    camera: Camera,
+    scan: CameraScan,
+    detections: tuple[tuple[float, float], ...],
+    errors: PoseErrors,
+    frame: LocalFrame,
+    tag_id: int,
+) -> SearchLikelihood | None:
+    """The parameters of a frame's likelihood; None: no pose near its time is known, or the camera is on a
+    gimbal.
+    """
+    pose = camera.track.at(scan.time_us)
+    if pose is None or scan.mount_rad is None:
+        return None
+    q_frd_from_mount = from_euler(*scan.mount_rad)
+    arm = rotate(pose.q_ned_from_frd, scan.position_frd_m)
+    north_m, east_m, down_m = (p + a for p, a in zip(pose.pos_ned_m, arm, strict=True))
+    lat_deg, lon_deg, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
+    place, rotation = errors.covariances(pose.q_ned_from_frd, q_frd_from_mount)
+    return SearchLikelihood(
+        tag_id=tag_id,
+        number=scan.number,
+        time_us=scan.time_us,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        height_m=-down_m,
+        q_ned_from_mount=product(pose.q_ned_from_frd, q_frd_from_mount),
+        place_m2=(place[0, 0], place[0, 1], place[1, 1], place[2, 2]),
+        rotation_rad2=(*rotation[0], rotation[1, 1], rotation[1, 2], rotation[2, 2]),
+        weights=errors.weights(camera.since_detection_s(scan.time_us)) if detections else (1.0, 1.0),
+        width_px=scan.width_px,
+        height_px=scan.height_px,
+        focal_px=scan.focal_px,
+        distortion=scan.distortion,
+        detections=detections,
+    )
+
+
+def sight_of(likelihood: SearchLikelihood, frame: LocalFrame) -> CameraSight:
+    """A frame in the area's own coordinates."""
+    m = likelihood
+    north_m, east_m, _ = frame.ned_from_geodetic(m.lat_deg, m.lon_deg, frame.origin.alt_m)
+    nn, ne, ee, dd = m.place_m2
+    xx, xy, xz, yy, yz, zz = m.rotation_rad2
+    return CameraSight(
+        place_ned_m=(north_m, east_m, -m.height_m),
+        q_ned_from_mount=m.q_ned_from_mount,
+        place_m2=np.array([[nn, ne, 0.0], [ne, ee, 0.0], [0.0, 0.0, dd]]),
+        rotation_rad2=np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]),
+        weights=m.weights,
+        width_px=m.width_px,
+        height_px=m.height_px,
+        focal_px=m.focal_px,
+        distortion=m.distortion,
+        detections=np.array(m.detections, dtype=np.float64).reshape(-1, 2),
+    )
