@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import all as dialect
 
 __all__ = ["VEHICLE_RANGE_PAYLOAD", "VehicleRange", "range_message", "read_range_payload"]
 
-VEHICLE_RANGE_PAYLOAD: Final = 0xF518
+VEHICLE_RANGE_PAYLOAD: Final = 0xF519
 """Payload type; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""
 
 _VERSION: Final = 1

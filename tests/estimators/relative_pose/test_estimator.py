@@ -146,7 +146,7 @@ def test_other_aircraft_and_other_ranges_are_ignored():
         for system, to in ((4, 2), (1, 3)):
             other = VehicleRange(to_system=to, number=k, time_us=k, range_m=5.0, sigma_m=3.0)
             crowd.say(range_message(other), system, 27)
-        crowd.say(dialect.MAVLink_tunnel_message(0, 0, 0xF518, 20, [9] * 128), 1, 27)
+        crowd.say(dialect.MAVLink_tunnel_message(0, 0, 0xF519, 20, [9] * 128), 1, 27)
     assert alone.rows == crowd.rows
     assert crowd.runner.estimator.remarks()["ranges_lost"] == 0.0
 
