@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from autopilot_bridge.clock.pacing import wall_time_s
 from estimators.magnetic_identification import particles as p
 from estimators.magnetic_identification.classes import GaussianClass
-from estimators.magnetic_identification.hypotheses import Control, GaussianHypothesis, Measurement
+from estimators.magnetic_identification.hypotheses import Control, Measurement
+from estimators.magnetic_identification.particle_hypotheses import GaussianHypothesis
 
 Array = NDArray[np.float64]
 

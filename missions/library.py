@@ -47,6 +47,12 @@ def _multi_target() -> Mission[Any]:
     return MultiTargetMission()
 
 
+def _vision_search() -> Mission[Any]:
+    from missions.vision_search.mission import VisionSearchMission
+
+    return VisionSearchMission()
+
+
 def _survey() -> Mission[Any]:
     from missions.survey.mission import SurveyMission
 
@@ -68,6 +74,7 @@ class _NamedMissions(Mapping[str, Mission[Any]]):
             "occupancy": _occupancy,
             "multi-target": _multi_target,
             "survey": _survey,
+            "vision-search": _vision_search,
         }
     )
 

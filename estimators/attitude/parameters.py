@@ -10,6 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.checks import require_members
+
 TRIM_LIMIT_RAD: Final = 0.3
 """ArduPilot itself accepts 10 degrees."""
 
@@ -133,9 +135,7 @@ class AttitudeParameters:
     reference_time_s: float = 3.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vehicle", _choice(VehicleKind, "vehicle", self.vehicle))
-        object.__setattr__(self, "imu", _choice(ImuSource, "imu", self.imu))
-        object.__setattr__(self, "airspeed", _choice(AirspeedSource, "airspeed", self.airspeed))
+        require_members(self, vehicle=VehicleKind, imu=ImuSource, airspeed=AirspeedSource)
         for name, (low, high) in _RANGES.items():
             value = getattr(self, name)
             if value is None:
@@ -179,13 +179,6 @@ _RANGES: Final[dict[str, tuple[float, float]]] = {
     "reference_time_s": (0.01, 100.0),
 }
 _MAY_BE_INFINITE: Final = frozenset(name for name, (_, high) in _RANGES.items() if not isfinite(high))
-
-
-def _choice(kind: type[StrEnum], name: str, value: str) -> StrEnum:
-    try:
-        return kind(value)
-    except ValueError:
-        raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}") from None
 
 
 # Order of the coefficients for the compiled step: every numeric parameter, by its name.

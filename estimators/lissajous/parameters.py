@@ -5,6 +5,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from flightsim.foundation.checks import (
+    named,
+    require_finite,
+    require_members,
+    require_not_negative,
+    require_positive,
+)
+
 
 class Form(StrEnum):
     """The three estimators of Steckenrider et al. 2020, Table IV."""
@@ -82,24 +90,20 @@ class LissajousParameters:
     history_s: float = 2.0
 
     def __post_init__(self) -> None:
-        for name, kind in (("form", Form), ("source", Source)):
-            value = getattr(self, name)
-            if value not in tuple(kind):
-                raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}")
-            object.__setattr__(self, name, kind(value))
-        for name in ("omega_x_rad_s", "omega_y_rad_s", "max_gap_s", "history_s"):
-            _require(name, getattr(self, name), above_zero=True)
-        for name in ("epsilon_rad_s", "acceleration_psd_m2_s3", "frequency_walk_rad2_s3", "off_pattern_gate"):
-            _require(name, getattr(self, name), above_zero=False)
-        for name in ("orientation_rad", "centre_north_m", "centre_east_m", "position_delay_s"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} {getattr(self, name)} is not a finite number")
+        require_members(self, form=Form, source=Source)
+        require_positive(
+            **named(self, "omega_x_rad_s", "omega_y_rad_s", "max_gap_s", "history_s"),
+            **named(self, "position_sigma_m", "velocity_sigma_m_s"),
+        )
+        require_not_negative(
+            **named(self, "epsilon_rad_s", "acceleration_psd_m2_s3", "frequency_walk_rad2_s3"),
+            off_pattern_gate=self.off_pattern_gate,
+        )
+        require_finite(
+            **named(self, "orientation_rad", "centre_north_m", "centre_east_m", "position_delay_s")
+        )
         if self.frequency and self.form is not Form.PROPOSED:
             raise ValueError(f"frequency with form={self.form}: correcting frequencies needs form=proposed")
-        for name in ("position_sigma_m", "velocity_sigma_m_s"):
-            value = getattr(self, name)
-            if value is not None:
-                _require(name, value, above_zero=True)
         if (self.centre_lat_deg is None) != (self.centre_lon_deg is None):
             raise ValueError("centre_lat_deg and centre_lon_deg go together; give both or neither")
         lat_deg, lon_deg = self.centre_lat_deg or 0.0, self.centre_lon_deg or 0.0
@@ -116,9 +120,3 @@ class LissajousParameters:
     def has_centre(self) -> bool:
         """Whether the pattern's centre is specified by coordinates."""
         return self.centre_lat_deg is not None
-
-
-def _require(name: str, value: float, *, above_zero: bool) -> None:
-    if not (math.isfinite(value) and (value > 0.0 if above_zero else value >= 0.0)):
-        accepted = "a number above 0" if above_zero else "0 or a number above it"
-        raise ValueError(f"{name} {value:g} is not accepted: {accepted} is")

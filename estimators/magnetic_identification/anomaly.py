@@ -7,7 +7,7 @@ evidences (Bayes). The paper's filter, with white noise and a fixed signature, r
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -17,18 +17,21 @@ from estimators.magnetic_identification.classes import AnomalyClass, GaussianCla
 from estimators.magnetic_identification.hypotheses import (
     Before,
     Control,
-    DipoleHypothesis,
-    GaussianHypothesis,
     Hypothesis,
     Measurement,
-    ParticleHypothesis,
     ShapelessHypothesis,
 )
 from estimators.magnetic_identification.parameters import IdentificationParameters
+from estimators.magnetic_identification.particle_hypotheses import (
+    DipoleHypothesis,
+    GaussianHypothesis,
+    ParticleHypothesis,
+)
+from estimators.magnetic_identification.samples import Place, Sample, TracePoint
 from estimators.occupancy.detection import MapError
 from estimators.tracking.modes import Mode, find_modes
 
-__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly", "Sample", "TracePoint"]
+__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly"]
 
 Array = NDArray[np.float64]
 
@@ -40,51 +43,7 @@ _BACKGROUND_PRIOR: Final = 0.3  # of what is no target
 _UNKNOWN_PRIOR: Final = 0.1
 _LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
 _TRACE_SIGMAS: Final = 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """Averaged readings of one vehicle.
-
-    Attributes:
-        time_us: vehicle time of the middle.
-        vehicle: number of the vehicle.
-        north_m, east_m, height_m: mean place from the map's home.
-        course_rad: course of the vehicle over ground.
-        residual_nt: mean of reading less map, less level.
-        readings: number of readings.
-    """
-
-    time_us: int
-    vehicle: int
-    north_m: float
-    east_m: float
-    height_m: float
-    course_rad: float
-    residual_nt: float
-    readings: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TracePoint:
-    """The state after one measurement.
-
-    Attributes:
-        time_us: vehicle time.
-        number: number of the pass, from 0.
-        residual_nt: the measurement.
-        confidence: the paper's C_t, per particle and over its greatest value; NaN: no class has it.
-        probability: that the anomaly is one of the targets.
-        evidence: logarithm of the evidence of the most probable target, less that of the most probable other
-            explanation.
-    """
-
-    time_us: int
-    number: int
-    residual_nt: float
-    confidence: float
-    probability: float
-    evidence: float
+_SHIFTS: Final = 8  # of a place to the mean around it
 
 
 class Anomaly:
@@ -179,6 +138,10 @@ class Anomaly:
             self._loudest = sample
         self._note(sample, confidence)
 
+    def restore(self, kept: "Anomaly") -> None:
+        """Return to the state of an earlier copy (`copy.deepcopy`), which must not be used any more."""
+        self.__dict__.update(kept.__dict__)
+
     def _before(self, first: Sample, last: Sample | None, threshold_nt: float) -> Before | None:
         """The measurement before the first one beyond the threshold, if the track entered the anomaly
         between them.
@@ -249,6 +212,12 @@ class Anomaly:
         return shares / shares.sum()
 
     @property
+    def log_density(self) -> float:
+        """Logarithm of the density of all its measurements, whichever hypothesis is right."""
+        logs = self._log_prior + self.log_evidence
+        return float(logs.max() + np.log(np.exp(logs - logs.max()).sum()))
+
+    @property
     def probability(self) -> float:
         """Probability that the anomaly is one of the targets."""
         return float(self.probabilities[self._sought].sum())
@@ -265,17 +234,29 @@ class Anomaly:
                 self._place_ne_m = self._in_map(float(forward_m), float(right_m))
         return self._place_ne_m
 
-    @property
-    def place_sigma_m(self) -> float:
-        """Standard deviation of the place of the most probable target, the larger of both axes."""
+    def likeliest_place(self, radius_m: float) -> Place:
+        """Where the anomaly is if it is the most probable target: the place with the largest share of the
+        belief within a radius. It is found by mean shift from each mode (Fukunaga and Hostetler 1975), so
+        mirror modes are not averaged to a place where the target is not.
+        """
         best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
         hypothesis = self._hypotheses[best]
         if not isinstance(hypothesis, ParticleHypothesis):
-            return math.inf
-        places, weights = hypothesis.sources()[:, :2], hypothesis.weights
-        off = places - weights @ places
-        covariance = (off * weights[:, None]).T @ off
-        return math.sqrt(float(np.linalg.eigvalsh(covariance)[-1]))
+            return Place(north_m=self._loudest.north_m, east_m=self._loudest.east_m, share=0.0)
+        sources, weights = hypothesis.sources(), hypothesis.weights
+        found = []
+        for mode in find_modes(sources, weights):
+            centre = np.array(mode.mean[:2])
+            for _ in range(_SHIFTS):
+                inside = np.sum((sources[:, :2] - centre) ** 2, axis=1) <= radius_m * radius_m
+                share = float(weights[inside].sum())
+                if share <= 0.0:
+                    break
+                centre = weights[inside] @ sources[inside, :2] / share
+            found.append((share, *centre.tolist()))
+        share, forward_m, right_m = max(found, default=(0.0, 0.0, 0.0))
+        north_m, east_m = self._in_map(forward_m, right_m)
+        return Place(north_m=north_m, east_m=east_m, share=share)
 
     def modes(self) -> list[Mode]:
         """The modes under the most probable target: north and east from the map's home, axis from north."""

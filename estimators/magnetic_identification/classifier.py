@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.magnetic_identification.anomaly import TracePoint
+from estimators.magnetic_identification.samples import TracePoint
 
 __all__ = ["FEATURES", "TraceClassifier", "shipped_classifier", "trace_features"]
 

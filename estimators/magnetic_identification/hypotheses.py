@@ -1,42 +1,20 @@
-"""The hypotheses about one anomaly, each with its evidence: a particle filter for each class of anomaly, and
-the map's error or a body of unknown shape without a signature.
+"""What a hypothesis about one anomaly takes and gives, and the hypotheses without a signature: the error of
+the map, and a body of unknown shape. Those of classes are in `particle_hypotheses`.
 
-The evidence of a hypothesis is the probability density of all measurements under it: the product of the
-means of the particles' likelihoods. The paper's confidence (7) is the same mean without memory, each weight
-over its greatest possible value.
+The evidence of a hypothesis is the probability density of all measurements under it, given that they begin an
+anomaly.
 """
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.magnetic_identification import particles as p
-from estimators.magnetic_identification.classes import DipoleClass, GaussianClass
-from estimators.tracking.resampling import effective_count, roulette, systematic
-
-__all__ = [
-    "Before",
-    "Control",
-    "DipoleHypothesis",
-    "GaussianHypothesis",
-    "Hypothesis",
-    "Measurement",
-    "ParticleHypothesis",
-    "ShapelessHypothesis",
-]
+__all__ = ["Before", "Control", "Hypothesis", "Measurement", "ShapelessHypothesis", "log_beyond"]
 
 Array = NDArray[np.float64]
-
-_FARTHEST: Final = 3.5  # standard deviations at which an anomaly of a Gaussian class can begin
-_RESAMPLED_BELOW: Final = 0.5  # of the particles: effective number
-_LEAST_INSIDE: Final = 0.01  # share of that ellipse beyond the threshold, for a class that hardly exceeds it
-_DRAWS: Final = 4096  # simulated passes for the probability of a beginning
-_LEAST_BEGINNINGS: Final = 1e-4  # share of those that begin an anomaly, for a class that hardly does
-_SPREAD_EVERY: Final = 4  # one particle of so many starts anywhere in that ellipse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,11 +116,11 @@ class ShapelessHypothesis:
         variance_nt2 = map_nt2 if self._correlation_m is None else self._sigma_nt2
         self._mean_nt, self._variance_nt2 = 0.0, variance_nt2
         if before is None:
-            beyond = _beyond(threshold_nt, np.array([math.sqrt(variance_nt2 + seen.white_nt2)]))
+            beyond = log_beyond(threshold_nt, np.array([math.sqrt(variance_nt2 + seen.white_nt2)]))
             return self._update(seen)[0] - beyond
         total_nt2 = variance_nt2 + before.seen.white_nt2
         correlation = self._decay(before.control)[0] * variance_nt2 / total_nt2
-        beginning = _entering(threshold_nt / math.sqrt(total_nt2), correlation)
+        beginning = _log_entering(threshold_nt / math.sqrt(total_nt2), correlation)
         return self._update(before.seen)[0] + self.step(before.control, seen)[0] - beginning
 
     def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
@@ -168,300 +146,14 @@ class ShapelessHypothesis:
         return -0.5 * (fit + math.log(math.tau * total_nt2)), math.exp(-0.5 * fit)
 
 
-class ParticleHypothesis(ABC):
-    """What the filters of both forms share: motion and resampling.
-
-    Attributes:
-        particles: (n, width), see `particles`.
-        weights: (n,), sum one.
-    """
-
-    def __init__(self, width: int, count: int, rng: np.random.Generator, *, by_roulette: bool) -> None:
-        self.particles: Array = np.zeros((count, width))
-        self.weights: Array = np.full(count, 1.0 / count)
-        self._other = np.empty_like(self.particles)
-        self._noise = np.empty((2, count))
-        self._fits = np.empty((count, 2))
-        self._chosen = np.empty(count, dtype=np.int64)
-        self._rng = rng
-        self._by_roulette = by_roulette
-
-    @abstractmethod
-    def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
-        """Logarithm of the evidence of a measurement, and the mean fit; sets the weights."""
-
-    def _weigh_beginning(self, seen: Measurement, before: Before) -> float:
-        """Weigh by the last measurement within the threshold and by the first one beyond it, where the
-        particles are now; logarithm of the density of both.
-        """
-        control, still = before.control, np.zeros_like(self._noise)
-        p.move(self.particles, -control.forward_m, -control.right_m, 0.0, still, 0.0, 0.0)
-        density = self._weigh(before.seen, 1.0, 0.0)[0]
-        p.move(self.particles, control.forward_m, control.right_m, 0.0, still, 0.0, 0.0)
-        return density + self._weigh(seen, control.decay, control.drive_nt2)[0]
-
-    def _log_beginnings(
-        self, signals: tuple[Array, Array], map_nt2: float, threshold_nt: float, before: Before
-    ) -> float:
-        """Logarithm of the share of simulated places at which an anomaly begins.
-
-        Args:
-            signals: (n,) each: signals at the place of the measurement before, and here.
-            map_nt2, threshold_nt, before: as of `start`.
-        """
-        errors = self._rng.standard_normal((4, signals[0].size))
-        map_then = math.sqrt(map_nt2) * errors[0]
-        map_now = before.control.decay * map_then + math.sqrt(before.control.drive_nt2) * errors[1]
-        white_nt = math.sqrt(before.seen.white_nt2)
-        then_nt = signals[0] + map_then + white_nt * errors[2]
-        now_nt = signals[1] + map_now + white_nt * errors[3]
-        begins = (np.abs(then_nt) <= threshold_nt) & (np.abs(now_nt) > threshold_nt)
-        return math.log(max(float(np.mean(begins)), _LEAST_BEGINNINGS))
-
-    def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
-        if effective_count(self.weights) < _RESAMPLED_BELOW * self.weights.size:
-            self._resample()
-        self._rng.standard_normal(out=self._noise)
-        p.move(
-            self.particles,
-            control.forward_m,
-            control.right_m,
-            control.turn_rad,
-            self._noise,
-            control.forward_sigma_m,
-            control.turn_sigma_rad,
-        )
-        return self._weigh(seen, control.decay, control.drive_nt2)
-
-    def _resample(self) -> None:
-        if self._by_roulette:
-            marks = np.sort(self._rng.random(self.weights.size))
-            roulette(self.weights, marks, self._chosen)
-        else:
-            systematic(self.weights, float(self._rng.random()), self._chosen)
-        p.copy_chosen(self._chosen, self.particles, self._other)
-        self.particles, self._other = self._other, self.particles
-        self.weights[:] = 1.0 / self.weights.size
-
-    def predicted_nt(self, forward_m: Array, right_m: Array, height_m: float, count: int) -> Array:
-        """Anomaly at places in the frame of the vehicle, (count, places), for as many equally probable
-        particles.
-        """
-        chosen = np.empty(count, dtype=np.int64)
-        systematic(self.weights, 0.5, chosen)
-        rows = self.particles[chosen]
-        cosine, sine = rows[:, p.COS, None], rows[:, p.SIN, None]
-        x = rows[:, p.X, None] + cosine * forward_m - sine * right_m
-        y = rows[:, p.Y, None] + sine * forward_m + cosine * right_m
-        return self._signals(rows, x, y, height_m)
-
-    @abstractmethod
-    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
-        """Signals, nT, that particles predict at places of their target's frame."""
-
-    def sources(self) -> Array:
-        """(n, 3) forward and right of the vehicle, and axis relative to its course (8)."""
-        out = np.empty((self.weights.size, 3))
-        p.relative_sources(self.particles, out)
-        return out
-
-
-class GaussianHypothesis(ParticleHypothesis):
-    """The anomaly is of a class with a Gaussian signature."""
-
-    def __init__(
-        self, of: GaussianClass, count: int, rng: np.random.Generator, *, by_roulette: bool = False
-    ) -> None:
-        super().__init__(p.GAUSSIAN, count, rng, by_roulette=by_roulette)
-        self._class = of
-        self._signature = np.array([of.amplitude_nt, of.sigma_along_m, of.sigma_across_m])
-
-    def start(
-        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
-    ) -> float:
-        """Put the particles on the level curves of the first measurement (section III-C).
-
-        Before the measurement every place is as probable within the ellipse of 3.5 standard deviations. The
-        level of a particle is drawn around the measurement, some are drawn from the whole ellipse, and the
-        weight is the ratio of both densities (importance sampling).
-        """
-        of, rng, count = self._class, self._rng, self.weights.size
-        amplitude_nt, level_nt = abs(of.amplitude_nt), math.copysign(1.0, of.amplitude_nt) * seen.residual_nt
-        sigma_nt = math.sqrt(seen.white_nt2 + map_nt2 + (of.amplitude_spread * level_nt) ** 2)
-        lowest_nt = amplitude_nt * math.exp(-0.5 * _FARTHEST**2)
-        # the square of the distance in standard deviations is uniform over the area of an ellipse
-        square = _FARTHEST**2 * rng.random(count)
-        drawn_nt = level_nt + sigma_nt * rng.standard_normal(count)
-        on_level = (np.arange(count) % _SPREAD_EVERY > 0) & (drawn_nt > lowest_nt) & (drawn_nt < amplitude_nt)
-        square[on_level] = -2.0 * np.log(drawn_nt[on_level] / amplitude_nt)
-        there_nt = amplitude_nt * np.exp(-0.5 * square)
-        density = np.exp(-0.5 * ((there_nt - level_nt) / sigma_nt) ** 2) / (sigma_nt * math.sqrt(math.tau))
-        share = float(np.mean(on_level))
-        ratio = (
-            share
-            * 0.5
-            * _FARTHEST**2
-            * density
-            * there_nt
-            / max(
-                _normal_share((lowest_nt - level_nt) / sigma_nt, (amplitude_nt - level_nt) / sigma_nt), 1e-12
-            )
-            + 1.0
-            - share
-        )
-        self.weights[:] = 1.0 / (count * ratio)
-        particles = self.particles
-        particles[:] = 0.0
-        angle, axis = rng.uniform(-math.pi, math.pi, (2, count))
-        size = np.exp(of.size_spread * rng.standard_normal(count))
-        particles[:, p.X] = np.sqrt(square) * np.cos(angle) * of.sigma_along_m * size
-        particles[:, p.Y] = np.sqrt(square) * np.sin(angle) * of.sigma_across_m * size
-        particles[:, p.COS], particles[:, p.SIN] = np.cos(axis), np.sin(axis)
-        particles[:, p.SIZE] = size
-        particles[:, p.AMPLITUDE] = 1.0
-        particles[:, p.AMPLITUDE_VAR] = of.amplitude_spread**2
-        particles[:, p.MAP_VAR] = map_nt2
-        if before is not None:
-            signals = self._simulated(before.control)
-            return self._weigh_beginning(seen, before) - self._log_beginnings(
-                signals, map_nt2, threshold_nt, before
-            )
-        inside = -2.0 * math.log(min(1.0, max(threshold_nt, lowest_nt) / amplitude_nt)) / _FARTHEST**2
-        return self._weigh(seen, 1.0, 0.0)[0] - math.log(max(inside, _LEAST_INSIDE))
-
-    def _simulated(self, control: Control) -> tuple[Array, Array]:
-        """Signals before a step and after it, for steps that end anywhere in the ellipse."""
-        of, rng = self._class, self._rng
-        size = np.exp(of.size_spread * rng.standard_normal(_DRAWS))
-        along_m, across_m = of.sigma_along_m * size, of.sigma_across_m * size
-        distance, angle = _FARTHEST * np.sqrt(rng.random(_DRAWS)), rng.uniform(-math.pi, math.pi, _DRAWS)
-        x, y = distance * np.cos(angle) * along_m, distance * np.sin(angle) * across_m
-        course, step_m = (
-            rng.uniform(-math.pi, math.pi, _DRAWS),
-            math.hypot(control.forward_m, control.right_m),
-        )
-        amplitude_nt = of.amplitude_nt * (1.0 + of.amplitude_spread * rng.standard_normal(_DRAWS))
-        then_x, then_y = x - step_m * np.cos(course), y - step_m * np.sin(course)
-        then_nt, now_nt = (
-            amplitude_nt * np.exp(-0.5 * ((a / along_m) ** 2 + (b / across_m) ** 2))
-            for a, b in ((then_x, then_y), (x, y))
-        )
-        return then_nt, now_nt
-
-    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
-        amplitude_nt, along_m, across_m = self._signature
-        size = rows[:, p.SIZE, None]
-        square = (x / (along_m * size)) ** 2 + (y / (across_m * size)) ** 2
-        signals: Array = amplitude_nt * rows[:, p.AMPLITUDE, None] * np.exp(-0.5 * square)
-        return signals
-
-    def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
-        return p.weigh_gaussian(
-            self.particles,
-            self.weights,
-            self._signature,
-            seen.residual_nt,
-            seen.white_nt2,
-            decay,
-            drive_nt2,
-            self._fits,
-        )
-
-
-class DipoleHypothesis(ParticleHypothesis):
-    """The anomaly is of a class of dipoles."""
-
-    def __init__(
-        self,
-        of: DipoleClass,
-        count: int,
-        rng: np.random.Generator,
-        *,
-        field_ned: Array,
-        by_roulette: bool = False,
-    ) -> None:
-        super().__init__(p.DIPOLE, count, rng, by_roulette=by_roulette)
-        self._class = of
-        self._field_ned = field_ned
-
-    def start(
-        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
-    ) -> float:
-        """Spread the particles over the places from which an anomaly of the class can begin."""
-        of, rng, count = self._class, self._rng, self.weights.size
-        depth_m = of.least_m * (of.most_m / of.least_m) ** rng.random(count)
-        distance_m = 2.0 * depth_m * np.sqrt(rng.random(count))
-        angle = rng.uniform(-math.pi, math.pi, count)
-        particles = self.particles
-        particles[:] = 0.0
-        particles[:, p.X], particles[:, p.Y] = distance_m * np.cos(angle), distance_m * np.sin(angle)
-        particles[:, p.COS], particles[:, p.SIN] = math.cos(seen.course_rad), math.sin(seen.course_rad)
-        particles[:, p.HEIGHT] = seen.height_m - depth_m
-        particles[:, p.RANGE] = depth_m
-        for k in range(p.TERMS - 1):
-            particles[:, p.COVARIANCE + (p.TERMS + 1) * k] = of.strength_nt**2
-        particles[:, p.COVARIANCE + p.TERMS * p.TERMS - 1] = map_nt2
-        self.weights[:] = 1.0 / count
-        if before is not None:
-            signals = self._simulated(seen, before.control)
-            return self._weigh_beginning(seen, before) - self._log_beginnings(
-                signals, map_nt2, threshold_nt, before
-            )
-        density = self._weigh(seen, 1.0, 0.0)[0]
-        return density - _beyond(threshold_nt, np.sqrt(self._fits[:, 1]))
-
-    def _simulated(self, seen: Measurement, control: Control) -> tuple[Array, Array]:
-        """Signals before a step and after it, of dipoles with strengths of the class at the particles'
-        places.
-        """
-        rows = self.particles.copy()
-        rows[:, p.MEANS : p.MEANS + p.TERMS - 1] = self._class.strength_nt * self._rng.standard_normal(
-            (len(rows), p.TERMS - 1)
-        )
-        x, y, cosine, sine = (rows[:, k, None] for k in (p.X, p.Y, p.COS, p.SIN))
-        then_x = x - cosine * control.forward_m + sine * control.right_m
-        then_y = y - sine * control.forward_m - cosine * control.right_m
-        then_nt = self._signals(rows, then_x, then_y, seen.height_m)[:, 0]
-        return then_nt, self._signals(rows, x, y, seen.height_m)[:, 0]
-
-    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
-        up = np.maximum(1.0, height_m - rows[:, p.HEIGHT, None])
-        distance = np.sqrt(x * x + y * y + up * up)
-        offset = (x / distance, y / distance, -up / distance)
-        along = sum(self._field_ned[k] * offset[k] for k in range(3))
-        total = sum(
-            rows[:, p.MEANS + k, None] * (3.0 * along * offset[k] - self._field_ned[k]) for k in range(3)
-        )
-        signals: Array = (rows[:, p.RANGE, None] / distance) ** 3 * total
-        return signals
-
-    def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
-        return p.weigh_dipole(
-            self.particles,
-            self.weights,
-            self._field_ned,
-            seen.height_m,
-            seen.residual_nt,
-            seen.white_nt2,
-            decay,
-            drive_nt2,
-            self._fits,
-        )
-
-
-def _normal_share(low: float, high: float) -> float:
-    """Probability of a standard normal number between two bounds."""
-    return 0.5 * (math.erf(high / math.sqrt(2.0)) - math.erf(low / math.sqrt(2.0)))
-
-
-def _beyond(threshold_nt: float, sigmas_nt: Array) -> float:
+def log_beyond(threshold_nt: float, sigmas_nt: Array) -> float:
     """Logarithm of the mean probability that normal numbers without a mean are beyond a threshold."""
     scaled = threshold_nt / math.sqrt(2.0) / sigmas_nt
     shares = [math.erfc(value) for value in scaled.tolist()]
     return math.log(max(sum(shares) / len(shares), 1e-300))
 
 
-def _entering(threshold: float, correlation: float) -> float:
+def _log_entering(threshold: float, correlation: float) -> float:
     """Logarithm of the probability that the first of two standard normal numbers is within a threshold and
     the second one beyond it.
     """

@@ -3,8 +3,13 @@
 Readings are averaged over a second. A measurement beyond the threshold starts an anomaly, unless the vehicle
 is within reach of a known one, whose particles then take it as one more. A pass ends when the measurements
 are small again or the vehicle has left; the particles are kept for the next one.
+
+A pass near a known anomaly may be over another source, or the known one may have been an error of the map. A
+rival anomaly therefore begins with each such pass and takes its measurements too. At the end of the pass, the
+one that predicted them better keeps them (Bayes factor); if that is the rival, the known one is as it was.
 """
 
+import copy
 import math
 from dataclasses import dataclass, field
 from typing import Final
@@ -12,8 +17,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.magnetic_identification.anomaly import Anomaly, Sample
+from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.parameters import IdentificationParameters
+from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import AnomalyDetector, MapError
 from estimators.occupancy.placed_readings import PlacedReading
 from flightsim.foundation.random_streams import RandomStreams
@@ -25,6 +31,7 @@ Array = NDArray[np.float64]
 _ENDS_AFTER_M: Final = 100.0  # of track with small measurements: the end of a pass
 _SMALL: Final = 0.5  # of the threshold
 _LEAST_STEP_M: Final = 1.0  # shorter displacements give no course
+_ANOTHER_NATS: Final = 6.0  # by which a rival must be better: other sources within reach are seldom
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,11 +42,33 @@ class Progress:
         sample: the measurement.
         anomaly: the anomaly it belongs to; None: to none.
         pass_ended: an anomaly whose pass has ended with it.
+        loudest: the largest measurement of that pass, or of the one in progress.
+        doubted: at present, another source explains the pass in progress better, or the level is doubtful.
     """
 
     sample: Sample
     anomaly: Anomaly | None
-    pass_ended: Anomaly | None
+    pass_ended: Anomaly | None = None
+    loudest: Sample | None = None
+    doubted: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rival:
+    """The alternative while a known anomaly is passed again: the measurements are about another source.
+
+    Attributes:
+        anomaly: of that source, begun with the pass.
+        kept: copy of the known one before the pass.
+    """
+
+    anomaly: Anomaly
+    kept: Anomaly
+
+    def wins(self, known: Anomaly) -> bool:
+        """Whether it predicted the measurements of the pass better than the known anomaly."""
+        predicted = known.log_density - self.kept.log_density
+        return self.anomaly.log_density > predicted + _ANOTHER_NATS
 
 
 @dataclass(slots=True, kw_only=True)
@@ -52,7 +81,10 @@ class _Vehicle:
         sums: of north, east, height, residual; and the number of readings.
         last: newest measurement.
         anomaly: the anomaly of the pass in progress.
+        rival: alternative to it, if it was known before the pass.
+        loudest: largest measurement of the pass in progress.
         small_m: length of track since the last measurement that was not small.
+        doubtful: anomalies that began while the level was doubtful.
     """
 
     detector: AnomalyDetector
@@ -60,7 +92,26 @@ class _Vehicle:
     sums: list[float] = field(default_factory=lambda: [0.0] * 5)
     last: Sample | None = None
     anomaly: Anomaly | None = None
+    rival: _Rival | None = None
+    loudest: Sample | None = None
     small_m: float = 0.0
+    doubtful: list[Anomaly] = field(default_factory=list)
+
+    def note(self, sample: Sample, last: Sample | None, *, small_nt: float) -> Sample:
+        """Follow the pass in progress; returns its largest measurement."""
+        size_nt = abs(sample.residual_nt)
+        if size_nt > small_nt:
+            self.small_m = 0.0
+        elif last is not None:
+            self.small_m += math.hypot(sample.north_m - last.north_m, sample.east_m - last.east_m)
+        if self.loudest is None or size_nt > abs(self.loudest.residual_nt):
+            self.loudest = sample
+        return self.loudest
+
+    def end_pass(self) -> None:
+        """Forget the pass in progress."""
+        self.anomaly = self.rival = self.loudest = None
+        self.small_m = 0.0
 
 
 class Identifier:
@@ -89,6 +140,7 @@ class Identifier:
         self._map_error = map_error
         self._field_ned = field_ned
         self._streams = RandomStreams(parameters.seed)
+        self._rivals = 0
         self._vehicles: dict[int, _Vehicle] = {}
         self._threshold_nt = max(
             parameters.threshold_nt, 3.0 * math.hypot(parameters.noise_nt, map_error.sigma_nt)
@@ -122,10 +174,14 @@ class Identifier:
                 map_error=self._map_error,
             )
             vehicle = self._vehicles[number] = _Vehicle(detector=detector)
-        dropped = vehicle.detector.dropped
+        dropped, restarts = vehicle.detector.dropped, vehicle.detector.restarts
         vehicle.detector.update(reading.time_us, reading.total_nt, map_nt, reading.north_m, reading.east_m)
         if vehicle.detector.dropped > dropped:
             return None
+        if vehicle.detector.restarts > restarts:
+            self._discard_doubtful(vehicle)
+        elif not vehicle.detector.level_doubtful:
+            vehicle.doubtful.clear()
         interval_us = round(1e6 * self._parameters.interval_s)
         complete = None
         if vehicle.began_us >= 0 and reading.time_us >= vehicle.began_us + interval_us:
@@ -163,40 +219,75 @@ class Identifier:
     def _advance(self, vehicle: _Vehicle, sample: Sample) -> Progress:
         last, vehicle.last = vehicle.last, sample
         loud = abs(sample.residual_nt) > self._threshold_nt
-        near = self._within_reach(sample)
-        before = vehicle.anomaly
-        if before is not None and near is not before and not loud:
-            near = None
-        anomaly = near
-        if near is not None:
-            if vehicle.anomaly is not near and loud:
-                if not near.under_way:
-                    near.passes += 1
-                near.under_way = True
-                vehicle.anomaly, vehicle.small_m = near, 0.0
-            near.take(sample)
+        present, passed = self._within_reach(sample), vehicle.anomaly
+        ended: Anomaly | None = None
+        loudest, doubted = vehicle.loudest, vehicle.detector.level_doubtful
+        if passed is not None and present is not passed:
+            ended = self._end_pass(vehicle)
+            # a quiet measurement beside the anomaly of the pass is about neither
+            present = self._within_reach(sample) if loud else None
+            if loud and vehicle.detector.level_doubtful:
+                ended = None  # it may be an offset of all measurements
+        if present is not None:
+            self._take(vehicle, present, sample, last if loud else None)
         elif loud and last is not None:
-            anomaly = vehicle.anomaly = self._start(sample, last)
-            vehicle.small_m = 0.0
-        ended = self._ended(vehicle, sample, last, near if near is not None else anomaly)
-        return Progress(sample=sample, anomaly=anomaly, pass_ended=ended)
+            present = vehicle.anomaly = self._start(sample, last)
+            if vehicle.detector.level_doubtful:
+                vehicle.doubtful.append(present)
+        if vehicle.anomaly is not None:
+            largest = vehicle.note(sample, last, small_nt=_SMALL * self._threshold_nt)
+            doubted = doubted or (vehicle.rival is not None and vehicle.rival.wins(vehicle.anomaly))
+            loudest = loudest if ended is not None else largest
+            if vehicle.small_m >= _ENDS_AFTER_M:
+                ended = self._end_pass(vehicle)
+        return Progress(sample=sample, anomaly=present, pass_ended=ended, loudest=loudest, doubted=doubted)
 
-    def _ended(
-        self, vehicle: _Vehicle, sample: Sample, last: Sample | None, present: Anomaly | None
-    ) -> Anomaly | None:
-        """The anomaly whose pass ends with this measurement."""
-        passed = vehicle.anomaly
-        if passed is None:
-            return None
-        if abs(sample.residual_nt) > _SMALL * self._threshold_nt:
-            vehicle.small_m = 0.0
-        elif last is not None:
-            vehicle.small_m += math.hypot(sample.north_m - last.north_m, sample.east_m - last.east_m)
-        if passed is present and vehicle.small_m < _ENDS_AFTER_M:
-            return None
-        vehicle.anomaly = None
+    def _take(self, vehicle: _Vehicle, known: Anomaly, sample: Sample, last: Sample | None) -> None:
+        """One more measurement of a known anomaly.
+
+        Args:
+            vehicle: its vehicle.
+            known: the anomaly.
+            sample: the measurement.
+            last: the one before, if this one is beyond the threshold: a pass begins unless one is in
+                progress.
+        """
+        if vehicle.rival is not None:
+            vehicle.rival.anomaly.take(sample)
+        if vehicle.anomaly is None and last is not None:
+            vehicle.anomaly = known
+            if not known.under_way:
+                kept = copy.deepcopy(known)
+                vehicle.rival = _Rival(anomaly=self._new(sample, last, "rival", self._rivals), kept=kept)
+                self._rivals += 1
+                known.passes += 1
+            known.under_way = True
+        for other in self._vehicles.values():
+            if other is not vehicle and other.anomaly is known:
+                other.rival = None  # without the other measurements its known anomaly can't be judged
+        known.take(sample)
+
+    def _discard_doubtful(self, vehicle: _Vehicle) -> None:
+        """The level was wrong from its start: the anomalies since then are none."""
+        if vehicle.anomaly is not None and vehicle.anomaly in vehicle.doubtful:
+            vehicle.end_pass()
+        self.anomalies = [anomaly for anomaly in self.anomalies if anomaly not in vehicle.doubtful]
+        vehicle.doubtful.clear()
+        vehicle.began_us, vehicle.last = -1, None  # measurements with that level
+
+    def _end_pass(self, vehicle: _Vehicle) -> Anomaly:
+        """The anomaly whose pass of a vehicle ends: the known one, or its rival."""
+        passed, rival = vehicle.anomaly, vehicle.rival
+        assert passed is not None
+        vehicle.end_pass()
         passed.under_way = any(other.anomaly is passed for other in self._vehicles.values())
-        return passed
+        if rival is None or passed.under_way or not rival.wins(passed):
+            return passed
+        passed.restore(rival.kept)
+        another = rival.anomaly
+        another.number, another.under_way = self.started, False
+        self._add(another)
+        return another
 
     def _within_reach(self, sample: Sample) -> Anomaly | None:
         """The nearest anomaly within reach."""
@@ -207,11 +298,20 @@ class Identifier:
         return min(near)[2] if near else None
 
     def _start(self, sample: Sample, last: Sample) -> Anomaly:
+        anomaly = self._new(sample, last, "anomaly", self.started)
+        self._add(anomaly)
+        return anomaly
+
+    def _add(self, anomaly: Anomaly) -> None:
+        """Keep an anomaly, instead of the least probable target if there are too many."""
         if len(self.anomalies) >= self._parameters.most_anomalies:
             idle = [anomaly for anomaly in self.anomalies if not anomaly.under_way] or self.anomalies
             self.anomalies.remove(min(idle, key=lambda anomaly: anomaly.probability))
-        seed = self._streams.child("anomaly", self.started)
-        anomaly = Anomaly(
+        self.started += 1
+        self.anomalies.append(anomaly)
+
+    def _new(self, sample: Sample, last: Sample, stream: str, index: int) -> Anomaly:
+        return Anomaly(
             self.started,
             sample,
             self._parameters,
@@ -220,9 +320,6 @@ class Identifier:
             threshold_nt=self._threshold_nt,
             field_ned=self._field_ned,
             # as fast as PCG64 is, and faster for normal numbers, most of the cost of a step
-            rng=np.random.Generator(np.random.SFC64(seed)),
+            rng=np.random.Generator(np.random.SFC64(self._streams.child(stream, index))),
             last=last,
         )
-        self.started += 1
-        self.anomalies.append(anomaly)
-        return anomaly

@@ -1,10 +1,10 @@
 """Parameters of the identification of magnetic targets."""
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
 from estimators.magnetic_identification.classes import AnomalyClass, DipoleClass, classes_from
+from flightsim.foundation.checks import named, require_not_negative, require_positive
 
 __all__ = ["FALSE_ANOMALIES", "TARGETS", "IdentificationParameters"]
 
@@ -71,18 +71,13 @@ class IdentificationParameters:
                 "targets names no class: there is nothing to identify; give one or more, such as "
                 "target:gaussian:30:80:60"
             )
-        for name in ("interval_s", "threshold_nt", "noise_nt", "unknown_nt", "unknown_m", "report_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted; more than 0 is")
-        for name in ("shape_error", "forward_noise", "turn_noise", "course_noise_rad", "target_speed_m_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted; 0 or more is")
-        if self.map_error_nt is not None and not (
-            math.isfinite(self.map_error_nt) and self.map_error_nt >= 0.0
-        ):
-            raise ValueError(f"map_error_nt {self.map_error_nt:g} is not accepted; 0 or more is, or none")
+        require_positive(
+            **named(self, "interval_s", "threshold_nt", "noise_nt", "unknown_nt", "unknown_m", "report_s")
+        )
+        require_not_negative(
+            **named(self, "shape_error", "forward_noise", "turn_noise", "course_noise_rad"),
+            **named(self, "target_speed_m_s", "map_error_nt"),
+        )
         if not 0.0 < self.target_prior < 1.0:
             raise ValueError(f"target_prior {self.target_prior:g} is not between 0 and 1")
         if not 100 <= self.particles <= 1_000_000:

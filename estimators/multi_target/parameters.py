@@ -1,7 +1,6 @@
 """Parameters of the multi-target estimator."""
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 
 from estimators.errors import EstimatorError
@@ -9,6 +8,7 @@ from estimators.tracking.grid import GridLayout
 from estimators.tracking.intensity import Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor
 from estimators.tracking.smc_phd import SmcPhdParameters
+from flightsim.foundation.checks import check_fields, named, require_finite, require_members, require_positive
 
 __all__ = ["Belief", "MultiTargetParameters"]
 
@@ -77,22 +77,12 @@ class MultiTargetParameters:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, kind in (("belief", Belief), ("motion", MotionKind)):
-            value = getattr(self, name)
-            if value not in tuple(kind):
-                raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}")
-            object.__setattr__(self, name, kind(value))
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float) and not math.isfinite(value):
-                raise ValueError(f"{field.name} {value} is not a finite number")
-        for name in (
-            *("cell_m", "birth_per_m2", "found_width_m", "found_mass", "found_distance_m"),
-            *("reported_mass", "forget_s"),
-        ):
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise ValueError(f"{name} {value:g} is not accepted: a number above 0 is")
+        require_members(self, belief=Belief, motion=MotionKind)
+        check_fields(self, require_finite)
+        require_positive(
+            **named(self, "cell_m", "birth_per_m2", "found_width_m", "found_mass", "found_distance_m"),
+            **named(self, "reported_mass", "forget_s"),
+        )
         if not 0 <= self.centre_vehicle <= 255:
             raise ValueError(f"centre_vehicle {self.centre_vehicle} is not a system id, 0..255")
         if self.seed < 0:

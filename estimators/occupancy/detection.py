@@ -144,6 +144,7 @@ class AnomalyDetector:
         anomalous: whether an anomaly is in progress.
         dropped: number of unusable readings.
         insignificant: number of anomalies that may be errors of the map.
+        restarts: number of levels that turned out to be wrong, because an anomaly lasted too long.
     """
 
     def __init__(
@@ -177,6 +178,7 @@ class AnomalyDetector:
         self.residual_nt = math.nan
         self.dropped = 0
         self.insignificant = 0
+        self.restarts = 0
         self._map_error = map_error or MapError()
         self._noise_nt = noise_nt
         unexplained_nt = _SIGMAS * math.hypot(noise_nt, self._map_error.sigma_nt)
@@ -186,6 +188,7 @@ class AnomalyDetector:
         self._level_time_us = level_time_s * 1e6
         self._longest_us = longest_s * 1e6
         self._level_nt = math.nan
+        self._level_began_us = -1
         self._time_us = -1
         self._began_us = -1
         self._peak: Anomaly | None = None
@@ -194,6 +197,13 @@ class AnomalyDetector:
     @property
     def anomalous(self) -> bool:
         return self._peak is not None
+
+    @property
+    def level_doubtful(self) -> bool:
+        """Whether an anomaly is in progress that began before the level had settled: the level may be wrong
+        because its first readings were near a source.
+        """
+        return self._peak is not None and self._began_us - self._level_began_us < self._level_time_us
 
     def update(
         self, time_us: int, reading_nt: float, map_nt: float, north_m: float, east_m: float
@@ -210,8 +220,9 @@ class AnomalyDetector:
         self._add_point(north_m, east_m, difference_nt)
         if self._peak is not None and time_us - self._began_us > self._longest_us:
             self._peak, self._level_nt = None, math.nan
+            self.restarts += 1
         if math.isnan(self._level_nt):
-            self._level_nt = difference_nt
+            self._level_nt, self._level_began_us = difference_nt, time_us
         elapsed_us = 0 if self._time_us < 0 else time_us - self._time_us
         self._time_us = time_us
         residual_nt = self.residual_nt = difference_nt - self._level_nt

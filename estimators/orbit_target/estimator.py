@@ -22,6 +22,7 @@ from estimators.pressure_height import PressureHeight
 from estimators.tracking.line_of_sight import detection, gimbal_attitude
 from estimators.vehicle_time import UNIX_TIME_US
 from flightsim.foundation.atmosphere import air_density_ratio
+from flightsim.foundation.checks import require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 _AUTOPILOT: Final = 1
@@ -67,9 +68,7 @@ class OrbitTargetParameters(TrackerParameters):
             raise ValueError("target_north_m and target_east_m make a place together; give both, or neither")
         if self.ground_pa is not None and not _PRESSURES_PA[0] < self.ground_pa < _PRESSURES_PA[1]:
             raise ValueError(f"ground_pa {self.ground_pa:g} is not in 10000..120000 Pa")
-        for name in ("target_sigma_m", "drift_sigma_m_s"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} {getattr(self, name):g} is not accepted: a number above 0 is")
+        require_positive(target_sigma_m=self.target_sigma_m, drift_sigma_m_s=self.drift_sigma_m_s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,6 +7,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from estimators.lissajous.parameters import LissajousParameters
+from flightsim.foundation.checks import (
+    named,
+    require_finite,
+    require_members,
+    require_not_negative,
+    require_positive,
+)
 
 
 class Heading(StrEnum):
@@ -95,40 +102,20 @@ class TargetFusionParameters(LissajousParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not reach the base of a dataclass with slots
         LissajousParameters.__post_init__(self)
-        for name, kind in (("heading", Heading), ("mount", Mount), ("distance", Range)):
-            value = getattr(self, name)
-            if value not in tuple(kind):
-                raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}")
-            object.__setattr__(self, name, kind(value))
+        require_members(self, heading=Heading, mount=Mount, distance=Range)
         if not 1 <= self.centre_vehicle <= 255:
             raise ValueError(f"centre_vehicle {self.centre_vehicle} is not a system id, 1..255")
         if self.confirmations < 1:
             raise ValueError(f"confirmations {self.confirmations} is not accepted: 1 or more is")
-        for name in (
-            "bearing_sigma_rad",
-            "tilt_sigma_rad",
-            "size_sigma_rad",
-            "range_sigma",
-            "gate",
-            "wait_s",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted: a number above 0 is")
-        for name in (
-            "min_speed_m_s",
-            "target_size_m",
-            "height_sigma_m",
-            "yaw_sigma_rad",
-            "walk_m_sqrt_s",
-            "max_delay_s",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted: 0 or a number above it is")
-        for name in ("mount_roll_rad", "mount_pitch_rad", "mount_yaw_rad"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} {getattr(self, name)} is not a finite number")
+        require_positive(
+            **named(self, "bearing_sigma_rad", "tilt_sigma_rad", "size_sigma_rad", "range_sigma", "gate"),
+            wait_s=self.wait_s,
+        )
+        require_not_negative(
+            **named(self, "min_speed_m_s", "target_size_m", "height_sigma_m", "yaw_sigma_rad"),
+            **named(self, "walk_m_sqrt_s", "max_delay_s"),
+        )
+        require_finite(**named(self, "mount_roll_rad", "mount_pitch_rad", "mount_yaw_rad"))
         if self.distance is Range.SIZE and not self.target_size_m:
             raise ValueError("distance=size needs target_size_m, the true size of the target")
         if self.wait_s > self.history_s:

@@ -112,7 +112,7 @@ class SightModel:
         for name in ("target_size_m", "pixel_sigma_px"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
-                raise EstimatorError(f"`{name}` {value:g} is not possible; give more than 0")
+                raise EstimatorError(f"{name} {value:g} is not possible; give more than 0")
         if not 0.0 < self.false_rate < 1.0:
             raise EstimatorError(
                 f"false_rate {self.false_rate:g} is not between 0 and 1; without false detections one "
@@ -154,7 +154,7 @@ class PoseErrors:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
-                raise EstimatorError(f"`{name}` {value:g} is not possible; give 0 or more")
+                raise EstimatorError(f"{name} {value:g} is not possible; give 0 or more")
 
     def weights(self, since_s: float | None) -> tuple[float, float]:
         """Factors of the variances of place and of angles.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from estimators.tracking.intensity import BirthIntensity, Cluster, Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
+from flightsim.foundation.checks import named, require_positive
 
 __all__ = ["GaussianPhd", "GaussianPhdParameters"]
 
@@ -37,10 +38,7 @@ class GaussianPhdParameters:
     gate_squared: float = 30.0
 
     def __post_init__(self) -> None:
-        for name in ("least_weight", "merge_distance_squared", "gate_squared"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted: a finite number above 0 is")
+        require_positive(**named(self, "least_weight", "merge_distance_squared", "gate_squared"))
         if not 1 <= self.max_components <= 100_000:
             raise ValueError(f"max_components {self.max_components} is not in 1..100000")
 

@@ -4,7 +4,6 @@ The integral of the intensity over a region is the expected number of targets th
 particles, `GaussianPhd` by Gaussian components.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking.range_bearing import Viewpoint
+from flightsim.foundation.checks import named, require_not_negative
 
 __all__ = ["BirthIntensity", "Cluster", "Motion", "MotionKind", "TargetIntensity"]
 
@@ -51,10 +51,7 @@ class Motion:
     survival_per_s: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("walk_m_sqrt_s", "acceleration_m_s2_sqrt_hz", "speed_sigma_m_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted: a finite number from 0 is")
+        require_not_negative(**named(self, "walk_m_sqrt_s", "acceleration_m_s2_sqrt_hz", "speed_sigma_m_s"))
         if not 0.0 < self.survival_per_s <= 1.0:
             raise ValueError(f"survival_per_s {self.survival_per_s:g} is not in 0..1, or is 0")
 

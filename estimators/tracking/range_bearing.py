@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.checks import named, require_not_negative, require_positive
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.layouts import Slots
 
@@ -71,12 +72,10 @@ class RangeBearingSensor:
     def __post_init__(self) -> None:
         if not 0.0 < self.gain <= 1.0:
             raise ValueError(f"gain {self.gain:g} is not in 0..1, or is 0")
-        for name in ("forward_scale_m", "right_scale_m", "reach_m", "range_sigma_m", "bearing_sigma_rad"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted: a finite number above 0 is")
-        if not (math.isfinite(self.clutter_per_scan) and self.clutter_per_scan >= 0.0):
-            raise ValueError(f"clutter_per_scan {self.clutter_per_scan:g} is not a finite number from 0")
+        require_positive(
+            **named(self, "forward_scale_m", "right_scale_m", "reach_m", "range_sigma_m", "bearing_sigma_rad")
+        )
+        require_not_negative(clutter_per_scan=self.clutter_per_scan)
 
     @property
     def values(self) -> Array:

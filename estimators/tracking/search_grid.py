@@ -207,16 +207,30 @@ class SearchGrid:
         return float(-np.sum(p * np.log(p))) + 2.0 * math.log(self.layout.cell_m)
 
     def shares(self, layout: GridLayout) -> Array:
-        p = self.probability()
         own = self.layout
-        north, east = own.centres()
-        rows = np.clip(((north[:, 0] - layout.south_m) / layout.cell_m).astype(np.int64), 0, layout.rows - 1)
-        columns = np.clip(((east[0] - layout.west_m) / layout.cell_m).astype(np.int64), 0, layout.columns - 1)
-        by_rows = np.zeros((layout.rows, own.columns))
-        np.add.at(by_rows, rows, p)
-        out = np.zeros((layout.columns, layout.rows))
-        np.add.at(out, columns, by_rows.T)
-        return np.ascontiguousarray(out.T)
+        by_rows = _rebinned(
+            self.probability(), own.south_m, own.cell_m, layout.south_m, layout.cell_m, layout.rows
+        )
+        by_columns = _rebinned(
+            by_rows.T, own.west_m, own.cell_m, layout.west_m, layout.cell_m, layout.columns
+        )
+        return np.ascontiguousarray(by_columns.T)
+
+
+def _rebinned(
+    p: Array, start_m: float, side_m: float, to_start_m: float, to_side_m: float, count: int
+) -> Array:
+    """Sums of cells along the first axis over other intervals: a cell counts by the share that lies in each,
+    and what lies outside of all counts in the nearest.
+    """
+    below = np.vstack((np.zeros((1, p.shape[1])), np.cumsum(p, axis=0)))
+    edges = (to_start_m + to_side_m * np.arange(count + 1) - start_m) / side_m
+    edges = np.clip(edges, 0.0, len(p))
+    edges[0], edges[-1] = 0.0, len(p)
+    index = np.minimum(edges.astype(np.int64), len(p) - 1)
+    share = (edges - index)[:, None]
+    at_edges = below[index] * (1.0 - share) + below[index + 1] * share
+    return np.maximum(np.diff(at_edges, axis=0), 0.0)  # rounding
 
 
 def _spread_by_three(p: Array, variance: float) -> Array:

@@ -27,6 +27,7 @@ from estimators.tracking.range_bearing import (
     Viewpoint,
 )
 from estimators.tracking.resampling import systematic
+from flightsim.foundation.checks import require_positive
 from flightsim.foundation.kernels import kernel
 
 __all__ = ["SmcPhd", "SmcPhdParameters", "update_weights"]
@@ -72,10 +73,7 @@ class SmcPhdParameters:
             raise ValueError(
                 f"min_particles {self.min_particles} is more than max_particles {self.max_particles}"
             )
-        for name in ("birth_floor_m", "cluster_radius_m"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} {value:g} is not accepted: a finite number above 0 is")
+        require_positive(birth_floor_m=self.birth_floor_m, cluster_radius_m=self.cluster_radius_m)
 
 
 class SmcPhd:

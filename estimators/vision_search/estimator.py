@@ -22,6 +22,7 @@ from autopilot_bridge.mavlink.search_likelihood import (
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message
 from estimators.tracking.area_belief import AreaBelief
+from estimators.tracking.camera_sight import CameraSight
 from estimators.vision_search.estimate import AreaEstimate
 from estimators.vision_search.frames import Camera, likelihood_of, sight_of
 from estimators.vision_search.parameters import VisionSearchParameters
@@ -46,6 +47,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
     Attributes:
         belief: the belief, for the planner and the picture of a search.
         detections, frames: numbers of frames with a detection, and of all frames, that were used.
+        newest: the newest used frame of each vehicle, by system id.
     """
 
     NAME: ClassVar[str] = "vision-search"
@@ -84,6 +86,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         """Discard everything except the parameters."""
         self.belief: AreaBelief = self.parameters.new_belief()
         self.detections = self.frames = 0
+        self.newest: dict[int, CameraSight] = {}
         self._cameras: dict[int, Camera] = {}
         self._frame: LocalFrame | None = None
         self._estimates: tuple[AreaEstimate, ...] = ()
@@ -187,7 +190,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
             camera.counts["repeated"] += 1
             return Outcome.REPEATED
         camera.counts["received"] += 1
-        return self._observe(time_us, camera, likelihood)
+        return self._observe(time_us, camera, message.src_system, likelihood)
 
     def _on_scan(self, camera: Camera, system_id: int, scan: CameraScan) -> Outcome:
         p = self.parameters
@@ -221,7 +224,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
             self._outbox.append(sent)
         camera.counts["used"] += 1
         # what is sent, with its rounding, so that every member of the team uses the same
-        return self._observe(scan.time_us + camera.offset_us, camera, sent)
+        return self._observe(scan.time_us + camera.offset_us, camera, system_id, sent)
 
     def _note_clock(self, camera: Camera, system_id: int, scan: CameraScan) -> None:
         if camera.attitude_us >= 0:
@@ -232,12 +235,12 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     # the belief
 
-    def _observe(self, now_us: int, camera: Camera, likelihood: SearchLikelihood) -> Outcome:
+    def _observe(self, now_us: int, camera: Camera, system_id: int, likelihood: SearchLikelihood) -> Outcome:
         """Use a frame. The time is that of its exposure, so that an estimate has one time on every link."""
         frame = self._frame
         assert frame is not None
         time_us = likelihood.time_us + camera.offset_us if camera.position is not None else now_us
-        sight = sight_of(likelihood, frame)
+        sight = self.newest[system_id] = sight_of(likelihood, frame)
         if self._time_us is None:
             self._time_us = time_us
         if time_us >= self._time_us:
@@ -289,12 +292,16 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         """The home of the centre vehicle."""
         return None if self._frame is None else self._frame.origin
 
+    def likelihoods(self) -> list[MAVLinkMessage]:
+        """The likelihoods of the own vehicle's frames since the last call, for the other vehicles."""
+        outbox, self._outbox = self._outbox, []
+        return [search_likelihood_message(item) for item in outbox]
+
     def publish(self) -> Sequence[MAVLinkMessage]:
         """The likelihoods of the own vehicle's frames since the last call, and, after a detection,
         FOLLOW_TARGET with the mean and its standard deviations.
         """
-        messages: list[MAVLinkMessage] = [search_likelihood_message(item) for item in self._outbox]
-        self._outbox = []
+        messages = self.likelihoods()
         estimate, frame = self._unpublished, self._frame
         self._unpublished = None
         if estimate is None or frame is None:

@@ -47,6 +47,22 @@ def require_rate(rate_hz: int) -> None:
         raise ValueError(f"rate_hz = {rate_hz!r} is not accepted: a positive whole number of hertz is")
 
 
+def named(record: Any, *names: str) -> dict[str, Any]:
+    """Fields of a record, to be checked by name; those that are None are left out."""
+    return {name: value for name in names if (value := getattr(record, name)) is not None}
+
+
+def require_members(record: Any, **kinds: type[Enum]) -> None:
+    """Fields of a frozen dataclass are members of these enumerations; a member's value becomes the member."""
+    for name, kind in kinds.items():
+        value = getattr(record, name)
+        try:
+            object.__setattr__(record, name, kind(value))
+        except ValueError:
+            accepted = ", ".join(str(member.value) for member in kind)
+            raise ValueError(f"{name} {value!r} is not one of {accepted}") from None
+
+
 def check_amounts(record: Any, *positive: str) -> None:
     """Check the float fields of a dataclass: those named must be above zero, the others at least zero."""
     values = {field.name: getattr(record, field.name) for field in fields(record) if field.type is float}

@@ -60,6 +60,8 @@ class CameraParameters:
         false_detections_per_frame: mean of a Poisson number, anywhere in the image.
         false_size_px: (least, most) size of a false detection, uniform.
         mount_roll_rad, mount_pitch_rad, mount_yaw_rad: of a camera without gimbal, against the body.
+        misalignment_rad: roll, pitch and yaw by which the camera itself is turned against the mount that
+            these angles describe; what the vehicle reports does not have it.
         position_frd_m: place on the vehicle, from its centre of gravity.
         max_zoom: longest focal length, in focal lengths of the model.
         blur_px_m: of the lens at zoom 1: diameter of the circle of confusion in pixels, for each 1/m between
@@ -86,6 +88,7 @@ class CameraParameters:
     mount_roll_rad: float = 0.0
     mount_pitch_rad: float = -0.5 * math.pi
     mount_yaw_rad: float = 0.0
+    misalignment_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     max_zoom: float = 6.0
     blur_px_m: float = 2.0
@@ -113,6 +116,10 @@ class CameraParameters:
             mount_pitch_rad=self.mount_pitch_rad,
             mount_yaw_rad=self.mount_yaw_rad,
         )
+        if len(self.misalignment_rad) != 3 or not all(map(math.isfinite, self.misalignment_rad)):
+            raise ValueError(
+                f"misalignment_rad = {self.misalignment_rad!r} is not accepted: three finite angles are"
+            )
         if len(self.position_frd_m) != 3 or not all(map(math.isfinite, self.position_frd_m)):
             raise ValueError(
                 f"position_frd_m = {self.position_frd_m!r} is not accepted: 3 finite numbers are"
@@ -201,7 +208,10 @@ class Camera:
         self._targets = targets
         self._gimbal = gimbal
         self._q_frd_from_mount: Array = np.zeros(4)
-        quaternion_from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad, self._q_frd_from_mount)
+        q_frd_from_mount, q_mount_from_camera = np.zeros(4), np.zeros(4)
+        quaternion_from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad, q_frd_from_mount)
+        quaternion_from_euler(*p.misalignment_rad, q_mount_from_camera)
+        multiply(q_frd_from_mount, q_mount_from_camera, self._q_frd_from_mount)
         self._focal_px = p.model.focal_px
         self._zoom = 1.0
         self.focus_distance_m: float | None = None

@@ -135,7 +135,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
     """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy,
-    multi-target, survey, a mission file (.plan, .waypoints), or a Python file of your own.
+    multi-target, survey, vision-search, a mission file (.plan, .waypoints), or a Python file of your own.
 
     `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
     options)`. The run folder gets flight.tlog, summary.json and track.png.

@@ -24,6 +24,7 @@ _MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
     "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
     "multi-target": ("missions.cli.multi_target_command", "COMMAND"),
     "survey": ("missions.cli.survey_command", "COMMAND"),
+    "vision-search": ("missions.cli.vision_search_command", "COMMAND"),
 }
 _FILES_OF_USERS: Final = "missions.cli.file_command"
 _OWN: Final = "a mission of your own"

@@ -38,11 +38,23 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
     return study(train=given["train"])
 
 
+def _magnetic_search(given: Given) -> "Study[Any, Any]":
+    from missions.studies.magnetic_search import study
+
+    return study()
+
+
 def _multi_target(given: Given) -> "Study[Any, Any]":
     from missions.multi_target.objective import Exploration
     from missions.studies.multi_target_search import study
 
     return study(given["horizon"], given["alpha"], Exploration(given["exploration"]))
+
+
+def _vision_search(given: Given) -> "Study[Any, Any]":
+    from missions.studies.vision_search import study
+
+    return study(given["model"], given["side"], given["passes"])
 
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
@@ -131,7 +143,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "Magnetic targets and false anomalies after one and two passes: Lum et al. 2005.\n\n"
                 "Areas under the ROC of the threshold, the paper's confidence, the classifier and the "
                 "evidence of classes, on maps and targets that the classifier was not fitted to, and with "
-                "larger offsets, more noise and deeper targets. The folder gets roc.png."
+                "larger offsets, more noise and deeper targets. The folder gets roc.png, and passes.png with "
+                "figures 4 to 6."
             ),
             options=(
                 click.Option(
@@ -141,6 +154,17 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_magnetic_identification,
+        ),
+        "magnetic-search": StudyCommand(
+            help=(
+                "Three searchers name a magnetic target among five false anomalies: Lum et al. 2005, "
+                "figure 8.\n\n"
+                "By passes that detect an anomaly, by the trace of the paper's confidence, and by the "
+                "evidence of classes, in the worlds of fly occupancy. The searchers are points that turn at "
+                "one rate."
+            ),
+            options=(),
+            build=_magnetic_search,
         ),
         "multi-target": StudyCommand(
             help=(
@@ -166,6 +190,28 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 ),
             ),
             build=_multi_target,
+        ),
+        "vision-search": StudyCommand(
+            help=(
+                "One and two aircraft search a square for a tag with downward cameras, and localize it: "
+                "Tisdale et al. 2008, as flights on SITL.\n\n"
+                "A fine grid, a coarse grid and particles over the same flights, with their error, sigma and "
+                "consistency; the measured pose errors; the error budget of Table II. The folder gets "
+                "errors.png."
+            ),
+            options=(
+                click.Option(["--model"], default="aerosonde", help="Of the vehicles."),
+                click.Option(
+                    ["--side"],
+                    type=FiniteRange(min=100.0, max=5000.0),
+                    default=1000.0,
+                    help="Of the searched square, m.",
+                ),
+                click.Option(
+                    ["--passes"], type=click.IntRange(1, 100), default=6, help="Over the target, of all."
+                ),
+            ),
+            build=_vision_search,
         ),
     }
 )

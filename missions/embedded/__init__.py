@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from missions.embedded.hidden_tag import HiddenTag, vision_search_world
     from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
     from missions.embedded.survey_worlds import survey_world
@@ -25,6 +26,7 @@ __all__ = [
     "MAGNETOMETER",
     "MAX_FLIGHT_S",
     "EmbeddedSitl",
+    "HiddenTag",
     "MotionKind",
     "RenderedTags",
     "TagTarget",
@@ -40,6 +42,7 @@ __all__ = [
     "survey_world",
     "tag_search_world",
     "terrain_targets_world",
+    "vision_search_world",
 ]
 
 _SITL: Final = "missions.embedded.sitl"
@@ -53,6 +56,7 @@ __getattr__ = lazy_exports(
     {
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         "RenderedTags": _RENDERED_TAGS,
+        **dict.fromkeys(("HiddenTag", "vision_search_world"), "missions.embedded.hidden_tag"),
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
         **dict.fromkeys(("CAMERA", "MAGNETOMETER", "MotionKind", "carrying", "motion_of"), _WORLDS),

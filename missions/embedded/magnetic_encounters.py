@@ -30,7 +30,7 @@ from flightsim.payload import (
     synthetic_map,
 )
 
-__all__ = ["Encounter", "EncounterConditions", "encounters"]
+__all__ = ["Encounter", "EncounterConditions", "as_published", "encounters"]
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,8 @@ class EncounterConditions:
 
     Attributes:
         offset_m: largest distance of a pass from the source.
-        noise_nt: standard deviation of a reading, white.
+        noise_nt: standard deviation of a reading, white, as it is stated.
+        noise_factor: true noise over the stated one.
         depth_factor: distance to a target over that of its class: the extent of a Gaussian grows with it,
             and its amplitude falls with its cube, as of a dipole.
         speed_m_s: ground speed.
@@ -59,6 +60,7 @@ class EncounterConditions:
 
     offset_m: float = 80.0
     noise_nt: float = 0.3
+    noise_factor: float = 1.0
     depth_factor: float = 1.0
     speed_m_s: float = 25.0
 
@@ -112,7 +114,7 @@ def encounters(seed: int, conditions: EncounterConditions, *, passes: int = 2) -
                 break
         yield Encounter(
             is_target=is_target,
-            survey_map=_as_published(published),
+            survey_map=as_published(published),
             place_ne_m=(source.north_m, source.east_m),
             passes=tuple(
                 _readings(rng, field, places, conditions, start_s=k * (_TURN_S + 2.0 * _PASS_M / 25.0))
@@ -202,7 +204,8 @@ def _readings(
     # drift of the sensor and what base-station correction leaves: a straight line over one pass
     elapsed_s = np.arange(len(places)) / _RATE_HZ
     drift_nt = 0.2 * rng.standard_normal() + 0.2 * rng.standard_normal() * elapsed_s / _DRIFT_S
-    total_nt = total_nt + drift_nt + conditions.noise_nt * rng.standard_normal(len(places))
+    noise_nt = conditions.noise_nt * conditions.noise_factor
+    total_nt = total_nt + drift_nt + noise_nt * rng.standard_normal(len(places))
     reported = places + _POSITION_M * rng.standard_normal(2)
     return tuple(
         PlacedReading(
@@ -216,7 +219,8 @@ def _readings(
     )
 
 
-def _as_published(published: MagneticMap) -> SurveyMap:
+def as_published(published: MagneticMap) -> SurveyMap:
+    """A published map as a search reads it from its file."""
     gradient = published.vertical_gradient_nt_m
     home = published.home
     return SurveyMap(

@@ -171,6 +171,11 @@ class MultiTargetOptions(MissionOptions):
         )
 
     @property
+    def step_length_m(self) -> float:
+        """Distance to the next scan."""
+        return self.planner_parameters.step_m
+
+    @property
     def estimator_parameters(self) -> MultiTargetParameters:
         """Parameters of the estimator that the mission runs; the same as those of `estimator_settings`."""
         area = self.area

@@ -6,7 +6,7 @@ vehicles in turn are what the paper names as future work.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -51,6 +51,16 @@ class Area:
     def nearest(self, north_m: float, east_m: float) -> Place:
         """The place inside that is nearest to a place."""
         return (min(max(north_m, self.south_m), self.north_m), min(max(east_m, self.west_m), self.east_m))
+
+    def strip(self, index: int, count: int) -> "Area":
+        """One of `count` equal strips of the longer side, from the south or from the west."""
+        if self.height_m >= self.width_m:
+            side_m = self.height_m / count
+            south_m = self.south_m + index * side_m
+            return replace(self, south_m=south_m, north_m=south_m + side_m)
+        side_m = self.width_m / count
+        west_m = self.west_m + index * side_m
+        return replace(self, west_m=west_m, east_m=west_m + side_m)
 
     @property
     def centre_ne_m(self) -> Place:
@@ -248,6 +258,10 @@ class SweepPlanner:
     def next_place(
         self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
     ) -> Place:
+        return self.along(here)
+
+    def along(self, here: Place) -> Place:
+        """The next place from a place."""
         target = self._places[self._next % len(self._places)]
         away_m = math.dist(here, target)
         if away_m > 1.5 * self._step_m:  # the way to the path, in steps too

@@ -103,31 +103,12 @@ def planner_of(options: MultiTargetOptions) -> SearchPlanner:
     """The planner that one vehicle's options describe."""
     parameters, area = options.planner_parameters, options.area
     if options.planner is PlannerKind.SWEEP:
-        share = area if options.vehicles == 1 else _strip(area, options.index, options.vehicles)
+        share = area if options.vehicles == 1 else area.strip(options.index, options.vehicles)
         path = sweep_path(share, options.own_start_ne_m, parameters.step_m * options.steps, options.spacing_m)
         return SweepPlanner(path, parameters.step_m)
     heading_rad = HEADING_RAD if options.turn_limit_rad is None else None  # an aircraft flies where it looks
     return ExploringPlanner(
         parameters, area, heading_rad=heading_rad, seed=options.search_seed * 256 + options.index
-    )
-
-
-def _strip(area: Area, index: int, count: int) -> Area:
-    """One vehicle's share of a sweep: a strip of the longer side."""
-    if area.height_m >= area.width_m:
-        side_m = area.height_m / count
-        return Area(
-            south_m=area.south_m + index * side_m,
-            north_m=area.south_m + (index + 1) * side_m,
-            west_m=area.west_m,
-            east_m=area.east_m,
-        )
-    side_m = area.width_m / count
-    return Area(
-        south_m=area.south_m,
-        north_m=area.north_m,
-        west_m=area.west_m + index * side_m,
-        east_m=area.west_m + (index + 1) * side_m,
     )
 
 

@@ -23,8 +23,8 @@ _AT_M: Final = 1e-6
 class StepLaw(Protocol):
     """A law of motion to a place that changes from time to time."""
 
-    def aim(self, place_ned_m: Vector) -> None:
-        """Fly to another place."""
+    def aim(self, place_ned_m: Vector, yaw_rad: float | None = None) -> None:
+        """Fly to another place, with another heading unless it is None."""
         ...
 
     def setpoint(self, time_s: float, place_ned_m: Vector, velocity_ned_m_s: Vector) -> Setpoint:
@@ -59,8 +59,9 @@ class TrajectoryLaw:
         self._yaw_rad = yaw_rad
         self._time_s = 0.0
 
-    def aim(self, place_ned_m: Vector) -> None:
+    def aim(self, place_ned_m: Vector, yaw_rad: float | None = None) -> None:
         self._aim = place_ned_m
+        self._yaw_rad = self._yaw_rad if yaw_rad is None else yaw_rad
 
     def setpoint(self, time_s: float, place_ned_m: Vector, velocity_ned_m_s: Vector) -> Setpoint:
         dt_s = min(_LONGEST_STEP_S, max(0.0, time_s - self._time_s))
@@ -136,8 +137,9 @@ class BacksteppingLaw:
         self._most_m_s2 = limits.acceleration_m_s2
         self._yaw_rad = yaw_rad
 
-    def aim(self, place_ned_m: Vector) -> None:
+    def aim(self, place_ned_m: Vector, yaw_rad: float | None = None) -> None:
         self._aim = place_ned_m
+        self._yaw_rad = self._yaw_rad if yaw_rad is None else yaw_rad
 
     def setpoint(self, time_s: float, place_ned_m: Vector, velocity_ned_m_s: Vector) -> Setpoint:
         g = self._gains

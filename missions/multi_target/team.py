@@ -1,67 +1,24 @@
-"""One flight of a team that searches for targets, including takeoff and landing of every vehicle."""
+"""The vehicles of one flight that search for an unknown number of targets."""
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from estimators.multi_target.estimate import TargetRow
-from flightsim.foundation.geodesy import LocalFrame
-from flightsim.foundation.vectors import wrap_pi
-from missions.errors import MissionError
-from missions.kind import VehicleKind
-from missions.multi_target.options import MultiTargetOptions, StepLawKind, check_vehicle
-from missions.multi_target.planner import Place
-from missions.multi_target.search import HEADING_RAD, TargetSearch
+from missions.multi_target.options import MultiTargetOptions, check_vehicle
+from missions.multi_target.search import TargetSearch
 from missions.multi_target.sensor_watch import SensorWatch
-from missions.multi_target.steps import BacksteppingLaw, StepLaw, TrajectoryLaw
-from missions.occupancy.steering import steering
-from missions.occupancy.traffic import Traffic
-from missions.planning.limits import MulticopterLimits
-from missions.vehicle.concurrency import run_concurrently
-from missions.vehicle.firmware import Mode
+from missions.search_team import SearchTeam
 from missions.vehicle.payload import TARGET_SENSOR_COMPONENT
-from missions.vehicle.setpoint import Setpoint, Vector
-from missions.vehicle.telemetry import Position
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-SEARCH: Final = "search"
-"""Name of the phase in which a vehicle searches."""
-
-_TAKEOFF_S: Final = 300.0
-_LANDING_S: Final = 900.0
-_TURN_S: Final = 4.0  # for the turn to the heading of the search
-_POSITION_HZ: Final = {StepLawKind.TRAJECTORY: 10.0, StepLawKind.BACKSTEPPING: 50.0}
-"""The backstepping law closes a loop over position and velocity; the other one only watches the arrival."""
-_SLOWEST_SHARE: Final = 0.2  # of the speed: a step that takes longer is given up
-_LEAST_STEP_S: Final = 15.0
-_SAME_RAD: Final = math.radians(3.0)  # smaller changes of heading are not commanded
-_MODE_AGE_US: Final = 2_500_000
+__all__ = ["TargetSearchTeam"]
 
 
-@dataclass(slots=True, kw_only=True)
-class Searcher:
-    """One vehicle's part in the search.
-
-    Attributes:
-        track: (time us, north m, east m) of its reported positions, some per second.
-        began_us, ended_us: begin and end of its search, vehicle time; -1: not yet.
-        goal: place of its next scan.
-        late_steps: number of steps that were given up because the place was not reached.
-    """
-
-    track: list[tuple[int, float, float]] = field(default_factory=list)
-    began_us: int = -1
-    ended_us: int = -1
-    goal: Place = (0.0, 0.0)
-    goal_us: int = 0
-    late_steps: int = 0
-
-
-class TargetSearchTeam:
-    """The vehicles of one flight and their shared search.
+class TargetSearchTeam(SearchTeam[MultiTargetOptions]):
+    """The vehicles and their shared search.
 
     Args:
         vehicles: the vehicles, each ready to arm.
@@ -69,200 +26,19 @@ class TargetSearchTeam:
 
     Attributes:
         search: belief, goals and decisions.
-        searchers: one per vehicle.
         watch: the estimator.
     """
 
+    search: TargetSearch
+    watch: SensorWatch
+
     def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[MultiTargetOptions]) -> None:
-        self._vehicles = tuple(vehicles)
-        self._options = tuple(options)
+        super().__init__(vehicles, options, check=check_vehicle, component=TARGET_SENSOR_COMPONENT)
         centre = vehicles[0].system_id if len(vehicles) > 1 else 0
         parameters = replace(options[0].estimator_parameters, centre_vehicle=centre)
         self.watch = SensorWatch(vehicles, parameters, self._on_scan)
         self.search = TargetSearch(self.watch.belief, options)
-        self.searchers = [Searcher() for _ in vehicles]
-        self._traffic = Traffic([own.own_altitude_m for own in options])
-        self._frame = LocalFrame(vehicles[0].home)
-        self._scan_us = -1
-
-    async def fly(self) -> None:
-        """Fly all vehicles."""
-        self.watch.start()
-        try:
-            await run_concurrently([self._fly_one(index) for index in range(len(self._vehicles))])
-        finally:
-            self.watch.stop()
-
-    async def _fly_one(self, index: int) -> None:
-        vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic
-        notes, clock = vehicle.notes, vehicle.clock
-        notes.begin("checks", clock.stamp_us)
-        limits = await vehicle.limits(own.own_altitude_m)
-        check_vehicle(own, limits)
-        await vehicle.payload.require(TARGET_SENSOR_COMPONENT)
-        await vehicle.commands.set_message_rate("GLOBAL_POSITION_INT", _POSITION_HZ[own.law])
-        await vehicle.commands.request("HOME_POSITION", 3.0)
-        if vehicle.kind is VehicleKind.FIXED_WING:
-            await vehicle.wing.prepare_piloting()
-        traffic.checked(index)
-        await self._wait(vehicle, lambda: traffic.may_rise(index), "the layers above to be taken", _TAKEOFF_S)
-        notes.begin("takeoff", clock.stamp_us)
-        await vehicle.takeoff(own.own_altitude_m)
-        traffic.risen(index)
-        if index == 0:
-            self._frame = LocalFrame(vehicle.home)  # arming has set the home again
-        if not self.search.over:
-            if isinstance(limits, MulticopterLimits):
-                await self._search_by_setpoints(index, limits)
-            else:
-                await self._search_by_headings(index)
-        self.search.leave(index)
-        if self.search.over:
-            self.watch.stop()  # the way home is no part of the search
-        self.searchers[index].ended_us = clock.time_us
-        notes.begin("return", clock.stamp_us)
-        if not traffic.may_land(index):
-            await vehicle.hold()
-            await self._wait(
-                vehicle,
-                lambda: traffic.may_land(index),
-                "the layers below to be empty",
-                _LANDING_S,
-                flying=True,
-            )
-        if vehicle.kind is VehicleKind.FIXED_WING:
-            await vehicle.wing.land_along()
-        else:
-            await vehicle.return_to_launch(timeout_s=_LANDING_S)
-        traffic.down(index)
-        notes.end(clock.stamp_us)
-
-    async def _wait(
-        self, vehicle: "Vehicle", ready: Callable[[], bool], what: str, one_s: float, *, flying: bool = False
-    ) -> None:
-        """Wait for the other vehicles; the time limit grows with their number."""
-
-        def look() -> bool:
-            if flying and not vehicle.armed:
-                raise MissionError(
-                    f"the vehicle disarmed while it waited for {what}; {vehicle.link.last_received()}"
-                )
-            return ready()
-
-        own = self._options[0]
-        step_s = own.planner_parameters.step_m / (own.speed_m_s or 1.0)
-        searching_s = 0.0 if flying else 4.0 * own.steps * step_s
-        await vehicle.link.wait_until(
-            look, what=what, on=("HEARTBEAT",), timeout_s=searching_s + one_s * len(self._vehicles)
-        )
-
-    # the search
 
     def _on_scan(self, time_us: int, targets: tuple[TargetRow, ...]) -> None:
-        self._scan_us = self._vehicles[0].clock.time_us
+        self.scanned()
         self.search.scanned(time_us, targets)
-
-    def _begin(self, index: int) -> None:
-        vehicle, searcher = self._vehicles[index], self.searchers[index]
-        vehicle.notes.begin(SEARCH, vehicle.clock.stamp_us)
-        now_us = vehicle.clock.time_us
-        if self.search.began_us < 0:
-            self._scan_us = max(self._scan_us, self._vehicles[0].clock.time_us)
-        searcher.began_us = searcher.goal_us = now_us
-        searcher.goal = self.search.begin(index, vehicle.clock.stamp_us)
-
-    def _advance(self, index: int, here: Place) -> bool:
-        """Process a position: decide when the goal is reached. Returns whether the goal has changed."""
-        search, searcher, own = self.search, self.searchers[index], self._options[index]
-        vehicle = self._vehicles[index]
-        now_us = vehicle.clock.time_us
-        if not searcher.track or now_us - searcher.track[-1][0] >= 500_000:
-            searcher.track.append((now_us, *here))
-        vehicle.notes.progress = search.progress
-        self._check_sensor()
-        away_m = math.dist(here, searcher.goal)
-        if away_m > (own.acceptance_m or 2.0):
-            step_m = own.planner_parameters.step_m
-            limit_s = _LEAST_STEP_S + max(step_m, away_m) / (_SLOWEST_SHARE * (own.speed_m_s or 4.0))
-            if now_us - searcher.goal_us < limit_s * 1e6:
-                return False
-            searcher.late_steps += 1
-        if search.over or not search.may_step(index):
-            return False
-        searcher.goal = search.step(index, vehicle.clock.stamp_us, here)
-        searcher.goal_us = now_us
-        return True
-
-    def _check_sensor(self) -> None:
-        silent_s = (self._vehicles[0].clock.time_us - self._scan_us) * 1e-6
-        if silent_s > self._options[0].sensor_limit_s and not self.search.over:
-            self.search.reason = f"no scan was received for {silent_s:.0f} s"
-
-    async def _search_by_setpoints(self, index: int, limits: MulticopterLimits) -> None:
-        """Fly from place to place by streamed setpoints; while no scan arrives, the vehicle holds its
-        place.
-        """
-        vehicle, own, searcher = self._vehicles[index], self._options[index], self.searchers[index]
-        home = vehicle.home
-        north_m, east_m, _ = self._frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
-        own_frame = LocalFrame(home)
-        down_m = -own.own_altitude_m
-
-        def from_home(place: Place) -> Vector:
-            return place[0] - north_m, place[1] - east_m, down_m
-
-        def measured() -> tuple[Vector, Vector]:
-            p = vehicle.latest(Position)
-            if p is None:
-                raise MissionError(f"the vehicle reports no position; {vehicle.link.last_received()}")
-            return own_frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m), p.vel_ned_m_s
-
-        start, _ = measured()
-        law: StepLaw = (TrajectoryLaw if own.law is StepLawKind.TRAJECTORY else BacksteppingLaw)(
-            place_ned_m=(start[0], start[1], down_m),
-            speed_m_s=own.speed_m_s or 4.0,
-            limits=limits,
-            yaw_rad=HEADING_RAD,
-        )
-
-        def source(time_s: float) -> Setpoint | None:
-            if self.search.over:
-                return None
-            here, velocity = measured()
-            if time_s >= _TURN_S:
-                if searcher.began_us < 0:
-                    self._begin(index)
-                    law.aim(from_home(searcher.goal))
-                elif self._advance(index, (here[0] + north_m, here[1] + east_m)):
-                    law.aim(from_home(searcher.goal))
-            return law.setpoint(time_s, here, velocity)
-
-        async with vehicle.guided(own.rate_hz) as session:
-            await session.follow(source)
-
-    async def _search_by_headings(self, index: int) -> None:
-        """Fly an aircraft along headings to one place after the other."""
-        vehicle, own, searcher = self._vehicles[index], self._options[index], self.searchers[index]
-        guided = vehicle.firmware.modes[Mode.GUIDED]
-        async with steering(
-            vehicle, altitude_m=own.own_altitude_m, speed_m_s=own.speed_m_s or 0.0, rate_hz=own.rate_hz
-        ) as flight:
-            self._begin(index)
-            commanded: float | None = None
-            with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
-                async with vehicle.link.guard("the end of the search"):
-                    async for _ in stream:
-                        settled = vehicle.clock.time_us - searcher.began_us > _MODE_AGE_US
-                        if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
-                            raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
-                        p = vehicle.latest(Position)
-                        if p is None:
-                            continue
-                        north_m, east_m, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
-                        self._advance(index, (north_m, east_m))
-                        if self.search.over:
-                            break
-                        bearing = math.atan2(searcher.goal[1] - east_m, searcher.goal[0] - north_m)
-                        if commanded is None or abs(wrap_pi(bearing - commanded)) > _SAME_RAD:
-                            commanded = bearing % math.tau
-                            await flight.turn_to(commanded)

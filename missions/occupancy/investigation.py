@@ -7,17 +7,21 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
-from estimators.magnetic_identification.anomaly import Anomaly, Sample
+from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.classifier import shipped_classifier, trace_features
 from estimators.magnetic_identification.identifier import Identifier, Progress
+from estimators.magnetic_identification.samples import Place, Sample
 from estimators.occupancy import detection
 from estimators.occupancy.detection import MapError
 from estimators.occupancy.placed_readings import PlacedReading
+from estimators.tracking.grid import GridLayout
 from missions.occupancy.next_pass import Pass, candidate_passes
 
 _ACCEPT: Final = 0.97
 _DISMISS: Final = 0.03
-_LARGEST_SIGMA_M: Final = 25.0  # of the place of a target that is named
+_REOPEN: Final = 0.3  # a dismissed suspect is open again beyond it, after a pass that happened to be near
+_PLACED_WITHIN_M: Final = 40.0  # of the place of a target that is named, with the probability below
+_PLACED: Final = 0.9
 _MOST_PASSES: Final = 5  # a suspect that is still open then is decided by the more probable
 _LEAST_GAIN_NATS: Final = 0.02
 _MOST_ASSIGNED: Final = 8  # so many passes, which may detect nothing, are flown over one suspect at most
@@ -53,11 +57,13 @@ class Suspect:
         identified: its filters.
         verdict: what is decided.
         probability: that it is the target.
+        likeliest: where it is, if it is the target.
         anomalies: (searcher, loudest measurement) of each pass, in the order of time.
         assigned: number of passes that were assigned over it.
     """
 
     identified: Anomaly
+    likeliest: Place
     verdict: Verdict = Verdict.OPEN
     probability: float = 0.5
     anomalies: list[tuple[int, detection.Anomaly]] = field(default_factory=list)
@@ -70,8 +76,10 @@ class Suspect:
 
     @property
     def place_ne_m(self) -> tuple[float, float]:
-        """Its most probable place."""
-        return self.identified.place_ne_m
+        """Its most probable place: as a target, or as what it is instead."""
+        if self.probability < 0.5:
+            return self.identified.place_ne_m
+        return self.likeliest.north_m, self.likeliest.east_m
 
 
 class Investigation:
@@ -90,6 +98,7 @@ class Investigation:
         identifier: Identifier,
         *,
         searchers: int,
+        layout: GridLayout,
         noise_nt: float,
         map_error: MapError,
     ) -> None:
@@ -99,6 +108,7 @@ class Investigation:
             identify: TRACE or BAYES.
             identifier: fresh filters.
             searchers: number of searchers.
+            layout: cells of the searched area, in which the target is.
             noise_nt: standard deviation of a measurement.
             map_error: error of the published map.
         """
@@ -106,6 +116,7 @@ class Investigation:
         self.suspects: dict[int, Suspect] = {}
         self.passes_flown = 0
         self.identify = identify
+        self._layout = layout
         self._noise_nt = noise_nt
         self._map_error = map_error
         self._legs: list[list[tuple[float, float]]] = [[] for _ in range(searchers)]
@@ -113,7 +124,6 @@ class Investigation:
         self._fresh = [False] * searchers
         self._samples: list[Sample | None] = [None] * searchers
         self._speeds_m_s = [25.0] * searchers
-        self._loudest: dict[tuple[int, int], Sample] = {}
 
     def take(self, searcher: int, reading: PlacedReading, map_nt: float) -> Progress | None:
         """Process a reading of a searcher."""
@@ -127,23 +137,36 @@ class Investigation:
                 _LEAST_SPEED_M_S, moved_m * 1e6 / (sample.time_us - last.time_us)
             )
         self._samples[searcher] = sample
-        if progress.anomaly is not None:
-            key = (searcher, progress.anomaly.number)
-            loudest = self._loudest.get(key)
-            if loudest is None or abs(sample.residual_nt) > abs(loudest.residual_nt):
-                self._loudest[key] = sample
         return progress
+
+    def certain(self, searcher: int, progress: Progress) -> bool:
+        """Whether the anomaly of a pass in progress is the target already. A probability may be looked at
+        after every measurement, the output of the classifier at the end of a pass only.
+        """
+        anomaly = progress.anomaly
+        if self.identify is not Identify.BAYES or anomaly is None or progress.doubted:
+            return False
+        if anomaly.probability < _ACCEPT or not self.in_pass(searcher):
+            return False
+        return self._placed(anomaly.likeliest_place(_PLACED_WITHIN_M))
 
     def in_pass(self, searcher: int) -> bool:
         """Whether a searcher is at an anomaly."""
         return self.identifier.in_pass(searcher)
 
-    def conclude(self, searcher: int, anomaly: Anomaly) -> Suspect:
-        """Decide after a pass of a searcher over an anomaly, and assign the next pass if it is open."""
+    def conclude(self, searcher: int, anomaly: Anomaly, loudest: Sample | None = None) -> Suspect:
+        """Decide after a pass of a searcher over an anomaly, and assign the next pass if it is open.
+
+        Args:
+            searcher: number of the searcher.
+            anomaly: the anomaly.
+            loudest: largest measurement of the pass; None: nothing was detected.
+        """
         suspect = self.suspects.get(anomaly.number)
         if suspect is None:
-            suspect = self.suspects[anomaly.number] = Suspect(identified=anomaly)
-        loudest = self._loudest.pop((searcher, anomaly.number), None)
+            suspect = self.suspects[anomaly.number] = Suspect(
+                identified=anomaly, likeliest=anomaly.likeliest_place(_PLACED_WITHIN_M)
+            )
         if loudest is not None:
             suspect.anomalies.append(
                 (
@@ -157,11 +180,15 @@ class Investigation:
                     ),
                 )
             )
-        if suspect.verdict is Verdict.OPEN:
+        if suspect.verdict is not Verdict.TARGET:
             self._decide(suspect)
         self._release(suspect)
         self._assign_waiting()
         return suspect
+
+    def flies_pass(self, searcher: int) -> bool:
+        """Whether a searcher is assigned a pass."""
+        return self._assigned[searcher] is not None
 
     def next_leg(self, searcher: int, *, done: bool) -> tuple[tuple[float, float] | None, Suspect | None]:
         """The next goal of a searcher that flies a pass.
@@ -191,7 +218,9 @@ class Investigation:
         likely = [
             suspect
             for suspect in self.suspects.values()
-            if suspect.verdict is Verdict.OPEN and suspect.probability >= _ACCEPT
+            if suspect.verdict is Verdict.OPEN
+            and suspect.probability >= _ACCEPT
+            and self._layout.contains(*suspect.place_ne_m)
         ]
         if not likely:
             return None
@@ -214,12 +243,23 @@ class Investigation:
         else:
             features = trace_features(anomaly.trace)
             suspect.probability = float(shipped_classifier().probability(features))
-        placed = anomaly.place_sigma_m <= _LARGEST_SIGMA_M
-        last_chance = anomaly.passes >= _MOST_PASSES
-        if (suspect.probability >= _ACCEPT and placed) or (last_chance and suspect.probability >= 0.5):
+        suspect.likeliest = anomaly.likeliest_place(_PLACED_WITHIN_M)
+        placed, last_chance = self._placed(suspect.likeliest), anomaly.passes >= _MOST_PASSES
+        inside = self._layout.contains(*suspect.place_ne_m)
+        if (suspect.probability >= _ACCEPT and placed) or (
+            last_chance and inside and suspect.probability >= 0.5
+        ):
             suspect.verdict = Verdict.TARGET
         elif suspect.probability <= _DISMISS or last_chance:
             suspect.verdict = Verdict.DISMISSED
+        elif suspect.probability >= _REOPEN:
+            suspect.verdict = Verdict.OPEN
+
+    def _placed(self, place: Place) -> bool:
+        """Whether a place is known well enough. The target is in the searched area: a place outside may be
+        that of its mirror image.
+        """
+        return place.share >= _PLACED and self._layout.contains(place.north_m, place.east_m)
 
     def _release(self, suspect: Suspect) -> None:
         """End the passes that are assigned over a suspect."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.magnetic_identification.anomaly import Anomaly as Identified
+from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.localisation import gaussian_centre
 from estimators.occupancy.occupancy_map import OccupancyMap
@@ -217,8 +218,14 @@ class Search:
             reading.east_m,
             anomalous=investigation.in_pass(searcher),
         )
-        if progress is not None and progress.pass_ended is not None:
-            self._report_pass(searcher, progress.pass_ended, reading.time_us)
+        if progress is None:
+            return
+        if progress.pass_ended is not None:
+            self._report_pass(searcher, progress.pass_ended, reading.time_us, progress.loudest)
+        elif self.found is None and investigation.certain(searcher, progress):
+            # the rest of the pass would not change it
+            assert progress.anomaly is not None
+            self._report_pass(searcher, progress.anomaly, reading.time_us, progress.loudest)
 
     def next_leg(self, searcher: int, time_us: int, *, done: bool) -> tuple[float, float] | None:
         """The next goal of a searcher that is assigned a pass over a suspect; None: it searches on."""
@@ -230,6 +237,10 @@ class Search:
             goal, _ = self.investigation.next_leg(searcher, done=False)
         return goal
 
+    def flies_pass(self, searcher: int) -> bool:
+        """Whether a searcher is assigned a pass over a suspect that is still wanted."""
+        return self.investigation is not None and self.investigation.flies_pass(searcher)
+
     def finish(self, time_us: int) -> None:
         """The time of the search is over: name the most probable suspect whose place only is not known well
         enough.
@@ -237,13 +248,15 @@ class Search:
         if self.investigation is None or self.found is not None:
             return
         suspect = self.investigation.most_probable()
-        if suspect is not None and self.map.layout.contains(*suspect.place_ne_m):
+        if suspect is not None:
             self.found, self.found_us = suspect, time_us
 
-    def _report_pass(self, searcher: int, anomaly: Identified, time_us: int) -> None:
+    def _report_pass(
+        self, searcher: int, anomaly: Identified, time_us: int, loudest: Sample | None = None
+    ) -> None:
         """A pass over an anomaly has ended: change the scores by what is decided."""
         assert self.investigation is not None
-        suspect = self.investigation.conclude(searcher, anomaly)
+        suspect = self.investigation.conclude(searcher, anomaly, loudest)
         north_m, east_m = suspect.place_ne_m
         if not self.map.layout.contains(north_m, east_m):
             return

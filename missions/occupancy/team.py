@@ -88,7 +88,7 @@ class SearchTeam:
             first.layout,
             first.search_parameters,
             [own.decision_parameters for own in options],
-            investigation=_investigation(options, survey_map),
+            investigation=investigation_of(options, survey_map),
         )
         self.searchers = [
             Searcher(pilot=Pilot(self.search, k, start_ne_m=start_place(own)))
@@ -267,7 +267,7 @@ class SearchTeam:
         )
 
 
-def _investigation(options: Sequence[OccupancyOptions], survey_map: SurveyMap) -> Investigation | None:
+def investigation_of(options: Sequence[OccupancyOptions], survey_map: SurveyMap) -> Investigation | None:
     """The identification of a team; None when anomalies count by threshold."""
     first = options[0]
     if first.identify is Identify.THRESHOLD:
@@ -279,6 +279,7 @@ def _investigation(options: Sequence[OccupancyOptions], survey_map: SurveyMap) -
             first.identification, map_error=map_error, field_ned=field_direction(survey_map.home, _FIELD_YEAR)
         ),
         searchers=len(options),
+        layout=first.layout,
         noise_nt=first.noise_nt,
         map_error=map_error,
     )

@@ -1,19 +1,29 @@
-"""Pictures of the study `magnetic-identification`: ROC and reliability."""
+"""Pictures of the study `magnetic-identification`: ROC and reliability, and figures 4 to 6 of the paper."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from missions.studies.magnetic_passes import BEYOND_M, DIAGONAL_RAD, TARGET
+
+if TYPE_CHECKING:
+    from missions.studies.magnetic_passes import DiagonalPass
+
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 _COLOURS: Final = ("#9ca3af", "#c2410c", "#1769aa", "#15803d")
 _INK: Final = "#1f2937"
 _BINS: Final = 10
+_TARGET_COLOUR, _FALSE_COLOUR, _TRUTH_COLOUR = "#1769aa", "#c2410c", "#dc2626"
+_DOTS: Final = 4000  # particles that are drawn
+_FAR_M: Final = 4500.0
 
 
 def draw_curves(
@@ -52,6 +62,85 @@ def draw_curves(
             axes.spines[side].set_visible(False)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, Array]]) -> None:
+    """Draw figures 4 and 5 (the particles of a diagonal pass) and 6 (the confidence along passes).
+
+    Args:
+        path: the file; it must not exist.
+        flown: the diagonal pass.
+        traces: see `pass_traces`.
+    """
+    figure = Figure(figsize=(12.0, 9.0), dpi=130, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    in_target, in_vehicle, angles, confidence = figure.subplots(2, 2).ravel()
+    rng = np.random.default_rng(0)
+    count = len(flown.hypothesis.weights)
+    shown = rng.choice(count, min(count, _DOTS), replace=False)
+    chosen = rng.choice(count, min(count, _DOTS), p=flown.hypothesis.weights)
+    _draw_in_target(in_target, flown, shown, chosen)
+    sources = flown.hypothesis.sources()[chosen]
+    in_vehicle.plot(sources[:, 1], sources[:, 0], ".", color=_TARGET_COLOUR, markersize=2, alpha=0.4)
+    in_vehicle.plot(0.0, 0.0, "^", color=_INK, markersize=9)
+    in_vehicle.plot(0.0, -BEYOND_M, "+", color=_TRUTH_COLOUR, markersize=12, markeredgewidth=1.8)
+    in_vehicle.set_aspect("equal")
+    in_vehicle.set_xlim(-1500.0, 1500.0)
+    _title(in_vehicle, "the target, seen from the vehicle (8)", "right, m", "forward, m")
+    psi_deg = np.degrees(flown.ended[:, 2])
+    angles.hist(
+        psi_deg, bins=180, range=(-180.0, 180.0), weights=flown.hypothesis.weights, color=_TARGET_COLOUR
+    )
+    for sign in (-1.0, 1.0):
+        for angle in (math.degrees(DIAGONAL_RAD), 180.0 - math.degrees(DIAGONAL_RAD)):
+            angles.axvline(sign * angle, color=_TRUTH_COLOUR, linewidth=0.9, linestyle="--")
+    angles.set_xticks(range(-180, 181, 60))
+    _title(angles, "course relative to the target's axis", "psi, degrees", "weight")
+    for is_target, trace in traces:
+        colour = _TARGET_COLOUR if is_target else _FALSE_COLOUR
+        confidence.plot(trace[:, 0], trace[:, 1], color=colour, linewidth=1.1, alpha=0.75)
+    for label, colour in (("target", _TARGET_COLOUR), ("false anomaly", _FALSE_COLOUR)):
+        confidence.plot([], [], color=colour, label=label)
+    confidence.set_ylim(0.0, 1.0)
+    confidence.legend(fontsize=8, frameon=False, loc="lower right")
+    _title(confidence, "confidence along first passes (7)", "time since the begin of the anomaly, s", "C")
+    with path.open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def _draw_in_target(axes: Any, flown: "DiagonalPass", shown: Indices, chosen: Indices) -> None:
+    """Figure 4: the particles at the first measurement and at the end, on the target's signature."""
+    side = np.linspace(-_FAR_M, _FAR_M, 200)
+    square = (side[:, None] / TARGET.sigma_along_m) ** 2 + (side / TARGET.sigma_across_m) ** 2
+    axes.contour(
+        side, side, TARGET.amplitude_nt * np.exp(-0.5 * square), levels=[3.0, 10.0, 30.0, 80.0],
+        colors="#9ca3af", linewidths=0.7,
+    )  # fmt: skip
+    axes.plot(
+        flown.began[shown, 1], flown.began[shown, 0], ".", color="#9ca3af", markersize=2, alpha=0.4,
+        label="first measurement",
+    )  # fmt: skip
+    ended = flown.ended[chosen]
+    axes.plot(ended[:, 1], ended[:, 0], ".", color=_TARGET_COLOUR, markersize=2, alpha=0.4, label="end")
+    along_m = np.array([flown.began_along_m, BEYOND_M])
+    axes.plot(
+        along_m * math.sin(DIAGONAL_RAD), along_m * math.cos(DIAGONAL_RAD), color=_TRUTH_COLOUR,
+        linewidth=1.2, label="track",
+    )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.set_xlim(-3000.0, 3000.0)
+    axes.set_ylim(-_FAR_M, _FAR_M)
+    axes.legend(fontsize=8, frameon=False, loc="lower right", markerscale=4)
+    _title(axes, "particles in the target's frame", "right of the axis, m", "along the axis, m")
+
+
+def _title(axes: Any, title: str, x: str, y: str) -> None:
+    axes.set_title(title, fontsize=10, loc="left", color=_INK)
+    axes.set_xlabel(x, fontsize=9)
+    axes.set_ylabel(y, fontsize=9)
+    axes.tick_params(labelsize=8, colors=_INK)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
 
 
 def _roc(of_targets: Array, of_others: Array) -> tuple[Array, Array]:

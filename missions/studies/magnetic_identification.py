@@ -6,144 +6,28 @@ threshold on the anomaly, the paper's confidence alone, the classifier on traces
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.magnetic_identification.anomaly import Anomaly
-from estimators.magnetic_identification.classifier import FEATURES, shipped_classifier, trace_features
-from estimators.magnetic_identification.estimator import field_direction
-from estimators.magnetic_identification.identifier import Identifier
-from estimators.magnetic_identification.parameters import IdentificationParameters
-from estimators.occupancy.survey_map import map_error_of
+from estimators.magnetic_identification.classifier import FEATURES, shipped_classifier
 from estimators.tracking.metrics import calibration_error
-from missions.embedded.magnetic_encounters import Encounter, EncounterConditions, encounters
 from missions.studies.design import grid
 from missions.studies.magnetic_training import fitted_tables, require_training, write_tables
+from missions.studies.magnetic_trial import CONDITIONS, PASSES, Cell, EncounterRow, trial
 from missions.studies.results import Results
 from missions.studies.study import Study
 
 Array = NDArray[np.float64]
 
 METHODS: Final = ("threshold", "trace", "classifier", "bayes")
-CONDITIONS: Final[Mapping[str, EncounterConditions]] = MappingProxyType(
-    {
-        "nominal": EncounterConditions(),
-        "offset": EncounterConditions(offset_m=150.0),
-        "noise": EncounterConditions(noise_nt=1.0),
-        "depth": EncounterConditions(depth_factor=1.3),
-    }
-)
-"""By name: passes up to 150 m off, three times the noise, targets 30 % deeper than their class."""
-PASSES: Final = 2
 CLASSIFIER: Final = "classifier.toml"
-_YEAR: Final = 2026.0
-_NEAR_M: Final = 300.0  # an anomaly farther from the source is another one
-_PARTICLES: Final = 3000
+_PICTURED: Final = 200_000  # particles of figures 4 and 5
+_TRACES: Final = 8  # encounters of figure 6
 _TARGET, _FALSE = slice(0, PASSES), slice(PASSES, 2 * PASSES)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
-    """A cell of the design.
-
-    Attributes:
-        condition: one of `CONDITIONS`.
-    """
-
-    condition: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EncounterRow:
-    """Figures after each pass over a target, then after each pass over a false anomaly; NaN: no anomaly was
-    detected there.
-
-    Attributes:
-        detected: number of the sources, of two, at which an anomaly was detected.
-        peak_nt: largest measurement.
-        confidence: mean of the paper's confidence.
-        evidence: logarithm of the evidence ratio.
-        probability: of a target, by the evidence.
-        error_m: distance of the place from the true one.
-        features: those of the classifier, one pass after the other.
-    """
-
-    detected: int
-    peak_nt: tuple[float, ...]
-    confidence: tuple[float, ...]
-    evidence: tuple[float, ...]
-    probability: tuple[float, ...]
-    error_m: tuple[float, ...]
-    features: tuple[float, ...]
-
-
-def trial(cell: Cell, seed: int) -> EncounterRow:
-    """One map, one target, one false anomaly."""
-    conditions = CONDITIONS[cell.condition]
-    figures = [
-        after_pass
-        for encounter in encounters(seed, conditions, passes=PASSES)
-        for after_pass in figures_of_passes(encounter, seed, noise_nt=conditions.noise_nt)
-    ]
-    columns = np.array(figures)
-    return EncounterRow(
-        detected=int(np.isfinite(columns[PASSES - 1, 0])) + int(np.isfinite(columns[-1, 0])),
-        peak_nt=tuple(columns[:, 0].tolist()),
-        confidence=tuple(columns[:, 1].tolist()),
-        evidence=tuple(columns[:, 2].tolist()),
-        probability=tuple(columns[:, 3].tolist()),
-        error_m=tuple(columns[:, 4].tolist()),
-        features=tuple(columns[:, 5:].ravel().tolist()),
-    )
-
-
-def figures_of_passes(encounter: Encounter, seed: int, *, noise_nt: float) -> list[list[float]]:
-    """After each pass: peak, mean confidence, evidence ratio, probability, error of the place, and the
-    features of the classifier.
-    """
-    survey_map = encounter.survey_map
-    identifier = Identifier(
-        IdentificationParameters(noise_nt=noise_nt, particles=_PARTICLES, seed=seed),
-        map_error=map_error_of(survey_map),
-        field_ned=field_direction(survey_map.home, _YEAR),
-    )
-    found = []
-    for readings in encounter.passes:
-        for reading in readings:
-            map_nt = survey_map.total_nt(reading.north_m, reading.east_m, reading.height_m)
-            identifier.take(1, reading, map_nt)
-        found.append(_figures_of(_at(identifier, encounter.place_ne_m), encounter.place_ne_m))
-    return found
-
-
-def _at(identifier: Identifier, place_ne_m: tuple[float, float]) -> Anomaly | None:
-    """The strongest anomaly at a place."""
-    near = [a for a in identifier.anomalies if math.dist(a.place_ne_m, place_ne_m) <= _NEAR_M]
-    return max(near, key=_peak_nt, default=None)
-
-
-def _peak_nt(anomaly: Anomaly) -> float:
-    return max(abs(point.residual_nt) for point in anomaly.trace)
-
-
-def _figures_of(anomaly: Anomaly | None, place_ne_m: tuple[float, float]) -> list[float]:
-    if anomaly is None:
-        return [math.nan] * (5 + len(FEATURES))
-    features = trace_features(anomaly.trace)
-    return [
-        _peak_nt(anomaly),
-        float(features[0]),
-        anomaly.trace[-1].evidence,
-        anomaly.probability,
-        math.dist(anomaly.place_ne_m, place_ne_m),
-        *features.tolist(),
-    ]
 
 
 def area_under_curve(of_targets: Array, of_others: Array) -> float:
@@ -234,11 +118,17 @@ class Output:
     train: bool
 
     def __call__(self, results: Results, folder: Path) -> None:
-        from missions.studies.magnetic_figures import draw_curves
+        from missions.studies.magnetic_figures import draw_curves, draw_passes
+        from missions.studies.magnetic_passes import diagonal_pass, pass_traces
 
         scores = {method: values[0] for method, values in scores_of(results).items()}
         probability = {"classifier": scores["classifier"], "bayes": results.values("probability")[0]}
         draw_curves(folder / "roc.png", scores, probability, passes=PASSES)
+        draw_passes(
+            folder / "passes.png",
+            diagonal_pass(results.seed, _PICTURED),
+            list(pass_traces(results.seed, _TRACES)),
+        )
         if self.train:
             features = results.values("features").reshape(-1, 2 * PASSES, len(FEATURES))
             is_target = np.zeros(features.shape[:2], dtype=np.bool_)

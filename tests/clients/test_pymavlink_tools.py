@@ -39,6 +39,7 @@ def script(vehicle: str) -> Iterator[Client]:
 
 
 @compatibility(client="pymavlink mavftp", feature="put, get, list, rename, remove, crc")
+@pytest.mark.slow
 def test_mavftp(script: Client, tmp_path: Path) -> None:
     client = mavftp.MAVFTP(script.link, 1, 1)
     folder, file = f"{FOLDER[script.flavour]}/tools", tmp_path / "data.bin"

@@ -39,6 +39,7 @@ def lands(model: str, flavour: str, turbulence: Turbulence, climbed_m: float, se
     )
 
 
+@pytest.mark.slow
 def test_a_cessna_lands_softly_in_calm() -> None:
     figures = lands("c172x", "px4", Turbulence.NONE, 1160.0, 1)
     assert abs(figures.touch_along_m) < 40.0 and abs(figures.touch_across_m) < 5.0

@@ -64,7 +64,8 @@ def test_options_of_the_embedded_sitl_are_refused_with_a_vehicle_elsewhere(optio
         (["sector", "--ratio", "3:4"], "--ratio is for lissajous, not for sector"),
         (
             ["sector", "--spacing", "5"],
-            "--spacing is for parallel-sweep, expanding-square, multi-target, survey, not for sector",
+            "--spacing is for parallel-sweep, expanding-square, multi-target, survey, vision-search, "
+            "not for sector",
         ),
         (
             ["lissajous", "--heading", "5"],

@@ -145,3 +145,31 @@ def test_other_named_values_and_components_are_ignored(map_file):
     assert found.handle(1_000, reading(1_000, 1.0, name="TEMP")) is Outcome.IGNORED
     assert found.handle(1_000, reading(1_000, 1.0, component=1)) is Outcome.IGNORED
     assert found.handle(2_000, reading(2_000, math.nan)) is Outcome.NOT_FINITE
+
+
+def test_along_a_border_of_stairs_readings_without_a_map_make_no_anomaly_and_the_search_goes_on(tmp_path):
+    """A published map often ends in stairs of cells; a track along them has a map value here and there."""
+    lines = np.linspace(-1500.0, 1500.0, 61)
+    total = LEVEL_NT + 0.02 * (lines[:, None] + lines)
+    total[lines[:, None] + 400.0 < lines] = np.nan
+    path = tmp_path / "stairs.npz"
+    MagneticMap(
+        north_m=lines, east_m=lines, total_field_nt=total, height_m=HEIGHT_M, home=HOME, error_nt=1.0
+    ).save(path)
+    found = estimator(path)
+    rng = np.random.default_rng(3)
+    source = target(rng, (0.0, 0.0))
+    along = np.arange(-1240.0, 960.0, 2.0)
+    border = np.column_stack((along + 70.0 * np.sin(along / 120.0), along + 340.0))
+    across = np.column_stack((np.full(560, -20.0), np.arange(350.0, -1050.0, -2.5)))
+    used = 0
+    for k, taken in enumerate(readings(rng, np.vstack((border, across)), [source])):
+        if k == len(border):
+            used = found.remarks()["readings_unplaced"]
+            assert found.remarks()["anomalies"] == 0.0
+        field_nt = LEVEL_NT + 0.02 * (taken.north_m + taken.east_m)
+        found.handle(taken.time_us, reading(taken.time_us, field_nt + taken.total_nt))
+        if k % 2 == 0:
+            found.handle(taken.time_us, position(taken.time_us, taken.north_m, taken.east_m))
+    assert 50 < used < len(border) - 50
+    assert found.identifier.anomalies[-1].probability > 0.8

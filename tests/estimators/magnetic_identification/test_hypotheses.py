@@ -8,15 +8,11 @@ from scipy.stats import multivariate_normal
 
 from estimators.magnetic_identification import particles as p
 from estimators.magnetic_identification.classes import DipoleClass, GaussianClass
-from estimators.magnetic_identification.hypotheses import (
-    Before,
-    Control,
-    DipoleHypothesis,
-    GaussianHypothesis,
-    ShapelessHypothesis,
-)
+from estimators.magnetic_identification.hypotheses import Before, ShapelessHypothesis
+from estimators.magnetic_identification.particle_hypotheses import DipoleHypothesis, GaussianHypothesis
 from estimators.tracking.modes import find_modes
 from flightsim.payload import DipoleSignature
+from missions.studies.magnetic_passes import diagonal_pass
 from tests.estimators.magnetic_identification.encounters import (
     CORRELATION_M,
     DIRECTION,
@@ -171,38 +167,10 @@ def test_equation_8_puts_the_source_where_it_is_seen_from_the_vehicle():
     assert out[0] == pytest.approx((-50.0, 100.0, -0.5 * math.pi))
 
 
-def diagonal_pass(seed: int, count: int, *, by_roulette: bool = False) -> GaussianHypothesis:
-    """Figure 4: from where the anomaly begins, over the centre with slope 1:5, to 2250 m beyond it."""
-    of = GaussianClass(
-        name="target",
-        amplitude_nt=100.0,
-        sigma_along_m=1000.0,
-        sigma_across_m=500.0,
-        amplitude_spread=0.0,
-        size_spread=0.0,
-    )
-    hypothesis = GaussianHypothesis(
-        of, count, np.random.Generator(np.random.SFC64(seed)), by_roulette=by_roulette
-    )
-    psi = math.atan(0.2)
-    along_m = 25.0 * np.arange(-200, 91)
-    square = (along_m * math.cos(psi) / 1000.0) ** 2 + (along_m * math.sin(psi) / 500.0) ** 2
-    values = 100.0 * np.exp(-0.5 * square) + 0.5 * np.random.default_rng(seed).standard_normal(len(along_m))
-    first = int(np.flatnonzero(values > 3.0)[0])
-    hypothesis.start(measurement(values[first], white_nt2=1.0), 0.0)
-    control = Control(
-        forward_m=25.0, right_m=0.0, turn_rad=0.0, forward_sigma_m=0.5, turn_sigma_rad=0.015, decay=0.0,
-        drive_nt2=0.0,
-    )  # fmt: skip
-    for value in values[first + 1 :]:
-        hypothesis.step(control, measurement(value, white_nt2=1.0))
-    return hypothesis
-
-
 @pytest.mark.parametrize("seed", slow_after(1, range(2)))
 def test_a_diagonal_pass_leaves_four_modes(seed):
     """Figures 4 and 5 with 200,000 particles: the modes that the paper's pair merged are separate."""
-    hypothesis = diagonal_pass(seed, 200_000)
+    hypothesis = diagonal_pass(seed, 200_000).hypothesis
     modes = find_modes(hypothesis.sources(), hypothesis.weights, least_cell=25.0)
     angles = sorted(math.degrees(mode.mean[2]) for mode in modes)
     assert angles == pytest.approx([-168.7, -11.3, 11.3, 168.7], abs=3.0)

@@ -8,6 +8,7 @@ import pytest
 from estimators.magnetic_identification.identifier import Identifier
 from estimators.magnetic_identification.parameters import IdentificationParameters
 from estimators.occupancy.detection import MapError
+from flightsim.payload import GaussianSignature
 from tests.estimators.magnetic_identification.encounters import (
     CORRELATION_M,
     DIRECTION,
@@ -123,9 +124,77 @@ def test_the_confidence_of_the_paper_stays_for_a_target_and_drops_for_a_boat():
         ({"targets": ("a:gaussian:1:2:3",), "false_anomalies": ("a:dipole:1:2:3",)}, "a name of their own"),
         ({"target_prior": 1.0}, "target_prior 1 is not between 0 and 1"),
         ({"particles": 10}, "particles 10 is not in 100..1000000"),
-        ({"interval_s": math.nan}, "interval_s nan is not accepted"),
+        ({"interval_s": math.nan}, "interval_s = nan is not accepted"),
     ],
 )
 def test_impossible_parameters_are_refused(values, said):
     with pytest.raises(ValueError, match=said):
         IdentificationParameters(**values)
+
+
+def test_another_source_within_reach_of_a_known_anomaly_is_an_anomaly_of_its_own():
+    rng, found = np.random.default_rng(5), identifier()
+    wreck = GaussianSignature(
+        north_m=0.0, east_m=0.0, amplitude_nt=14.0, sigma_along_m=35.0, sigma_across_m=25.0
+    )
+    fly(found, rng, [wreck], offset_m=0.0, first_rad=0.0)
+    (known,) = found.anomalies
+    before = known.log_density, known.passes, known.place_ne_m
+    beside = track(rng, offset_m=0.0, course_rad=0.0) + np.array([0.0, 190.0])
+    source = target(rng, (0.0, 190.0))
+    for reading in readings(rng, beside, [wreck, source], start_us=200_000_000):
+        found.take(1, reading, 0.0)
+    _, another = found.anomalies
+    assert another.probability > 0.9 > 0.1 > known.probability
+    assert math.dist(another.place_ne_m, (0.0, 190.0)) < 60.0
+    assert (known.passes, known.place_ne_m) == before[1:]
+    assert known.log_density == pytest.approx(before[0], abs=20.0)  # but for the quiet ones before the pass
+
+
+def test_a_source_right_after_another_ends_the_pass_over_that():
+    rng, found = np.random.default_rng(6), identifier()
+    sources = [target(rng), boat(rng, (0.0, 290.0))]
+    places = track(rng, offset_m=0.0, course_rad=0.5 * math.pi)
+    ended = []
+    for reading in readings(rng, places, sources):
+        progress = found.take(1, reading, 0.0)
+        if progress is not None and progress.pass_ended is not None:
+            ended.append((progress.pass_ended, progress.loudest.residual_nt, progress.sample.residual_nt))
+    (first, loudest_nt, beyond_nt), *_ = ended
+    assert first is found.anomalies[0]
+    assert loudest_nt > 20.0
+    assert beyond_nt > 3.0  # there is nothing quiet between the two
+    assert [anomaly for anomaly, _, _ in ended].count(first) == 1
+    assert not first.under_way
+
+
+def test_a_vehicle_that_begins_at_a_source_does_not_take_the_wrong_level_for_anomalies():
+    """Its first reading is the level, which is too high: where nothing is, everything is too low."""
+    rng, found = np.random.default_rng(7), identifier()
+    source = target(rng)
+    away = track(rng, offset_m=10.0, course_rad=0.3, half_m=2000.0)
+    start = int(np.argmin(np.hypot(*away.T)))
+    reported = []
+    for reading in readings(rng, away[start:], [source]):
+        progress = found.take(1, reading, 0.0)
+        if progress is not None and progress.pass_ended is not None:
+            reported.append(progress.pass_ended)
+    assert found.started > 0
+    assert found.anomalies == reported == []
+    fly(found, rng, [source], passes=2, start_us=300_000_000)
+    assert found.anomalies[0].probability > 0.9
+
+
+def test_mirror_places_are_kept_apart():
+    """A straight pass beside a target does not show on which side it was; the mean would be on the track."""
+    shares = []
+    for seed in range(4):
+        rng, found = np.random.default_rng(seed), identifier()
+        fly(found, rng, [target(rng)], offset_m=60.0, first_rad=0.0)
+        (anomaly,) = found.anomalies
+        place = anomaly.likeliest_place(40.0)
+        assert abs(abs(place.east_m - 60.0) - 60.0) < 35.0  # at the target, or at its mirror image
+        shares.append(place.share)
+        fly(found, rng, [target(rng)], offset_m=0.0, first_rad=0.5 * math.pi, start_us=200_000_000)
+        assert anomaly.likeliest_place(40.0).share > 0.9
+    assert max(shares) < 0.9

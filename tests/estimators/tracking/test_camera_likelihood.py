@@ -208,9 +208,9 @@ def test_correlated_detections_have_the_information_of_a_gauss_markov_process():
     ("make", "reported"),
     [
         (lambda: SightModel(rate=PAPER_RATE, target_size_m=2.0, false_rate=0.0), "false_rate 0"),
-        (lambda: SightModel(rate=PAPER_RATE, target_size_m=0.0), "`target_size_m` 0"),
+        (lambda: SightModel(rate=PAPER_RATE, target_size_m=0.0), "target_size_m 0"),
         (lambda: DetectionRate(peak=1.1), "peak 1.1"),
-        (lambda: PoseErrors(forward_m=-1.0), "`forward_m` -1"),
+        (lambda: PoseErrors(forward_m=-1.0), "forward_m -1"),
         (lambda: sight(ERRORS, place=(math.nan, 0.0, -1.0)), "not finite"),
         (lambda: sight(ERRORS, distortion=(0.0,)), "is not k1, k2, p1, p2, k3"),
     ],

@@ -211,6 +211,7 @@ def connected(port):
     raise AssertionError(f"no listener at {port}")
 
 
+@pytest.mark.slow
 def test_a_base_station_hears_a_team_on_one_link(tmp_path):
     """By TCP, which waits for a machine with other work: on UDP what is not taken in at once is lost."""
     done, port = threading.Event(), free_port(socket.SOCK_STREAM)

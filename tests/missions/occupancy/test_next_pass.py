@@ -27,16 +27,17 @@ from tests.estimators.magnetic_identification.encounters import (
 MAP_ERROR = MapError(sigma_nt=MAP_NT, correlation_m=CORRELATION_M)
 
 
-def search(identify=Identify.BAYES, searchers=2):
+def search(identify=Identify.BAYES, searchers=2, *, south_m=-800.0):
     identifier = Identifier(
         IdentificationParameters(particles=1500, noise_nt=0.2), map_error=MAP_ERROR, field_ned=DIRECTION
     )
+    layout = GridLayout(south_m=south_m, west_m=-800.0, cell_m=200.0, rows=8, columns=8)
     return Search(
-        GridLayout(south_m=-800.0, west_m=-800.0, cell_m=200.0, rows=8, columns=8),
+        layout,
         SearchParameters(noise_nt=0.2),
         [DecisionParameters()] * searchers,
         investigation=Investigation(
-            identify, identifier, searchers=searchers, noise_nt=0.2, map_error=MAP_ERROR
+            identify, identifier, searchers=searchers, layout=layout, noise_nt=0.2, map_error=MAP_ERROR
         ),
     )
 
@@ -165,3 +166,42 @@ def test_the_classifier_on_the_trace_names_and_dismisses_too():
         named.append(max(s.probability for s in found.investigation.suspects.values()))
     assert named[0] > 0.8
     assert named[1] < 0.3
+
+
+def test_a_target_outside_the_searched_area_is_not_named_and_stays_open():
+    """The target is inside: a place outside is that of something else, or a mirror image."""
+    rng = np.random.default_rng(3)
+    found, source = search(south_m=300.0), target(rng)
+    fly(found, rng, source)
+    fly(found, rng, source, course_rad=1.7, start_us=120_000_000, offset_m=-30.0)
+    (suspect,) = found.investigation.suspects.values()
+    assert suspect.probability > 0.97
+    assert (found.found, suspect.verdict) == (None, Verdict.OPEN)
+    found.finish(900_000_000)
+    assert found.found is None
+
+
+def test_a_dismissed_suspect_is_open_again_when_a_later_pass_speaks_for_it():
+    rng = np.random.default_rng(3)
+    found, source = search(), target(rng)
+    fly(found, rng, source, offset_m=70.0)
+    (suspect,) = found.investigation.suspects.values()
+    suspect.verdict = Verdict.DISMISSED
+    fly(found, rng, source, course_rad=1.7, start_us=120_000_000, offset_m=-30.0)
+    fly(found, rng, source, course_rad=0.9, start_us=240_000_000, offset_m=10.0)
+    assert found.found is suspect
+    assert suspect.verdict is Verdict.TARGET
+
+
+def test_the_target_is_named_within_the_pass_that_suffices():
+    """The rest of the pass, 700 m, would not change it."""
+    rng = np.random.default_rng(4)
+    found, source = search(), target(rng)
+    fly(found, rng, source, offset_m=50.0)
+    assert found.found is None
+    start_us = 120_000_000
+    fly(found, rng, source, course_rad=1.7, start_us=start_us, offset_m=0.0)
+    assert found.found is not None
+    assert math.hypot(*found.found.place_ne_m) < 40.0
+    at_centre_s = 700.0 / 25.0
+    assert (found.found_us - start_us) * 1e-6 < at_centre_s + 7.0

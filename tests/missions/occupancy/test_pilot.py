@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimators.tracking.grid import GridLayout
-from missions.occupancy.decision import DecisionParameters
+from missions.occupancy.decision import Decision, DecisionParameters
 from missions.occupancy.pilot import Motion, Pilot, heading_for_course
 from missions.occupancy.search import Search, SearchParameters
 from tests.missions.occupancy.point_mass import Aircraft
@@ -71,6 +71,63 @@ def test_a_cell_that_is_never_reached_is_given_up():
 def test_at_rest_the_nose_is_the_course():
     hovering = Motion(time_us=0, north_m=0.0, east_m=0.0, vel_ne_m_s=(0.1, -0.1), yaw_rad=1.0)
     assert hovering.course_rad == 1.0
+
+
+class Passes:
+    """A search that assigns one pass, whose begin is right behind the searcher."""
+
+    def __init__(self, legs):
+        self.legs, self.wanted = list(legs), True
+        self.map = new_search().map
+
+    def next_leg(self, searcher, time_us, *, done):
+        return self.legs.pop(0) if self.legs and (done or len(self.legs) == 2) else None
+
+    def flies_pass(self, searcher):
+        return self.wanted
+
+    def next_cell(self, searcher, north_m, east_m, heading_rad):
+        self.wanted = False
+        return Decision(cell=(0, 0), heading_rad=0.0, utility=0.0)
+
+
+def fly_pass(search, *, until_s=60.0, wind=(0.0, 5.0)):
+    """Track (n, 2) of an aircraft that turns with a radius of 90 m."""
+    pilot = Pilot(search, 0, start_ne_m=(1000.0, 0.0))
+    place, heading_rad, wanted_rad, track = np.zeros(2), 0.0, 0.0, []
+    for k in range(round(until_s / 0.1)):
+        most = 0.1 * 25.0 / 90.0
+        heading_rad += float(np.clip(math.remainder(wanted_rad - heading_rad, math.tau), -most, most))
+        velocity = 25.0 * np.array([math.cos(heading_rad), math.sin(heading_rad)]) + wind
+        place = place + 0.1 * velocity
+        track.append(place)
+        now = Motion(
+            time_us=k * 100_000, north_m=place[0], east_m=place[1], vel_ne_m_s=tuple(velocity),
+            yaw_rad=heading_rad, airspeed_m_s=25.0, wind_ne_m_s=wind,
+        )  # fmt: skip
+        command = pilot.update(now)
+        if command is not None:
+            wanted_rad = command.heading_rad
+    return pilot, np.array(track)
+
+
+@pytest.mark.parametrize("side_m", [-40.0, 40.0])
+def test_a_pass_is_flown_over_its_suspect_though_a_turn_precedes_it(side_m):
+    """The turn back leaves the aircraft two radii beside the line; one heading would pass that far off."""
+    pilot, track = fly_pass(Passes([(20.0, side_m), (-580.0, 0.0)]))
+    suspect = (-280.0, 0.5 * side_m)
+    assert np.hypot(*(track - suspect).T).min() < 90.0
+    assert len(pilot.commands) > 3
+
+
+def test_a_pass_over_a_suspect_that_was_decided_is_left_at_once():
+    search = Passes([(500.0, 0.0), (1100.0, 0.0)])
+    pilot = Pilot(search, 0, start_ne_m=(1000.0, 0.0))
+    pilot.update(motion(0.0, 0.0, 0.0))
+    assert pilot.update(motion(1.0, 25.0, 0.0)).goal_ne_m == (500.0, 0.0)
+    assert pilot.update(motion(2.0, 50.0, 0.0)) is None
+    search.legs, search.wanted = [], False
+    assert pilot.update(motion(3.0, 75.0, 0.0)).goal_ne_m == search.map.layout.centre_of((0, 0))
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (-4.0, 3.0)])

@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu
 
-from estimators.magnetic_identification.anomaly import TracePoint
 from estimators.magnetic_identification.classifier import (
     FEATURES,
     TraceClassifier,
     shipped_classifier,
     trace_features,
 )
+from estimators.magnetic_identification.samples import TracePoint
 from missions.embedded.magnetic_encounters import EncounterConditions, encounters
 from missions.studies import run_trial
+from missions.studies.magnetic_figures import draw_passes
 from missions.studies.magnetic_identification import area_under_curve, study
+from missions.studies.magnetic_passes import TARGET, diagonal_pass, pass_traces
 from missions.studies.magnetic_training import fitted_tables, write_tables
 
 
@@ -98,3 +100,26 @@ def test_fitted_tables_are_what_scikit_learn_has_fitted(tmp_path):
     assert TraceClassifier.of(tables["logistic"]).probability(features) == pytest.approx(expected, abs=1e-4)
     network = TraceClassifier.of(tables["network"]).probability(features)
     assert np.mean((network > 0.5) == is_target) > 0.95
+
+
+def test_the_passes_of_figures_4_to_6_are_drawn(tmp_path):
+    traces = list(pass_traces(3, 1))
+    assert [is_target for is_target, _ in traces] == [True, False]
+    assert all(((trace[:, 1] >= 0.0) & (trace[:, 1] <= 1.0)).all() for _, trace in traces)
+    flown = diagonal_pass(1, 4000)
+    square = (flown.began[:, 0] / 1000.0) ** 2 + (flown.began[:, 1] / 500.0) ** 2
+    level_nt = np.median(TARGET.amplitude_nt * np.exp(-0.5 * square))
+    assert level_nt == pytest.approx(3.5, abs=1.0)  # on the level curve of the first measurement
+    draw_passes(tmp_path / "passes.png", flown, traces)
+    assert (tmp_path / "passes.png").stat().st_size > 50_000
+
+
+def test_more_noise_than_stated_is_in_the_readings():
+    stated, more = (
+        next(encounters(5, EncounterConditions(noise_factor=factor))).passes[0] for factor in (1.0, 1.3)
+    )
+    values = [np.array([reading.total_nt for reading in readings]) for readings in (stated, more)]
+    # of second differences, far from the source: white noise alone
+    spreads = [np.diff(v[:200], 2).std() / math.sqrt(6.0) for v in values]
+    assert spreads[0] == pytest.approx(0.3, rel=0.15)
+    assert spreads[1] == pytest.approx(1.3 * spreads[0], rel=0.1)

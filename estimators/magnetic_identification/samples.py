@@ -1,0 +1,64 @@
+"""What goes into the investigation of an anomaly and what comes out: measurements, places, and the trace."""
+
+from dataclasses import dataclass
+
+__all__ = ["Place", "Sample", "TracePoint"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """Averaged readings of one vehicle.
+
+    Attributes:
+        time_us: vehicle time of the middle.
+        vehicle: number of the vehicle.
+        north_m, east_m, height_m: mean place from the map's home.
+        course_rad: course of the vehicle over ground.
+        residual_nt: mean of reading less map, less level.
+        readings: number of readings.
+    """
+
+    time_us: int
+    vehicle: int
+    north_m: float
+    east_m: float
+    height_m: float
+    course_rad: float
+    residual_nt: float
+    readings: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TracePoint:
+    """The state after one measurement.
+
+    Attributes:
+        time_us: vehicle time.
+        number: number of the pass, from 0.
+        residual_nt: the measurement.
+        confidence: the paper's C_t, per particle and over its greatest value; NaN: no class has it.
+        probability: that the anomaly is one of the targets.
+        evidence: logarithm of the evidence of the most probable target, less that of the most probable other
+            explanation.
+    """
+
+    time_us: int
+    number: int
+    residual_nt: float
+    confidence: float
+    probability: float
+    evidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A place from the map's home.
+
+    Attributes:
+        north_m, east_m: the place.
+        share: of the belief near it.
+    """
+
+    north_m: float
+    east_m: float
+    share: float

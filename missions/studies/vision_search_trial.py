@@ -1,0 +1,166 @@
+"""The trial of the study `vision-search`: one search on SITL, and its log through four beliefs.
+
+As in Tisdale et al. 2008, the aircraft fly by one belief, and the others are computed from the same flight
+afterwards: a fine grid, a coarse one, and particles.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Final
+
+from estimators.library import make_estimator
+from estimators.log_replay import replay
+from estimators.logs import open_log
+from flightsim.world_spec import WorldSpec
+from missions.embedded.hidden_tag import vision_search_world
+from missions.runs.request import RunRequest
+from missions.studies.flights import fly_trial
+from missions.studies.study import run_of
+from missions.vision_search.figures import ELLIPSE_95
+from missions.vision_search.options import VisionSearchOptions
+
+__all__ = ["BELIEFS", "TEAMS", "Cell", "Localized", "VisionSearchTrial"]
+
+TEAMS: Final[Mapping[str, int]] = MappingProxyType({"one": 1, "two": 2})
+
+BELIEFS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "fine": ("cell_m=0.67", "single_precision=true"),
+        "coarse": ("cell_m=12.5",),
+        "particles": ("belief=particles", "particles=6400"),
+    }
+)
+"""The paper's three representations, as settings of the estimator."""
+
+_ESTIMATE_PERIOD: Final = "estimate_period_s=20"
+_PARAMETERS: Final = MappingProxyType(
+    {"COM_LOW_BAT_ACT": 0.0}
+)  # some searches outlast the battery's failsafe
+_ANGLES_AND_PLACE: Final = (
+    *("forward_m", "right_m", "height_m", "yaw_rad", "pitch_rad", "roll_rad"),
+    *("place_time_s", "attitude_time_s"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """Parameters of a trial."""
+
+    aircraft: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Localized:
+    """The result of a search.
+
+    Attributes:
+        completed: the search was flown, and passed its checks.
+        reason: why not; "" otherwise.
+        localized: the belief of the flight has narrowed down.
+        localized_s: time until then; NaN: it did not.
+        search_s: duration of the search.
+        sim_time_s: time from boot to the end.
+        figures: of each belief ("fine", "coarse", "particles") its `error_m`, `sigma_m` and
+            `distance_squared` (Mahalanobis), as "fine_error_m"; and the vehicles' pose errors, root mean
+            squares over the team, as "pose_pitch_rad".
+    """
+
+    completed: bool
+    reason: str
+    localized: bool
+    localized_s: float
+    search_s: float
+    sim_time_s: float
+    figures: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisionSearchTrial:
+    """One search.
+
+    Attributes:
+        model: of the vehicles.
+        side_m: of the searched square (paper: 1 km).
+        passes: over the target, of all vehicles.
+    """
+
+    model: str = "aerosonde"
+    side_m: float = 1000.0
+    passes: int = 6
+
+    def __call__(self, cell: Cell, seed: int) -> Localized:
+        """Fly the search. The same seed has the same place of the target for both teams."""
+        _, run = run_of(seed)
+        half_m = 0.5 * self.side_m
+        options = VisionSearchOptions(
+            vehicles=TEAMS[cell.aircraft],
+            area_m=(-half_m, -half_m, half_m, half_m),
+            passes=self.passes,
+            tag_size_m=3.0,
+            search_seed=run,
+        )
+        world = WorldSpec.of_team(options.vehicles, model=self.model, seed=seed)
+        world = vision_search_world(world, options)
+        result = fly_trial(
+            "vision-search", RunRequest(options=options, world=world, parameters=dict(_PARAMETERS))
+        )
+        summary = result.summary
+        place = summary["target_north_m"], summary["target_east_m"]
+        figures = _pose_figures(summary)
+        for name, settings in BELIEFS.items():
+            figures |= _replayed(name, settings, options, result.folder / "flight.tlog", place)
+        localized_s = summary["localized_s"]
+        return Localized(
+            completed=result.outcome == "completed",
+            reason=result.reason,
+            localized=summary["localized"],
+            localized_s=math.nan if localized_s is None else localized_s,
+            search_s=summary["search_s"],
+            sim_time_s=summary["sim_time_s"],
+            figures=figures,
+        )
+
+
+def _pose_figures(summary: Mapping[str, Any]) -> dict[str, float]:
+    known = [errors for errors in summary["pose_errors"].values() if errors is not None]
+    return {
+        f"pose_{name}": math.sqrt(sum(errors[name] ** 2 for errors in known) / len(known))
+        for name in _ANGLES_AND_PLACE
+        if known
+    }
+
+
+def _replayed(
+    name: str, settings: tuple[str, ...], options: VisionSearchOptions, log: Any, place: tuple[float, float]
+) -> dict[str, float]:
+    """The end of one belief over the log of a flight."""
+    parameters = options.estimator_parameters
+    chosen = {setting.partition("=")[0] for setting in (*settings, _ESTIMATE_PERIOD)}
+    own = [
+        f"{field.name}={getattr(parameters, field.name)}"
+        for field in fields(parameters)
+        if field.name not in chosen
+    ]
+    centre = f"centre_vehicle={1 if options.vehicles > 1 else 0}"
+    own = [setting for setting in own if not setting.startswith("centre_vehicle")]
+    done = replay(
+        open_log(log), partial(make_estimator, "vision-search", (*own, centre, *settings, _ESTIMATE_PERIOD))
+    )
+    (runner,) = done.fleet.runners.values()
+    table = runner.tables.get("AreaEstimate")
+    if table is None:
+        return {}
+    last = dict(zip(table.columns, table.values[-1].tolist(), strict=True))
+    n, e = place[0] - last["north_m"], place[1] - last["east_m"]
+    sn, se, rho = last["north_sigma_m"], last["east_sigma_m"], last["north_east_correlation"]
+    a, b = n / sn, e / se
+    distance = (a * a + b * b - 2.0 * rho * a * b) / (1.0 - rho * rho)
+    return {
+        f"{name}_error_m": math.hypot(n, e),
+        f"{name}_sigma_m": math.sqrt(sn * se) * (1.0 - rho * rho) ** 0.25,
+        f"{name}_distance_squared": distance,
+        f"{name}_inside": float(distance <= ELLIPSE_95),
+    }

@@ -1,0 +1,188 @@
+"""The picture of a vision search: beliefs at four moments with the footprints, and how the belief narrows
+down.
+"""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, Polygon
+
+from estimators.vision_search import AreaEstimate
+from missions.vision_search.figures import ELLIPSE_95, true_place
+
+if TYPE_CHECKING:
+    from missions.mission import Debriefing
+    from missions.vision_search.search import Moment
+    from missions.vision_search.team import VisionSearchTeam
+
+__all__ = ["draw_search"]
+
+_COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
+_INK: Final = "#1f2937"
+_GRID: Final = "#e5e7eb"
+_TRUE: Final = "#dc2626"
+_WIDTHS: Final = 6.0  # half the side of the ellipses' view, in standard deviations
+
+
+def draw_search(path: Path, title: str, team: "VisionSearchTeam", debriefing: "Debriefing") -> None:
+    """Draw the search.
+
+    Args:
+        path: the file; it must not exist.
+        title: title above the picture.
+        team: the team at the end of the search.
+        debriefing: debriefing of the run.
+    """
+    place = true_place(team, debriefing, team.search.moments[-1].time_us)
+    figure = Figure(figsize=(14.0, 7.2), dpi=120, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
+    grid = figure.add_gridspec(2, 4, height_ratios=(3.4, 2.8))
+    for k, moment in enumerate(_four(team)):
+        _draw_moment(figure.add_subplot(grid[0, k]), moment, team, place)
+    _draw_detection(figure.add_subplot(grid[1, 0]), team)
+    _draw_covariance(figure.add_subplot(grid[1, 1:3]), team, place)
+    _draw_ellipses(figure.add_subplot(grid[1, 3]), team, place)
+    with path.open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def _four(team: "VisionSearchTeam") -> list["Moment"]:
+    """Two moments of the search, the first after the target was localized, and the last."""
+    search = team.search
+    moments, end_us = search.moments, search.localized_us
+    flown = [m for m in moments if m.time_us >= search.began_us] or moments
+    if end_us < 0:
+        return [flown[min(len(flown) - 1, k * len(flown) // 3)] for k in range(4)]
+    start_us = flown[0].time_us
+    wanted = [start_us + share * (end_us - start_us) for share in (0.4, 0.85)]
+    after = [m for m in flown if m.time_us >= end_us] or [flown[-1]]
+    return [*(min(flown, key=lambda m: abs(m.time_us - t)) for t in wanted), after[0], flown[-1]]
+
+
+def _times(states: list[AreaEstimate], began_us: int) -> list[float]:
+    return [(state.time_us - began_us) * 1e-6 for state in states]
+
+
+def _draw_moment(
+    axes: Any, moment: "Moment", team: "VisionSearchTeam", place: tuple[float, float] | None
+) -> None:
+    layout, search = team.search.layout, team.search
+    density = moment.shares / max(moment.shares.max(), 1e-300)
+    axes.imshow(
+        np.sqrt(density),  # small probabilities are visible too
+        origin="lower",
+        extent=(layout.west_m, layout.east_m, layout.south_m, layout.north_m),
+        cmap="Greys",
+        vmin=0.0,
+        vmax=1.0,
+        interpolation="nearest",
+    )
+    for k, searcher in enumerate(team.searchers):
+        colour = _COLOURS[k % len(_COLOURS)]
+        track = np.array([(n, e) for t, n, e in searcher.track if t <= moment.time_us]).reshape(-1, 2)
+        axes.plot(track[:, 1], track[:, 0], "-", color=colour, linewidth=1.0, label=f"vehicle {k + 1}")
+        here = moment.places[k]
+        if here is not None:
+            axes.add_patch(_footprint(here, team, k, colour))
+    if place is not None:
+        axes.plot(place[1], place[0], "+", color=_TRUE, markersize=10, label="target")
+    _ellipse(axes, moment.estimate, _COLOURS[2])
+    axes.set_xlim(layout.west_m, layout.east_m)
+    axes.set_ylim(layout.south_m, layout.north_m)
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=7, colors=_INK)
+    seconds = (moment.time_us - search.began_us) * 1e-6
+    axes.set_title(
+        f"{seconds:.0f} s: {moment.estimate.detections} detections, sigma {moment.estimate.sigma_m:.1f} m",
+        fontsize=9,
+        color=_INK,
+        loc="left",
+    )
+    axes.legend(fontsize=7, loc="upper right", framealpha=0.85)
+
+
+def _footprint(here: tuple[float, float, float], team: "VisionSearchTeam", index: int, colour: str) -> Any:
+    """What a level camera sees from a place."""
+    options = team.options[index]
+    north_m, east_m, yaw_rad = here
+    half_right = options.own_altitude_m * math.tan(0.5 * options.view_rad)
+    half_ahead = 0.5625 * half_right
+    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+    corners = [
+        (east_m + ahead * sine + right * cosine, north_m + ahead * cosine - right * sine)
+        for ahead, right in (
+            (half_ahead, -half_right),
+            (half_ahead, half_right),
+            (-half_ahead, half_right),
+            (-half_ahead, -half_right),
+        )
+    ]
+    return Polygon(corners, closed=True, fill=False, edgecolor=colour, linewidth=1.4)
+
+
+def _ellipse(axes: Any, estimate: AreaEstimate, colour: str, label: str = "") -> None:
+    """The 95 % ellipse."""
+    covariance = np.array(
+        [
+            [estimate.east_variance_m2, estimate.north_east_covariance_m2],
+            [estimate.north_east_covariance_m2, estimate.north_variance_m2],
+        ]
+    )
+    values, vectors = np.linalg.eigh(covariance)
+    width, height = 2.0 * np.sqrt(ELLIPSE_95 * np.maximum(values, 0.0))
+    angle = math.degrees(math.atan2(vectors[1, 0], vectors[0, 0]))
+    centre = estimate.east_m, estimate.north_m
+    axes.add_patch(
+        Ellipse(centre, width, height, angle=angle, fill=False, edgecolor=colour, linewidth=1.3, label=label)
+    )
+
+
+def _draw_detection(axes: Any, team: "VisionSearchTeam") -> None:
+    for k, states in enumerate(team.search.states):
+        pod = [state.probability_of_detection for state in states]
+        colour = _COLOURS[k % len(_COLOURS)]
+        axes.plot(_times(states, team.search.began_us), pod, color=colour, label=f"vehicle {k + 1}")
+    axes.set_ylim(0.0, 1.0)
+    _style(axes, "cumulative probability of detection")
+
+
+def _draw_covariance(axes: Any, team: "VisionSearchTeam", place: tuple[float, float] | None) -> None:
+    for k, states in enumerate(team.search.states):
+        colour = _COLOURS[k % len(_COLOURS)]
+        times = _times(states, team.search.began_us)
+        axes.semilogy(times, [s.sigma_m for s in states], color=colour, label=f"sigma, vehicle {k + 1}")
+        if place is not None:
+            errors = [max(1e-3, math.dist(place, (s.north_m, s.east_m))) for s in states]
+            axes.semilogy(times, errors, color=colour, linestyle=":", label=f"error, vehicle {k + 1}")
+    _style(axes, "longest sigma and error, m")
+
+
+def _draw_ellipses(axes: Any, team: "VisionSearchTeam", place: tuple[float, float] | None) -> None:
+    last = [states[-1] for states in team.search.states if states]
+    for k, estimate in enumerate(last):
+        colour = _COLOURS[k % len(_COLOURS)]
+        _ellipse(axes, estimate, colour, f"vehicle {k + 1}")
+        axes.plot(estimate.east_m, estimate.north_m, "o", color=colour, markersize=3)
+    if place is not None:
+        axes.plot(place[1], place[0], "+", color=_TRUE, markersize=10)
+    if last:
+        half_m = _WIDTHS * last[0].sigma_m
+        axes.set_xlim(last[0].east_m - half_m, last[0].east_m + half_m)
+        axes.set_ylim(last[0].north_m - half_m, last[0].north_m + half_m)
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=7, colors=_INK)
+    axes.set_title("95 % ellipses at the end, m", fontsize=9, color=_INK, loc="left")
+
+
+def _style(axes: Any, label: str) -> None:
+    axes.set_ylabel(label, fontsize=8, color=_INK)
+    axes.set_xlabel("time of the search, s", fontsize=8, color=_INK)
+    axes.set_xlim(left=0.0)
+    axes.grid(color=_GRID, linewidth=0.8)
+    axes.tick_params(labelsize=7, colors=_INK)
+    axes.legend(fontsize=7, loc="best", frameon=False)

@@ -1,0 +1,70 @@
+"""The study `magnetic-search`, and the searches with points that it consists of."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from missions.embedded.point_searchers import search_with_points
+from missions.embedded.worlds import drawn_target
+from missions.occupancy.investigation import Identify
+from missions.occupancy.options import OccupancyOptions
+from missions.studies import run_trial
+from missions.studies.magnetic_search import report, study, summarise
+
+SMALL = OccupancyOptions(
+    vehicles=2, width_m=900.0, height_m=900.0, identify=Identify.BAYES, particles=800, search_time_s=200.0
+)
+
+
+def test_points_find_the_target_of_the_world_and_a_seed_repeats_itself():
+    first, again = (search_with_points(SMALL, 3, false_count=0) for _ in range(2))
+    assert first.target_ne_m == drawn_target(SMALL, 3)[0]
+    assert first.error_m < 60.0
+    assert 0.0 < first.time_s < 200.0
+    assert (again.time_s, again.error_m) == (first.time_s, first.error_m)
+    assert np.array_equal(again.search.map.scores, first.search.map.scores)
+
+
+def test_a_search_that_is_over_names_nothing():
+    done = search_with_points(
+        OccupancyOptions(vehicles=1, width_m=900.0, height_m=900.0, search_time_s=2.0), 3, false_count=0
+    )
+    assert done.search.found is None
+    assert (done.time_s, math.isnan(done.error_m)) == (2.0, True)
+
+
+def test_the_time_of_a_search_that_does_not_name_the_target_is_infinite():
+    columns = {
+        "target_named": [[1, 0, 0], [1, 1, 1]],
+        "false_anomaly_named": [[0, 1, 1], [0, 0, 0]],
+        "time_s": [[100.0, 20.0, 30.0], [90.0, 200.0, 300.0]],
+        "error_m": [[8.0, 900.0, 700.0], [4.0, 6.0, 10.0]],
+    }
+    results = SimpleNamespace(
+        cells=[{"identify": "threshold"}, {"identify": "bayes"}],
+        values=lambda name: np.array(columns[name], dtype=np.float64),
+    )
+    threshold, bayes = summarise(results)["searches"].values()
+    assert (threshold["target_named"], threshold["false_anomaly_named"]) == (0.3333, 0.6667)
+    assert (threshold["time_s_median"], bayes["time_s_median"]) == (None, 200.0)
+    assert (bayes["sooner_than_threshold"], bayes["later_than_threshold"]) == (1.0, 0.0)
+    assert (bayes["pairs_that_both_name_it"], bayes["time_to_threshold_s_median_of_pairs"]) == (1, -10.0)
+    assert bayes["error_m_median"] == 6.0
+    assert "bayes" in report(results)[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", range(4))
+def test_the_evidence_names_the_target_among_five_false_anomalies(run):
+    index = 3 * run + list(Identify).index(Identify.BAYES)
+    row = run_trial(study(), index, runs=4)
+    assert (row["identify"], row["target_named"], row["false_anomaly_named"]) == ("bayes", True, False)
+    assert row["error_m"] < 40.0
+
+
+def test_its_cells_can_be_stored():
+    """Rows are written with the parameters of their cells: plain numbers and texts."""
+    assert [type(cell["identify"]) for cell in study().design.cells] == [str] * 3
+    assert study().schema.table_schema(study().design.cells[0]) is not None
