@@ -24,6 +24,7 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
         "magnetic-identification": "estimators.magnetic_identification",
         "multi-target": "estimators.multi_target",
         "orbit-target": "estimators.orbit_target",
+        "relative-pose": "estimators.relative_pose",
         "survey": "estimators.survey",
         "target-fusion": "estimators.target_fusion",
         "vision-search": "estimators.vision_search",

@@ -8,6 +8,7 @@ from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
 from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MagnetometerComponent
+from autopilot_bridge.payload.range_radio import RangeRadioComponent
 from autopilot_bridge.payload.target_sensor import TargetSensorComponent
 from flightsim.payload import Payload
 
@@ -51,6 +52,11 @@ class PayloadStation:
         if payload.target_sensor is not None:
             self._target_sensor = TargetSensorComponent(system_id=system_id, send=send)
             self.components.append(self._target_sensor)
+        self._range_radio: RangeRadioComponent | None = None
+        if payload.range_radio is not None:
+            sigma_m = payload.range_radio.parameters.sigma_m
+            self._range_radio = RangeRadioComponent(system_id=system_id, send=send, sigma_m=sigma_m)
+            self.components.append(self._range_radio)
 
     def step(self, time_us: int) -> None:
         """One physics step: the devices, then the messages of their components."""
@@ -62,6 +68,8 @@ class PayloadStation:
             self._magnetometer.update(payload.reading)
         if self._target_sensor is not None and payload.scan is not None:
             self._target_sensor.update(payload.scan)
+        if self._range_radio is not None and payload.ranges:
+            self._range_radio.update(payload.ranges)
         for component in self.components:
             component.step(time_us)
 

@@ -127,6 +127,11 @@ class SitlVehicle:
                     targets=targets,
                     magnetic_field=magnetic_field,
                     terrain=terrain,
+                    others=lambda: [
+                        (other.system_id, vehicle.truth)
+                        for other, vehicle in zip(world_spec.vehicles, world.vehicles, strict=True)
+                        if vehicle is not self.vehicle and other.payload.range_radio is not None
+                    ],
                 )
             )
 

@@ -27,6 +27,7 @@ from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
 from flightsim.payload.magnetic_spec import InducedDipole, MagneticSpec, SignatureSpec, magnetic_field_of
 from flightsim.payload.payload import Payload, PayloadParameters
+from flightsim.payload.range_radio import MeasuredRange, RadioOutage, RangeRadio, RangeRadioParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.survey_magnetometer import (
@@ -81,11 +82,15 @@ __all__ = [
     "MagneticReading",
     "MagneticSpec",
     "MainField",
+    "MeasuredRange",
     "Payload",
     "PayloadParameters",
     "PictureDetection",
     "PinholeModel",
+    "RadioOutage",
     "RandomWalk",
+    "RangeRadio",
+    "RangeRadioParameters",
     "ResolutionDetection",
     "ScanDisturbance",
     "SeenTargets",

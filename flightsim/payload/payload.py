@@ -1,8 +1,8 @@
 """The payload of one vehicle, composed and stepped together: gimbal, camera, survey magnetometer, target
-sensor.
+sensor, range radio.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.detection import CameraFrame
 from flightsim.payload.gimbal import Gimbal, GimbalParameters
 from flightsim.payload.magnetic_field import MagneticField
+from flightsim.payload.range_radio import MeasuredRange, RangeRadio, RangeRadioParameters
 from flightsim.payload.survey_magnetometer import (
     MagneticReading,
     SurveyMagnetometer,
@@ -31,19 +32,31 @@ class PayloadParameters:
     camera: CameraParameters | None = None
     magnetometer: SurveyMagnetometerParameters | None = None
     target_sensor: TargetSensorParameters | None = None
+    range_radio: RangeRadioParameters | None = None
 
 
 class Payload:
     """Mission payload of one vehicle. Call `step` once per physics step, after the vehicle's.
 
     Attributes:
-        gimbal, camera, magnetometer, target_sensor: the devices; None: not carried.
+        gimbal, camera, magnetometer, target_sensor, range_radio: the devices; None: not carried.
         frame: the camera's frame delivered on this step, or None.
         reading: the magnetometer's reading delivered on this step, or None.
         scan: the target sensor's scan taken on this step, or None.
+        ranges: the ranges that the radio measured on this step.
     """
 
-    __slots__ = ("camera", "frame", "gimbal", "magnetometer", "reading", "scan", "target_sensor")
+    __slots__ = (
+        "camera",
+        "frame",
+        "gimbal",
+        "magnetometer",
+        "range_radio",
+        "ranges",
+        "reading",
+        "scan",
+        "target_sensor",
+    )
 
     def __init__(
         self,
@@ -56,6 +69,7 @@ class Payload:
         targets: GroundTargets | None = None,
         magnetic_field: MagneticField | None = None,
         terrain: Terrain | None = None,
+        others: Callable[[], Sequence[tuple[int, NDArray[np.float64]]]] = tuple,
     ) -> None:
         """Fit the devices.
 
@@ -70,6 +84,7 @@ class Payload:
             targets: what a camera and a target sensor see; None: nothing.
             magnetic_field: what a magnetometer measures.
             terrain: hides targets from the target sensor; None: level ground.
+            others: system id and truth vector of the other vehicles with a range radio.
 
         Raises:
             ValueError: a rate that doesn't divide the physics rate; a magnetometer without a field.
@@ -81,6 +96,8 @@ class Payload:
         self.target_sensor: TargetSensor | None = None
         self.reading: MagneticReading | None = None
         self.scan: TargetScan | None = None
+        self.range_radio: RangeRadio | None = None
+        self.ranges: tuple[MeasuredRange, ...] = ()
         if targets is None:
             targets = GroundTargets(seeds=_no_seeds)
         if parameters.gimbal is not None:
@@ -117,6 +134,15 @@ class Payload:
                 seeds=seeds,
                 terrain=terrain,
             )
+        if parameters.range_radio is not None:
+            self.range_radio = RangeRadio(
+                parameters.range_radio,
+                truth=truth,
+                home=home,
+                others=others,
+                physics_rate_hz=physics_rate_hz,
+                seeds=seeds,
+            )
 
     def step(self, time_us: int) -> None:
         """One physics step ending at `time_us`: gimbal, then what hangs on it, then the others."""
@@ -128,6 +154,8 @@ class Payload:
             self.reading = self.magnetometer.step(time_us)
         if self.target_sensor is not None:
             self.scan = self.target_sensor.step(time_us)
+        if self.range_radio is not None:
+            self.ranges = self.range_radio.step(time_us)
 
 
 def _no_seeds(index: int) -> np.random.SeedSequence:

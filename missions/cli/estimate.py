@@ -66,7 +66,7 @@ class _LiveProgressLine:
 @key_option()
 def estimate(**given: Any) -> int:
     """Run an estimator on a live link: attitude, lissajous, magnetic-identification, multi-target,
-    orbit-target, survey, target-fusion, vision-search, or a Python file.
+    orbit-target, relative-pose, survey, target-fusion, vision-search, or a Python file.
 
     It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
     replay of flight.tlog in the run folder gives the same estimates.

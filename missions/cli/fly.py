@@ -120,7 +120,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     "--estimator",
     metavar="NAME|FILE.py",
     help="Estimator beside the flight: attitude, lissajous, magnetic-identification, multi-target, "
-    "orbit-target, survey, target-fusion, vision-search.",
+    "orbit-target, relative-pose, survey, target-fusion, vision-search.",
 )
 @_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."

@@ -14,6 +14,12 @@ if TYPE_CHECKING:
     from missions.studies.study import Study
 
 
+def _handoff(given: Given) -> "Study[Any, Any]":
+    from missions.studies.handoff import study
+
+    return study(given["comparison"], given["belief"], given["window"], given["trade_off"])
+
+
 def _lissajous_localization(given: Given) -> "Study[Any, Any]":
     from missions.studies.lissajous_localization import study
 
@@ -53,6 +59,43 @@ def _vision_search(given: Given) -> "Study[Any, Any]":
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
     {
+        "handoff": StudyCommand(
+            help=(
+                "Moving-target handoff without GPS: two aircraft in opposite orbits, five walking targets, "
+                "of which one is the tracker's (Tolman et al. 2021, section VII).\n\n"
+                "Image points stand for pixels. The folder gets handoff.png: correct decisions against the "
+                "time that they take."
+            ),
+            options=(
+                click.Option(
+                    ["--comparison"],
+                    type=click.Choice(["evidence", "paper", "rms", "all"]),
+                    default="evidence",
+                    help=(
+                        "What decides: probabilities from all pairs of tracks, the paper's thresholds, the "
+                        "same with the root mean square as residual, or all three."
+                    ),
+                ),
+                click.Option(
+                    ["--belief"],
+                    type=click.Choice(["particles", "gaussians"]),
+                    default="particles",
+                    help="What estimates the relative pose.",
+                ),
+                click.Option(
+                    ["--window"],
+                    type=click.IntRange(10, 600),
+                    default=100,
+                    help="Samples of the windows that are compared, at 10 Hz.",
+                ),
+                click.Option(
+                    ["--trade-off"],
+                    is_flag=True,
+                    help="Windows of 25 to 100 samples with several thresholds (figure 9), not --window.",
+                ),
+            ),
+            build=_handoff,
+        ),
         "lissajous-localization": StudyCommand(
             help=(
                 "Two drones on Lissajous paths localise a target: Tables II to V of Steckenrider et al. "

@@ -74,6 +74,7 @@ def carrying(world: WorldSpec, payload: PayloadParameters) -> WorldSpec:
                     camera=vehicle.payload.camera or payload.camera,
                     magnetometer=vehicle.payload.magnetometer or payload.magnetometer,
                     target_sensor=vehicle.payload.target_sensor or payload.target_sensor,
+                    range_radio=vehicle.payload.range_radio or payload.range_radio,
                 ),
             )
             for vehicle in world.vehicles

@@ -35,7 +35,7 @@ def test_the_library_alone_imports_no_estimator():
         (
             "atitude",
             "'atitude' is not known; there are attitude, lissajous, magnetic-identification, multi-target, "
-            "orbit-target, survey, target-fusion, vision-search",
+            "orbit-target, relative-pose, survey, target-fusion, vision-search",
         ),
         ("nowhere.py", "nowhere.py does not exist"),
     ],

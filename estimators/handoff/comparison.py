@@ -1,0 +1,60 @@
+"""The role of the handoff logic: which track of the handoff aircraft is the tracker's target."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.relative_pose.belief import PoseMode
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TrackWindows:
+    """Windows of tracks at the same times, each in the present level frame of its aircraft (equation 41).
+
+    Attributes:
+        time_us: present time.
+        times_us: (n,) times of the places, ascending to the present.
+        handoff: (n, 2) forward and right by track number of the handoff aircraft.
+        target: (n, 2) the tracker's target; None: it has no window.
+        others: the tracker's other tracks, by number.
+    """
+
+    time_us: int
+    times_us: NDArray[np.int64]
+    handoff: Mapping[int, Array]
+    target: Array | None
+    others: Mapping[int, Array] = field(default_factory=dict)
+
+
+class TrackComparison(ABC):
+    """Compares windows of tracks one after the other, until one track is decided for.
+
+    Attributes:
+        decided: number of the track that is the target; None: not decided yet.
+    """
+
+    def __init__(self) -> None:
+        self.decided: int | None = None
+
+    @abstractmethod
+    def update(self, windows: TrackWindows, pose: PoseMode) -> None:
+        """Compare the tracks of one time.
+
+        Args:
+            windows: of the tracks.
+            pose: the relative pose of a converged belief.
+        """
+
+    @property
+    @abstractmethod
+    def scores(self) -> Mapping[int, float]:
+        """By track of the handoff aircraft: how far it is the target, 0..1."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Discard scores and decision."""

@@ -1,0 +1,274 @@
+"""The belief about the relative pose of two aircraft: its role, its inputs, and its modes.
+
+Frames (Tolman et al. 2021, figure 1): the level frame of an aircraft has its origin at the aircraft, axes
+forward, right and down, and is its body frame without roll and pitch. The pose is that of the tracking
+aircraft in the level frame of the handoff aircraft: the position (forward, right, down), equation 20, and the
+relative heading psi_h - psi_r, which takes vectors of the tracker's level frame to the handoff aircraft's.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.relative_pose.parameters import RelativePoseParameters
+from flightsim.foundation.vectors import wrap_pi
+
+Array = NDArray[np.float64]
+
+FORWARD: Final = 0
+RIGHT: Final = 1
+DOWN: Final = 2
+HEADING: Final = 3
+STATES: Final = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LevelMotion:
+    """Motion of one aircraft in its own level frame.
+
+    Attributes:
+        forward_m_s, right_m_s, down_m_s: velocity; both aircraft against the same air, or both against the
+            ground (a common wind cancels).
+        yaw_rate_rad_s: rate of the level frame about the vertical, e_3' R omega.
+    """
+
+    forward_m_s: float
+    right_m_s: float = 0.0
+    down_m_s: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseMeasurement:
+    """What is measured at one time (the paper's y); NaN: not measured.
+
+    Attributes:
+        range_m: slant range.
+        down_m: the tracker's depth below the handoff aircraft, from two pressures.
+        heading_rad: psi_h - psi_r, from two magnetometers.
+    """
+
+    range_m: float = math.nan
+    down_m: float = math.nan
+    heading_rad: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseMode:
+    """One Gaussian of the belief.
+
+    Attributes:
+        weight: its probability.
+        forward_m, right_m, down_m, heading_rad: mean.
+        covariance: (4, 4) of forward, right, down and heading.
+    """
+
+    weight: float
+    forward_m: float
+    right_m: float
+    down_m: float
+    heading_rad: float
+    covariance: Array
+
+    @property
+    def horizontal_range_m(self) -> float:
+        """rho."""
+        return math.hypot(self.forward_m, self.right_m)
+
+    @property
+    def bearing_rad(self) -> float:
+        """Relative bearing of the tracker from the nose of the handoff aircraft, clockwise."""
+        return math.atan2(self.right_m, self.forward_m)
+
+    @property
+    def horizontal_sigma_m(self) -> float:
+        """Root of the sum of both horizontal variances."""
+        return math.sqrt(float(self.covariance[0, 0] + self.covariance[1, 1]))
+
+    def from_tracker(self, forward_m: float, right_m: float) -> tuple[float, float]:
+        """A horizontal place of the tracker's level frame, in the handoff aircraft's (equation 33)."""
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        return (self.forward_m + c * forward_m + s * right_m, self.right_m - s * forward_m + c * right_m)
+
+    def place_covariance(self, forward_m: float, right_m: float) -> Array:
+        """(2, 2) covariance of `from_tracker`, to first order."""
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        jacobian = np.array(
+            [[1.0, 0.0, 0.0, -s * forward_m + c * right_m], [0.0, 1.0, 0.0, -c * forward_m - s * right_m]]
+        )
+        found: Array = jacobian @ self.covariance @ jacobian.T
+        return found
+
+
+class RelativePoseBelief(ABC):
+    """A belief that is moved by both aircraft's motion and updated by range, height and heading.
+
+    It starts with the first complete measurement, with any bearing. It starts anew when its predictions of
+    the range have been inconsistent with the measurements for some time (`reset_nis`).
+
+    Args:
+        parameters: noise, numbers and limits.
+
+    Attributes:
+        known: whether it has started.
+        resets: number of times that it was inconsistent and started anew.
+    """
+
+    def __init__(self, parameters: RelativePoseParameters | None = None) -> None:
+        self.parameters = parameters or RelativePoseParameters()
+        self.known = False
+        self.resets = 0
+        self._nis = 1.0
+        self._modes: tuple[PoseMode, ...] | None = None
+
+    def reset(self) -> None:
+        """Discard the pose; the next complete measurement starts it."""
+        self.known = False
+        self._nis = 1.0
+        self._modes = None
+
+    def predict(self, dt_s: float, own: LevelMotion, other: LevelMotion) -> None:
+        """Move the pose by a time (equation 26 with the tracker's yaw rate).
+
+        Args:
+            dt_s: time step; not above 0: nothing happens.
+            own: motion of the handoff aircraft.
+            other: motion of the tracking aircraft.
+        """
+        if self.known and dt_s > 0.0:
+            self._modes = None
+            self._move(dt_s, own, other)
+
+    def update(self, measured: PoseMeasurement) -> None:
+        """Fuse the measurements of one time."""
+        self._modes = None
+        if not self.known:
+            if math.isfinite(measured.range_m + measured.down_m + measured.heading_rad):
+                self._start(measured)
+                self.known, self._nis = True, 1.0
+            return
+        nis = self._fuse(measured)
+        if math.isfinite(nis):
+            p = self.parameters
+            # one outlier must not reset: a single value counts with at most ten times the limit
+            self._nis += (min(nis, 10.0 * p.reset_nis) - self._nis) / p.reset_after
+            if self._nis > p.reset_nis:
+                self.resets += 1
+                self.reset()
+
+    @property
+    def consistency(self) -> float:
+        """Moving average of the squared innovation of the range over its variance; consistent: about 1."""
+        return self._nis
+
+    @property
+    def modes(self) -> Sequence[PoseMode]:
+        """The modes, the most probable first; none before the start. Several: the bearing is ambiguous."""
+        if self._modes is None:
+            self._modes = self._find_modes() if self.known else ()
+        return self._modes
+
+    @property
+    def best(self) -> PoseMode | None:
+        """The most probable mode."""
+        return self.modes[0] if self.known else None
+
+    @property
+    def converged(self) -> bool:
+        """Whether one mode holds nearly all probability, and its place is narrow enough."""
+        best, p = self.best, self.parameters
+        return (
+            best is not None
+            and best.weight >= p.converged_weight
+            and best.horizontal_sigma_m <= p.converged_sigma_m
+        )
+
+    @abstractmethod
+    def _start(self, measured: PoseMeasurement) -> None:
+        """Start with a complete measurement and any bearing."""
+
+    @abstractmethod
+    def _move(self, dt_s: float, own: LevelMotion, other: LevelMotion) -> None:
+        """Move the pose by a time."""
+
+    @abstractmethod
+    def _fuse(self, measured: PoseMeasurement) -> float:
+        """Fuse measurements; returns the squared innovation of the range over its predicted variance, NaN
+        without a range.
+        """
+
+    @abstractmethod
+    def _find_modes(self) -> tuple[PoseMode, ...]:
+        """The modes, the most probable first."""
+
+
+def joined_modes(
+    weights: Array, means: Array, covariances: Array, *, apart_sigmas: float, least_weight: float
+) -> tuple[PoseMode, ...]:
+    """Gaussians joined to modes: groups whose horizontal means are far apart against their spread.
+
+    Args:
+        weights: (n,), sum one.
+        means: (n, 4) of forward, right, down and heading.
+        covariances: (n, 4, 4).
+        apart_sigmas: two Gaussians are joined when their horizontal distance is below this many standard
+            deviations of both along the line between them.
+        least_weight: lighter modes are left out; the remaining weights add up to one.
+    """
+    parts = [
+        (float(weights[k]), means[k].copy(), covariances[k].copy())
+        for k in np.argsort(-weights, kind="stable")
+    ]
+    joined = True
+    while joined:
+        joined = False
+        for i in range(len(parts)):
+            for j in range(i + 1, len(parts)):
+                if _close(parts[i], parts[j], apart_sigmas):
+                    parts[i] = _joined(parts[i], parts[j])
+                    del parts[j]
+                    joined = True
+                    break
+            if joined:
+                break
+    parts = [part for part in parts if part[0] >= least_weight] or parts[:1]
+    total = sum(part[0] for part in parts)
+    return tuple(
+        PoseMode(
+            weight=weight / total,
+            forward_m=float(mean[FORWARD]),
+            right_m=float(mean[RIGHT]),
+            down_m=float(mean[DOWN]),
+            heading_rad=wrap_pi(float(mean[HEADING])),
+            covariance=covariance,
+        )
+        for weight, mean, covariance in sorted(parts, key=lambda part: -part[0])
+    )
+
+
+_Part = tuple[float, Array, Array]
+
+
+def _close(a: _Part, b: _Part, apart_sigmas: float) -> bool:
+    off = b[1][:2] - a[1][:2]
+    distance = float(np.hypot(off[0], off[1]))
+    if distance == 0.0:
+        return True
+    line = off / distance
+    sigmas = sum(math.sqrt(max(0.0, float(line @ part[2][:2, :2] @ line))) for part in (a, b))
+    return distance < apart_sigmas * sigmas
+
+
+def _joined(a: _Part, b: _Part) -> _Part:
+    """Mean and covariance of both together."""
+    weight = a[0] + b[0]
+    off = b[1] - a[1]
+    off[HEADING] = wrap_pi(float(off[HEADING]))
+    share = b[0] / weight if weight > 0.0 else 0.0
+    covariance = (1.0 - share) * a[2] + share * b[2] + share * (1.0 - share) * np.outer(off, off)
+    return weight, a[1] + share * off, covariance

@@ -1,0 +1,175 @@
+"""The estimator `relative-pose`: where another aircraft is, from ranges and both aircraft's sensors, without
+GPS (Tolman et al. 2021, section III; docs/handoff.md).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Final, Literal
+
+from autopilot_bridge.mavlink.vehicle_range import read_range_payload
+from estimators.input_guard import InputGuard
+from estimators.interface import Estimator, Need, Outcome
+from estimators.messages import Message
+from estimators.relative_pose.aircraft import AircraftState
+from estimators.relative_pose.belief import PoseMeasurement, RelativePoseBelief
+from estimators.relative_pose.estimate import RelativePoseEstimate
+from estimators.relative_pose.gaussian_bank import GaussianBank
+from estimators.relative_pose.parameters import RelativePoseParameters
+from estimators.relative_pose.particle_belief import ParticlePose
+
+_RANGE: Final = "range"
+_STEP_US: Final = 200_000  # between ranges the pose is moved at this interval
+_OLD_US: Final = 500_000  # an aircraft whose newest sample is older is not used
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RelativePoseSettings(RelativePoseParameters):
+    """Parameters of the estimator. Their noise is that of flights, whose errors are not white: magnetic
+    headings inherit the errors of roll and pitch, airspeeds those of the pitot tube.
+
+    Attributes:
+        vehicle: system id of the aircraft in whose level frame the pose is (the handoff aircraft).
+        other: system id of the other aircraft (the tracker).
+        belief: particles, or a bank of Gaussians.
+    """
+
+    heading_sigma_rad: float = 0.1
+    walk_m_sqrt_s: float = 2.0
+    reset_nis: float = 6.0
+    vehicle: int = 1
+    other: int = 2
+    belief: Literal["particles", "gaussians"] = "particles"
+
+    def __post_init__(self) -> None:
+        # zero-argument super() does not reach the base of a dataclass with slots
+        RelativePoseParameters.__post_init__(self)
+        for name in ("vehicle", "other"):
+            if not 1 <= getattr(self, name) <= 255:
+                raise ValueError(f"{name} = {getattr(self, name)} is not accepted: 1 to 255 are")
+        if self.vehicle == self.other:
+            raise ValueError(f"other = {self.other} is not accepted: it is `vehicle` itself")
+
+
+class RelativePoseEstimator(Estimator[RelativePoseSettings]):
+    """Fuses the ranges of one aircraft with the inertial, magnetic and pressure samples of both.
+
+    Attributes:
+        pose: the belief.
+    """
+
+    NAME: ClassVar[str] = "relative-pose"
+    PARAMETERS = RelativePoseSettings
+    TEAM: ClassVar[bool] = True
+
+    def __init__(self, parameters: RelativePoseSettings | None = None) -> None:
+        super().__init__(parameters)
+        self._own, self._other = AircraftState(), AircraftState()
+        self._guard = InputGuard()
+        self.reset()
+
+    @property
+    def needs(self) -> tuple[Need, ...]:
+        """The messages that both aircraft must send; the ranges come from `vehicle` alone."""
+        ranges = Need(messages=("TUNNEL",), rate_hz=0.0, purpose="ranges of the radio", optional=True)
+        return (*self._own.needs, ranges)
+
+    def reset(self) -> None:
+        """Discard everything except the parameters."""
+        p = self.parameters
+        self.pose: RelativePoseBelief = ParticlePose(p) if p.belief == "particles" else GaussianBank(p)
+        self._own.reset()
+        self._other.reset()
+        self._guard.reset()
+        self._moved_us: int | None = None
+        self._number: int | None = None
+        self._lost = self._ranges = 0
+        self._converged_us: int | None = None
+        self._estimates: tuple[RelativePoseEstimate, ...] = ()
+
+    def handle(self, time_us: int, message: Message) -> Outcome:
+        p = self.parameters
+        if message.src_system not in (p.vehicle, p.other):
+            return Outcome.IGNORED
+        if message.name == "TUNNEL":
+            return self._on_range(time_us, message)
+        aircraft = self._own if message.src_system == p.vehicle else self._other
+        outcome = aircraft.take(time_us, message)
+        if outcome is Outcome.TIME_JUMP:
+            self.reset()
+        elif outcome is Outcome.USED and aircraft is self._own and self._due(time_us):
+            return self._step(time_us, math.nan)
+        return outcome
+
+    def _due(self, time_us: int) -> bool:
+        return self._moved_us is not None and time_us - self._moved_us >= _STEP_US
+
+    def _on_range(self, time_us: int, message: Message) -> Outcome:
+        measured = read_range_payload(message.payload_type, message.payload_length, message.payload)
+        p = self.parameters
+        if measured is None or message.src_system != p.vehicle or measured.to_system != p.other:
+            return Outcome.IGNORED
+        refused = self._guard.check(measured.time_us, _RANGE, (measured.range_m,), leads=False)
+        if refused is Outcome.TIME_JUMP:
+            self.reset()
+            return refused
+        if refused is not None:
+            return refused
+        if self._number is not None:
+            self._lost += ((measured.number - self._number) & 0xFFFF) - 1
+        self._number = measured.number
+        self._ranges += 1
+        return self._step(time_us, measured.range_m)
+
+    def _step(self, time_us: int, range_m: float) -> Outcome:
+        own, other = self._own, self._other
+        for aircraft in (own, other):
+            if aircraft.newest_us is None or time_us - aircraft.newest_us > _OLD_US:
+                return Outcome.WAITING
+        if not (own.moved and other.moved):
+            return Outcome.WAITING
+        own_motion, other_motion = own.motion(), other.motion()
+        if self._moved_us is not None:
+            self.pose.predict((time_us - self._moved_us) * 1e-6, own_motion, other_motion)
+        self._moved_us = time_us
+        turned = own.heading_rad - other.heading_rad
+        self.pose.update(
+            PoseMeasurement(
+                range_m=range_m,
+                down_m=own.height_m - other.height_m,
+                heading_rad=math.remainder(turned, math.tau) if math.isfinite(turned) else math.nan,
+            )
+        )
+        if not self.pose.known:
+            return Outcome.WAITING
+        converged = self.pose.converged
+        if converged and self._converged_us is None:
+            self._converged_us = time_us
+        self._estimates = (
+            RelativePoseEstimate(
+                time_us=time_us,
+                subject=self.parameters.vehicle,
+                modes=tuple(self.pose.modes),
+                converged=converged,
+                resets=self.pose.resets,
+            ),
+        )
+        return Outcome.UPDATED
+
+    @property
+    def estimates(self) -> Sequence[RelativePoseEstimate]:
+        """The newest estimate."""
+        return self._estimates
+
+    def remarks(self) -> Mapping[str, float | str]:
+        """Numbers of ranges and resets, consistency, and whether the pose has converged."""
+        found: dict[str, float | str] = {
+            "ranges": float(self._ranges),
+            "ranges_lost": float(self._lost),
+            "resets": float(self.pose.resets),
+            "consistency": self.pose.consistency,
+            "belief": self.parameters.belief,
+        }
+        if self._converged_us is None:
+            found["note"] = "the pose has not converged"
+        return found

@@ -1,0 +1,227 @@
+"""The Monte Carlo study `handoff`: which of five walking targets is the tracker's (Tolman et al. 2021)."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from missions.studies.design import listed
+from missions.studies.handoff_trial import Cell, Comparison, Handoff, HandoffTrial, PoseBelief
+from missions.studies.results import Results
+from missions.studies.statistics import figures_of, rate_of
+from missions.studies.study import Study
+
+__all__ = ["study"]
+
+Array = NDArray[np.float64]
+
+PAPER: Final[Mapping[str, float]] = {"runs": 500, "correct": 486, "mean_time_s": 314.0}
+"""The paper's result, with windows of 100 samples, T_r = 15 m and T_gamma = 0.95."""
+
+WINDOWS: Final = (25, 50, 100)
+RESIDUALS_M: Final[Mapping[Comparison, tuple[float, ...]]] = {
+    Comparison.PAPER: (10.0, 15.0, 30.0),
+    Comparison.RMS: (1.0, 1.5, 3.0),
+    Comparison.EVIDENCE: (15.0,),
+}
+"""Windows and thresholds of the trade-off (figure 9)."""
+
+_BINS: Final = (0.0, 0.9, 0.95, 0.99, 0.995, 0.999, 1.0)
+_COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
+
+
+def study(
+    comparison: str = Comparison.EVIDENCE.value,
+    belief: str = PoseBelief.PARTICLES.value,
+    window: int = 100,
+    trade_off: bool = False,
+) -> Study[Cell, Handoff]:
+    """The study.
+
+    Args:
+        comparison: "evidence", "paper", "rms", or "all" of them.
+        belief: what estimates the relative pose: "particles" or "gaussians".
+        window: samples of the windows.
+        trade_off: windows and residual thresholds of figure 9 instead of one of each.
+    """
+    kinds = tuple(Comparison) if comparison == "all" else (Comparison(comparison),)
+    cells = [
+        {"comparison": kind.value, "window": samples, "residual_m": residual_m, "belief": belief}
+        for kind in kinds
+        for samples in (WINDOWS if trade_off else (window,))
+        for residual_m in (RESIDUALS_M[kind] if trade_off else (_residual_m(kind),))
+    ]
+    return Study(
+        name="handoff",
+        description=(
+            "Moving-target handoff without GPS: five walking targets, of which one is the tracker's "
+            "(Tolman et al. 2021)."
+        ),
+        trial=HandoffTrial(),
+        parameters=Cell,
+        row=Handoff,
+        design=listed(cells),
+        runs=500,
+        success="correct",
+        metrics=("time_s", "converged_s", "track_error_m"),
+        options={"comparison": comparison, "belief": belief, "window": window, "trade_off": trade_off},
+        summarise=summarise,
+        report=lines_of,
+        draw=draw,
+    )
+
+
+def _residual_m(kind: Comparison) -> float:
+    """The paper's 15 m as a norm; over 100 samples it is a root mean square of 1.5 m."""
+    return 1.5 if kind is Comparison.RMS else 15.0
+
+
+def summarise(results: Results) -> Mapping[str, Any]:
+    """Entries of `summary.json`: those of the first cell, of all cells, and the paper's."""
+    cells = [_cell(results, number) for number in range(len(results.cells))]
+    first = {key: value for key, value in cells[0].items() if key not in results.cells[0]}
+    return {**first, "cells_of_handoff": cells, "paper": dict(PAPER)}
+
+
+def _cell(results: Results, number: int) -> dict[str, Any]:
+    flags = {name: results.values(name)[number] for name in ("correct", "wrong", "timeout")}
+    known = np.isfinite(flags["correct"])
+    counts = {name: int(np.nansum(values)) for name, values in flags.items()}
+    rate = rate_of(counts["correct"], int(known.sum()))
+    times = figures_of(results.values("time_s")[number])
+    converged = results.values("converged_s")[number]
+    return {
+        **results.cells[number],
+        "runs": rate.n,
+        "correct": counts["correct"],
+        "correct_ci95": [_rounded(value) for value in rate.ci95],
+        "mean_time_s": _rounded(times.mean),
+        "mean_time_s_ci95": [_rounded(value) for value in times.mean_ci95],
+        "median_time_s": _rounded(times.median),
+        "wrong": counts["wrong"],
+        "timeouts": counts["timeout"],
+        "converged_in_30_s": int(np.sum(converged <= 30.0)),
+        "mean_stated": _rounded(np.nanmean(results.values("score")[number]) if counts["correct"] else np.nan),
+        "causes": _causes(results, number),
+        "calibration": _calibration(results, number),
+    }
+
+
+def _causes(results: Results, number: int) -> dict[str, int]:
+    """Failures by cause, with the seeds that repeat them."""
+    rows = results.table.select(["cell", "cause", "correct"]).to_pylist()
+    return dict(
+        sorted(
+            Counter(row["cause"] for row in rows if row["cell"] == number and row["correct"] is False).items()
+        )
+    )
+
+
+def _calibration(results: Results, number: int) -> list[dict[str, Any]]:
+    """Decisions by the score that was stated with them, and how many were right."""
+    scores, correct = results.values("score")[number], results.values("correct")[number]
+    found = []
+    for low, high in pairwise(_BINS):
+        inside = (scores > low) & (scores <= high)
+        if inside.any():
+            rate = rate_of(int(correct[inside].sum()), int(inside.sum()))
+            found.append(
+                {
+                    "above": low,
+                    "decisions": rate.n,
+                    "stated": _rounded(float(scores[inside].mean())),
+                    "right": _rounded(rate.rate),
+                    "right_ci95": [_rounded(value) for value in rate.ci95],
+                }
+            )
+    return found
+
+
+def _rounded(value: float) -> float | None:
+    return round(float(value), 4) if np.isfinite(value) else None
+
+
+def lines_of(results: Results) -> Sequence[str]:
+    """The table of the study."""
+    lines = [
+        f"{'comparison':<10} {'window':>6} {'T_r m':>6} {'runs':>5} {'correct':>8} {'95 %':>14} {'wrong':>6} "
+        f"{'timeouts':>8} {'mean s':>7} {'median':>7}"
+    ]
+    for number in range(len(results.cells)):
+        cell = _cell(results, number)
+        low, high = cell["correct_ci95"]
+        share = f"{100.0 * cell['correct'] / cell['runs']:.1f} %" if cell["runs"] else ""
+        times = "".join(
+            f"{'' if cell[name] is None else format(cell[name], '.0f'):>8}"
+            for name in ("mean_time_s", "median_time_s")
+        )
+        lines.append(
+            f"{cell['comparison']:<10} {cell['window']:>6} {cell['residual_m']:>6g} {cell['runs']:>5} "
+            f"{share:>8} {100 * low:>6.1f} to {100 * high:<5.1f} {cell['wrong']:>5} {cell['timeouts']:>8} "
+            f"{times}"
+        )
+        lines += [f"    {count} x {cause}" for cause, count in cell["causes"].items()]
+    lines.append("paper      window 100, T_r 15 m: 500 runs, 97.2 % correct, mean 314 s")
+    return lines
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw `handoff.png`: correct decisions against the time that they take, beside the paper's point; and
+    the share of runs that have decided over time.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.4), dpi=120, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    colours = dict(zip((kind.value for kind in Comparison), _COLOURS, strict=True))
+    times = results.values("time_s")
+    for number, given in enumerate(results.cells):
+        cell, colour = _cell(results, number), colours[given["comparison"]]
+        if cell["mean_time_s"] is not None:
+            share = cell["correct"] / cell["runs"]
+            low, high = cell["correct_ci95"]
+            left.errorbar(
+                cell["mean_time_s"],
+                share,
+                yerr=[[max(0.0, share - low)], [max(0.0, high - share)]],
+                fmt="o",
+                markersize=4,
+                color=colour,
+                linewidth=1.0,
+            )
+            left.annotate(
+                f"{given['window']}, {given['residual_m']:g} m",
+                (cell["mean_time_s"], share),
+                xytext=(4, 4),
+                textcoords="offset points",
+                fontsize=7,
+                color=colour,
+            )
+        decided = np.sort(times[number][np.isfinite(times[number])])
+        if len(decided):
+            shares = np.arange(1, len(decided) + 1) / max(1, cell["runs"])
+            right.step(
+                decided, shares, where="post", color=colour, linewidth=1.2, alpha=1.0 if number == 0 else 0.5
+            )
+    left.plot(PAPER["mean_time_s"], PAPER["correct"] / PAPER["runs"], "*", color="#1f2937", markersize=10)
+    left.annotate("paper", (PAPER["mean_time_s"], PAPER["correct"] / PAPER["runs"]), fontsize=8)
+    for name, colour in colours.items():
+        if any(cell["comparison"] == name for cell in results.cells):
+            left.plot([], [], "o", color=colour, markersize=4, label=name)
+    left.set_xlabel("mean time of a decision, s", fontsize=9)
+    left.set_ylabel("share of correct decisions, 95 % interval", fontsize=9)
+    left.legend(fontsize=8, frameon=False, loc="lower right")
+    right.set_xlabel("time, s", fontsize=9)
+    right.set_ylabel("share of runs with a decision", fontsize=9)
+    right.set_ylim(0.0, 1.02)
+    for axes in (left, right):
+        axes.grid(color="#e5e7eb", linewidth=0.8)
+        axes.tick_params(labelsize=8)
+    with (folder / "handoff.png").open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})

@@ -1,0 +1,298 @@
+"""One trial of the study `handoff`: two aircraft fly until a track is decided for, or for 15 minutes."""
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.handoff.aircraft_tracks import AircraftTracks
+from estimators.handoff.comparison import TrackComparison
+from estimators.handoff.evidence import EvidenceComparison
+from estimators.handoff.matching import MatchComparison, MatchingParameters, Residual
+from estimators.handoff.process import HandoffProcess, TrackerReport, WindowParameters
+from estimators.orbit_target.relative_target import RelativeState
+from estimators.relative_pose import (
+    GaussianBank,
+    LevelMotion,
+    ParticlePose,
+    RelativePoseBelief,
+    RelativePoseParameters,
+)
+from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
+from missions.orbit.guidance import OrbitGuidance, OrbitParameters
+from missions.studies.handoff_world import HandoffSetting, HandoffWorld
+
+Array = NDArray[np.float64]
+
+TIMEOUT_S: Final = 900.0  # paper: 15 minutes
+_SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
+_DESIGNATED_M: Final = 5.0  # a track this close to the target is the one that the operator designates
+_REGAINED_M: Final = 10.0  # a track this close to where the target was lost is taken for it
+_LOST_AFTER_S: Final = 5.0  # after it the operator designates anew
+_RIGHT_M: Final = 15.0  # a track this far from its nearest target is of none
+
+
+class Comparison(StrEnum):
+    """What decides."""
+
+    PAPER = "paper"  # equations 44 to 47, T_r limits the Frobenius norm
+    RMS = "rms"  # the same, T_r limits the root mean square
+    EVIDENCE = "evidence"
+
+
+class PoseBelief(StrEnum):
+    """What estimates the relative pose."""
+
+    PARTICLES = "particles"
+    GAUSSIANS = "gaussians"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """Parameters of a trial.
+
+    Attributes:
+        comparison: what decides.
+        window: samples of the windows (paper: 100).
+        residual_m: T_r (paper: 15 m); without effect on the evidence.
+        belief: what estimates the relative pose.
+    """
+
+    comparison: str = Comparison.EVIDENCE.value
+    window: int = 100
+    residual_m: float = 15.0
+    belief: str = PoseBelief.PARTICLES.value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Handoff:
+    """Outcome of a trial.
+
+    Attributes:
+        decided, correct, wrong, timeout: a track was decided for; it is the tracked target; it is not; none
+            was within 15 minutes.
+        time_s: time of the decision since the start.
+        converged_s: time at which the relative pose first was converged.
+        score: of the track that was decided for: gamma, or its probability.
+        track_error_m: distance from it to the tracked target.
+        tracker_error_m: distance from the place that the tracker reports to the target.
+        resets: times that the belief about the pose started anew.
+        designations: times that the tracker's operator designated the target.
+        cause: of a failure.
+    """
+
+    decided: bool
+    correct: bool
+    wrong: bool
+    timeout: bool
+    time_s: float | None
+    converged_s: float | None
+    score: float | None
+    track_error_m: float | None
+    tracker_error_m: float | None
+    resets: int
+    designations: int
+    cause: str
+
+
+class _Tracker:
+    """The tracking aircraft: its tracks, and which of them an operator has designated as the target."""
+
+    def __init__(self, world: HandoffWorld, tracks: AircraftTracks) -> None:
+        self._world = world
+        self.tracks = tracks
+        self.designations = 0
+        self._number: int | None = None
+        self._place: tuple[float, float] | None = None  # last one, in the frame of the reckoning
+        self._seen_us = 0
+
+    def step(self) -> TrackerReport:
+        """Take a frame, and report."""
+        world, which = self._world, HandoffWorld.TRACKER
+        motion = world.motion(which)
+        self.tracks.move(1.0 / world.setting.rate_hz, motion)
+        known = self.tracks.level()
+        held = known.get(self._number) if self._number is not None else None
+        # without a track the operator holds the camera on the target
+        target = world.seen_from(which, world.targets[:1])[0]
+        self.tracks.scan(world.time_us, *world.frame(which, held or (float(target[0]), float(target[1]))))
+        self._choose(target)
+        known = dict(self.tracks.level())
+        held = known.pop(self._number, None) if self._number is not None else None
+        return TrackerReport(motion=motion, target=held, others=known)
+
+    def _choose(self, target: Array) -> None:
+        world, places = self._world, self.tracks.places
+        if self._number is not None and self._number in places:
+            self._place, self._seen_us = places[self._number], world.time_us
+            return
+        lost_s = (world.time_us - self._seen_us) * 1e-6
+        near, within = self._place, _REGAINED_M
+        if near is None or lost_s > _LOST_AFTER_S:
+            near, within = tuple(self.tracks.reckoning.placed(target[None])[0].tolist()), _DESIGNATED_M
+        number = min(places, key=lambda k: math.dist(places[k], near), default=None)
+        if number is not None and math.dist(places[number], near) <= within:
+            if within == _DESIGNATED_M:
+                self.designations += 1
+            self._number, self._place, self._seen_us = number, places[number], world.time_us
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandoffTrial:
+    """The trial: a function of its cell and its seed.
+
+    Args:
+        setting: targets, aircraft and sensors.
+        timeout_s: time without a decision that is a failure.
+    """
+
+    setting: HandoffSetting = field(default_factory=HandoffSetting)
+    timeout_s: float = TIMEOUT_S
+
+    def __call__(self, cell: Cell, seed: int) -> Handoff:
+        world = HandoffWorld(self.setting, seed)
+        windows = WindowParameters(samples=cell.window, every_s=1.0 / self.setting.rate_hz)
+        keep_s = 1.5 * windows.span_s + 1.0
+        tracker = _Tracker(world, AircraftTracks(self._ransac(seed, 0), keep_s))
+        process = HandoffProcess(
+            self._belief(cell, seed),
+            AircraftTracks(self._ransac(seed, 1), keep_s),
+            _comparison(cell),
+            windows,
+        )
+        # opposite orbits: the relative pose is easiest to observe in them
+        pilots = [
+            OrbitGuidance(OrbitParameters(radius_m=self.setting.radius_m, direction=d)) for d in (1, -1)
+        ]
+        rolls = (0.0, 0.0)
+        report = TrackerReport(motion=LevelMotion(forward_m_s=self.setting.airspeed_m_s))
+        while world.time_us < 1e6 * self.timeout_s and process.decided_us is None:
+            world.advance(rolls)
+            report = tracker.step()
+            pointing = process.target()
+            frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
+            own = world.motion(HandoffWorld.HANDOFF)
+            process.step(world.time_us, own, report, world.measured(), frame)
+            rolls = (
+                _orbit_roll(
+                    pilots[0],
+                    world.time_us,
+                    tuple(world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0].tolist()),
+                    world.ground_velocity(HandoffWorld.TRACKER),
+                    world.roll_rad(HandoffWorld.TRACKER),
+                ),
+                _SEARCH_ROLL_RAD
+                if (target := process.target()) is None
+                else _orbit_roll(
+                    pilots[1],
+                    world.time_us,
+                    target,
+                    (own.forward_m_s, own.right_m_s),  # equation 34
+                    world.roll_rad(HandoffWorld.HANDOFF),
+                ),
+            )
+        return _outcome(world, process, tracker, report)
+
+    def _ransac(self, seed: int, which: int) -> RecursiveRansac:
+        s = self.setting
+        rate = s.rate_hz
+        return RecursiveRansac(
+            RansacParameters(
+                noise_density=0.2,
+                clutter_per_m2=max(s.false_points, 0.1) / 40_000.0,
+                window=round(2.0 * rate),
+                good_age=round(1.0 * rate),
+                lost_after=round(1.5 * rate),
+                inlier_m=4.0,
+                speed_max_m_s=2.0 * s.walk_m_s[1] + 1.5 * s.wind_m_s + 2.0,
+                seed_support=round(0.6 * rate),
+                detected=s.detected,
+                seed=2 * seed + which,
+            )
+        )
+
+    def _belief(self, cell: Cell, seed: int) -> RelativePoseBelief:
+        s = self.setting
+        parameters = RelativePoseParameters(
+            range_sigma_m=s.range_sigma_m,
+            height_sigma_m=math.sqrt(2.0) * s.height_sigma_m,
+            heading_sigma_rad=math.sqrt(2.0) * s.heading_sigma_rad,
+            seed=seed,
+        )
+        return (
+            ParticlePose(parameters)
+            if PoseBelief(cell.belief) is PoseBelief.PARTICLES
+            else GaussianBank(parameters)
+        )
+
+
+def _comparison(cell: Cell) -> TrackComparison:
+    kind = Comparison(cell.comparison)
+    if kind is Comparison.EVIDENCE:
+        return EvidenceComparison()
+    residual = Residual.FROBENIUS if kind is Comparison.PAPER else Residual.RMS
+    return MatchComparison(MatchingParameters(residual=residual, residual_m=cell.residual_m))
+
+
+def _orbit_roll(
+    pilot: OrbitGuidance,
+    time_us: int,
+    target: tuple[float, ...],
+    velocity: tuple[float, float],
+    roll_rad: float,
+) -> float:
+    """Roll of the orbit guidance; everything in the level frame, in which the heading is 0."""
+    state = RelativeState(
+        time_us=time_us,
+        offset_ne_m=(target[0], target[1]),
+        offset_rate_ne_m_s=(-velocity[0], -velocity[1]),
+        offset_std_m=0.0,
+    )
+    return pilot.command(state, 0.0, roll_rad).roll_rad
+
+
+def _outcome(
+    world: HandoffWorld, process: HandoffProcess, tracker: _Tracker, report: TrackerReport
+) -> Handoff:
+    number = process.comparison.decided
+    track_error_m = tracker_error_m = score = None
+    correct, cause = False, "" if process.converged_us is not None else "pose never converged"
+    if report.target is not None:
+        true = world.seen_from(HandoffWorld.TRACKER, world.targets)
+        off = np.hypot(*(true - report.target).T)
+        tracker_error_m = float(off[0])
+        if int(np.argmin(off)) != 0 and off[0] > _DESIGNATED_M:
+            cause = "tracker on another target"
+    if number is not None:
+        score = process.comparison.scores.get(number)
+        place = process.tracks.level().get(number)
+        off = np.full(len(world.targets), math.inf)
+        if place is not None:
+            true = world.seen_from(HandoffWorld.HANDOFF, world.targets)
+            off = np.hypot(*(true - place).T)
+            track_error_m = float(off[0])
+        nearest = int(np.argmin(off))
+        correct = nearest == 0 and bool(off[0] <= _RIGHT_M)
+        if correct:
+            cause = ""
+        elif not cause:
+            cause = "another target" if off[nearest] <= _RIGHT_M else "a track of no target"
+    elif not cause:
+        cause = "no decision"
+    return Handoff(
+        decided=number is not None,
+        correct=correct,
+        wrong=number is not None and not correct,
+        timeout=number is None,
+        time_s=None if process.decided_us is None else process.decided_us * 1e-6,
+        converged_s=None if process.converged_us is None else process.converged_us * 1e-6,
+        score=score,
+        track_error_m=track_error_m,
+        tracker_error_m=tracker_error_m,
+        resets=process.pose.resets,
+        designations=tracker.designations,
+        cause=cause,
+    )

@@ -1,0 +1,244 @@
+"""The world of the study `handoff`: two aircraft, walking targets, and what the aircraft measure.
+
+It is the setting of Tolman et al. 2021, section VII, at the level of image points: a frame has the points of
+the targets in view with noise, misses and false points, in place of pixels. What the paper does not give is a
+parameter with a default of our own.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.handoff.ground_points import CameraAxes, on_ground
+from estimators.relative_pose import LevelMotion, PoseMeasurement
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.random_streams import RandomStreams
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandoffSetting:
+    """Targets, aircraft and sensors.
+
+    Attributes:
+        targets: number of walking targets (paper: 5).
+        area_m: sides of their area, north and east (paper: 140 m by 270 m).
+        walk_m_s: least and greatest speed of a target.
+        turn_rad_sqrt_s: random walk of a target's heading.
+        airspeed_m_s: of both aircraft.
+        heights_m: of the tracker and of the handoff aircraft over the ground.
+        radius_m: of both orbits.
+        start_m: least and greatest distance from which the handoff aircraft starts.
+        wind_m_s: greatest wind per axis.
+        rate_hz: of the camera, the range and all other measurements.
+        range_sigma_m, heading_sigma_rad: noise of range and headings (paper: 3 m, 0.01 rad).
+        range_missing: share of ranges that are not received.
+        height_sigma_m: noise of each pressure altitude.
+        airspeed_sigma_m_s, airspeed_bias_m_s: noise, and standard deviation of a constant error, of airspeed.
+        yaw_rate_sigma_rad_s, yaw_rate_bias_rad_s: the same of the yaw rate.
+        tilt_sigma_rad, tilt_time_s: errors of roll and of pitch, and their correlation time. In
+            docs/attitude.md the attitude filter's mean squared errors are 0.1 to 1.6 deg^2.
+        half_view: half of the image's width and height, as tangents (60 by 47 degrees).
+        pixel_rad: noise of an image point.
+        detected: probability that a target in view gives a point.
+        false_points: mean number of false points in a frame.
+    """
+
+    targets: int = 5
+    area_m: tuple[float, float] = (140.0, 270.0)
+    walk_m_s: tuple[float, float] = (0.8, 2.0)
+    turn_rad_sqrt_s: float = 0.3
+    airspeed_m_s: float = 18.0
+    heights_m: tuple[float, float] = (150.0, 120.0)
+    radius_m: float = 120.0
+    start_m: tuple[float, float] = (300.0, 900.0)
+    wind_m_s: float = 4.0
+    rate_hz: float = 10.0
+    range_sigma_m: float = 3.0
+    heading_sigma_rad: float = 0.01
+    range_missing: float = 0.05
+    height_sigma_m: float = 1.0
+    airspeed_sigma_m_s: float = 0.3
+    airspeed_bias_m_s: float = 0.2
+    yaw_rate_sigma_rad_s: float = 0.003
+    yaw_rate_bias_rad_s: float = 0.001
+    tilt_sigma_rad: float = 0.012
+    tilt_time_s: float = 5.0
+    half_view: tuple[float, float] = (0.577, 0.433)
+    pixel_rad: float = 0.002
+    detected: float = 0.9
+    false_points: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_fields(
+            self,
+            require_not_negative,
+            but=dict.fromkeys(
+                ("airspeed_m_s", "radius_m", "rate_hz", "targets", "tilt_time_s"), require_positive
+            ),
+        )
+
+
+@dataclass
+class _Aircraft:
+    """One aircraft that turns by its bank, without sideslip; north, east, and its errors."""
+
+    place: Array
+    heading_rad: float
+    height_m: float
+    rng: np.random.Generator
+    speed_bias_m_s: float
+    rate_bias_rad_s: float
+    roll_rad: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+    tilt: Array = field(default_factory=lambda: np.zeros(2))  # errors of roll and pitch
+
+
+class HandoffWorld:
+    """The truth, and the measurements of it.
+
+    Args:
+        setting: targets, aircraft and sensors.
+        seed: of all random numbers.
+
+    Attributes:
+        time_us: present time.
+        targets: (n, 2) north and east of the targets; the first one is tracked.
+    """
+
+    TRACKER = 0
+    HANDOFF = 1
+
+    def __init__(self, setting: HandoffSetting, seed: int) -> None:
+        self.setting = s = setting
+        streams = RandomStreams(seed)
+        self._walk = streams.generator("handoff", "targets")
+        self._link = streams.generator("handoff", "link")
+        start = streams.generator("handoff", "start")
+        n = s.targets
+        self._half = 0.5 * np.array(s.area_m)
+        self.targets: Array = self._walk.uniform(-1.0, 1.0, (n, 2)) * self._half
+        self._headings = self._walk.uniform(-math.pi, math.pi, n)
+        self._speeds = self._walk.uniform(*s.walk_m_s, n)
+        self.wind = start.uniform(-s.wind_m_s, s.wind_m_s, 2)
+        self.time_us = 0
+        angle, around = start.uniform(-math.pi, math.pi, 2)
+        away = s.radius_m * np.array([math.cos(around), math.sin(around)])
+        far = start.uniform(*s.start_m) * np.array([math.cos(angle), math.sin(angle)])
+        places = (self.targets[0] + away, self.targets[0] + far)
+        headings = (around + 0.5 * math.pi, start.uniform(-math.pi, math.pi))
+        self._aircraft = tuple(
+            _Aircraft(
+                place=places[k],
+                heading_rad=headings[k],
+                height_m=s.heights_m[k],
+                rng=(rng := streams.generator("handoff", "aircraft", k)),
+                speed_bias_m_s=rng.normal(0.0, s.airspeed_bias_m_s),
+                rate_bias_rad_s=rng.normal(0.0, s.yaw_rate_bias_rad_s),
+                tilt=rng.normal(0.0, s.tilt_sigma_rad, 2),
+            )
+            for k in range(2)
+        )
+
+    def advance(self, rolls_rad: tuple[float, float]) -> None:
+        """Advance by one period of the rate with commanded rolls of the tracker and the handoff aircraft."""
+        s, steps = self.setting, 5
+        dt = 1.0 / (s.rate_hz * steps)
+        before = [aircraft.heading_rad for aircraft in self._aircraft]
+        for _ in range(steps):
+            for aircraft, roll in zip(self._aircraft, rolls_rad, strict=True):
+                aircraft.roll_rad += (roll - aircraft.roll_rad) * min(1.0, dt / 0.4)
+                rate = GRAVITY_M_S2 * math.tan(aircraft.roll_rad) / s.airspeed_m_s
+                middle = aircraft.heading_rad + 0.5 * rate * dt
+                aircraft.place += dt * (
+                    s.airspeed_m_s * np.array([math.cos(middle), math.sin(middle)]) + self.wind
+                )
+                aircraft.heading_rad += rate * dt
+        step = 1.0 / s.rate_hz
+        for aircraft, heading in zip(self._aircraft, before, strict=True):
+            aircraft.yaw_rate_rad_s = (aircraft.heading_rad - heading) / step
+            keep = math.exp(-step / s.tilt_time_s)
+            aircraft.tilt *= keep
+            aircraft.tilt += aircraft.rng.normal(0.0, s.tilt_sigma_rad * math.sqrt(1.0 - keep * keep), 2)
+        n = len(self.targets)
+        self._headings += s.turn_rad_sqrt_s * math.sqrt(step) * self._walk.standard_normal(n)
+        outside = np.any(np.abs(self.targets) > self._half, axis=1)
+        # a target at the edge turns to the middle
+        back = np.arctan2(-self.targets[:, 1], -self.targets[:, 0])
+        self._headings = np.where(outside, back, self._headings)
+        self.targets += (step * self._speeds)[:, None] * np.column_stack(
+            (np.cos(self._headings), np.sin(self._headings))
+        )
+        self.time_us += round(1e6 * step)
+
+    def motion(self, which: int) -> LevelMotion:
+        """Airspeed and yaw rate as an aircraft measures them."""
+        s, a = self.setting, self._aircraft[which]
+        return LevelMotion(
+            forward_m_s=s.airspeed_m_s + a.speed_bias_m_s + a.rng.normal(0.0, s.airspeed_sigma_m_s),
+            yaw_rate_rad_s=a.yaw_rate_rad_s + a.rate_bias_rad_s + a.rng.normal(0.0, s.yaw_rate_sigma_rad_s),
+        )
+
+    def measured(self) -> PoseMeasurement:
+        """Range, depth and relative heading between the aircraft."""
+        s, rng = self.setting, self._link
+        tracker, handoff = self._aircraft
+        down = handoff.height_m - tracker.height_m
+        slant = math.hypot(*(tracker.place - handoff.place).tolist(), down)
+        noise, missing = rng.standard_normal(5), rng.random() < s.range_missing
+        return PoseMeasurement(
+            range_m=math.nan if missing else slant + s.range_sigma_m * noise[0],
+            down_m=down + s.height_sigma_m * (noise[1] - noise[2]),
+            heading_rad=handoff.heading_rad
+            - tracker.heading_rad
+            + s.heading_sigma_rad * (noise[3] - noise[4]),
+        )
+
+    def frame(self, which: int, pointing: tuple[float, float]) -> tuple[Array, Array]:
+        """Moving objects in a frame of a camera that points at a place of its level frame.
+
+        Returns:
+            (n, 2) forward and right in the level frame, with the errors of attitude and image, and (n, 2, 2)
+            the covariances that the aircraft gives them.
+        """
+        s, a = self.setting, self._aircraft[which]
+        camera = CameraAxes.towards(*pointing, a.height_m)
+        level = self.seen_from(which, self.targets)
+        points = camera.project(np.column_stack((level, np.full(len(level), a.height_m))))
+        inside = np.all(np.abs(points) < s.half_view, axis=1)  # NaN behind the camera is outside
+        seen = inside & (a.rng.random(len(level)) < s.detected)
+        points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
+        false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
+        directions = camera.directions(np.vstack((points, false)))
+        roll, pitch = a.tilt.tolist()
+        # directions + tilt x directions, of a small tilt about forward and right
+        tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
+        tilted[:, 2] -= pitch * directions[:, 0]
+        height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
+        # only the part of the tilt's error that changes from frame to frame is noise to the tracker
+        sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
+        places, covariances = on_ground(tilted, height_m, sigma)
+        below = np.isfinite(places).all(axis=1) & (np.hypot(*places.T) < 6.0 * a.height_m)
+        return places[below], covariances[below]
+
+    def seen_from(self, which: int, places: Array) -> Array:
+        """True forward and right (n, 2) of places (n, 2), north and east, in an aircraft's level frame."""
+        a = self._aircraft[which]
+        c, s = math.cos(a.heading_rad), math.sin(a.heading_rad)
+        found: Array = (places - a.place) @ np.array([[c, -s], [s, c]])
+        return found
+
+    def ground_velocity(self, which: int) -> tuple[float, float]:
+        """True velocity over ground in the level frame."""
+        a = self._aircraft[which]
+        c, s = math.cos(a.heading_rad), math.sin(a.heading_rad)
+        forward = c * self.wind[0] + s * self.wind[1]
+        return self.setting.airspeed_m_s + forward, -s * self.wind[0] + c * self.wind[1]
+
+    def roll_rad(self, which: int) -> float:
+        """True roll."""
+        return self._aircraft[which].roll_rad

@@ -1,0 +1,89 @@
+"""The study of the handoff: its world, one trial, its summary and picture."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from missions.studies import Inline, run_study, run_trial
+from missions.studies.handoff import study
+from missions.studies.handoff_trial import Cell, HandoffTrial
+from missions.studies.handoff_world import HandoffSetting, HandoffWorld
+
+
+def test_targets_stay_in_their_area_and_the_noise_is_the_papers():
+    world = HandoffWorld(HandoffSetting(wind_m_s=0.0), 3)
+    start = world.targets.copy()
+    off, headings = [], []
+    for _ in range(600):
+        world.advance((0.2, -0.1))
+        assert (np.abs(world.targets) <= (70.0 + 0.5, 135.0 + 0.5)).all()
+        measured = world.measured()
+        tracker, handoff = (world.seen_from(k, np.zeros((1, 2)))[0] for k in (0, 1))
+        a, b = (aircraft.place for aircraft in world._aircraft)
+        if math.isfinite(measured.range_m):
+            off.append(measured.range_m - math.hypot(*(a - b), 30.0))
+        turn = math.atan2(tracker[1], tracker[0]) - math.atan2(handoff[1], handoff[0])
+        bearings = math.atan2(*(-a)[::-1]) - math.atan2(*(-b)[::-1])
+        headings.append(math.remainder(measured.heading_rad - turn + bearings, math.tau))
+    assert np.hypot(*(world.targets - start).T).min() > 1.0
+    assert np.mean(off) == pytest.approx(0.0, abs=0.5) and np.std(off) == pytest.approx(3.0, abs=0.3)
+    assert np.std(headings) == pytest.approx(0.01 * math.sqrt(2.0), abs=0.002)
+    assert 0.02 < 1.0 - len(off) / 600 < 0.09
+
+
+def test_a_frame_shows_the_targets_where_they_are():
+    setting = HandoffSetting(tilt_sigma_rad=0.0, pixel_rad=1e-6, height_sigma_m=0.0, false_points=0.0)
+    world = HandoffWorld(setting, 5)
+    world.advance((0.0, 0.0))
+    seen = []
+    for _ in range(40):
+        world.advance((0.3, 0.0))
+        (target,) = world.seen_from(0, world.targets[:1])
+        places, covariances = world.frame(0, (target[0], target[1]))
+        true = world.seen_from(0, world.targets)
+        assert len(places) == len(covariances) <= 5
+        for place in places:
+            assert np.hypot(*(true - place).T).min() < 0.01
+        seen.append(len(places) > 0 and np.hypot(*(places - target).T).min() < 0.01)
+    assert 0.7 < np.mean(seen) < 1.0  # a tenth is missed
+
+
+def test_a_trial_decides_for_the_target_and_repeats_itself():
+    rows = [HandoffTrial(timeout_s=120.0)(Cell(belief="gaussians"), 1) for _ in range(2)]
+    assert rows[0] == rows[1]
+    assert rows[0].correct and not rows[0].wrong and not rows[0].timeout
+    assert rows[0].track_error_m < 15.0 and rows[0].score >= 0.99
+    assert rows[0].converged_s < rows[0].time_s < 120.0
+
+
+def test_a_trial_that_is_too_short_is_a_timeout():
+    row = HandoffTrial(timeout_s=1.0)(Cell(belief="gaussians"), 1)
+    assert row.timeout and not row.decided and row.time_s is None
+    assert row.cause == "pose never converged"
+
+
+def test_the_summary_has_the_papers_figures(tmp_path):
+    made = study("evidence", "gaussians")
+    result = run_study(made, runs=2, engine=Inline(), out=tmp_path / "handoff")
+    folder = Path(result.folder)
+    summary = json.loads((folder / "summary.json").read_text())
+    names = ("runs", "correct", "correct_ci95", "mean_time_s", "median_time_s", "wrong", "timeouts")
+    assert all(name in summary for name in names)
+    assert summary["runs"] == 2 == summary["correct"] + summary["wrong"] + summary["timeouts"]
+    low, high = summary["correct_ci95"]
+    assert low <= summary["correct"] / 2 <= high
+    assert 10.0 < summary["mean_time_s"] < 900.0
+    assert summary["paper"]["correct"] == 486
+    assert (folder / "handoff.png").stat().st_size > 10_000
+    assert "evidence" in (folder / "table.txt").read_text()
+
+
+def test_the_trade_off_has_windows_and_thresholds():
+    made = study("all", trade_off=True)
+    cells = [(cell["comparison"], cell["window"], cell["residual_m"]) for cell in made.design.cells]
+    assert ("paper", 100, 15.0) in cells and ("rms", 25, 1.0) in cells and ("evidence", 50, 15.0) in cells
+    assert len(set(cells)) == len(cells) == 21
+    assert run_trial(study("evidence", "gaussians", window=50), 0, runs=1)["window"] == 50
