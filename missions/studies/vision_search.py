@@ -52,7 +52,7 @@ def study(model: str = "aerosonde", side_m: float = 1000.0, passes: int = 6) -> 
     Args:
         model: of the vehicles.
         side_m: of the searched square.
-        passes: over the target, of all vehicles.
+        passes: over the target, of each vehicle.
     """
     return Study(
         name="vision-search",

@@ -84,7 +84,7 @@ class VisionSearchTrial:
     Attributes:
         model: of the vehicles.
         side_m: of the searched square (paper: 1 km).
-        passes: over the target, of all vehicles.
+        passes: over the target, of each vehicle.
     """
 
     model: str = "aerosonde"
@@ -98,7 +98,7 @@ class VisionSearchTrial:
         options = VisionSearchOptions(
             vehicles=TEAMS[cell.aircraft],
             area_m=(-half_m, -half_m, half_m, half_m),
-            passes=self.passes,
+            passes=self.passes * TEAMS[cell.aircraft],
             tag_size_m=3.0,
             search_seed=run,
         )
