@@ -95,6 +95,11 @@ class MissionOptions:
         changes: dict[str, Any] = {name: v for name, v in values.items() if name not in given}
         return replace(self, given=given, **changes)
 
+    def unless_none(self, **values: float) -> Self:
+        """The same options, with values for fields that are None."""
+        changes: dict[str, Any] = {name: v for name, v in values.items() if getattr(self, name) is None}
+        return replace(self, **changes)
+
     def for_vehicle(self, limits: Limits) -> Self:
         """The same options as one vehicle flies them: options not specified get values that suit its kind."""
         return self

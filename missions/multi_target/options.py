@@ -1,9 +1,9 @@
 """Options of a search for an unknown number of targets."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Final, Protocol
 
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
 from estimators.tracking.intensity import MotionKind
@@ -216,11 +216,6 @@ class MultiTargetOptions(MissionOptions):
         )
         return own if self.chosen("altitude_m") else own.unless_chosen(altitude_m=60.0)
 
-    def unless_none(self, **values: float) -> "MultiTargetOptions":
-        """The same options, with values for fields that are None."""
-        changes: dict[str, Any] = {name: v for name, v in values.items() if getattr(self, name) is None}
-        return replace(self, **changes)
-
 
 def check_vehicle(options: MultiTargetOptions, limits: Limits) -> None:
     """Refuse what one vehicle of the team can't fly.
@@ -228,6 +223,40 @@ def check_vehicle(options: MultiTargetOptions, limits: Limits) -> None:
     Args:
         options: options adapted to the vehicle.
         limits: limits of the vehicle.
+
+    Raises:
+        PlanError: names the option to change.
+    """
+    step_m, _ = check_steps(options, limits)
+    if step_m >= min(options.area.height_m, options.area.width_m):
+        raise PlanError(
+            f"`step_m` {step_m:.0f} m leaves the searched area of {options.area.height_m:g} m by "
+            f"{options.area.width_m:g} m; ask for a larger `area_m`, or a smaller `step_m`"
+        )
+
+
+class SteppedOptions(Protocol):
+    """Options of a search by steps in an area."""
+
+    @property
+    def vehicles(self) -> int: ...
+    @property
+    def separation_m(self) -> float: ...
+    @property
+    def own_altitude_m(self) -> float: ...
+    @property
+    def area_m(self) -> tuple[float, float, float, float]: ...
+    @property
+    def step_m(self) -> float | None: ...
+    @property
+    def speed_m_s(self) -> float | None: ...
+
+
+def check_steps(options: SteppedOptions, limits: Limits) -> tuple[float, float]:
+    """Refuse layers, altitude, area, speed and steps that one vehicle can't fly.
+
+    Returns:
+        Step and speed.
 
     Raises:
         PlanError: names the option to change.
@@ -244,14 +273,9 @@ def check_vehicle(options: MultiTargetOptions, limits: Limits) -> None:
     step_m, speed_m_s = options.step_m, options.speed_m_s
     if step_m is None or speed_m_s is None:
         raise PlanError("the options are not those of a vehicle yet: call for_vehicle")
-    if step_m >= min(options.area.height_m, options.area.width_m):
-        raise PlanError(
-            f"`step_m` {step_m:.0f} m leaves the searched area of {options.area.height_m:g} m by "
-            f"{options.area.width_m:g} m; ask for a larger `area_m`, or a smaller `step_m`"
-        )
     if not isinstance(limits, FixedWingLimits):
         limits.check_speed(speed_m_s)
-        return
+        return step_m, speed_m_s
     limits.check_airspeed(speed_m_s)
     radius_m = limits.turn_radius_m(speed_m_s)
     if step_m < radius_m:
@@ -259,3 +283,4 @@ def check_vehicle(options: MultiTargetOptions, limits: Limits) -> None:
             f"`step_m` {step_m:g} m is too short for an aircraft whose turns have a radius of "
             f"{radius_m:.0f} m; ask for {math.ceil(radius_m)} m or more, or a lower `speed_m_s`"
         )
+    return step_m, speed_m_s

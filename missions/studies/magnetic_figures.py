@@ -29,7 +29,7 @@ _FAR_M: Final = 4500.0
 def draw_curves(
     path: Path, scores: Mapping[str, Array], probability: Mapping[str, Array], *, passes: int
 ) -> None:
-    """Draw the ROC of each method after one and two passes, and the reliability of the probabilities,.
+    """Draw the ROC of each method after one and two passes, and the reliability of the probabilities.
 
     Args:
         path: the file; it must not exist.
@@ -52,7 +52,7 @@ def draw_curves(
     for (method, values), colour in zip(probability.items(), _COLOURS[2:], strict=True):
         _draw_reliability(panels[2], method, values, passes, colour)
     panels[2].plot([0, 1], [0, 1], color="#e5e7eb", linewidth=1.0, zorder=0)
-    panels[2].set_title("reliability, all passes", fontsize=10, loc="left", color=_INK)
+    panels[2].set_title("reliability, all passes (area: their number)", fontsize=10, loc="left", color=_INK)
     panels[2].set_xlabel("stated probability", fontsize=9)
     panels[2].set_ylabel("share of targets", fontsize=9)
     panels[2].legend(fontsize=8, frameon=False, loc="upper left")
@@ -161,4 +161,4 @@ def _draw_reliability(axes: Any, method: str, values: Array, passes: int, colour
     filled = count > 0
     stated = np.bincount(which, weights=values[known], minlength=_BINS)[filled] / count[filled]
     share = np.bincount(which, weights=happened[known], minlength=_BINS)[filled] / count[filled]
-    axes.plot(stated, share, marker="o", markersize=4, color=colour, linewidth=1.2, label=method)
+    axes.scatter(stated, share, s=4.0 + 0.6 * count[filled], color=colour, alpha=0.7, label=method)

@@ -1,13 +1,13 @@
 """Options of a search for one tagged target by cameras."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Final
 
 from estimators.vision_search.parameters import BeliefKind, VisionSearchParameters
 from missions.errors import PlanError
-from missions.multi_target.options import StepLawKind
+from missions.multi_target.options import StepLawKind, check_steps
 from missions.multi_target.planner import Area, PlannerParameters
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
@@ -234,11 +234,6 @@ class VisionSearchOptions(MissionOptions):
         )
         return own.unless_chosen(altitude_m=_WINGS_ALTITUDE_M, separation_m=_WINGS_SEPARATION_M)
 
-    def unless_none(self, **values: float) -> "VisionSearchOptions":
-        """The same options, with values for fields that are None."""
-        changes: dict[str, Any] = {name: v for name, v in values.items() if getattr(self, name) is None}
-        return replace(self, **changes)
-
 
 def check_vehicle(options: VisionSearchOptions, limits: Limits) -> None:
     """Refuse what one vehicle of the team can't fly.
@@ -250,29 +245,8 @@ def check_vehicle(options: VisionSearchOptions, limits: Limits) -> None:
     Raises:
         PlanError: names the option to change.
     """
-    limits.check_separation(options.separation_m, options.vehicles)
-    limits.check_altitude(options.own_altitude_m)
-    south_m, west_m, north_m, east_m = options.area_m
-    reach_m = math.hypot(max(abs(south_m), abs(north_m)), max(abs(west_m), abs(east_m)))
-    if not reach_m <= limits.reach_m:
-        raise PlanError(
-            f"the searched area reaches {reach_m:.0f} m from home, more than {limits.reach_m:g} m; "
-            "ask for a smaller `area_m`, or one nearer to home"
-        )
-    step_m, speed_m_s = options.step_m, options.speed_m_s
-    if step_m is None or speed_m_s is None:
-        raise PlanError("the options are not those of a vehicle yet: call for_vehicle")
-    if not isinstance(limits, FixedWingLimits):
-        limits.check_speed(speed_m_s)
-        return
-    limits.check_airspeed(speed_m_s)
-    if options.localize is LocalizeKind.ORBIT:
+    check_steps(options, limits)
+    if isinstance(limits, FixedWingLimits) and options.localize is LocalizeKind.ORBIT:
         raise PlanError(
             "an aircraft with a fixed camera does not see the middle of its turn; ask for `localize` passes"
-        )
-    radius_m = limits.turn_radius_m(speed_m_s)
-    if step_m < radius_m:
-        raise PlanError(
-            f"`step_m` {step_m:g} m is too short for an aircraft whose turns have a radius of "
-            f"{radius_m:.0f} m; ask for {math.ceil(radius_m)} m or more, or a lower `speed_m_s`"
         )

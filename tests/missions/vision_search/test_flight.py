@@ -16,7 +16,7 @@ from missions.runs.session import fly
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
 
-SMALL = {"altitude_m": 25.0, "area_m": (-30.0, -30.0, 30.0, 30.0), "step_m": 12.0, "tag_size_m": 1.0}
+SMALL = {"altitude_m": 15.0, "area_m": (-20.0, -20.0, 20.0, 20.0), "step_m": 8.0, "tag_size_m": 0.6}
 
 
 def flown(out, *, hidden=None, picture=False, mission=None, **changes):
@@ -29,9 +29,9 @@ def flown(out, *, hidden=None, picture=False, mission=None, **changes):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     mission = VisionSearchMission()
-    hidden = HiddenTag(place_ne_m=(12.0, -8.0))
+    hidden = HiddenTag(place_ne_m=(8.0, -5.0))
     out = tmp_path_factory.mktemp("runs") / "run"
-    return flown(out, hidden=hidden, picture=True, mission=mission, passes=1), mission
+    return flown(out, hidden=hidden, picture=True, mission=mission, passes=2), mission
 
 
 def test_the_target_is_found_and_localized(run):
@@ -41,7 +41,7 @@ def test_the_target_is_found_and_localized(run):
     assert summary["localized"] and summary["search_end"] == "all passes are flown"
     assert summary["error_m"] < 1.0
     assert summary["sigma_m"] < 1.0
-    assert (summary["target_north_m"], summary["target_east_m"]) == pytest.approx((12.0, -8.0), abs=0.5)
+    assert (summary["target_north_m"], summary["target_east_m"]) == pytest.approx((8.0, -5.0), abs=0.5)
     assert summary["beliefs"][0]["detections"] >= 3
     assert 0.0 < summary["pose_errors"]["1"]["pitch_rad"] < 0.01
     assert {path.name for path in result.folder.iterdir()} >= {"flight.tlog", "summary.json", "track.png"}
