@@ -64,7 +64,7 @@ class TrackHistory:
 
     def __init__(self, keep_s: float) -> None:
         if not keep_s > 0.0:
-            raise ValueError(f"`keep_s` = {keep_s:g} is not accepted: a number above 0 is")
+            raise ValueError(f"keep_s = {keep_s:g} is not accepted: a number above 0 is")
         self._keep_us = round(1e6 * keep_s)
         self._places: dict[int, deque[tuple[int, float, float]]] = {}
         self._newest_us = 0

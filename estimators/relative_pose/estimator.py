@@ -48,7 +48,7 @@ class RelativePoseSettings(RelativePoseParameters):
             if not 1 <= getattr(self, name) <= 255:
                 raise ValueError(f"{name} = {getattr(self, name)} is not accepted: 1 to 255 are")
         if self.vehicle == self.other:
-            raise ValueError(f"other = {self.other} is not accepted: it is `vehicle` itself")
+            raise ValueError(f"other = {self.other} is not accepted: it is the vehicle itself")
 
 
 class RelativePoseEstimator(Estimator[RelativePoseSettings]):

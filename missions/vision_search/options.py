@@ -10,12 +10,17 @@ from missions.errors import PlanError
 from missions.multi_target.options import StepLawKind, check_steps
 from missions.multi_target.planner import Area, PlannerParameters
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
+from missions.patterns.lissajous import NAMED_PATTERNS
 from missions.planning.limits import FixedWingLimits, Limits
 
 MAX_STEPS: Final = 20_000
 LARGEST_SIDE_M: Final = 20_000.0
 _WINGS_ALTITUDE_M: Final = 90.0
 _WINGS_SEPARATION_M: Final = 10.0
+_ERRORS: Final = (
+    *("place_sigma_m", "height_sigma_m", "yaw_sigma_rad", "tilt_sigma_rad", "mount_sigma_rad"),
+    *("place_time_s", "attitude_time_s", "target_walk_m_sqrt_s"),
+)
 _TURNS: Final = 2.5  # step of an aircraft, in turn radii
 
 
@@ -151,6 +156,12 @@ class VisionSearchOptions(MissionOptions):
             raise PlanError(f"`link_delay_s` {self.link_delay_s:g} s is not in 0..60 s")
         if not 0.1 <= self.view_rad <= 2.9:
             raise PlanError(f"`view_rad` {math.degrees(self.view_rad):g} degrees is not in 6..166 degrees")
+        if self.curve.upper() not in NAMED_PATTERNS:
+            raise PlanError(f"`curve` {self.curve!r} is not known; there are {', '.join(NAMED_PATTERNS)}")
+        for name in _ERRORS:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise PlanError(f"`{name}` {value:g} is not possible; ask for 0 or more")
         try:  # these constructors refuse impossible values
             _ = self.estimator_parameters, self.planner_parameters
         except ValueError as error:

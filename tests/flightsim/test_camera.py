@@ -190,6 +190,18 @@ def test_line_of_sight_and_height_give_the_place_back() -> None:
     np.testing.assert_allclose(100.0 * sight / sight[2], (70.0, 20.0, 100.0), atol=1e-5)
 
 
+def test_a_camera_that_is_turned_on_its_mount_sees_the_target_elsewhere() -> None:
+    """The mount looks straight down; 2 degrees about the camera's right axis, 1 about its down axis."""
+    turned = (0.0, math.radians(2.0), math.radians(1.0))
+    (straight,) = Bench((0.0, 0.0), **SURE).detections()
+    (found,) = Bench((0.0, 0.0), misalignment_rad=turned, **SURE).detections()
+    assert straight.normalised == pytest.approx((0.0, 0.0), abs=1e-6)
+    # the axis is turned up in the picture and to its right, so that the target is seen below and to the left
+    assert found.normalised == pytest.approx((-math.tan(turned[2]), math.tan(turned[1])), rel=2e-3)
+    with pytest.raises(ValueError, match="misalignment_rad"):
+        CameraParameters(misalignment_rad=(0.0, math.nan, 0.0))
+
+
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 def test_pixels_and_normalised_coordinates_are_inverse(x: float, y: float) -> None:
     model = PinholeModel()

@@ -64,7 +64,7 @@ def test_wrong_options_are_usage_errors(
 
 def test_an_unknown_study_is_reported_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["study", "magic"]) == 2
-    assert "no study 'magic'; there are lissajous-localization" in capsys.readouterr().err
+    assert "no study 'magic'; there are handoff, lissajous-localization" in capsys.readouterr().err
 
 
 def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

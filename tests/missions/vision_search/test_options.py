@@ -27,7 +27,8 @@ WINGS = FixedWingLimits()
         ({"tag_size_m": 0.0}, "`tag_size_m` 0"),
         ({"horizon": 9}, "`horizon` 9 is not in 1..8"),
         ({"cell_m": 0.001}, "`cell_m` 0.001 m makes"),
-        ({"place_sigma_m": -1.0}, "forward_m -1"),
+        ({"place_sigma_m": -1.0}, "`place_sigma_m` -1"),
+        ({"curve": "L9"}, "`curve` 'L9' is not known; there are L1, L2, L3, L4"),
         ({"search_time_s": 1e6}, "`search_time_s` 1e.06 s is more than"),
     ],
 )
