@@ -33,10 +33,10 @@ class Encounter:
     The measurements have the noise of the paper's study: range 3 m, headings 0.01 rad each.
     """
 
-    def __init__(self, seed):
+    def __init__(self, seed, far_m=1500.0):
         self.rng = rng = np.random.default_rng([18, seed])
         self.wind = rng.uniform(-6.0, 6.0, 2)
-        angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(300.0, 1500.0)
+        angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(300.0, far_m)
         speed = rng.uniform(14.0, 22.0)
         place = rng.uniform(-math.pi, math.pi)
         radius = rng.uniform(100.0, 200.0)
