@@ -44,6 +44,7 @@ def test_parameters(mavsdk: Session, sitl: PluginSitl) -> None:
 
 
 @compatibility(feature="calibration")
+@pytest.mark.slow
 def test_calibration(mavsdk: Session, sitl: PluginSitl, client: str, request: pytest.FixtureRequest) -> None:
     if sitl.flavour == "ardupilot":
         assert "UNSUPPORTED" in rejected(mavsdk, "calibration", "cancel")

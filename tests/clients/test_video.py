@@ -109,7 +109,6 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Flight]:
         client.link.close()
 
 
-@pytest.mark.slow
 def test_video_capture_shows_the_target_where_the_detector_says(flight: Flight) -> None:
     capture = watch(flight.uri())
     picture_where(capture, lambda p: 0 in tags(p), "tag 0")

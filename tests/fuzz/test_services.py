@@ -28,6 +28,7 @@ def test_absurd_orders_are_borne(flavour: str, model: str) -> None:
     assert figures.messages >= 500
 
 
+@pytest.mark.slow
 def test_the_same_seed_fires_the_same() -> None:
     first, second = (Campaign("px4", "iris", 3).one_round(300, orders=True) for _ in range(2))
     assert (first.messages, first.answers_bytes) == (second.messages, second.answers_bytes)

@@ -112,6 +112,7 @@ def runs() -> Array:
     return np.array(out)
 
 
+@pytest.mark.slow
 def test_with_gps(runs: Array) -> None:
     part = runs[:, : round(LOST_S - 22.0)]
     nees = part[:, :, :4].mean(axis=(0, 1))
@@ -120,6 +121,7 @@ def test_with_gps(runs: Array) -> None:
     assert rms[4] < 0.3 and rms[5] < 0.06 and rms[6] < 0.3
 
 
+@pytest.mark.slow
 def test_dead_reckoning(runs: Array) -> None:
     part = runs[:, round(LOST_S - 20.0) :]
     nees = part[:, :, :4].mean(axis=(0, 1))

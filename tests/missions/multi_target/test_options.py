@@ -23,7 +23,7 @@ from missions.planning.limits import FixedWingLimits, MulticopterLimits
         ({"undetected": 0.0}, "`undetected` 0"),
         ({"search_time_s": 1e6}, "`search_time_s`"),
         ({"gain": 2.0}, "gain 2"),
-        ({"found_width_m": -1.0}, "found_width_m -1"),
+        ({"found_width_m": -1.0}, "found_width_m = -1.0"),
         ({"place_sigma_m": -1.0}, "`place_sigma_m`"),
     ],
 )
