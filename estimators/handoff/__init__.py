@@ -4,6 +4,7 @@ from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.alignment import Alignment, align
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.handoff.dead_reckoning import DeadReckoning, TrackHistory
+from estimators.handoff.designation import Designation, DesignationParameters
 from estimators.handoff.evidence import EvidenceComparison, EvidenceParameters
 from estimators.handoff.matching import Match, MatchComparison, MatchingParameters, Residual, blended
 from estimators.handoff.process import HandoffProcess, TrackerReport, WindowParameters
@@ -12,6 +13,8 @@ __all__ = [
     "AircraftTracks",
     "Alignment",
     "DeadReckoning",
+    "Designation",
+    "DesignationParameters",
     "EvidenceComparison",
     "EvidenceParameters",
     "HandoffProcess",

@@ -26,11 +26,13 @@ class TrackerReport:
         motion: its motion.
         target: forward and right of its target in its level frame; None: it has no track of it.
         others: the same of its other tracks, by number from 1.
+        identity: probability that the target still is the designated one.
     """
 
     motion: LevelMotion
     target: tuple[float, float] | None = None
     others: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    identity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,7 +144,14 @@ class HandoffProcess:
         }
         target = reported.pop(_TARGET, None)
         self.comparison.update(
-            TrackWindows(time_us=time_us, times_us=times_us, handoff=own, target=target, others=reported),
+            TrackWindows(
+                time_us=time_us,
+                times_us=times_us,
+                handoff=own,
+                target=target,
+                others=reported,
+                identity=1.0 if self._report is None else self._report.identity,
+            ),
             best,
         )
         if self.comparison.decided is not None and self.decided_us is None:

@@ -214,10 +214,7 @@ class HandoffWorld:
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
         directions = camera.directions(np.vstack((points, false)))
-        roll, pitch = a.tilt.tolist()
-        # directions + tilt x directions, of a small tilt about forward and right
-        tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
-        tilted[:, 2] -= pitch * directions[:, 0]
+        tilted = _tilted(directions, a.tilt)
         height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
         # only the part of the tilt's error that changes from frame to frame is noise to the tracker
         sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
@@ -232,6 +229,15 @@ class HandoffWorld:
         found: Array = (places - a.place) @ np.array([[c, -s], [s, c]])
         return found
 
+    def apparent(self, which: int, places: Array) -> Array:
+        """Where an aircraft's camera shows places: as `seen_from`, with the present errors of roll and pitch.
+        A track is of the target that is shown where the track is.
+        """
+        a = self._aircraft[which]
+        level = self.seen_from(which, places)
+        directions = np.column_stack((level, np.full(len(level), a.height_m)))
+        return on_ground(_tilted(directions, a.tilt), a.height_m, self.setting.pixel_rad)[0]
+
     def ground_velocity(self, which: int) -> tuple[float, float]:
         """True velocity over ground in the level frame."""
         a = self._aircraft[which]
@@ -242,3 +248,12 @@ class HandoffWorld:
     def roll_rad(self, which: int) -> float:
         """True roll."""
         return self._aircraft[which].roll_rad
+
+
+def _tilted(directions: Array, tilt: Array) -> Array:
+    """Directions (n, 3) of the level frame turned by small errors of roll and pitch, about forward and right."""
+    roll, pitch = tilt.tolist()
+    tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
+    tilted[:, 2] -= pitch * directions[:, 0]
+    found: Array = tilted
+    return found
