@@ -17,7 +17,13 @@ from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as dialect
 
-__all__ = ["MAX_POINTS", "MOVING_POINTS_PAYLOAD", "MovingPoints", "moving_points_messages", "read_moving_points"]
+__all__ = [
+    "MAX_POINTS",
+    "MOVING_POINTS_PAYLOAD",
+    "MovingPoints",
+    "moving_points_messages",
+    "read_moving_points",
+]
 
 MOVING_POINTS_PAYLOAD: Final = 0xF51A
 """Payload type; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""

@@ -145,9 +145,7 @@ class EvidenceComparison(TrackComparison):
         )
         wrong = np.diag(np.square([p.wrong_sigma_m, p.wrong_sigma_m, p.wrong_sigma_rad]))
         priors = ((1.0 - p.wrong, narrow), (p.wrong, narrow + wrong))
-        logs = np.array(
-            [self._hypotheses(pairs, covariance) + _log(weight) for weight, covariance in priors]
-        )
+        logs = np.array([self._hypotheses(pairs, covariance) + _log(weight) for weight, covariance in priors])
         # the prior of a track: what is left beside `absent`, shared by all
         logs[:, :-1] += _log((1.0 - p.absent) / len(numbers))
         logs[:, -1] += _log(p.absent)
@@ -189,9 +187,7 @@ class EvidenceComparison(TrackComparison):
         first = self._factors(pairs, [0], tracks, nothing)[0]
         logs = [
             float(first[k])
-            + self._pattern(
-                pairs, others, [j for j in tracks if j != k], self._joined(pairs, 0, k, nothing)
-            )
+            + self._pattern(pairs, others, [j for j in tracks if j != k], self._joined(pairs, 0, k, nothing))
             for k in tracks
         ]
         return np.array([*logs, self._pattern(pairs, others, tracks, nothing)])

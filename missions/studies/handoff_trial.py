@@ -24,17 +24,15 @@ from estimators.relative_pose import (
 )
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
 from missions.orbit.guidance import OrbitGuidance, OrbitParameters
-from missions.studies.handoff_world import HandoffSetting, HandoffWorld
+from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
 
 Array = NDArray[np.float64]
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
-_DESIGNATED_M: Final = 5.0  # a track this close to the target is the one that the operator designates
 _SURE: Final = 0.98  # with a smaller probability of the identity the operator designates anew
 _OPERATOR_S: Final = 5.0  # time that it takes
 _APART_M: Final = 10.0  # the operator tells targets apart that are farther from each other
-_RIGHT_M: Final = 10.0  # a track this far from where the nearest target is shown is of none
 
 
 class Comparison(StrEnum):
@@ -117,37 +115,36 @@ class _Tracker:
         self.designation = Designation()
         self._doubtful_us: int | None = 0
 
-    def step(self) -> TrackerReport:
-        """Take a frame, and report."""
+    def step(self) -> tuple[LevelMotion, TrackerReport]:
+        """Take a frame; returns the motion since the last one, and the report."""
         world, which, designation = self._world, HandoffWorld.TRACKER, self.designation
         motion = world.motion(which)
         self.tracks.move(1.0 / world.setting.rate_hz, motion)
         known = self.tracks.level()
         held = known.get(designation.number) if designation.number is not None else None
         # without a track the operator holds the camera on the target
-        shown = world.apparent(which, world.targets)
-        self.tracks.scan(world.time_us, *world.frame(which, held or (float(shown[0, 0]), float(shown[0, 1]))))
+        true = world.seen_from(which, world.targets)
+        self.tracks.scan(world.time_us, *world.frame(which, held or (float(true[0, 0]), float(true[0, 1]))))
         designation.update(world.time_us, self.tracks.places)
-        self._operate(shown)
-        known = dict(self.tracks.level())
-        held = known.pop(designation.number, None) if designation.number is not None else None
-        return TrackerReport(motion=motion, target=held, others=known, identity=designation.probability)
+        self._operate(true)
+        return motion, TrackerReport(
+            tracks=self.tracks.level(), number=designation.number, identity=designation.probability
+        )
 
-    def _operate(self, shown: Array) -> None:
+    def _operate(self, true: Array) -> None:
         designation, now_us = self.designation, self._world.time_us
         if designation.number is not None and designation.probability >= _SURE:
             self._doubtful_us = None
             return
         if self._doubtful_us is None:
             self._doubtful_us = now_us
-        apart_m = np.hypot(*(shown[1:] - shown[0]).T)
         waited_s = (now_us - self._doubtful_us) * 1e-6
-        if waited_s < (_OPERATOR_S if designation.count else 0.0) or (apart_m < _APART_M).any():
+        close = np.hypot(*(true[1:] - true[0]).T) < _APART_M
+        if waited_s < (_OPERATOR_S if designation.count else 0.0) or close.any():
             return
-        near = {k: math.dist(place, shown[0]) for k, place in self.tracks.level().items()}
-        number = min(near, key=lambda k: near[k], default=None)
-        if number is not None and near[number] <= _DESIGNATED_M:
-            designation.designate(now_us, number, self.tracks.places[number])
+        for number, target in targets_of(self.tracks.level(), true).items():
+            if target == 0:
+                designation.designate(now_us, number, self.tracks.places[number])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,19 +175,19 @@ class HandoffTrial:
             OrbitGuidance(OrbitParameters(radius_m=self.setting.radius_m, direction=d)) for d in (1, -1)
         ]
         rolls = (0.0, 0.0)
-        report = TrackerReport(motion=LevelMotion(forward_m_s=self.setting.airspeed_m_s))
+        report = TrackerReport()
         early: tuple[float, bool] | None = None
         while world.time_us < 1e6 * self.timeout_s and process.decided_us is None:
             world.advance(rolls)
-            report = tracker.step()
+            motion, report = tracker.step()
             pointing = process.target()
             frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
             own = world.motion(HandoffWorld.HANDOFF)
-            process.step(world.time_us, own, report, world.measured(), frame)
+            process.step(world.time_us, own, motion, report, world.measured(), frame)
             scores = process.comparison.scores
             if early is None and scores:
                 best = max(scores, key=lambda number: scores[number])
-                early = scores[best], _nearest(world, process, best)[0] == 0
+                early = scores[best], _target_of(world, HandoffWorld.HANDOFF, process.tracks, best) == 0
             rolls = (
                 _orbit_roll(
                     pilots[0],
@@ -269,17 +266,10 @@ def _orbit_roll(
     return pilot.command(state, 0.0, roll_rad).roll_rad
 
 
-def _nearest(world: HandoffWorld, process: HandoffProcess, number: int) -> tuple[int | None, float]:
-    """The target that the camera shows where a track of the handoff aircraft is, None without one; and the
-    distance of the track from the tracked target's true place.
-    """
-    place = process.tracks.level().get(number)
-    if place is None:
-        return None, math.inf
-    shown = np.hypot(*(world.apparent(HandoffWorld.HANDOFF, world.targets) - place).T)
-    true = world.seen_from(HandoffWorld.HANDOFF, world.targets[:1])[0]
-    nearest = int(np.argmin(shown))
-    return (nearest if shown[nearest] <= _RIGHT_M else None), math.dist(true, place)
+def _target_of(world: HandoffWorld, which: int, tracks: AircraftTracks, number: int | None) -> int | None:
+    """The true target of a track of an aircraft; None: it is of none."""
+    found = targets_of(tracks.level(), world.seen_from(which, world.targets))
+    return None if number is None else found.get(number)
 
 
 def _outcome(
@@ -295,18 +285,20 @@ def _outcome(
     if report.target is not None:
         true = world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0]
         tracker_error_m = math.dist(true, report.target)
-        shown = world.apparent(HandoffWorld.TRACKER, world.targets)
-        if int(np.argmin(np.hypot(*(shown - report.target).T))) != 0:
+        if _target_of(world, HandoffWorld.TRACKER, tracker.tracks, report.number) != 0:
             cause = "tracker on another target"
     if number is not None:
         score = process.comparison.scores.get(number)
-        nearest, off_m = _nearest(world, process, number)
-        track_error_m = off_m if math.isfinite(off_m) else None
-        correct = nearest == 0
+        target = _target_of(world, HandoffWorld.HANDOFF, process.tracks, number)
+        place = process.tracks.level().get(number)
+        if place is not None:
+            true = world.seen_from(HandoffWorld.HANDOFF, world.targets[:1])[0]
+            track_error_m = math.dist(true, place)
+        correct = target == 0
         if correct:
             cause = ""
         elif not cause:
-            cause = "a track of no target" if nearest is None else "another target"
+            cause = "a track of no target" if target is None else "another target"
     elif not cause:
         cause = "no decision"
     return Handoff(

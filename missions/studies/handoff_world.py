@@ -6,7 +6,9 @@ parameter with a default of our own.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ from flightsim.foundation.checks import check_fields, require_not_negative, requ
 from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
+
+_SHIFT_M: Final = 30.0  # largest common error of the tracks of one aircraft
+_RIGHT_M: Final = 10.0  # a track this far from its nearest target is of none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,7 +219,10 @@ class HandoffWorld:
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
         directions = camera.directions(np.vstack((points, false)))
-        tilted = _tilted(directions, a.tilt)
+        roll, pitch = a.tilt.tolist()
+        # directions + tilt x directions, of a small tilt about forward and right
+        tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
+        tilted[:, 2] -= pitch * directions[:, 0]
         height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
         # only the part of the tilt's error that changes from frame to frame is noise to the tracker
         sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
@@ -229,15 +237,6 @@ class HandoffWorld:
         found: Array = (places - a.place) @ np.array([[c, -s], [s, c]])
         return found
 
-    def apparent(self, which: int, places: Array) -> Array:
-        """Where an aircraft's camera shows places: as `seen_from`, with the present errors of roll and pitch.
-        A track is of the target that is shown where the track is.
-        """
-        a = self._aircraft[which]
-        level = self.seen_from(which, places)
-        directions = np.column_stack((level, np.full(len(level), a.height_m)))
-        return on_ground(_tilted(directions, a.tilt), a.height_m, self.setting.pixel_rad)[0]
-
     def ground_velocity(self, which: int) -> tuple[float, float]:
         """True velocity over ground in the level frame."""
         a = self._aircraft[which]
@@ -250,10 +249,27 @@ class HandoffWorld:
         return self._aircraft[which].roll_rad
 
 
-def _tilted(directions: Array, tilt: Array) -> Array:
-    """Directions (n, 3) of the level frame turned by small errors of roll and pitch, about forward and right."""
-    roll, pitch = tilt.tolist()
-    tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
-    tilted[:, 2] -= pitch * directions[:, 0]
-    found: Array = tilted
-    return found
+def targets_of(tracks: Mapping[int, tuple[float, float]], targets: Array) -> dict[int, int]:
+    """The true target of each track, by the pattern of all: errors of roll and pitch move all tracks of an
+    aircraft alike, by more than targets are apart. Tracks of no target are left out.
+
+    Args:
+        tracks: forward and right by number.
+        targets: (n, 2) true places in the same frame.
+    """
+    if not tracks:
+        return {}
+    places = np.array(list(tracks.values()))
+    off = places[:, None] - targets  # (tracks, targets, 2)
+    # shifts that put one track on one target; none, if all are too far
+    shifts = [np.zeros(2), *off[np.hypot(*off.transpose(2, 0, 1)) < _SHIFT_M]]
+    costs = []
+    for shift in shifts:
+        apart = np.hypot(*(off - shift).transpose(2, 0, 1)).min(axis=1)
+        costs.append(np.minimum(apart, _RIGHT_M).sum() + 0.1 * float(np.hypot(*shift)))
+    apart = np.hypot(*(off - shifts[int(np.argmin(costs))]).transpose(2, 0, 1))
+    return {
+        number: int(row.argmin())
+        for number, row in zip(tracks, apart, strict=True)
+        if row.min() <= _RIGHT_M
+    }

@@ -1,0 +1,166 @@
+"""The estimators `handoff` of both aircraft in a mission's own loop, and the link between them."""
+
+import heapq
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
+from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
+from estimators.relative_pose import PoseMode
+from estimators.runner import Runner
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+__all__ = ["HandoffWatch", "Moment", "RadioLink"]
+
+_ONBOARD: Final = 191
+_EVERY_US: Final = 500_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """What the handoff aircraft knows at a time, for the picture.
+
+    Attributes:
+        time_us: time of the estimate.
+        estimate: of the handoff aircraft.
+        modes: of the relative pose.
+        scores: by track of the handoff aircraft.
+    """
+
+    time_us: int
+    estimate: HandoffEstimate
+    modes: tuple[PoseMode, ...]
+    scores: dict[int, float]
+
+
+class RadioLink:
+    """Messages from one aircraft to the other, with losses and exponentially distributed delays.
+
+    Args:
+        loss: probability that a message is lost.
+        delay_s: mean delay.
+        rng: of both.
+
+    Attributes:
+        counts: messages "sent", "lost" and "delivered".
+    """
+
+    def __init__(self, loss: float, delay_s: float, rng: np.random.Generator) -> None:
+        self._loss, self._delay_s, self._rng = loss, delay_s, rng
+        self._under_way: list[tuple[int, int, int, Frame]] = []
+        self._sent = 0
+        self.counts: Counter[str] = Counter()
+
+    def send(self, now_us: int, to: int, frame: Frame) -> None:
+        """Send a frame to the aircraft with this index."""
+        self.counts["sent"] += 1
+        lost, delay_s = self._rng.random() < self._loss, self._delay_s * self._rng.exponential()
+        if lost:
+            self.counts["lost"] += 1
+            return
+        self._sent += 1
+        heapq.heappush(self._under_way, (now_us + round(delay_s * 1e6), self._sent, to, frame))
+
+    def due(self, now_us: int) -> list[tuple[int, Frame]]:
+        """The frames that arrive by now, with the index of their receiver."""
+        found = []
+        while self._under_way and self._under_way[0][0] <= now_us:
+            _, _, to, frame = heapq.heappop(self._under_way)
+            self.counts["delivered"] += 1
+            found.append((to, frame))
+        return found
+
+
+class HandoffWatch:
+    """Passes the messages of both aircraft to the estimators, and theirs over the link.
+
+    The sensor messages of the tracker reach the handoff aircraft without delay; what the estimators publish
+    goes over the link.
+
+    Args:
+        vehicles: the handoff aircraft and the tracker.
+        settings: of the estimators, in this order.
+        link: between the aircraft.
+
+    Attributes:
+        estimators: in this order.
+        link: as given.
+        moments: of the handoff aircraft, every half second.
+    """
+
+    def __init__(
+        self, vehicles: "Sequence[Vehicle]", settings: Sequence[HandoffSettings], link: RadioLink
+    ) -> None:
+        self._vehicles = tuple(vehicles)
+        self.estimators = [HandoffEstimator(own) for own in settings]
+        self._runners = [Runner(estimator) for estimator in self.estimators]
+        self.link = link
+        self.moments: list[Moment] = []
+        self._encoders = [FrameEncoder(vehicle.system_id, _ONBOARD) for vehicle in vehicles]
+        self._parsers = [FrameParser() for _ in vehicles]
+        self._stops: list[Callable[[], None]] = []
+
+    def remarks(self, index: int) -> dict[str, float | str]:
+        """Figures of one aircraft's estimator."""
+        return dict(self._runners[index].remarks)
+
+    def start(self) -> None:
+        """Start to process messages."""
+        names = sorted(self._runners[0].read_names | self._runners[1].read_names)
+        for vehicle in self._vehicles:
+            connection, system_id = vehicle.link.connection, vehicle.system_id
+
+            def take(frame: Frame, own: int = system_id) -> None:
+                if frame.system_id == own:
+                    self._take(frame)
+
+            self._stops += [connection.listen(name, take) for name in names]
+
+    def stop(self) -> None:
+        """Stop processing messages."""
+        for stop in self._stops:
+            stop()
+        self._stops = []
+
+    def _take(self, frame: Frame) -> None:
+        now_us = self._vehicles[0].clock.time_us
+        for to, arrived in self.link.due(now_us):
+            self._feed(to, arrived)
+        for index in range(len(self._runners)):
+            self._feed(index, frame)
+
+    def _feed(self, index: int, frame: Frame) -> None:
+        runner = self._runners[index]
+        runner.feed(frame)
+        now_us = self._vehicles[0].clock.time_us
+        for message in self.estimators[index].publish():
+            self._send(now_us, index, message)
+        if index == 0:
+            self._note()
+
+    def _send(self, now_us: int, index: int, message: Any) -> None:
+        (frame,) = self._parsers[index].feed(self._encoders[index].encode(message))
+        self.link.send(now_us, 1 - index, frame)
+
+    def _note(self) -> None:
+        estimates = self.estimators[0].estimates
+        if not estimates:
+            return
+        (estimate,) = estimates
+        if self.moments and estimate.time_us - self.moments[-1].time_us < _EVERY_US:
+            return
+        process = self.estimators[0].process
+        self.moments.append(
+            Moment(
+                time_us=estimate.time_us,
+                estimate=estimate,
+                modes=tuple(process.pose.modes),
+                scores=dict(process.comparison.scores),
+            )
+        )
