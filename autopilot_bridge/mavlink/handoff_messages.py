@@ -1,8 +1,9 @@
 """Tracks and the decision of a handoff in TUNNEL messages between two aircraft.
 
-MAVLink has no message for tracks of targets relative to an aircraft that may not know its position. FOLLOW_TARGET
-and ADSB_VEHICLE have geodetic positions. docs/mavlink/handoff.md documents the payloads. All numbers are
-little-endian; vectors are forward and right in the level frame of the sender at the time of the message.
+MAVLink has no message for tracks of targets relative to an aircraft that may not know its position.
+FOLLOW_TARGET and ADSB_VEHICLE have geodetic positions. docs/mavlink/handoff.md documents the payloads. All
+numbers are little-endian; vectors are forward and right in the level frame of the sender at the time of the
+message.
 """
 
 import math

@@ -5,8 +5,8 @@ cannot report that a frame was searched and shows nothing that moves. docs/mavli
 the payload.
 
 All numbers are little-endian: version (uint8), points in this message (uint8), number of its first point
-(uint8), points of the scan (uint8), scan (uint32), time (uint64, microseconds since the vehicle's boot, of the
-exposure), standard deviation (float32), then for each point the tangents to the right and down (float32).
+(uint8), points of the scan (uint8), scan (uint32), time (uint64, microseconds since the vehicle's boot, of
+the exposure), standard deviation (float32), then for each point the tangents to the right and down (float32).
 """
 
 import math

@@ -1,9 +1,9 @@
 """The estimator `handoff`: which track of the handoff aircraft is the tracker's target, without GPS
 (Tolman et al. 2021; docs/handoff.md).
 
-It runs on both aircraft. On the tracker it tracks what moves, follows the designated track, reports all of them
-and receives the decision. On the handoff aircraft it estimates the relative pose, tracks what moves, compares
-its tracks with the reported ones, and decides.
+It runs on both aircraft. On the tracker it tracks what moves, follows the designated track, reports all
+tracks and receives the decision. On the handoff aircraft it estimates the relative pose, tracks what moves,
+compares its tracks with the reported ones, and decides.
 """
 
 import math
@@ -137,9 +137,11 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             self._ground = None if math.isnan(self.sight.height.ground_m) else self.sight.height.ground_m
             if self._tracks:
                 self._place.take(time_us, message)
-        fused = (
-            self._state.take(time_us, message) if self._tracks_own(system) else self._fuse(message, time_us)
-        )
+        fused = Outcome.IGNORED
+        if not self._tracks:
+            fused = self.pose.handle(time_us, message)
+        elif system == self.own:
+            fused = self._state.take(time_us, message)
         if fused is Outcome.TIME_JUMP:
             self._restart()
             return fused
@@ -149,12 +151,6 @@ class HandoffEstimator(Estimator[HandoffSettings]):
                 return self._compare(time_us)
         return fused if fused is not Outcome.IGNORED else outcome
 
-    def _tracks_own(self, system: int) -> bool:
-        return self._tracks and system == self.own
-
-    def _fuse(self, message: Message, time_us: int) -> Outcome:
-        return Outcome.IGNORED if self._tracks else self.pose.handle(time_us, message)
-
     # messages between the aircraft
 
     def _tunnel(self, time_us: int, message: Message) -> Outcome:
@@ -163,7 +159,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             if kind == MOVING_POINTS_PAYLOAD:
                 outcome = self.sight.take(time_us, message)
                 return self._report(time_us) if outcome is Outcome.UPDATED and self._tracks else outcome
-            fused = self._fuse(message, time_us)
+            fused = Outcome.IGNORED if self._tracks else self.pose.handle(time_us, message)
             if fused is Outcome.TIME_JUMP:
                 self._restart()
             return self._compare(time_us) if fused is Outcome.UPDATED else fused
@@ -207,9 +203,9 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             taken_us = report.time_us + self._offsets_us.get(self.partner, 0)
             taken = self._partner_path.at(taken_us)
             newest_us = self._partner_path.time_us
-            if taken is None and (newest_us is None or taken_us > newest_us):
-                if time_us - taken_us < _PENDING_US:
-                    return  # the sender's motion up to then is still to come
+            to_come = newest_us is None or taken_us > newest_us
+            if taken is None and to_come and time_us - taken_us < _PENDING_US:
+                return  # the sender's motion up to then is still to come
             self._pending.popleft()
             if taken is None:
                 self.counts["unplaced"] += 1
@@ -252,15 +248,14 @@ class HandoffEstimator(Estimator[HandoffSettings]):
                 tracks=reported_tracks(tracks, taken),
             )
             self._number += 1
-        number = designation.number
-        place = None if number is None else tracks.level().get(number)
+        place = self.target()
         self._estimates = (
             HandoffEstimate(
                 time_us=time_us,
                 subject=self.own,
                 target_m=place or (math.nan, math.nan),
-                track=number or 0,
-                probability=designation.probability if number is not None else 0.0,
+                track=designation.number or 0,
+                probability=0.0 if designation.number is None else designation.probability,
                 identity=designation.probability,
                 decided=self.decision is not None and self.decision.decided,
                 released=self.released,

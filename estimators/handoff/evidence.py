@@ -11,10 +11,10 @@ roll and pitch, which move a track for seconds. For two different targets there 
 velocity between them, with wide priors. Both have a closed evidence (Bishop 2006, "Pattern Recognition and
 Machine Learning", section 3.5), so a pair has a Bayes factor.
 
-A hypothesis says which track is the target, or that none is. Under each the tracker's other tracks are joined
-to other tracks of the handoff aircraft, the best pair first, each pair with the x that the pairs before it
-leave, as long as its factor is above 1: the pattern of all targets counts, for "none" too. The pose's prior is
-a mixture: a belief that has converged to a wrong place is improbable, and not impossible.
+A hypothesis says which track is the target, or that none is. Under each the tracker's other tracks are
+joined to other tracks of the handoff aircraft, the best pair first, each pair with the x that the pairs
+before it leave, as long as its factor is above 1: the pattern of all targets counts, for "none" too. The
+pose's prior is a mixture: a belief that has converged to a wrong place is improbable, and not impossible.
 """
 
 import math

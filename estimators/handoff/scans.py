@@ -148,6 +148,5 @@ def level_places(
         line = rotate(gimbal.q, gimbal_from_camera(*scan.points[number]))
         directions[row] = line if turn is None else rotate(turn, line)
     places, covariances = on_ground(directions, height_m, math.hypot(scan.sigma, tilt_sigma_rad))
-    near = np.isfinite(places).all(axis=1)
-    near[near] = np.hypot(*places[near].T) < _FARTHEST * height_m
+    near = np.hypot(places[:, 0], places[:, 1]) < _FARTHEST * height_m  # NaN is not
     return places[near], covariances[near]

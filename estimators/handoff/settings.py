@@ -16,9 +16,9 @@ class HandoffSettings(RelativePoseSettings):
     """Parameters of the estimator. The noise is that of flights at some 300 m from the targets.
 
     Attributes:
-        role: aircraft on board of which it runs: "handoff" (`vehicle`), which decides, or "tracker" (`other`),
-            which reports its tracks.
-        target_north_m, target_east_m: place from home where the tracker's operator designates the target;
+        role: aircraft on board of which it runs: "handoff" (`vehicle`), which decides, or "tracker"
+            (`other`), which reports its tracks.
+        target_north_m, target_east_m: place from home at which the tracker's operator designates the target;
             None: the track nearest to the aircraft is designated.
         designate_m: a track within this distance of the place is designated.
         ground_altitude_m: pressure altitude of the ground; None: that before the aircraft is armed.

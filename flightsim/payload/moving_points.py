@@ -1,7 +1,8 @@
 """Moving-point camera: image points of what moves on the ground, frame by frame, without pictures.
 
-It stands for a camera and the front end that finds moving objects in its pictures (Tolman et al. 2021, section
-V-A), at the level of image points: those of the targets in view that move, with noise, misses and false points.
+It stands for a camera and the front end that finds moving objects in its pictures (Tolman et al. 2021,
+section V-A), at the level of image points: those of the targets in view that move, with noise, misses and
+false points.
 """
 
 import math

@@ -17,7 +17,7 @@ from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitGuidance, OrbitParameters
 from missions.orbit.roll_flight import follow_rolls
 from missions.planning.limits import FixedWingLimits
-from missions.vehicle.payload import GIMBAL_COMPONENT, MOVING_POINT_COMPONENT
+from missions.vehicle.payload import GIMBAL_COMPONENT, MOVING_POINT_COMPONENT, RANGE_RADIO_COMPONENT
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 
@@ -38,17 +38,19 @@ TICK_HZ: Final = 25.0
 class HandoffRun:
     """What both flights of a handoff share.
 
+    Args:
+        meet: called when the handoff aircraft arrives: from then on there is radio contact.
+
     Attributes:
         tracking: the tracker follows the target.
-        arrived: the handoff aircraft is where it loses GPS.
         over: the tracker may go home: the target was handed over, or time is over.
         decided_us: time of the decision; None: not yet.
         gps_lost_us: time at which the handoff aircraft has lost GPS; None: not yet.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, meet: Callable[[], None]) -> None:
+        self.meet = meet
         self.tracking = False
-        self.arrived = False
         self.over = False
         self.decided_us: int | None = None
         self.gps_lost_us: int | None = None
@@ -104,7 +106,7 @@ class HandoffAircraft(ABC):
         check_vehicle(options, limits)
         assert isinstance(limits, FixedWingLimits)
         self._limits = limits
-        await vehicle.payload.require(MOVING_POINT_COMPONENT, GIMBAL_COMPONENT)
+        await vehicle.payload.require(MOVING_POINT_COMPONENT, GIMBAL_COMPONENT, RANGE_RADIO_COMPONENT)
         self._gimbal = GimbalPointing(vehicle)
         self._pilot = await vehicle.wing.prepare_piloting()
         await self._pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
@@ -204,7 +206,16 @@ class TrackerFlight(HandoffAircraft):
         async with self.looking():
             self.begin("transit")
             await self.circle(options.target_ne_m, clockwise=True)
-            await self.wait(lambda: self.estimator.designation.count > 0, "a track of the target", _ARRIVAL_S)
+            near_m = 1.3 * options.radius_m
+            await self.wait(
+                lambda: (
+                    self.estimator.designation.count > 0
+                    and self.level()
+                    and self.away_m(options.target_ne_m) < near_m
+                ),
+                "an orbit around a track of the target",
+                _ARRIVAL_S,
+            )
             run.tracking = True
             self.begin("tracking")
             await self._track()
@@ -219,15 +230,16 @@ class TrackerFlight(HandoffAircraft):
             place = self._target_ne_m()
             if place is not None:
                 await self.circle(place, clockwise=True)
-            until_us = clock.time_us + round(_RECENTRE_S * 1e6)
             await self.wait(
-                lambda until_us=until_us: (
-                    self.estimator.released or run.over or clock.time_us >= until_us
-                ),
+                self._released_or(clock.time_us + round(_RECENTRE_S * 1e6)),
                 "the decision of the other aircraft",
                 4.0 * _RECENTRE_S,
             )
         self.vehicle.notes.marks["released_at_s"] = self.vehicle.clock.stamp_us * 1e-6
+
+    def _released_or(self, until_us: int) -> Callable[[], bool]:
+        """Whether the tracker may go home, or a time has come."""
+        return lambda: self.estimator.released or self.run.over or self.vehicle.clock.time_us >= until_us
 
     def _target_ne_m(self) -> Place | None:
         """Place of the tracked target from home, by the aircraft's own position."""
@@ -280,6 +292,7 @@ class TakeoverFlight(HandoffAircraft):
             if gps is not None:
                 await gps.off()
             self._with_gps = False
+            run.meet()
             run.gps_lost_us = vehicle.clock.stamp_us
             vehicle.notes.marks["gps_lost_at_s"] = run.gps_lost_us * 1e-6
             self.begin("relative pose")
@@ -296,9 +309,7 @@ class TakeoverFlight(HandoffAircraft):
                 self.begin("gps back")
                 await self._regain(gps)
                 back_us = vehicle.clock.time_us + round(_GPS_BACK_S * 1e6)
-                await guided.follow(
-                    lambda _t: self._setpoint() if vehicle.clock.time_us < back_us else None
-                )
+                await guided.follow(lambda _t: self._setpoint() if vehicle.clock.time_us < back_us else None)
         except BaseException:
             if not self._with_gps:
                 with suppress(MissionError):  # the first error is reported
@@ -351,10 +362,9 @@ class TakeoverFlight(HandoffAircraft):
         return self.pilot.setpoint(vehicle.clock.time_us, roll_rad)
 
     def _rate(self) -> Place:
-        """Rate of the offset to the target in level axes: its velocity against the air, if it has a track, less
-        the aircraft's.
+        """Rate of the offset to the target in level axes: the velocity of its track, if there is one, less
+        the aircraft's, both against the air.
         """
         own, process = self.pilot.airspeed_true_m_s, self.estimator.process
         velocity = process.tracks.velocity(process.comparison.decided)
         return velocity[0] - own, velocity[1]
-

@@ -31,9 +31,9 @@ class HandoffOptions(MissionOptions):
         estimator_seed: of the random numbers of estimators and link.
     """
 
-    altitude_m: float = 150.0
-    separation_m: float = 30.0
-    radius_m: float = 220.0
+    altitude_m: float = 95.0
+    separation_m: float = 20.0
+    radius_m: float = 150.0
     airspeed_m_s: float | None = None
     target_ne_m: tuple[float, float] = (900.0, 200.0)
     start_distance_m: float = 700.0
@@ -98,8 +98,9 @@ def check_vehicle(options: HandoffOptions, limits: Limits) -> None:
     least_m = limits.turn_radius_m(airspeed_m_s)
     if options.radius_m < least_m:
         raise PlanError(
-            f"an orbit of radius {options.radius_m:g} m can't be held at {airspeed_m_s:g} m/s: {least_m:.0f} m "
-            f"or more can; ask for `radius_m` {10.0 * math.ceil(0.1 * least_m):g}, or a lower `airspeed_m_s`"
+            f"an orbit of radius {options.radius_m:g} m can't be held at {airspeed_m_s:g} m/s: "
+            f"{least_m:.0f} m or more can; ask for `radius_m` {10.0 * math.ceil(0.1 * least_m):g}, or "
+            "a lower `airspeed_m_s`"
         )
     reach_m = max(math.hypot(*options.target_ne_m), math.hypot(*options.start_ne_m)) + options.radius_m
     if reach_m > limits.reach_m:
@@ -109,6 +110,6 @@ def check_vehicle(options: HandoffOptions, limits: Limits) -> None:
         )
     if options.own_altitude_m < 0.2 * options.radius_m:
         raise PlanError(
-            f"from {options.own_altitude_m:g} m at {options.radius_m:g} m targets are seen too flat to measure "
-            "their places; ask for a higher `altitude_m` or a smaller `radius_m`"
+            f"from {options.own_altitude_m:g} m at {options.radius_m:g} m targets are seen too flat to "
+            "measure their places; ask for a higher `altitude_m` or a smaller `radius_m`"
         )

@@ -60,12 +60,15 @@ class HandoffTeam:
             [settings_of(own, role, handoff, tracker) for role in ("handoff", "tracker")],
             RadioLink(own.link_loss, own.link_delay_s, np.random.Generator(np.random.PCG64(stream))),
         )
-        self.run = HandoffRun()
+        self.run = HandoffRun(self._meet)
         taker, keeper = self.watch.estimators
         self._flights = (
             TakeoverFlight(vehicles[0], options[0], taker, self.run),
             TrackerFlight(vehicles[1], options[1], keeper, self.run),
         )
+
+    def _meet(self) -> None:
+        self.watch.contact = True
 
     async def fly(self) -> None:
         """Fly both aircraft."""

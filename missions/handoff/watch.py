@@ -12,6 +12,7 @@ from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
 from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
 from estimators.relative_pose import PoseMode
 from estimators.runner import Runner
+from missions.vehicle.payload import RANGE_RADIO_COMPONENT
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -29,12 +30,14 @@ class Moment:
     Attributes:
         time_us: time of the estimate.
         estimate: of the handoff aircraft.
+        tracker: newest estimate of the tracker; None: it has none yet.
         modes: of the relative pose.
         scores: by track of the handoff aircraft.
     """
 
     time_us: int
     estimate: HandoffEstimate
+    tracker: HandoffEstimate | None
     modes: tuple[PoseMode, ...]
     scores: dict[int, float]
 
@@ -81,7 +84,7 @@ class HandoffWatch:
     """Passes the messages of both aircraft to the estimators, and theirs over the link.
 
     The sensor messages of the tracker reach the handoff aircraft without delay; what the estimators publish
-    goes over the link.
+    goes over the link. Before the aircraft are in contact, nothing is passed between them, ranges included.
 
     Args:
         vehicles: the handoff aircraft and the tracker.
@@ -91,7 +94,8 @@ class HandoffWatch:
     Attributes:
         estimators: in this order.
         link: as given.
-        moments: of the handoff aircraft, every half second.
+        contact: whether the aircraft are in radio contact.
+        moments: of the handoff aircraft while there is contact, every half second.
     """
 
     def __init__(
@@ -101,6 +105,7 @@ class HandoffWatch:
         self.estimators = [HandoffEstimator(own) for own in settings]
         self._runners = [Runner(estimator) for estimator in self.estimators]
         self.link = link
+        self.contact = False
         self.moments: list[Moment] = []
         self._encoders = [FrameEncoder(vehicle.system_id, _ONBOARD) for vehicle in vehicles]
         self._parsers = [FrameParser() for _ in vehicles]
@@ -132,8 +137,10 @@ class HandoffWatch:
         now_us = self._vehicles[0].clock.time_us
         for to, arrived in self.link.due(now_us):
             self._feed(to, arrived)
-        for index in range(len(self._runners)):
-            self._feed(index, frame)
+        for index, vehicle in enumerate(self._vehicles):
+            own = frame.system_id == vehicle.system_id and frame.component_id != RANGE_RADIO_COMPONENT
+            if own or self.contact:
+                self._feed(index, frame)
 
     def _feed(self, index: int, frame: Frame) -> None:
         runner = self._runners[index]
@@ -141,12 +148,13 @@ class HandoffWatch:
         now_us = self._vehicles[0].clock.time_us
         for message in self.estimators[index].publish():
             self._send(now_us, index, message)
-        if index == 0:
+        if index == 0 and self.contact:
             self._note()
 
     def _send(self, now_us: int, index: int, message: Any) -> None:
         (frame,) = self._parsers[index].feed(self._encoders[index].encode(message))
-        self.link.send(now_us, 1 - index, frame)
+        if self.contact:
+            self.link.send(now_us, 1 - index, frame)
 
     def _note(self) -> None:
         estimates = self.estimators[0].estimates
@@ -160,6 +168,7 @@ class HandoffWatch:
             Moment(
                 time_us=estimate.time_us,
                 estimate=estimate,
+                tracker=next(iter(self.estimators[1].estimates), None),
                 modes=tuple(process.pose.modes),
                 scores=dict(process.comparison.scores),
             )

@@ -1,4 +1,4 @@
-"""Flight by streamed roll commands, on autopilots that hold altitude and airspeed themselves and on others."""
+"""Flight by streamed roll commands, whether the autopilot holds altitude and airspeed itself or not."""
 
 import asyncio
 from typing import TYPE_CHECKING

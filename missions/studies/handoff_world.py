@@ -21,7 +21,7 @@ from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 
-_SHIFT_M: Final = 30.0  # largest common error of the tracks of one aircraft
+_SHIFT_M: Final = 60.0  # largest common error of the tracks of one aircraft
 _RIGHT_M: Final = 10.0  # a track this far from its nearest target is of none
 
 
@@ -269,7 +269,5 @@ def targets_of(tracks: Mapping[int, tuple[float, float]], targets: Array) -> dic
         costs.append(np.minimum(apart, _RIGHT_M).sum() + 0.1 * float(np.hypot(*shift)))
     apart = np.hypot(*(off - shifts[int(np.argmin(costs))]).transpose(2, 0, 1))
     return {
-        number: int(row.argmin())
-        for number, row in zip(tracks, apart, strict=True)
-        if row.min() <= _RIGHT_M
+        number: int(row.argmin()) for number, row in zip(tracks, apart, strict=True) if row.min() <= _RIGHT_M
     }
