@@ -34,9 +34,9 @@ _VERSION: Final = 1
 _RELEASED: Final = 1
 _DECIDED: Final = 1
 _PAYLOAD_SIZE: Final = 128
-_REPORT: Final = struct.Struct("<BBBBIQfHH")
+_REPORT: Final = struct.Struct("<BBBBIQfHBB")
 _TRACK: Final = struct.Struct("<H8f")
-_DECISION: Final = struct.Struct("<BBHIQf")
+_DECISION: Final = struct.Struct("<BBBBHIQf")
 _TRACKS_PER_MESSAGE: Final = (_PAYLOAD_SIZE - _REPORT.size) // _TRACK.size
 _MOST_TRACKS: Final = 255
 _FAR_M: Final = 1e5
@@ -88,6 +88,7 @@ class TrackReport:
     """One message of a report: some of the tracks of the tracking aircraft.
 
     Attributes:
+        system: system id of the tracking aircraft, 1 to 255: its onboard computer may have another one.
         report: number of the report, from 0.
         time_us: vehicle time of the sender.
         first: number of the first of `tracks` in the report.
@@ -98,6 +99,7 @@ class TrackReport:
         tracks: by number.
     """
 
+    system: int
     report: int
     time_us: int
     first: int
@@ -118,6 +120,7 @@ class HandoffDecision:
     """The decision of the handoff aircraft, or the best track so far.
 
     Attributes:
+        system: system id of the handoff aircraft, 1 to 255.
         number: of the message, from 0.
         time_us: vehicle time of the sender.
         decided: whether it has decided; otherwise `track` is the best one so far.
@@ -126,6 +129,7 @@ class HandoffDecision:
         track: of the sender.
     """
 
+    system: int
     number: int
     time_us: int
     decided: bool
@@ -136,6 +140,7 @@ class HandoffDecision:
 
 def track_report_messages(
     *,
+    system: int,
     report: int,
     time_us: int,
     target: int,
@@ -147,7 +152,7 @@ def track_report_messages(
 
     Args:
         report: number of the report, modulo 2^32.
-        time_us, target, identity, released: as in `TrackReport`.
+        system, time_us, target, identity, released: as in `TrackReport`.
         tracks: at most 255; further ones are left out.
     """
     kept = tracks[:_MOST_TRACKS]
@@ -156,7 +161,7 @@ def track_report_messages(
         part = kept[first : first + _TRACKS_PER_MESSAGE]
         payload = _REPORT.pack(
             *(_VERSION, len(part), first, len(kept)),
-            *(report & 0xFFFFFFFF, time_us, identity, target, _RELEASED if released else 0),
+            *(report & 0xFFFFFFFF, time_us, identity, target, _RELEASED if released else 0, system),
         ) + b"".join(track.pack() for track in part)
         messages.append(_tunnel(TRACK_REPORT_PAYLOAD, payload))
     return messages
@@ -171,8 +176,8 @@ def read_track_report(payload_type: int, length: int, payload: Sequence[int]) ->
     if payload_type != TRACK_REPORT_PAYLOAD or not _REPORT.size <= length <= len(payload):
         return None
     data = bytes(payload[:length])
-    version, count, first, total, report, time_us, identity, target, flags = _REPORT.unpack_from(data)
-    if version != _VERSION or first + count > total or (total and not count):
+    version, count, first, total, report, time_us, identity, target, flags, system = _REPORT.unpack_from(data)
+    if version != _VERSION or not system or first + count > total or (total and not count):
         return None
     if length < _REPORT.size + count * _TRACK.size or not 0.0 <= identity <= 1.0:
         return None
@@ -183,6 +188,7 @@ def read_track_report(payload_type: int, length: int, payload: Sequence[int]) ->
             return None
         found.append(track)
     return TrackReport(
+        system=system,
         report=report,
         time_us=time_us,
         first=first,
@@ -197,7 +203,7 @@ def read_track_report(payload_type: int, length: int, payload: Sequence[int]) ->
 def decision_message(decision: HandoffDecision) -> Any:
     """The TUNNEL message of a decision, to all systems and components."""
     payload = _DECISION.pack(
-        *(_VERSION, _DECIDED if decision.decided else 0, decision.target),
+        *(_VERSION, _DECIDED if decision.decided else 0, decision.system, 0, decision.target),
         *(decision.number & 0xFFFFFFFF, decision.time_us, decision.probability),
     )
     return _tunnel(HANDOFF_DECISION_PAYLOAD, payload + decision.track.pack())
@@ -213,11 +219,12 @@ def read_decision(payload_type: int, length: int, payload: Sequence[int]) -> Han
     if payload_type != HANDOFF_DECISION_PAYLOAD or not size <= length <= len(payload):
         return None
     data = bytes(payload[:length])
-    version, flags, target, number, time_us, probability = _DECISION.unpack_from(data)
+    version, flags, system, _, target, number, time_us, probability = _DECISION.unpack_from(data)
     track = ReportedTrack.read(_TRACK.unpack_from(data, _DECISION.size))
-    if version != _VERSION or track is None or not 0.0 <= probability <= 1.0:
+    if version != _VERSION or track is None or not system or not 0.0 <= probability <= 1.0:
         return None
     return HandoffDecision(
+        system=system,
         number=number,
         time_us=time_us,
         decided=bool(flags & _DECIDED),

@@ -125,6 +125,11 @@ class HandoffEstimator(Estimator[HandoffSettings]):
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         system = message.src_system
+        if message.name == "TUNNEL" and message.payload_type in (
+            TRACK_REPORT_PAYLOAD,
+            HANDOFF_DECISION_PAYLOAD,
+        ):
+            return self._from_partner(message)
         if system not in (self.own, self.partner):
             return Outcome.IGNORED
         if message.name in _INERTIAL and message.src_component == 1 and message.time_usec < UNIX_TIME_US:
@@ -154,28 +159,35 @@ class HandoffEstimator(Estimator[HandoffSettings]):
     # messages between the aircraft
 
     def _tunnel(self, time_us: int, message: Message) -> Outcome:
+        if message.src_system != self.own:
+            return Outcome.IGNORED
+        if message.payload_type == MOVING_POINTS_PAYLOAD:
+            outcome = self.sight.take(time_us, message)
+            return self._report(time_us) if outcome is Outcome.UPDATED and self._tracks else outcome
+        fused = Outcome.IGNORED if self._tracks else self.pose.handle(time_us, message)
+        if fused is Outcome.TIME_JUMP:
+            self._restart()
+        return self._compare(time_us) if fused is Outcome.UPDATED else fused
+
+    def _from_partner(self, message: Message) -> Outcome:
+        """A report or a decision, which the onboard computer of the other aircraft sends."""
         kind = message.payload_type
-        if message.src_system == self.own:
-            if kind == MOVING_POINTS_PAYLOAD:
-                outcome = self.sight.take(time_us, message)
-                return self._report(time_us) if outcome is Outcome.UPDATED and self._tracks else outcome
-            fused = Outcome.IGNORED if self._tracks else self.pose.handle(time_us, message)
-            if fused is Outcome.TIME_JUMP:
-                self._restart()
-            return self._compare(time_us) if fused is Outcome.UPDATED else fused
         wire = (kind, message.payload_length, message.payload)
         if kind == TRACK_REPORT_PAYLOAD and not self._tracks:
             part = read_track_report(*wire)
             if part is None:
                 return self._malformed()
+            if part.system != self.partner:
+                return Outcome.IGNORED
             report = self._assembler.add(part)
             if report is not None:
                 self._pending.append(report)
-                self._receive_pending(time_us)
             return Outcome.USED
         if kind == HANDOFF_DECISION_PAYLOAD and self._tracks:
             decision = read_decision(*wire)
-            return self._malformed() if decision is None else self._on_decision(decision)
+            if decision is None:
+                return self._malformed()
+            return self._on_decision(decision) if decision.system == self.partner else Outcome.IGNORED
         return Outcome.IGNORED
 
     def _malformed(self) -> Outcome:
@@ -240,6 +252,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
                     designation.designate(taken_us, number, tracks.places[number])
         if self._due(time_us, p.report_s):
             self._outbox += track_report_messages(
+                system=self.own,
                 report=self._number,
                 time_us=taken_us - self._offsets_us.get(self.own, 0),
                 target=designation.number or 0,
@@ -307,6 +320,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         if found is None or report is None or report.number is None:
             return
         decision = HandoffDecision(
+            system=self.own,
             number=self._number,
             time_us=time_us - self._offsets_us.get(self.own, 0),
             decided=self.process.comparison.decided is not None,

@@ -68,6 +68,7 @@ class ReportAssembler:
         self.counts["complete"] += 1
         self._open, self._done_us = None, message.time_us
         return TrackReport(
+            system=message.system,
             report=message.report,
             time_us=message.time_us,
             first=0,

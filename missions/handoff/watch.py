@@ -4,11 +4,11 @@ import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
+from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, MAVLinkMessage
 from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
 from estimators.relative_pose import PoseMode
 from estimators.runner import Runner
@@ -56,27 +56,27 @@ class RadioLink:
 
     def __init__(self, loss: float, delay_s: float, rng: np.random.Generator) -> None:
         self._loss, self._delay_s, self._rng = loss, delay_s, rng
-        self._under_way: list[tuple[int, int, int, Frame]] = []
+        self._under_way: list[tuple[int, int, int, MAVLinkMessage]] = []
         self._sent = 0
         self.counts: Counter[str] = Counter()
 
-    def send(self, now_us: int, to: int, frame: Frame) -> None:
-        """Send a frame to the aircraft with this index."""
+    def send(self, now_us: int, to: int, message: MAVLinkMessage) -> None:
+        """Send a message to the aircraft with this index."""
         self.counts["sent"] += 1
         lost, delay_s = self._rng.random() < self._loss, self._delay_s * self._rng.exponential()
         if lost:
             self.counts["lost"] += 1
             return
         self._sent += 1
-        heapq.heappush(self._under_way, (now_us + round(delay_s * 1e6), self._sent, to, frame))
+        heapq.heappush(self._under_way, (now_us + round(delay_s * 1e6), self._sent, to, message))
 
-    def due(self, now_us: int) -> list[tuple[int, Frame]]:
-        """The frames that arrive by now, with the index of their receiver."""
+    def due(self, now_us: int) -> list[tuple[int, MAVLinkMessage]]:
+        """The messages that arrive by now, with the index of their receiver."""
         found = []
         while self._under_way and self._under_way[0][0] <= now_us:
-            _, _, to, frame = heapq.heappop(self._under_way)
+            _, _, to, message = heapq.heappop(self._under_way)
             self.counts["delivered"] += 1
-            found.append((to, frame))
+            found.append((to, message))
         return found
 
 
@@ -135,8 +135,8 @@ class HandoffWatch:
 
     def _take(self, frame: Frame) -> None:
         now_us = self._vehicles[0].clock.time_us
-        for to, arrived in self.link.due(now_us):
-            self._feed(to, arrived)
+        for to, message in self.link.due(now_us):
+            self._arrive(to, message)
         for index, vehicle in enumerate(self._vehicles):
             own = frame.system_id == vehicle.system_id and frame.component_id != RANGE_RADIO_COMPONENT
             if own or self.contact:
@@ -147,14 +147,16 @@ class HandoffWatch:
         runner.feed(frame)
         now_us = self._vehicles[0].clock.time_us
         for message in self.estimators[index].publish():
-            self._send(now_us, index, message)
+            if self.contact:
+                self.link.send(now_us, 1 - index, message)
         if index == 0 and self.contact:
             self._note()
 
-    def _send(self, now_us: int, index: int, message: Any) -> None:
-        (frame,) = self._parsers[index].feed(self._encoders[index].encode(message))
-        if self.contact:
-            self.link.send(now_us, 1 - index, frame)
+    def _arrive(self, to: int, message: MAVLinkMessage) -> None:
+        """A message arrives at an aircraft: it goes to its estimator, and over its link into the log."""
+        (frame,) = self._parsers[to].feed(self._encoders[to].encode(message))
+        self._vehicles[to].link.connection.send(message)
+        self._feed(to, frame)
 
     def _note(self) -> None:
         estimates = self.estimators[0].estimates
