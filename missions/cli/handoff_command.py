@@ -17,7 +17,7 @@ def _values(given: Given) -> Mapping[str, Any]:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded.handoff_world import WalkingTargets, handoff_world
+    from missions.embedded import WalkingTargets, handoff_world
 
     return handoff_world(world, options, WalkingTargets(count=given["targets"]))
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from missions.embedded.handoff_world import WalkingTargets, handoff_world
     from missions.embedded.hidden_tag import HiddenTag, vision_search_world
     from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
@@ -31,8 +32,10 @@ __all__ = [
     "RenderedTags",
     "TagTarget",
     "TargetField",
+    "WalkingTargets",
     "alone",
     "carrying",
+    "handoff_world",
     "model_kind",
     "motion_of",
     "multi_target_world",
@@ -56,6 +59,7 @@ __getattr__ = lazy_exports(
     {
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         "RenderedTags": _RENDERED_TAGS,
+        **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.handoff_world"),
         **dict.fromkeys(("HiddenTag", "vision_search_world"), "missions.embedded.hidden_tag"),
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
