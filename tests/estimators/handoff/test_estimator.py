@@ -207,7 +207,8 @@ def test_targets_that_cross_are_not_confused_with_confidence(meet_s):
 @pytest.mark.slow
 def test_a_target_that_stops_is_lost_and_not_decided_for():
     scene = Scene()
-    scene.fly(8.0)
+    while scene.estimator(TRACKER).designation.number is None:
+        scene.fly(0.5)
     started, _ = scene.target_of(TRACKER)
     scene.velocities = scene.velocities.copy()
     scene.velocities[started] = 0.0
