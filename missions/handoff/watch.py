@@ -1,5 +1,6 @@
 """The estimators `handoff` of both aircraft in a mission's own loop, and the link between them."""
 
+import asyncio
 import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -136,7 +137,8 @@ class HandoffWatch:
     def _take(self, frame: Frame) -> None:
         now_us = self._vehicles[0].clock.time_us
         for to, message in self.link.due(now_us):
-            self._arrive(to, message)
+            # not inside this call: on a memory link the sender of the frame has not yet returned from it
+            asyncio.get_running_loop().call_soon(self._arrive, to, message)
         for index, vehicle in enumerate(self._vehicles):
             own = frame.system_id == vehicle.system_id and frame.component_id != RANGE_RADIO_COMPONENT
             if own or self.contact:
