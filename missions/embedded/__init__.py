@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from missions.embedded.handoff_world import WalkingTargets, handoff_world
     from missions.embedded.hidden_tag import HiddenTag, vision_search_world
     from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
     from missions.embedded.survey_worlds import survey_world
     from missions.embedded.tag_search import TagTarget, search_camera, tag_search_world
     from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
+    from missions.embedded.walking_targets import WalkingTargets, handoff_world
     from missions.embedded.worlds import (
         CAMERA,
         MAGNETOMETER,
@@ -59,7 +59,7 @@ __getattr__ = lazy_exports(
     {
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         "RenderedTags": _RENDERED_TAGS,
-        **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.handoff_world"),
+        **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.walking_targets"),
         **dict.fromkeys(("HiddenTag", "vision_search_world"), "missions.embedded.hidden_tag"),
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),
