@@ -2,7 +2,8 @@
 
 An operator designates a track. A tracker of several targets may exchange the tracks of two that come close to
 each other, and then follows another target under the same number. Nothing in the tracks shows it, so the
-probability that the track still is the designated target is part of what the aircraft reports.
+probability that the track still is the designated target is part of what the aircraft reports. A track that
+begins beside the target's is no other target: a tracker often has two tracks of one target for a second.
 """
 
 import math
@@ -23,16 +24,18 @@ class DesignationParameters:
             probability of 0.5 exp(-1/2).
         regained_m: a track that is this close to the place where the target's was lost is taken for it.
         regained: probability that it is.
+        doubled: the same of a track that began beside the target's while that lived.
         lost_s: time without a track after which the target is lost.
     """
 
     exchange_m: float = 2.0
     regained_m: float = 10.0
     regained: float = 0.9
+    doubled: float = 0.99
     lost_s: float = 5.0
 
     def __post_init__(self) -> None:
-        check_fields(self, require_positive, but={"regained": require_probability})
+        check_fields(self, require_positive, but=dict.fromkeys(("regained", "doubled"), require_probability))
 
 
 class Designation:
@@ -54,6 +57,8 @@ class Designation:
         self._seen_us = 0
         self._settled = 1.0  # probability before the present encounter
         self._nearest_m = math.inf  # least distance of another track in the present encounter
+        self._apart: set[int] = set()  # tracks that have been away from the target's: other targets
+        self._beside: set[int] = set()  # tracks that began beside it
 
     @property
     def probability(self) -> float:
@@ -85,14 +90,16 @@ class Designation:
             if not near:
                 return
             lost_at = self._place
-            self._settled = self.probability * p.regained / len(near)
-            self._nearest_m = math.inf
-            self.number = min(near, key=lambda k: math.dist(places[k], lost_at))
+            number = min(near, key=lambda k: math.dist(places[k], lost_at))
+            same = p.doubled if number in self._beside else p.regained / len(near)
+            self._settled, self._nearest_m = self.probability * same, math.inf
+            self.number = number
         self._place, self._seen_us = places[self.number], time_us
         here = self._place
-        nearest_m = min(
-            (math.dist(place, here) for k, place in places.items() if k != self.number), default=math.inf
-        )
+        off_m = {k: math.dist(place, here) for k, place in places.items() if k != self.number}
+        self._apart |= {k for k, away_m in off_m.items() if away_m > p.regained_m}
+        self._beside = {k for k in off_m if k not in self._apart}
+        nearest_m = min((off_m[k] for k in off_m if k in self._apart), default=math.inf)
         if nearest_m > 5.0 * p.exchange_m:  # the encounter is over
             self._settled, self._nearest_m = self.probability, math.inf
         else:

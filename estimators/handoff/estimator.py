@@ -243,7 +243,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         if taken is None:
             return Outcome.WAITING
         designation.update(taken_us, tracks.places)
-        if designation.number is None and designation.count == 0:
+        if designation.number is None:  # the operator designates the target, and anew when it was lost
             level = tracks.level(taken)
             expected = self._place.level(time_us)
             if level and expected is not None:

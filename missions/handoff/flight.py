@@ -209,7 +209,7 @@ class TrackerFlight(HandoffAircraft):
             near_m = 1.3 * options.radius_m
             await self.wait(
                 lambda: (
-                    self.estimator.designation.count > 0
+                    self.estimator.designation.number is not None
                     and self.level()
                     and self.away_m(options.target_ne_m) < near_m
                 ),

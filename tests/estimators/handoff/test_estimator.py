@@ -148,6 +148,19 @@ def test_an_identity_becomes_doubtful_when_tracks_meet_and_is_restored_by_the_op
     assert designation.number is None
 
 
+def test_a_second_track_of_the_same_target_leaves_no_doubt():
+    """It begins beside the target's track, takes its place, and is another target only once it was away."""
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0))
+    designation.update(100, {1: (0.0, 0.0), 2: (1.0, 0.0)})
+    assert designation.probability == 1.0
+    designation.update(200, {2: (1.0, 0.0)})
+    assert designation.number == 2 and designation.probability == pytest.approx(0.99)
+    designation.update(300, {2: (1.0, 0.0), 3: (20.0, 0.0)})
+    designation.update(400, {2: (1.0, 0.0), 3: (2.0, 0.0)})
+    assert designation.probability < 0.6
+
+
 # The bad inputs below take seconds each.
 
 
