@@ -303,9 +303,14 @@ class Camera:
                     position_ned_m=(float(north_m), float(east_m), float(down_m)),
                     size_m=target.parameters.size_m,
                     tag_id=target.parameters.tag_id,
+                    shape=target.parameters.shape,
+                    course_rad=math.atan2(east_m_s, north_m_s),
                 )
-                for target, (north_m, east_m, down_m) in zip(
-                    targets.targets, targets.positions_ned_m.tolist(), strict=True
+                for target, (north_m, east_m, down_m), (north_m_s, east_m_s, _) in zip(
+                    targets.targets,
+                    targets.positions_ned_m.tolist(),
+                    targets.velocities_ned_m_s.tolist(),
+                    strict=True,
                 )
             ),
             exposure_s=self.parameters.exposure_s,

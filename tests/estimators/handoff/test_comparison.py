@@ -20,7 +20,7 @@ from estimators.handoff import (
     align,
     blended,
 )
-from estimators.handoff.ground_points import CameraAxes, on_ground
+from estimators.vision.ground_points import CameraAxes, on_ground
 from estimators.relative_pose import LevelMotion, PoseMode
 
 STEP_US = 100_000
