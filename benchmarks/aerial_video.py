@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 PHYSICS_HZ = 150
 TURBULENCE_RAD, TURBULENCE_S = 0.03, 0.7
-HEIGHT_SIGMA_M = 1.0
+HEIGHT_SIGMA_M, HEIGHT_S = 1.0, 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ class VideoSetting:
         rate_hz: frames per second; it divides 150.
         vehicles, persons: numbers of targets.
         vehicle_m_s, person_m_s: least and greatest speed.
-        half_m: half of the sides of the targets' area.
+        half_m: half of the sides of the targets' area, north and east.
         relief_m: standard deviation of the terrain's heights; 0: level ground.
         jitter_rad: of the gimbal per joint.
         model: of the camera.
@@ -69,7 +69,7 @@ class VideoSetting:
     persons: int = 3
     vehicle_m_s: tuple[float, float] = (3.0, 8.0)
     person_m_s: tuple[float, float] = (0.8, 2.0)
-    half_m: float = 40.0
+    half_m: tuple[float, float] = (40.0, 40.0)
     relief_m: float = 0.0
     jitter_rad: float = math.radians(0.02)
     model: PinholeModel = field(
@@ -107,14 +107,14 @@ def geometry(setting: VideoSetting) -> CameraGeometry:
 def targets_of(setting: VideoSetting, streams: RandomStreams) -> GroundTargets:
     """Targets that walk and drive in their area."""
     rng = streams.generator("video", "speeds")
-    half = setting.half_m
+    half_n, half_e = setting.half_m
 
     def target(shape: TargetShape, size_m: float, speeds: tuple[float, float]) -> GroundTargetParameters:
         walk = RandomWalk(
-            south_m=-half,
-            west_m=-half,
-            north_m=half,
-            east_m=half,
+            south_m=-half_n,
+            west_m=-half_e,
+            north_m=half_n,
+            east_m=half_e,
             speed_m_s=float(rng.uniform(*speeds)),
             leg_s=4.0,
             turn_rad=0.4,
@@ -130,7 +130,7 @@ def terrain_of(setting: VideoSetting, seed: int) -> Terrain | None:
     """The ground, if it is not level."""
     if setting.relief_m == 0.0:
         return None
-    reach = setting.half_m + 3.0 * setting.height_m
+    reach = max(setting.half_m) + 3.0 * setting.height_m
     spec = TerrainSpec(
         south_m=-reach, west_m=-reach, north_m=reach, east_m=reach, relief_m=setting.relief_m, spacing_m=4.0
     )
@@ -157,6 +157,8 @@ def video(setting: VideoSetting, seed: int, seconds: float) -> Iterator[tuple[Vi
     wind = setting.wind_m_s * np.array([math.cos(from_rad), math.sin(from_rad)])
     around = rng.uniform(-math.pi, math.pi)
     tilt = np.zeros(2)
+    height_error = HEIGHT_SIGMA_M * float(rng.standard_normal())
+    height_keep = math.exp(-1.0 / (PHYSICS_HZ * HEIGHT_S))
     keep = math.exp(-1.0 / (PHYSICS_HZ * TURBULENCE_S))
     flags = GimbalFlags.ROLL_LOCK | GimbalFlags.PITCH_LOCK | GimbalFlags.YAW_LOCK
     for step in range(round(seconds * PHYSICS_HZ)):
@@ -168,6 +170,8 @@ def video(setting: VideoSetting, seed: int, seconds: float) -> Iterator[tuple[Vi
         place = setting.radius_m * np.array([math.cos(around), math.sin(around)])
         velocity = speed * np.array([-math.sin(around), math.cos(around)])
         air = velocity - wind
+        height_error *= height_keep
+        height_error += HEIGHT_SIGMA_M * math.sqrt(1.0 - height_keep**2) * float(rng.standard_normal())
         tilt = keep * tilt + TURBULENCE_RAD * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
         bank = math.atan2(speed**2, setting.radius_m * GRAVITY_M_S2) + tilt[0]
         heading = math.atan2(air[1], air[0])
@@ -195,7 +199,7 @@ def video(setting: VideoSetting, seed: int, seconds: float) -> Iterator[tuple[Vi
         reported = rotation_of(gimbal.measured_q_ned_from_gimbal)
         pose = CameraPose(
             axes=CameraAxes(axes=reported[:, [1, 2, 0]].T),
-            height_m=height_m + HEIGHT_SIGMA_M * float(rng.standard_normal()),
+            height_m=height_m + height_error,
         )
         picture = renderer.render(view)
         yield (

@@ -2,7 +2,8 @@
 
     python -m benchmarks.moving_objects [--seconds 12] [--seeds 3] [--jitter 0.02] [--only NAME]
 
-Aircraft at 100 m over persons and vehicles, and at 300 m over vehicles, 640 x 480 pixels at 30 Hz, in wind and
+Aircraft at 100 m over persons and vehicles, at 300 m over vehicles, and at 135 m over the walkers of the study
+`handoff` in their area, 640 x 480 pixels at 30 Hz, in wind and
 with gimbal jitter (`benchmarks/aerial_video.py`); the same over terrain. For each scene, and for corners and frame
 differences (and both), it prints the time per frame on one core and beside it that of the plain OpenCV calls that
 each cannot do without, the share of targets in view that are detected, false measurements per frame, the noise
@@ -36,10 +37,13 @@ from estimators.vision import (
 
 Array = NDArray[np.float64]
 
-HIGH: Final = VideoSetting(height_m=300.0, radius_m=300.0, vehicles=5, persons=0, half_m=100.0)
+HIGH: Final = VideoSetting(height_m=300.0, radius_m=300.0, vehicles=5, persons=0, half_m=(100.0, 100.0))
 SCENES: Final[Mapping[str, VideoSetting]] = {
     "100 m": VideoSetting(),
     "300 m": HIGH,
+    "study": VideoSetting(
+        height_m=135.0, radius_m=120.0, vehicles=0, persons=5, half_m=(70.0, 135.0), wind_m_s=4.0
+    ),
     "100 m, relief 2 m": VideoSetting(relief_m=2.0),
     "300 m, relief 5 m": replace(HIGH, relief_m=5.0),
 }

@@ -34,8 +34,8 @@ class CornerFlowParameters:
 
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
     objects: ObjectParameters = field(default_factory=ObjectParameters)
-    gate_squared: float = 36.0
-    least_px: float = 1.0
+    gate_squared: float = 64.0
+    least_px: float = 1.5
     least_corners: int = 1
 
     def __post_init__(self) -> None:

@@ -43,6 +43,7 @@ Grey = NDArray[np.uint8]
 _SMOOTH_PX: Final = 3
 _SOBEL_GAIN: Final = 0.125  # of a 3 x 3 Sobel, to levels per pixel
 _MOST_BLOBS: Final = 60
+_QUIET: Final = 0.98  # share of the picture in which nothing moves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,18 +54,18 @@ class FrameDifferenceParameters:
         registration: of corners, flow and homography.
         objects: what can be an object.
         least_levels: smallest difference that counts, of 255 levels.
-        noise_factor: differences count above that many times the median difference.
+        noise_factor: differences count above that many times what 98 % of the picture stays below.
         slack_px: error of the registration whose differences are allowed for.
         least_px: number of pixels of an object.
         largest_m: larger differences are of no object.
     """
 
     registration: RegistrationParameters = field(
-        default_factory=lambda: RegistrationParameters(corners=250, baseline_s=0.8, longest_gap_s=0.8)
+        default_factory=lambda: RegistrationParameters(corners=300, apart_px=9.0, baseline_s=0.8)
     )
     objects: ObjectParameters = field(default_factory=ObjectParameters)
-    least_levels: float = 12.0
-    noise_factor: float = 6.0
+    least_levels: float = 6.0
+    noise_factor: float = 2.0
     slack_px: float = 0.5
     least_px: int = 4
     largest_m: float = 12.0
@@ -108,11 +109,10 @@ class FrameDifferenceDetector(MovingObjectDetector):
         parallax_px = float(np.median(np.hypot(*found.parallax_px_m.T)))
         slack_px = p.slack_px + found.sigma_px + 2.0 * found.relief_m * parallax_px
         grey = cv2.blur(found.frame.grey, (_SMOOTH_PX, _SMOOTH_PX))
-        excess = cv2.min(
-            _excess(grey, found.reference.grey, found.homography, slack_px),
-            _excess(grey, second.grey, homography, 2.0 * slack_px),
-        )
-        level = max(p.least_levels, p.noise_factor * float(np.median(excess[::4, ::4])))
+        first, first_slope = _excess(grey, found.reference.grey, found.homography, slack_px)
+        other, other_slope = _excess(grey, second.grey, homography, 2.0 * slack_px)
+        excess = cv2.min(first, other)
+        level = max(p.least_levels, p.noise_factor * float(np.quantile(excess[::4, ::4], _QUIET)))
         _, marks = cv2.threshold(excess, level, 255, cv2.THRESH_BINARY)
         marks = cv2.morphologyEx(marks, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
         _, _, stats, middles = cv2.connectedComponentsWithStats(marks, connectivity=8)
@@ -122,6 +122,8 @@ class FrameDifferenceDetector(MovingObjectDetector):
         most_px = p.largest_m * max(self.camera.focal_px) / found.frame.pose.height_m
         fits = np.flatnonzero((area >= p.least_px) & (extent <= most_px))
         fits = fits[np.argsort(-area[fits], kind="stable")][:_MOST_BLOBS]
+        edges = _slope(grey)
+        fits = fits[[_has_edges(stats[k], edges, first_slope, other_slope) for k in fits]]
         return ObjectPoints(
             points_px=np.asarray(middles[fits], np.float64).reshape(-1, 2),
             sizes_px=extent[fits].astype(np.float64),
@@ -137,9 +139,20 @@ class FrameDifferenceDetector(MovingObjectDetector):
         self._earlier.clear()
 
 
-def _excess(grey: Grey, earlier: Grey, homography: Array, slack_px: float) -> Grey:
+def _slope(grey: Grey) -> Grey:
+    """Slope of a picture, levels per pixel."""
+    return np.asarray(
+        cv2.max(
+            cv2.convertScaleAbs(cv2.Sobel(grey, cv2.CV_16S, 1, 0), alpha=_SOBEL_GAIN),
+            cv2.convertScaleAbs(cv2.Sobel(grey, cv2.CV_16S, 0, 1), alpha=_SOBEL_GAIN),
+        ),
+        np.uint8,
+    )
+
+
+def _excess(grey: Grey, earlier: Grey, homography: Array, slack_px: float) -> tuple[Grey, Grey]:
     """Magnitude of the difference to an earlier frame that is warped by the ground's homography, less what a
-    shift by `slack_px` makes of that frame; 0 where it did not reach.
+    shift by `slack_px` makes of that frame, 0 where it did not reach; and the slope of that frame.
     """
     height, width = grey.shape
     warped = cv2.warpPerspective(
@@ -149,8 +162,13 @@ def _excess(grey: Grey, earlier: Grey, homography: Array, slack_px: float) -> Gr
         dst=grey.copy(),
         borderMode=cv2.BORDER_TRANSPARENT,
     )
-    slope = cv2.max(
-        cv2.convertScaleAbs(cv2.Sobel(warped, cv2.CV_16S, 1, 0), alpha=_SOBEL_GAIN * slack_px),
-        cv2.convertScaleAbs(cv2.Sobel(warped, cv2.CV_16S, 0, 1), alpha=_SOBEL_GAIN * slack_px),
-    )
-    return np.asarray(cv2.subtract(cv2.absdiff(grey, warped), slope), np.uint8)
+    slope = _slope(np.asarray(warped, np.uint8))
+    allowed = cv2.convertScaleAbs(slope, alpha=slack_px)
+    return np.asarray(cv2.subtract(cv2.absdiff(grey, warped), allowed), np.uint8), slope
+
+
+def _has_edges(stat: NDArray[np.int32], now: Grey, *before: Grey) -> bool:
+    """Whether a blob has more edges now than in the earlier frames: where an object has left, it has fewer."""
+    left, top, width, height = stat[:4].tolist()
+    rows, columns = slice(max(0, top - 1), top + height + 1), slice(max(0, left - 1), left + width + 1)
+    return int(now[rows, columns].sum()) > max(int(slope[rows, columns].sum()) for slope in before)

@@ -60,15 +60,15 @@ class RegistrationParameters:
         relief_m: standard deviation of heights that are taken for the ground's, in any case.
     """
 
-    corners: int = 400
-    quality: float = 0.02
-    apart_px: float = 9.0
-    window_px: int = 13
+    corners: int = 500
+    quality: float = 0.004
+    apart_px: float = 6.0
+    window_px: int = 9
     levels: int = 3
-    back_px: float = 0.4
-    baseline_s: float = 0.4
-    longest_gap_s: float = 0.6
-    life_s: float = 1.5
+    back_px: float = 0.2
+    baseline_s: float = 0.7
+    longest_gap_s: float = 0.8
+    life_s: float = 2.0
     ground_px: float = 1.5
     ground_share: float = 0.5
     least_sigma_px: float = 0.15
@@ -361,9 +361,7 @@ class GroundRegistration:
         sigma_px, relief_m = _scatter(off[ground], noises[ground], parallax[ground])
         sigma_px, relief_m = max(sigma_px, p.least_sigma_px), max(relief_m, p.relief_m)
         normalised = _distances(off, parallax, sigma_px * noises, relief_m)
-        old = frame.time_us - self._tracks.found_us > 1e6 * p.life_s
-        old[of_frame] &= normalised < _ON_GROUND
-        self._tracks.keep(~old)
+        self._retire(frame, of_frame[normalised < _ON_GROUND])
         return Registration(
             frame=frame,
             reference=reference,
@@ -382,6 +380,15 @@ class GroundRegistration:
         matrix = self.camera.matrix
         matrix[:2, 2] -= 0.5
         return matrix
+
+    def _retire(self, frame: StoredFrame, on_ground: Ids) -> None:
+        """Make room for new corners: the oldest ones of the ground, as many as replace all within a life."""
+        since_us = frame.time_us - self._past[-1].time_us
+        most = math.ceil(self.parameters.corners * since_us * 1e-6 / self.parameters.life_s)
+        old = on_ground[frame.time_us - self._tracks.found_us[on_ground] > 5e5 * self.parameters.life_s]
+        kept = np.ones(len(self._tracks.ids), np.bool_)
+        kept[old[:most]] = False  # ids, and so ages, are in order
+        self._tracks.keep(kept)
 
     def _forget(self, time_us: int) -> None:
         """Keep twice the baseline: frame differences compare with two earlier frames."""

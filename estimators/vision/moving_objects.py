@@ -4,6 +4,7 @@ Measurements are in the level frame of the vehicle, scaled by the height over th
 equations 36 to 40).
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -36,7 +37,7 @@ class ObjectParameters:
     """
 
     link_m: float = 4.5
-    link_m_s: float = 2.5
+    link_m_s: float = 5.0
     fastest_m_s: float = 30.0
     farthest: float = 4.0
     centre_px: float = 1.0
@@ -57,7 +58,7 @@ class MovingObjects:
         sizes_px: (n,) extents.
         points: (n,) numbers of corners, or of pixels, that show each.
         places: (n, 2) forward and right in the level frame (equation 40).
-        covariances: (n, 2, 2) theirs, as far as the picture makes them; errors of the pose are not in them.
+        covariances: (n, 2, 2) theirs, with those of the picture and of the pose.
         velocities: (n, 2) over the ground in the level frame; NaN: not measured.
     """
 
@@ -172,9 +173,10 @@ def objects_of(
             )
     middles = np.array([entry[0] for entry in found]).reshape(-1, 2)
     rays = (middles + 0.5 - camera.centre_px) / camera.focal_px
-    on, covariances = on_ground(
-        pose.axes.directions(rays), pose.height_m, p.centre_px / min(camera.focal_px)
-    )
+    sigma_rad = math.hypot(p.centre_px / min(camera.focal_px), pose.tilt_sigma_rad)
+    on, covariances = on_ground(pose.axes.directions(rays), pose.height_m, sigma_rad)
+    by_height = on * (pose.height_sigma_m / pose.height_m)
+    covariances += by_height[:, :, None] * by_height[:, None, :] + p.centre_m**2 * np.eye(2)
     return MovingObjects(
         time_us=time_us,
         pixels=middles + 0.5,
@@ -182,7 +184,7 @@ def objects_of(
         sizes_px=np.array([entry[1] for entry in found]),
         points=np.array([entry[2] for entry in found], np.int64),
         places=on,
-        covariances=covariances + p.centre_m**2 * np.eye(2),
+        covariances=covariances,
         velocities=np.array([entry[3] for entry in found]).reshape(-1, 2),
     )
 

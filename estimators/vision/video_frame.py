@@ -21,6 +21,8 @@ class CameraPose:
         axes: of the camera in the level frame of the vehicle (forward, right, down): the product
             R_hb^hl R_g^hb R_c^g of Tolman et al. 2021, equation 37.
         height_m: over the ground.
+        tilt_sigma_rad, height_sigma_m: standard deviations of the part of their errors that changes from frame
+            to frame; slower ones move all measurements together.
 
     Raises:
         EstimatorError: a value is not possible.
@@ -28,6 +30,8 @@ class CameraPose:
 
     axes: CameraAxes
     height_m: float
+    tilt_sigma_rad: float = 0.001
+    height_sigma_m: float = 0.3
 
     def __post_init__(self) -> None:
         axes = self.axes.axes
@@ -35,6 +39,9 @@ class CameraPose:
             raise EstimatorError(f"axes {axes.tolist()} are not possible; give a rotation matrix")
         if not (math.isfinite(self.height_m) and self.height_m > 0.0):
             raise EstimatorError(f"height_m {self.height_m:g} is not possible; give a height above 0")
+        for name, value in (("tilt_sigma_rad", self.tilt_sigma_rad), ("height_sigma_m", self.height_sigma_m)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise EstimatorError(f"{name} {value:g} is not possible; give 0 or more")
 
     @property
     def down(self) -> Array:
