@@ -197,15 +197,9 @@ def video(setting: VideoSetting, seed: int, seconds: float) -> Iterator[tuple[Vi
             rotation_mount_rad_s=tuple(gimbal.rates_gimbal_rad_s.tolist()),
         )
         reported = rotation_of(gimbal.measured_q_ned_from_gimbal)
-        pose = CameraPose(
-            axes=CameraAxes(axes=reported[:, [1, 2, 0]].T),
-            height_m=height_m + height_error,
-        )
+        pose = CameraPose(axes=CameraAxes(axes=reported[:, [1, 2, 0]].T), height_m=height_m + height_error)
         picture = renderer.render(view)
-        yield (
-            VideoFrame(time_us=time_us, pixels=picture, pose=pose),
-            _truth(setting, view, terrain),
-        )
+        yield (VideoFrame(time_us=time_us, pixels=picture, pose=pose), _truth(setting, view, terrain))
 
 
 def _views(targets: GroundTargets) -> tuple[TargetView, ...]:

@@ -4,9 +4,10 @@ V-A, the second source).
 The difference to one earlier frame shows a moving object twice: where it is, and where it was. Where it was
 differs from that frame only, so the smaller of the differences to two earlier frames shows where it is
 (Kameda and Minoh 1996, with both frames in the past so that there is no delay). For that an object must have
-moved by its own length, so the frames are farther apart than for the flow. A difference counts as far as it is
-above what an error of the registration and the parallax of heights make at the edges of the earlier frame; the
-object's own edges are not in that one.
+moved by its own length, so the frames are farther apart than for the flow; a slower one leaves a ghost, which
+has fewer edges than the same place had with the object on it. A difference counts as far as it is above what
+an error of the registration and the parallax of heights make at the edges of the earlier frame; the object's
+own edges are not in that one.
 """
 
 from collections import deque
@@ -168,7 +169,7 @@ def _excess(grey: Grey, earlier: Grey, homography: Array, slack_px: float) -> tu
 
 
 def _has_edges(stat: NDArray[np.int32], now: Grey, *before: Grey) -> bool:
-    """Whether a blob has more edges now than in the earlier frames: where an object has left, it has fewer."""
+    """Whether a blob has more edges now than in the earlier frames; a place that was left has fewer."""
     left, top, width, height = stat[:4].tolist()
     rows, columns = slice(max(0, top - 1), top + height + 1), slice(max(0, left - 1), left + width + 1)
     return int(now[rows, columns].sum()) > max(int(slope[rows, columns].sum()) for slope in before)

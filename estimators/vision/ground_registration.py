@@ -4,8 +4,8 @@ that takes the ground of an earlier frame to the present one.
 Source: Tolman et al. 2021, section V-A: corners (Shi and Tomasi 1994), optical flow (Lucas and Kanade 1981,
 pyramids by Bouguet 2001), homography of the ground. Here a corner is kept only if the flow backwards finds
 where it came from (Kalal, Mikolajczyk and Matas 2010), and the homography is MAGSAC++ (Barath et al. 2020) in
-OpenCV. Between two neighbouring frames a walker moves by less than the noise of the flow, so the earlier frame
-is one from some time ago: the corners are followed through all frames, but compared over that time.
+OpenCV. Between two neighbouring frames a walker moves by less than the noise of the flow, so the earlier
+frame is one from some time ago: the corners are followed through all frames, but compared over that time.
 """
 
 import math
@@ -76,9 +76,7 @@ class RegistrationParameters:
 
     def __post_init__(self) -> None:
         check_fields(
-            self,
-            require_positive,
-            but=dict.fromkeys(("quality", "ground_share"), require_probability),
+            self, require_positive, but=dict.fromkeys(("quality", "ground_share"), require_probability)
         )
         if self.longest_gap_s < self.baseline_s:
             raise EstimatorError(
@@ -274,7 +272,9 @@ class GroundRegistration:
             return None
         grey = pixels if pixels.ndim == 2 else np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), np.uint8)
         if self._ideal is not None:
-            grey = np.asarray(cv2.remap(grey, *self._ideal, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+            grey = np.asarray(
+                cv2.remap(grey, *self._ideal, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            )
         return np.array(grey, np.uint8, order="C")  # the caller may reuse its buffer
 
     def _follow(self, before: Grey, now: Grey) -> None:
@@ -292,7 +292,9 @@ class GroundRegistration:
             "criteria": (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.02),
             "flags": cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS,
         }
-        there, found, strengths = cv2.calcOpticalFlowPyrLK(before, now, start[:, None], guess[:, None].copy(), **options)
+        there, found, strengths = cv2.calcOpticalFlowPyrLK(
+            before, now, start[:, None], guess[:, None].copy(), **options
+        )
         back, found_back, _ = cv2.calcOpticalFlowPyrLK(now, before, there, start[:, None].copy(), **options)
         ends = there[:, 0]
         missed = np.hypot(*(back[:, 0] - start).T)

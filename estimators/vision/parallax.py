@@ -3,9 +3,9 @@
 With the ground n' X = h before the first camera, a point moves by X' = R X + t, and a ray x of the ground by
 the homography G = R + t n' / h (Hartley and Zisserman 2004, section 13.1). The vertical n is known from the
 camera's attitude, so that G alone gives R and t / h: with a and b in the ground, G a = s R a and G b = s R b,
-and R n is their cross product. A point of height z over the ground has the depth (h - z) / (n' x), so its ray is
-not G x but G x + t (n' x) z / h^2, to the first order: it moves along the line to the epipole (Irani and Anandan
-1998, "A unified approach to moving object detection in 2D and 3D scenes").
+and R n is their cross product. A point of height z over the ground has the depth (h - z) / (n' x), so its ray
+is not G x but G x + t (n' x) z / h^2, to the first order: it moves along the line to the epipole (Irani and
+Anandan 1998, "A unified approach to moving object detection in 2D and 3D scenes").
 """
 
 from typing import Final

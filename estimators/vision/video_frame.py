@@ -21,8 +21,8 @@ class CameraPose:
         axes: of the camera in the level frame of the vehicle (forward, right, down): the product
             R_hb^hl R_g^hb R_c^g of Tolman et al. 2021, equation 37.
         height_m: over the ground.
-        tilt_sigma_rad, height_sigma_m: standard deviations of the part of their errors that changes from frame
-            to frame; slower ones move all measurements together.
+        tilt_sigma_rad, height_sigma_m: standard deviations of the part of their errors that changes from
+            frame to frame; slower ones move all measurements together.
 
     Raises:
         EstimatorError: a value is not possible.

@@ -93,9 +93,7 @@ class Renderer:
         self._terrain = terrain
         self._heights = np.zeros((0, 0)) if terrain is None else np.ascontiguousarray(terrain.height_m)
         self._grid = (
-            np.zeros(3)
-            if terrain is None
-            else np.array([terrain.south_m, terrain.west_m, terrain.spacing_m])
+            np.zeros(3) if terrain is None else np.array([terrain.south_m, terrain.west_m, terrain.spacing_m])
         )
         self._exposures: dict[tuple[int, float], Exposure] = {}
         self._exposure(model.width_px, 1.0)

@@ -66,7 +66,10 @@ def draw_body(
         return
     middle = (0.5 * size_px[0], 0.5 * size_px[1])
     pixels = [focal_px * points[:, :2] / points[:, 2:] + middle for points in seen]
-    low, high = np.min([p.min(axis=0) for p in pixels], axis=0), np.max([p.max(axis=0) for p in pixels], axis=0)
+    low, high = (
+        np.min([p.min(axis=0) for p in pixels], axis=0),
+        np.max([p.max(axis=0) for p in pixels], axis=0),
+    )
     if not max(abs(low).max(), abs(high).max()) < LARGEST_PX:
         return
     where = box_of(low, high, window)

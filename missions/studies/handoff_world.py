@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.vision.ground_points import CameraAxes, on_ground
 from estimators.relative_pose import LevelMotion, PoseMeasurement
+from estimators.vision.ground_points import CameraAxes, on_ground
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
 from flightsim.foundation.random_streams import RandomStreams
