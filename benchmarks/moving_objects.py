@@ -254,9 +254,9 @@ def lines(name: str, tally: Tally, setting: VideoSetting) -> str:
         f"{tally.again / frames:.3f} a frame\n"
         f"    noise {sigma_px:.2f} px = {noise_mrad:.2f} mrad, "
         f"{above_m:.2f} m over the ground, places {rms_m:.2f} m rms\n"
-        f"    tracks: GOSPA {gospa_m:.2f} m, MOTA {mota:.3f}, missed "
-        f"{tally.missed / truths:.3f}, wrong {tally.wrong / truths:.3f}, new numbers {tally.switches}, purity "
-        f"{tally.pure / max(1, tally.matches):.3f}\n"
+        f"    tracks: GOSPA {gospa_m:.2f} m, MOTA {mota:.3f}, missed {tally.missed / truths:.3f}, wrong "
+        f"{tally.wrong / truths:.3f}, new numbers {tally.switches}, "
+        f"purity {tally.pure / max(1, tally.matches):.3f}\n"
     )
 
 

@@ -44,6 +44,7 @@ Grey = NDArray[np.uint8]
 _SMOOTH_PX: Final = 3
 _SOBEL_GAIN: Final = 0.125  # of a 3 x 3 Sobel, to levels per pixel
 _MOST_BLOBS: Final = 60
+_MOST_REACH_PX: Final = 8
 _QUIET: Final = 0.98  # share of the picture in which nothing moves
 
 
@@ -164,7 +165,9 @@ def _excess(grey: Grey, earlier: Grey, homography: Array, slack_px: float) -> tu
         borderMode=cv2.BORDER_TRANSPARENT,
     )
     slope = _slope(np.asarray(warped, np.uint8))
-    allowed = cv2.convertScaleAbs(slope, alpha=slack_px)
+    reach = min(int(slack_px), _MOST_REACH_PX)
+    near = cv2.dilate(slope, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) if reach else slope
+    allowed = cv2.convertScaleAbs(near, alpha=slack_px)
     return np.asarray(cv2.subtract(cv2.absdiff(grey, warped), allowed), np.uint8), slope
 
 
