@@ -367,12 +367,14 @@ class Camera:
         uniforms, normals = self._uniforms[self._row], self._normals[self._row]
         self._row += 1
         found: list[Detection] = []
+        searched = True
         if self.reader is not None:
-            found = list(self.reader.read(self.view(time_us)))
+            read = self.reader.read(self.view(time_us))
+            found, searched = list(read or ()), read is not None
         elif self._gimbal is None or not self._gimbal.retracted:
             found = self._detections(time_us, uniforms, normals) + self._false_detections(time_us)
             found.sort(key=lambda detection: (detection.u_px, detection.v_px))
-        frame = CameraFrame(time_us, self._number, tuple(found))
+        frame = CameraFrame(time_us, self._number, tuple(found), searched)
         self._number += 1
         return frame
 
