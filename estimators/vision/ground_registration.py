@@ -8,10 +8,11 @@ OpenCV. Between two neighbouring frames a walker moves by less than the noise of
 frame is one from some time ago: the corners are followed through all frames, but compared over that time.
 """
 
+import functools
 import math
 from collections import deque
 from dataclasses import dataclass, field, fields
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -286,16 +287,15 @@ class GroundRegistration:
         guess = start.copy()
         if self._step is not None:  # the picture goes on moving as it did
             guess = (_homogeneous(start) @ self._step).astype(np.float32)
-        options = {
-            "winSize": (p.window_px, p.window_px),
-            "maxLevel": p.levels,
-            "criteria": (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.02),
-            "flags": cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS,
-        }
-        there, found, strengths = cv2.calcOpticalFlowPyrLK(
-            before, now, start[:, None], guess[:, None].copy(), **options
+        flow: Any = functools.partial(
+            cv2.calcOpticalFlowPyrLK,
+            winSize=(p.window_px, p.window_px),
+            maxLevel=p.levels,
+            criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.02),
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS,
         )
-        back, found_back, _ = cv2.calcOpticalFlowPyrLK(now, before, there, start[:, None].copy(), **options)
+        there, found, strengths = flow(before, now, start[:, None], guess[:, None].copy())
+        back, found_back, _ = flow(now, before, there, start[:, None].copy())
         ends = there[:, 0]
         missed = np.hypot(*(back[:, 0] - start).T)
         size = (self.camera.width_px, self.camera.height_px)
@@ -305,7 +305,8 @@ class GroundRegistration:
         tracks.keep(kept)
         self._step = None
         if len(tracks.ids) >= _LEAST_CORNERS:
-            self._step = np.linalg.lstsq(_homogeneous(start[kept]), tracks.points_px, rcond=None)[0]
+            step, *_ = np.linalg.lstsq(_homogeneous(start[kept]), tracks.points_px, rcond=None)
+            self._step = np.asarray(step, np.float64)
 
     def _search(self, grey: Grey, time_us: int) -> None:
         """Find new corners in one part of the picture, apart from those that are followed."""
@@ -330,7 +331,7 @@ class GroundRegistration:
             )
             if corners is None:
                 continue
-            tracks.add(corners[:, 0] + np.array((0.0, top), np.float32), time_us)
+            tracks.add(np.asarray(corners[:, 0] + (0.0, top), np.float32), time_us)
             room -= len(corners)
 
     def _register(self, frame: StoredFrame) -> Registration | None:
@@ -369,7 +370,7 @@ class GroundRegistration:
             reference=reference,
             homography=homography,
             points_px=end,
-            ground_px=expected,
+            ground_px=np.asarray(expected, np.float64),
             parallax_px_m=parallax,
             sigma_px=sigma_px,
             relief_m=relief_m,
@@ -405,7 +406,8 @@ def _ideal_map(camera: CameraGeometry) -> tuple[NDArray[np.int16], NDArray[np.ui
     rays = (np.stack((columns.ravel(), rows.ravel()), -1) - camera.centre_px) / camera.focal_px
     seen = camera.pixels(np.column_stack((rays, np.ones(len(rays))))) - 0.5
     places = seen.reshape(camera.height_px, camera.width_px, 2).astype(np.float32)
-    first, second = cv2.convertMaps(places, None, cv2.CV_16SC2)
+    columns_of, rows_of = np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1])
+    first, second = cv2.convertMaps(columns_of, rows_of, cv2.CV_16SC2)
     return np.asarray(first, np.int16), np.asarray(second, np.uint16)
 
 
