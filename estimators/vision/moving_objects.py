@@ -145,7 +145,7 @@ def objects_of(
     """
     p = parameters
     places = _placed(points.points_px, camera, pose)
-    near = np.isfinite(places).all(axis=1)
+    near: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(axis=1))
     near[near] = np.hypot(*places[near].T) < p.farthest * pose.height_m
     velocities = np.full_like(places, np.nan)
     if points.before_px is not None and points.elapsed_s > 0.0:

@@ -370,7 +370,8 @@ class Camera:
         searched = True
         if self.reader is not None:
             read = self.reader.read(self.view(time_us))
-            found, searched = list(read or ()), read is not None
+            searched = read is not None
+            found = [] if read is None else list(read)
         elif self._gimbal is None or not self._gimbal.retracted:
             found = self._detections(time_us, uniforms, normals) + self._false_detections(time_us)
             found.sort(key=lambda detection: (detection.u_px, detection.v_px))
