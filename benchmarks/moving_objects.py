@@ -8,8 +8,8 @@ study `handoff` in their area; 640 x 480 pixels at 30 Hz, in wind and with gimba
 it prints
 
 * time per frame on one core, median and 99 %, beside the plain OpenCV calls that each cannot do without;
-* the share of targets in view that are detected, how long one is missed in a row (and how long if misses were
-  independent), false measurements, and second ones of the same target, per frame;
+* the share of targets in view that are detected, how long one is missed in a row before it is detected again
+  (and how long if misses were independent), false measurements, and second ones of one target, per frame;
 * noise of a detected point about the mean of its target, per axis, and height over the ground of what is
   measured;
 * from R-RANSAC on the measurements GOSPA, MOTA, shares of missed and of wrong tracks, changes of numbers,

@@ -110,7 +110,7 @@ class FrameDifferenceDetector(MovingObjectDetector):
         p = self.parameters
         parallax_px = float(np.median(np.hypot(*found.parallax_px_m.T)))
         slack_px = p.slack_px + found.sigma_px + 2.0 * found.relief_m * parallax_px
-        grey = cv2.blur(found.frame.grey, (_SMOOTH_PX, _SMOOTH_PX))
+        grey: Grey = np.asarray(cv2.blur(found.frame.grey, (_SMOOTH_PX, _SMOOTH_PX)), np.uint8)
         first, first_slope = _excess(grey, found.reference.grey, found.homography, slack_px)
         other, other_slope = _excess(grey, second.grey, homography, 2.0 * slack_px)
         excess = cv2.min(first, other)

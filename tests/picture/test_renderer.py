@@ -269,7 +269,7 @@ def test_a_body_stands_where_it_is(shape, size_m, ahead_m, height_m):
     if shape is TargetShape.PERSON:  # a car lies on most of its own shadow
         # the sun is in the south-east at 45 degrees: the shadow is north-west, as long as the body is high
         away = 0.6 * top_m * np.array([-math.cos(math.radians(150)), -math.sin(math.radians(150)), 0.0])
-        u_px, v_px = np.round(pixels_of(view, [(north, east, 0.0) + away])[0] - 0.5).astype(int)
+        u_px, v_px = np.round(pixels_of(view, [np.array((north, east, 0.0)) + away])[0] - 0.5).astype(int)
         assert shown[v_px, u_px].sum() < 0.85 * empty[v_px, u_px].sum()
     assert np.hypot(u - feet[0], v - feet[1]).max() < 1.5 * SMALL.focal_px * size_m / 20.0
 
