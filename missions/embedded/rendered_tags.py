@@ -9,15 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.vision import (
-    CameraGeometry,
-    TagDetection,
-    TagDetector,
-    TagDetectorParameters,
-    draw_detections,
-)
+from estimators.vision import TagDetection, TagDetector, TagDetectorParameters, draw_detections
 from flightsim.payload import CameraView, Detection, ImagerParameters, PinholeModel
 from flightsim.picture import Renderer, Scenery
+from missions.embedded.picture_geometry import picture_geometry
 
 __all__ = ["RenderedTags", "RenderedTagsReader", "TagPicture"]
 
@@ -102,14 +97,7 @@ class RenderedTagsReader:
 
     def _detector_at(self, zoom: float) -> TagDetector:
         if zoom != self._zoom:
-            model, imager = self._model, self._imager
-            geometry = CameraGeometry(
-                width_px=model.width_px,
-                height_px=model.height_px,
-                focal_px=(model.focal_px * zoom,) * 2,
-                centre_px=model.centre_px,
-                distortion=() if imager.distortion.none else imager.distortion.coefficients,
-            )
+            geometry = picture_geometry(self._model, self._imager, zoom)
             self._zoom = zoom
             self._detector = TagDetector(geometry, self._parameters.detector)
         return self._detector
