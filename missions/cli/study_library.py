@@ -39,7 +39,7 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
 
 
 def _magnetic_search(given: Given) -> "Study[Any, Any]":
-    from missions.occupancy.investigation import Identify
+    from missions.occupancy.suspect import Identify
     from missions.studies.magnetic_search import study
 
     return study([Identify(way) for way in given["identify"]])

@@ -13,12 +13,13 @@ from estimators.occupancy.survey_map import SurveyMap
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.occupancy.field_watch import FieldWatch
-from missions.occupancy.investigation import Identify, Investigation
+from missions.occupancy.investigation import Investigation
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
+from missions.occupancy.suspect import Identify
 from missions.occupancy.traffic import Traffic
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.firmware import Mode

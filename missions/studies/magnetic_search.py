@@ -14,8 +14,8 @@ import numpy as np
 
 from missions.embedded.point_searchers import search_with_points
 from missions.occupancy.figures import NAMED_WITHIN_M
-from missions.occupancy.investigation import Identify
 from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.suspect import Identify
 from missions.studies.design import grid
 from missions.studies.results import Results
 from missions.studies.study import Study

@@ -458,10 +458,7 @@ def test_the_field_is_the_published_map_and_the_targets(tmp_path: Path) -> None:
             background = onboard.interpolate(np.array(north_m), np.array(east_m), height_m)
             expected = sum(
                 signature.anomaly_nt(
-                    np.float64(north_m),
-                    np.float64(east_m),
-                    height_m,
-                    earth.total_nt * earth.direction_ned,
+                    np.float64(north_m), np.float64(east_m), height_m, earth.total_nt * earth.direction_ned
                 )
                 for signature in (target, wreck)
             )

@@ -8,8 +8,8 @@ import pytest
 
 from missions.embedded.point_searchers import search_with_points
 from missions.embedded.worlds import drawn_target
-from missions.occupancy.investigation import Identify
 from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.suspect import Identify
 from missions.studies import run_trial
 from missions.studies.magnetic_search import report, study, summarise
 
