@@ -180,6 +180,8 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         likelihood = read_search_likelihood(*content)
         if likelihood is None or likelihood.tag_id != self.parameters.tag_id:
             return Outcome.IGNORED
+        if self.parameters.own_vehicle and message.target_system not in (0, self.parameters.own_vehicle):
+            return Outcome.IGNORED
         if self._origin() is None:
             return Outcome.WAITING
         age_s = (time_us - likelihood.time_us - camera.offset_us) * 1e-6
@@ -292,16 +294,16 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         """The home of the centre vehicle."""
         return None if self._frame is None else self._frame.origin
 
-    def likelihoods(self) -> list[MAVLinkMessage]:
+    def take_likelihoods(self) -> list[SearchLikelihood]:
         """The likelihoods of the own vehicle's frames since the last call, for the other vehicles."""
         outbox, self._outbox = self._outbox, []
-        return [search_likelihood_message(item) for item in outbox]
+        return outbox
 
     def publish(self) -> Sequence[MAVLinkMessage]:
         """The likelihoods of the own vehicle's frames since the last call, and, after a detection,
         FOLLOW_TARGET with the mean and its standard deviations.
         """
-        messages = self.likelihoods()
+        messages: list[MAVLinkMessage] = [search_likelihood_message(item) for item in self.take_likelihoods()]
         estimate, frame = self._unpublished, self._frame
         self._unpublished = None
         if estimate is None or frame is None:
