@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
-from autopilot_bridge.mavlink.camera_scan import CameraScan, read_camera_scan
+from autopilot_bridge.mavlink.camera_scan import CAMERA_COMPONENTS, CameraScan, read_camera_scan
 from autopilot_bridge.mavlink.search_likelihood import (
     SearchLikelihood,
     read_search_likelihood,
@@ -31,7 +31,6 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 __all__ = ["VisionSearchEstimator"]
 
 _AUTOPILOT: Final = 1
-_CAMERA: Final = 100
 _FIDUCIAL: Final = int(dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL)
 _MOST_TAG: Final = 255
 _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
@@ -159,7 +158,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
     # the camera
 
     def _on_detection(self, _time_us: int, camera: Camera, message: Message) -> Outcome:
-        if message.type != _FIDUCIAL or message.src_component != _CAMERA:
+        if message.type != _FIDUCIAL or message.src_component not in CAMERA_COMPONENTS:
             return Outcome.IGNORED
         angles = (message.angle_x, message.angle_y)
         if not all(map(math.isfinite, angles)):
@@ -169,13 +168,15 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         if message.target_num != self.parameters.tag_id:
             self._other_tags[min(int(message.target_num), _MOST_TAG)] += 1
             return Outcome.IGNORED
-        camera.take_detection(int(message.time_usec), *angles)
+        camera.take_detection(message.src_component, int(message.time_usec), *angles)
         return Outcome.USED
 
     def _on_tunnel(self, time_us: int, camera: Camera, message: Message) -> Outcome:
         content = (message.payload_type, message.payload_length, message.payload)
         scan = read_camera_scan(*content)
-        if scan is not None and message.src_component == _CAMERA:
+        if scan is not None and message.src_component in CAMERA_COMPONENTS:
+            if not camera.looks(message.src_component):
+                return Outcome.IGNORED
             return self._on_scan(camera, message.src_system, scan)
         likelihood = read_search_likelihood(*content)
         if likelihood is None or likelihood.tag_id != self.parameters.tag_id:

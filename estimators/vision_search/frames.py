@@ -35,6 +35,7 @@ class Camera:
         counts: frames by what became of them.
         last_used_us: exposure of the last frame that was used.
         last_detected_us: exposure of the last detection that was used.
+        component: of the camera: the first one that has ended a frame.
     """
 
     track: VehicleTrack = field(default_factory=VehicleTrack)
@@ -45,22 +46,31 @@ class Camera:
     counts: Counter[str] = field(default_factory=Counter)
     last_used_us: int | None = None
     last_detected_us: int | None = None
-    _pending: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    component: int | None = None
+    _pending: dict[tuple[int, int], list[tuple[float, float]]] = field(default_factory=dict)
     _known: dict[tuple[int, int], None] = field(default_factory=dict)
 
-    def take_detection(self, exposed_us: int, angle_x_rad: float, angle_y_rad: float) -> None:
+    def looks(self, component: int) -> bool:
+        """Whether a component that ends a frame is the vehicle's searching camera."""
+        if self.component is None:
+            self.component = component
+        return component == self.component
+
+    def take_detection(
+        self, component: int, exposed_us: int, angle_x_rad: float, angle_y_rad: float
+    ) -> None:
         """Keep a detection until the frame's end is received; one that is received twice counts once."""
-        pairs = self._pending.setdefault(exposed_us, [])
+        pairs = self._pending.setdefault((component, exposed_us), [])
         pair = (math.tan(angle_x_rad), math.tan(angle_y_rad))
         if pair not in pairs:
             pairs.append(pair)
         while len(self._pending) > _KEPT:
-            del self._pending[min(self._pending)]
+            del self._pending[min(self._pending, key=lambda key: key[1])]
 
     def detections(self, exposed_us: int) -> tuple[tuple[float, float], ...]:
         """The detections of a frame that has ended."""
-        found = self._pending.pop(exposed_us, [])
-        for older in [time_us for time_us in self._pending if time_us < exposed_us]:
+        found = self._pending.pop((self.component or 0, exposed_us), [])
+        for older in [key for key in self._pending if key[1] < exposed_us]:
             del self._pending[older]
         return tuple(found[:MAX_DETECTIONS])
 
