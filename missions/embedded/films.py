@@ -76,6 +76,6 @@ def start_films(sitl: Sitl, folder: Path) -> list[FlightFilm]:
                 position_frd_m=p.position_frd_m,
                 latency_s=p.latency_s,
             )
-            reader.film = FlightFilm(folder / f"camera{system_id}.mp4", camera)
-            films.append(reader.film)
+            film = reader.film = FlightFilm(folder / f"camera{system_id}.mp4", camera)
+            films.append(film)
     return films
