@@ -30,7 +30,7 @@ _STEP_S: Final = 0.02
 _PAIRS: Final = 1200
 _ATTITUDES: Final = 40_000
 _LEAST_PAIRS: Final = 30
-_LEAST_TURN_RAD: Final = math.radians(20.0)  # in all pairs, root of the sum of squares
+_LEAST_TURN_RAD: Final = math.radians(6.0)  # in all pairs, root of the sum of squares
 _LEAST_SHARE: Final = 0.8  # of the rotation that the best shift explains
 
 

@@ -208,16 +208,17 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         if not camera.is_due(scan.time_us, p.frame_period_s):
             camera.counts["too_soon"] += 1
             return Outcome.IGNORED
-        likelihood = likelihood_of(camera, scan, detections, self._errors, frame, p.tag_id)
+        if camera.knows(scan.number, scan.time_us):
+            camera.counts["repeated"] += 1
+            return Outcome.REPEATED
+        likelihood = likelihood_of(
+            camera, scan, detections, self._errors, frame, tag_id=p.tag_id, pixel_sigma_px=p.pixel_sigma_px
+        )
         if likelihood is None:
             camera.counts["without_pose"] += 1
             return Outcome.WAITING
-        if not camera.is_new(scan.number, scan.time_us):
-            camera.counts["repeated"] += 1
-            return Outcome.REPEATED
+        camera.is_new(scan.number, scan.time_us)
         camera.last_used_us = scan.time_us
-        if detections:
-            camera.last_detected_us = scan.time_us
         message = search_likelihood_message(likelihood)
         sent = read_search_likelihood(message.payload_type, message.payload_length, message.payload)
         if sent is None:
