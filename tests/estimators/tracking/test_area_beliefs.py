@@ -214,7 +214,7 @@ def test_the_place_in_a_coarse_cell_is_uncertain():
         belief.update(sight(place, errors=exact, detections=[(0.0, 0.0)]))
     mean, covariance = belief.moments()
     assert mean == pytest.approx(place[:2], abs=0.5)
-    assert np.sqrt(np.diag(covariance)) == pytest.approx([20.0 / math.sqrt(3.0)] * 2, rel=0.1)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx([10.0] * 2, rel=0.1)  # to the cells' centres
 
 
 def test_the_particles_are_those_of_the_seed_and_are_resampled_by_effective_size():
