@@ -1,5 +1,5 @@
-"""The tag detector on rendered pictures: detection rate, corners and distance by the size of the tag, and false
-tags in pictures without one.
+"""The tag detector on rendered pictures: detection rate, corners and distance by the size of the tag, and
+false tags in pictures without one.
 
     python -m benchmarks.tag_detector --poses 500 --frames 10000
 
@@ -8,7 +8,9 @@ in the picture count.
 """
 
 import argparse
+import sys
 import time
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,33 +19,40 @@ from tests.estimators.vision.test_tag_detector import empty_frames, examine
 SIZES_PX = (0.0, 12.0, 16.0, 24.0, 48.0, np.inf)
 
 
+def say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--poses", type=int, default=500)
     parser.add_argument("--frames", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=6)
     given = parser.parse_args()
     begun_s = time.process_time()
     rows, false = examine(given.poses, given.seed)
-    print(f"{len(rows)} of {given.poses} tags are whole in the picture; {false} false tags")
-    print("| side of the tag, px | tags | detected | corners off, median px | reprojection, median px | distance off |")
-    for low, high in zip(SIZES_PX, SIZES_PX[1:], strict=False):
+    say(f"{len(rows)} of {given.poses} tags are whole in the picture; {false} false tags")
+    say("| side of the tag, px | tags | detected | corners off, px | reprojection, px | distance off |")
+    for low, high in pairwise(SIZES_PX):
         part = rows[(rows[:, 0] >= low) & (rows[:, 0] < high)]
         found = part[part[:, 1] == 1.0]
-        figures = "| | | |" if not len(found) else (
-            f"| {np.median(found[:, 2]):.2f} | {np.median(found[:, 3]):.2f} | {np.median(found[:, 4]):.1%} |"
-        )
+        figures = "| | | |"
+        if len(found):
+            corner_px, off_px, place = np.median(found[:, 2:5], axis=0)
+            figures = f"| {corner_px:.2f} | {off_px:.2f} | {place:.1%} |"
         share = part[:, 1].mean() if len(part) else np.nan
-        print(f"| {low:g} to {high:g} | {len(part)} | {share:.0%} {figures}")
+        say(f"| {low:g} to {high:g} | {len(part)} | {share:.0%} {figures}")
     found = rows[rows[:, 1] == 1.0]
-    print(
+    say(
         f"all: corners {np.median(found[:, 2]):.2f} px, reprojection {np.median(found[:, 3]):.2f} px, "
         f"place {np.median(found[:, 4]):.2%} of the distance off (medians); "
         f"{time.process_time() - begun_s:.0f} s of a core"
     )
     begun_s = time.process_time()
     tags = empty_frames(given.frames, 2)
-    print(f"{tags} tags in {given.frames} pictures without one; {time.process_time() - begun_s:.0f} s of a core")
+    say(f"{tags} tags in {given.frames} empty pictures; {time.process_time() - begun_s:.0f} s of a core")
 
 
 if __name__ == "__main__":

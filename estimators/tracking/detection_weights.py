@@ -103,7 +103,11 @@ class DetectionWeights:
         return 1.0 / share
 
     def _errors_on_ground(
-        self, height_m: float, q_ned_from_frd: Quaternion, q_frd_from_mount: Quaternion, ray: tuple[float, float]
+        self,
+        height_m: float,
+        q_ned_from_frd: Quaternion,
+        q_frd_from_mount: Quaternion,
+        ray: tuple[float, float],
     ) -> tuple[_Sum, float] | None:
         """Effect of errors of unit variance on the place on the ground, and the variance by the pixels; None:
         the ray does not meet the ground.
@@ -122,19 +126,13 @@ class DetectionWeights:
         of_turn = of_ray @ cross  # a rotation about t changes the ray by t x ray
         roll, _, yaw = euler_of(q_ned_from_frd)
         pitch_axis = body @ (0.0, math.cos(roll), -math.sin(roll))
-        axes = np.column_stack(
-            (e.roll_rad * body[:, 0], e.pitch_rad * pitch_axis, (0.0, 0.0, e.yaw_rad))
-        )
+        axes = np.column_stack((e.roll_rad * body[:, 0], e.pitch_rad * pitch_axis, (0.0, 0.0, e.yaw_rad)))
         cosine, sine = math.cos(yaw), math.sin(yaw)
         turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         spread = turn @ np.diag([e.forward_m, e.right_m, e.height_m]) @ turn.T
         pixels = of_ray @ mount[:, 1:]
         return (
-            _Sum(
-                mount=e.mount_rad * of_turn @ mount,
-                attitude=of_turn @ axes,
-                place=of_place @ spread,
-            ),
+            _Sum(mount=e.mount_rad * of_turn @ mount, attitude=of_turn @ axes, place=of_place @ spread),
             0.5 * self._pixel_rad**2 * float(np.sum(pixels * pixels)),
         )
 

@@ -197,8 +197,8 @@ class SearchGrid:
         )
         across = cross / total
         between = np.array([[row2 / total, across], [across, column2 / total]])
-        # the place within a cell counts where a belief is narrower than that, and not once more where the cells
-        # themselves show its width
+        # the place within a cell counts where a belief is narrower than that, and not once more where the
+        # cells themselves show its width
         variances, axes = np.linalg.eigh(between)
         covariance = side**2 * (axes * np.maximum(variances, 1.0 / 12.0)) @ axes.T
         return mean, np.asarray(covariance)

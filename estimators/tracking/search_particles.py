@@ -28,7 +28,9 @@ Draws = NDArray[np.uint16]
 _BINS: Final = 64  # along each axis, over the particles: for the distance to neighbours
 _SPREAD: Final = 0.4  # of that distance, standard deviation per axis; of a uniform cell it is 0.29
 _DRAWS: Final = 4  # numbers of 16 bits in one of the generator's: two for each axis
-_DRAW_UNIT: Final = math.sqrt(6.0) / 2.0**16  # the sum of two of them has the standard deviation 1 in this unit
+_DRAW_UNIT: Final = (
+    math.sqrt(6.0) / 2.0**16
+)  # the sum of two of them has the standard deviation 1 in this unit
 
 
 class SearchParticles:

@@ -116,14 +116,14 @@ class PictureWatch:
         found = []
         if self.without_attitude > _WITHOUT_SHARE * self.frames:
             found.append(
-                f"{self.without_attitude} of {self.frames} pictures have no attitude near their exposure, and "
-                "no use; check the clocks (start_us and latency_s in the camera's file) and the rate of ATTITUDE"
+                f"{self.without_attitude} of {self.frames} pictures have no attitude near their exposure, "
+                "and no use; check start_us and latency_s in the camera's file, and the rate of ATTITUDE"
             )
         difference = self.clocks.difference()
         if difference is not None and abs(difference.apart_s) >= _CLOCKS_APART_S:
             found.append(
-                f"the clocks of pictures and attitude are {abs(difference.apart_s):.2f} s apart: the pictures "
-                f"count as exposed {'before' if difference.apart_s > 0.0 else 'after'} they were; "
+                f"the clocks of pictures and attitude are {abs(difference.apart_s):.2f} s apart: the "
+                f"pictures count as exposed {'before' if difference.apart_s > 0.0 else 'after'} they were; "
                 "correct latency_s of a stream, or start_us of a recording, in the camera's file"
             )
         return found

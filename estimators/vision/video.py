@@ -1,4 +1,6 @@
-"""Pictures from outside: recorded videos and live streams (FFmpeg, by PyAV), and the writer of lossless ones."""
+"""Pictures from outside: recorded videos and live streams (FFmpeg, by PyAV), and a writer of lossless
+videos.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,7 +21,17 @@ __all__ = ["Film", "TimedPicture", "VideoError", "frames_of", "is_stream"]
 Picture = NDArray[np.uint8]
 
 _MICROSECOND: Final = Fraction(1, 1_000_000)
-_STREAMS: Final = ("rtsp://", "rtsps://", "rtmp://", "udp://", "rtp://", "srt://", "tcp://", "http://", "https://")
+_STREAMS: Final = (
+    "rtsp://",
+    "rtsps://",
+    "rtmp://",
+    "udp://",
+    "rtp://",
+    "srt://",
+    "tcp://",
+    "http://",
+    "https://",
+)
 _LOSSLESS: Final = {"qp": "0", "preset": "ultrafast"}
 _RTSP: Final = {"rtsp_transport": "tcp", "fflags": "nobuffer"}
 
@@ -81,7 +93,7 @@ def frames_of(source: str, *, timeout_s: float | None = None) -> Iterator[TimedP
 
 
 class Film:
-    """Writes a lossless video (H.264 without quantization, in MP4): its frames are to the bit what was written.
+    """Writes a lossless video (H.264 without quantization, in MP4): its frames are those written, to the bit.
 
     Args:
         path: the file; it must not exist.
@@ -136,7 +148,9 @@ class Film:
         try:
             yield
         except (av.error.FFmpegError, OSError) as error:
-            raise VideoError(f"can't write the video {self._path}: {error.strerror}; check the disk") from error
+            raise VideoError(
+                f"can't write the video {self._path}: {error.strerror}; check the disk"
+            ) from error
 
     def __enter__(self) -> "Film":
         return self

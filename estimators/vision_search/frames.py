@@ -57,9 +57,7 @@ class Camera:
             self.component = component
         return component == self.component
 
-    def take_detection(
-        self, component: int, exposed_us: int, angle_x_rad: float, angle_y_rad: float
-    ) -> None:
+    def take_detection(self, component: int, exposed_us: int, angle_x_rad: float, angle_y_rad: float) -> None:
         """Keep a detection until the frame's end is received; one that is received twice counts once."""
         pairs = self._pending.setdefault((component, exposed_us), [])
         pair = (math.tan(angle_x_rad), math.tan(angle_y_rad))

@@ -109,8 +109,8 @@ class ImagerParameters:
 
 @kernel
 def _undistort(points: Array, coefficients: Array) -> float:
-    """Replace the places (n, 2) at which rays are seen by the rays; returns the largest remaining distance, or
-    infinity.
+    """Replace the places (n, 2) at which rays are seen by the rays; returns the largest remaining distance,
+    or infinity.
     """
     k1, k2, p1, p2, k3 = coefficients
     largest = 0.0

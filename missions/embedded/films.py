@@ -1,5 +1,5 @@
-"""The pictures of a flight's cameras as lossless videos in its run folder, each beside the file that describes
-its camera: what `flightstack vision` reads.
+"""The pictures of a flight's cameras as lossless videos in its run folder, each beside the file that
+describes its camera: what `flightstack vision` reads.
 """
 
 from collections.abc import Iterator

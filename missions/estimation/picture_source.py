@@ -111,9 +111,7 @@ class LivePictures:
         now_us = self._now_us()
         if now_us is None:
             return
-        exposed_us = clock.exposed_us(
-            now_us, picture.time_us, latency_s=self._latency_s, rate=self._rate()
-        )
+        exposed_us = clock.exposed_us(now_us, picture.time_us, latency_s=self._latency_s, rate=self._rate())
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._put, exposed_us, picture.pixels)
 

@@ -191,10 +191,9 @@ def _over_log(
     with TlogWriter(folder / LOG_NAME) as copy:
         for stamp_us, frame in reader:
             definition = frame.definition
-            if (
-                (frame.system_id, frame.component_id) == (system_id, _AUTOPILOT)
-                and stamp_field(definition.name, definition.field_names) is not None
-            ):
+            if (frame.system_id, frame.component_id) == (system_id, _AUTOPILOT) and stamp_field(
+                definition.name, definition.field_names
+            ) is not None:
                 message = read_message(frame)
                 now_us = times.stamp(message)
                 if begin_us is None:
@@ -211,7 +210,8 @@ def _over_log(
     if not pictures.frames:
         reason = (
             f"no picture of {request.video} lies in the time of {log}: the first one is of "
-            f"{film.first_us * 1e-6:.2f} s of vehicle time, and the log begins at {(begin_us or 0) * 1e-6:.2f} s; "
+            f"{film.first_us * 1e-6:.2f} s of vehicle time, and the log begins at "
+            f"{(begin_us or 0) * 1e-6:.2f} s; "
             f"correct start_us in {request.camera}"
         )
     more = {"log": str(log), "frames_before_the_log": film.before, "frames_after_the_log": film.rest()}
@@ -281,10 +281,7 @@ def _replaced(frame: Frame, system_id: int, component_id: int) -> bool:
 
 def _progress(pictures: PictureWatch, time_us: int, trouble: str = "") -> VisionProgress:
     return VisionProgress(
-        time_s=time_us * 1e-6,
-        frames=pictures.frames,
-        detections=sum(pictures.tags.values()),
-        trouble=trouble,
+        time_s=time_us * 1e-6, frames=pictures.frames, detections=sum(pictures.tags.values()), trouble=trouble
     )
 
 
@@ -397,7 +394,11 @@ class _Live:
                     "is the vehicle on, and sending there?"
                 )
                 return
-            if not live.received and first_us is not None and wall_time_s() - begun_s > 2.0 * request.silence_s:
+            if (
+                not live.received
+                and first_us is not None
+                and wall_time_s() - begun_s > 2.0 * request.silence_s
+            ):
                 why = f" ({live.failure})" if live.failure else ""
                 self.reason = f"no picture was received from {request.video}{why}"
                 return

@@ -18,14 +18,7 @@ from missions.studies.design import grid
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, paired_difference, rate_of
 from missions.studies.study import Study
-from missions.studies.vision_search_trial import (
-    BELIEFS,
-    MOMENTS_S,
-    TEAMS,
-    Cell,
-    Localized,
-    VisionSearchTrial,
-)
+from missions.studies.vision_search_trial import BELIEFS, MOMENTS_S, TEAMS, Cell, Localized, VisionSearchTrial
 
 __all__ = ["error_budget", "study"]
 
@@ -53,7 +46,7 @@ _POSE: Final = (
 _COLOURS: Final = {"one": "#1769aa", "two": "#c2410c"}
 
 
-def study(model: str = "aerosonde", side_m: float = 1000.0, passes: int = 6) -> Study[Cell, Localized]:
+def study(model: str = "aerosonde", side_m: float = 1000.0, passes: int = 4) -> Study[Cell, Localized]:
     """The study.
 
     Args:

@@ -113,7 +113,7 @@ class VisionSearchTrial:
 
     model: str = "aerosonde"
     side_m: float = 1000.0
-    passes: int = 6
+    passes: int = 4
 
     def __call__(self, cell: Cell, seed: int) -> Localized:
         """Fly the search. The same seed has the same place of the target for both teams."""

@@ -43,7 +43,9 @@ def final(headings, rng, errors=ERRORS):
             errors.roll_rad * angles[0], errors.pitch_rad * angles[1], heading + errors.yaw_rad * angles[2]
         )
         true_place = np.array([north, east, -HEIGHT_M]) + place * (
-            errors.forward_m, errors.right_m, errors.height_m
+            errors.forward_m,
+            errors.right_m,
+            errors.height_m,
         )
         seen = rotation_matrix(product(true, mount)).T @ -true_place
         ray = (seen[1] / seen[0], seen[2] / seen[0])
@@ -68,7 +70,9 @@ def _variance(errors, reported, ray):
     """Variance of one detection per axis: all its causes, one after the other, by differences."""
     total = 0.0
     for name in ("forward_m", "right_m", "height_m", "yaw_rad", "pitch_rad", "roll_rad", "mount_rad"):
-        alone = PoseErrors(**(dict.fromkeys(PoseErrors.__dataclass_fields__, 0.0) | {name: getattr(errors, name)}))
+        alone = PoseErrors(
+            **(dict.fromkeys(PoseErrors.__dataclass_fields__, 0.0) | {name: getattr(errors, name)})
+        )
         one = DetectionWeights(alone, 0.0)
         one.take(0, height_m=HEIGHT_M, q_ned_from_frd=reported, q_frd_from_mount=DOWN, ray=ray)
         total += 1.0 / one.information_m2 if one.information_m2 else 0.0
@@ -103,11 +107,17 @@ def test_independent_errors_all_count():
 
 def test_a_constant_error_counts_once():
     """A second detection says nothing new, and one in the other direction does."""
-    weights = DetectionWeights(PoseErrors(**(dict.fromkeys(PoseErrors.__dataclass_fields__, 0.0) | {"mount_rad": 0.005})), 1e-6)
+    weights = DetectionWeights(
+        PoseErrors(**(dict.fromkeys(PoseErrors.__dataclass_fields__, 0.0) | {"mount_rad": 0.005})), 1e-6
+    )
 
     def factor(time_us, heading):
         return weights.take(
-            time_us, height_m=60.0, q_ned_from_frd=from_euler(0.0, 0.0, heading), q_frd_from_mount=DOWN, ray=(0.0, 0.0)
+            time_us,
+            height_m=60.0,
+            q_ned_from_frd=from_euler(0.0, 0.0, heading),
+            q_frd_from_mount=DOWN,
+            ray=(0.0, 0.0),
         )
 
     assert factor(0, 0.0) == 1.0

@@ -9,7 +9,9 @@ import pytest
 from estimators.vision.clock_check import ClockCheck
 
 DOWN = (0.0, -0.5 * math.pi, 0.0)
-GROUND = cv2.GaussianBlur(np.random.default_rng(3).integers(0, 256, (600, 600, 3)).astype(np.uint8), (0, 0), 2.5)
+GROUND = cv2.GaussianBlur(
+    np.random.default_rng(3).integers(0, 256, (600, 600, 3)).astype(np.uint8), (0, 0), 2.5
+)
 
 
 def seen(yaw_rad, north_m):

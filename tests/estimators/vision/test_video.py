@@ -1,10 +1,11 @@
 """Pictures from videos: lossless recordings, streams that break off, and the times of their pictures."""
 
 import asyncio
-import threading
-from fractions import Fraction
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 
@@ -30,16 +31,32 @@ def messages_of(taken, parameters=DETECTOR):
     return sent, watch
 
 
+def write_film(path, taken):
+    with Film(path, width_px=320, height_px=240) as film:
+        for time_us, pixels in taken:
+            film.write(time_us - CAMERA.start_us, pixels)
+    return path
+
+
+@contextmanager
+def serving(port, film, first, last, rounds=1):
+    """A stream of pictures of a film, in a process of its own."""
+    words = [str(word) for word in (port, film, first, last, rounds)]
+    command = [sys.executable, "-m", "tests.estimators.vision.stream_server", *words]
+    with subprocess.Popen(command, cwd=Path(__file__).parents[3]) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
 @pytest.fixture(scope="module")
 def taken():
     return pictures(6)
 
 
 def test_a_lossless_video_has_the_same_detections_as_the_pictures_themselves(taken, tmp_path):
-    path = tmp_path / "film.mp4"
-    with Film(path, width_px=320, height_px=240) as film:
-        for time_us, pixels in taken:
-            film.write(time_us - CAMERA.start_us, pixels)
+    path = write_film(tmp_path / "film.mp4", taken)
     read = [(CAMERA.start_us + frame.time_us, frame.pixels) for frame in frames_of(str(path))]
     assert [time_us for time_us, _ in read] == [time_us for time_us, _ in taken]
     assert all(np.array_equal(a, b) for (_, a), (_, b) in zip(read, taken, strict=True))
@@ -62,13 +79,13 @@ def test_an_empty_picture_is_reported_as_such(taken):
 
 
 def test_what_is_no_video_is_named(tmp_path):
-    with pytest.raises(VideoError, match="can't open the video .*missing.mp4"):
+    with pytest.raises(VideoError, match=r"can't open the video .*missing.mp4"):
         next(frames_of(str(tmp_path / "missing.mp4")))
     path = tmp_path / "text.mp4"
     path.write_text("no video", encoding="utf-8")
-    with pytest.raises(VideoError, match="can't open the video .*text.mp4"):
+    with pytest.raises(VideoError, match=r"can't open the video .*text.mp4"):
         next(frames_of(str(path)))
-    with pytest.raises(VideoError, match="can't create the video .*text.mp4"):
+    with pytest.raises(VideoError, match=r"can't create the video .*text.mp4"):
         Film(path, width_px=320, height_px=240)
     assert is_stream("rtsp://127.0.0.1:8554/camera1") and not is_stream("/a/film.mp4")
 
@@ -107,7 +124,7 @@ def test_descriptions_that_are_none_are_refused(tmp_path, text, message):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(EstimatorError, match=message):
         load_camera(path)
-    with pytest.raises(EstimatorError, match="can't read"):
+    with pytest.raises(EstimatorError, match=r"can't read"):
         load_camera(tmp_path / "missing.toml")
 
 
@@ -122,24 +139,10 @@ def test_times_of_a_stream_have_the_least_delay_of_the_network():
     assert clock.exposed_us(9_000_000, 7, latency_s=0.1, rate=4.0) == 8_900_000
 
 
-def serve(port, taken):
-    """Send pictures to the first player that connects, without loss, and close the connection."""
-    with av.open(f"tcp://127.0.0.1:{port}?listen=1", "w", format="nut") as container:
-        stream = container.add_stream("ffv1", rate=10)
-        stream.width, stream.height, stream.pix_fmt = 320, 240, "bgr0"
-        stream.codec_context.time_base = Fraction(1, 1000)
-        for k, (_, pixels) in enumerate(taken):
-            frame = av.VideoFrame.from_ndarray(pixels, format="bgr24")
-            frame.pts, frame.time_base = 100 * k, Fraction(1, 1000)
-            for packet in stream.encode(frame):
-                container.mux(packet)
-        for packet in stream.encode(None):
-            container.mux(packet)
-
-
-def test_a_stream_that_ends_is_opened_again_when_it_returns(taken):
-    """Two servers, one after the other, of other pictures; without loss, so that they are the same to the bit."""
-    port = free_port()
+@pytest.mark.slow
+def test_a_stream_that_ends_is_opened_again_when_it_returns(taken, tmp_path):
+    """Two servers, one after the other, of other pictures; without loss, so they are the same to the bit."""
+    port, path = free_port(), write_film(tmp_path / "film.mp4", taken)
 
     async def received(live, picture):
         while True:
@@ -149,13 +152,15 @@ def test_a_stream_that_ends_is_opened_again_when_it_returns(taken):
 
     async def watch():
         live = LivePictures(
-            f"tcp://127.0.0.1:{port}", now_us=lambda: 3_000_000, rate=lambda: 1.0, latency_s=0.1, timeout_s=20.0
+            f"tcp://127.0.0.1:{port}",
+            now_us=lambda: 3_000_000,
+            rate=lambda: 1.0,
+            latency_s=0.1,
+            timeout_s=20.0,
         )
-        for part in (taken[:3], taken[3:]):
-            server = threading.Thread(target=serve, args=(port, part), daemon=True)
-            server.start()
-            await asyncio.wait_for(received(live, part[-1][1]), 60.0)
-            server.join()
+        for first, last in ((0, 3), (3, 6)):
+            with serving(port, path, first, last):
+                await asyncio.wait_for(received(live, taken[last - 1][1]), 100.0)
         live.close()
         return live
 

@@ -5,21 +5,19 @@ import math
 import socket
 import threading
 import time
-from fractions import Fraction
 
-import av
 import pytest
 
-from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
 from autopilot_bridge.mavlink.camera_scan import read_camera_scan
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from estimators.errors import EstimatorError
-from estimators.vision.video import Film
+from estimators.messages import read_message
 from missions.cli.main import run_command_line
 from missions.estimation.vision import VisionRequest, watch
 from tests.clients.sitl_process import free_port
 from tests.estimators.vision.pictures import CAMERA, pictures
-from tests.estimators.vision.test_video import DETECTOR, messages_of
+from tests.estimators.vision.test_video import DETECTOR, messages_of, serving, write_film
 
 EPOCH_US = 1_735_689_600_000_000
 
@@ -43,9 +41,7 @@ def taken():
 @pytest.fixture
 def recording(tmp_path, taken):
     """A video and its camera's file."""
-    with Film(tmp_path / "film.mp4", width_px=320, height_px=240) as film:
-        for time_us, pixels in taken:
-            film.write(time_us - CAMERA.start_us, pixels)
+    write_film(tmp_path / "film.mp4", taken)
     (tmp_path / "camera.toml").write_text(CAMERA.toml(), encoding="utf-8")
     return tmp_path
 
@@ -81,11 +77,11 @@ def test_the_log_gets_the_messages_of_the_pictures_when_they_would_have_come(rec
     result = watch(request(recording))
     found = of_camera(result.folder / "flight.tlog")
     assert [frame.raw for _, frame in found] == messages_of(taken)[0]  # in place of the camera's own
+    scans = [(sent_us, read_message(frame)) for sent_us, frame in found if frame.definition.name == "TUNNEL"]
     ends = [
-        (time_us - EPOCH_US, read_camera_scan(*map(frame.decode().__getattribute__, (
-            "payload_type", "payload_length", "payload"))).time_us)
-        for time_us, frame in found if frame.definition.name == "TUNNEL"
-    ]  # fmt: skip
+        (sent_us - EPOCH_US, read_camera_scan(m.payload_type, m.payload_length, m.payload).time_us)
+        for sent_us, m in scans
+    ]
     assert [exposed_us for _, exposed_us in ends] == [time_us for time_us, _ in taken]
     assert all(100_000 < sent_us - exposed_us <= 140_000 for sent_us, exposed_us in ends)
     summary = json.loads((result.folder / "summary.json").read_text(encoding="utf-8"))
@@ -127,22 +123,6 @@ def test_bad_requests_name_what_is_wrong(recording, tmp_path, capsys):
     assert "can't open the video" in capsys.readouterr().err
 
 
-def serve(port, taken, stopped):
-    """Send the pictures again and again at 10 Hz, without loss."""
-    with av.open(f"tcp://127.0.0.1:{port}?listen=1", "w", format="nut") as container:
-        stream = container.add_stream("ffv1", rate=10)
-        stream.width, stream.height, stream.pix_fmt = 320, 240, "bgr0"
-        stream.codec_context.time_base = Fraction(1, 1000)
-        number = 0
-        while not stopped.is_set():
-            frame = av.VideoFrame.from_ndarray(taken[number % len(taken)][1], format="bgr24")
-            frame.pts, frame.time_base = 100 * number, Fraction(1, 1000)
-            for packet in stream.encode(frame):
-                container.mux(packet)
-            number += 1
-            time.sleep(0.1)
-
-
 def send_attitudes(port, stopped):
     """A vehicle's attitude and heartbeat, in real time."""
     encoder, begun_s = FrameEncoder(1, 1), time.monotonic()
@@ -177,17 +157,18 @@ def live():
 @pytest.mark.slow
 def test_a_live_stream_becomes_messages_on_the_link(recording, taken, live):
     video, link = free_port(), free_port()
-    live(serve, video, taken)
     live(send_attitudes, link)
-    result = watch(
-        request(
-            recording,
-            log=None,
-            connect=f"udpin:127.0.0.1:{link}",
-            video=f"tcp://127.0.0.1:{video}",
-            duration_s=8.0,
+    with serving(video, recording / "film.mp4", 0, 6, 200):
+        result = watch(
+            request(
+                recording,
+                log=None,
+                connect=f"udpin:127.0.0.1:{link}",
+                video=f"tcp://127.0.0.1:{video}",
+                duration_s=10.0,
+                silence_s=30.0,
+            )
         )
-    )
     summary = result.summary
     assert (result.outcome, result.reason) == ("completed", "")
     assert summary["frames"] > 20 and summary["frames_without_attitude"] == 0
@@ -199,8 +180,6 @@ def test_a_live_stream_becomes_messages_on_the_link(recording, taken, live):
 
 
 def _frame(raw):
-    from autopilot_bridge.mavlink import FrameParser
-
     (frame,) = FrameParser().feed(raw)
     return frame
 
