@@ -1,5 +1,5 @@
-"""Serves a lossless video to the first player that connects, once, without loss: a process of its own, because
-FFmpeg waits for the player.
+"""Serves a lossless video to the first player that connects, once: a process of its own, because FFmpeg waits
+for the player.
 
     python -m tests.estimators.vision.stream_server PORT FILE FIRST LAST [ROUNDS]
 """
