@@ -15,13 +15,13 @@ from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import wrap_pi
 from missions.errors import MissionError
 from missions.kind import VehicleKind
+from missions.layers import Layers
 from missions.multi_target.options import StepLawKind
 from missions.multi_target.planner import Place
 from missions.multi_target.search import HEADING_RAD
 from missions.multi_target.steps import BacksteppingLaw, StepLaw, TrajectoryLaw
-from missions.occupancy.steering import steering
-from missions.occupancy.traffic import Traffic
 from missions.planning.limits import Limits, MulticopterLimits
+from missions.steering import steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.firmware import Mode
 from missions.vehicle.setpoint import Setpoint, Vector
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 SEARCH: Final = "search"
 """Name of the phase in which a vehicle searches."""
 
-_TAKEOFF_S: Final = 300.0
-_LANDING_S: Final = 900.0
 _TURN_S: Final = 4.0  # for the turn to the heading of the search
 _POSITION_HZ: Final = {StepLawKind.TRAJECTORY: 10.0, StepLawKind.BACKSTEPPING: 50.0}
 """The backstepping law closes a loop over position and velocity; the other one only watches the arrival."""
@@ -179,7 +177,12 @@ class SearchTeam(Generic[Options]):
         self._options = tuple(options)
         self._check, self._component, self._rates_hz = check, component, rates_hz
         self.searchers = [Searcher() for _ in vehicles]
-        self._traffic = Traffic([own.own_altitude_m for own in options])
+        first = options[0]
+        self._layers = Layers(
+            vehicles,
+            [own.own_altitude_m for own in options],
+            busy_s=4.0 * first.steps * first.step_length_m / (first.speed_m_s or 1.0),
+        )
         self._frame = LocalFrame(vehicles[0].home)
         self._scan_us = -1
 
@@ -200,7 +203,7 @@ class SearchTeam(Generic[Options]):
             self.watch.stop()
 
     async def _fly_one(self, index: int) -> None:
-        vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic
+        vehicle, own = self._vehicles[index], self._options[index]
         notes, clock = vehicle.notes, vehicle.clock
         notes.begin("checks", clock.stamp_us)
         limits = await vehicle.limits(own.own_altitude_m)
@@ -212,11 +215,7 @@ class SearchTeam(Generic[Options]):
         await vehicle.commands.request("HOME_POSITION", 3.0)
         if vehicle.kind is VehicleKind.FIXED_WING:
             await vehicle.wing.prepare_piloting()
-        traffic.checked(index)
-        await self._wait(vehicle, lambda: traffic.may_rise(index), "the layers above to be taken", _TAKEOFF_S)
-        notes.begin("takeoff", clock.stamp_us)
-        await vehicle.takeoff(own.own_altitude_m)
-        traffic.risen(index)
+        await self._layers.take_off(index)
         if index == 0:
             self._frame = LocalFrame(vehicle.home)  # arming has set the home again
         if not self.search.over:
@@ -228,41 +227,7 @@ class SearchTeam(Generic[Options]):
         if self.search.over:
             self.watch.stop()  # the way home is no part of the search
         self.searchers[index].ended_us = clock.time_us
-        notes.begin("return", clock.stamp_us)
-        if not traffic.may_land(index):
-            await vehicle.hold()
-            await self._wait(
-                vehicle,
-                lambda: traffic.may_land(index),
-                "the layers below to be empty",
-                _LANDING_S,
-                flying=True,
-            )
-        if vehicle.kind is VehicleKind.FIXED_WING:
-            await vehicle.wing.land_along()
-        else:
-            await vehicle.return_to_launch(timeout_s=_LANDING_S)
-        traffic.down(index)
-        notes.end(clock.stamp_us)
-
-    async def _wait(
-        self, vehicle: "Vehicle", ready: Callable[[], bool], what: str, one_s: float, *, flying: bool = False
-    ) -> None:
-        """Wait for the other vehicles; the time limit grows with their number."""
-
-        def look() -> bool:
-            if flying and not vehicle.armed:
-                raise MissionError(
-                    f"the vehicle disarmed while it waited for {what}; {vehicle.link.last_received()}"
-                )
-            return ready()
-
-        own = self._options[0]
-        step_s = own.step_length_m / (own.speed_m_s or 1.0)
-        searching_s = 0.0 if flying else 4.0 * own.steps * step_s
-        await vehicle.link.wait_until(
-            look, what=what, on=("HEARTBEAT",), timeout_s=searching_s + one_s * len(self._vehicles)
-        )
+        await self._layers.land(index)
 
     # the search
 

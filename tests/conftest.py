@@ -9,6 +9,7 @@ import gc
 import os
 import signal
 import sys
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -62,8 +63,28 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+def leave_samples(items: Sequence[pytest.Item]) -> None:
+    """Mark as slow what is left out of the `sampled` tests.
+
+    The cases of a test are mostly the flavours, vehicles or links for which the same is shown. Where the
+    sample begins follows from the test's name, so each flavour is in the samples of half of the tests.
+    """
+    tests: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("sampled") and not item.get_closest_marker("slow"):
+            tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for name, cases in tests.items():
+        (count,) = next(cases[0].iter_markers("sampled")).args
+        begin = zlib.crc32(name.encode())
+        sample = {(begin + k * len(cases) // count) % len(cases) for k in range(count)}
+        for index, item in enumerate(cases):
+            if index not in sample:
+                item.add_marker("slow")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    leave_samples(items)
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:
         files.setdefault(item.path, []).append(item)

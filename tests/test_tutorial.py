@@ -1,28 +1,27 @@
 """`docs/tutorial.md` as a student works through it: its files are saved, its commands run in their order."""
 
+import contextlib
 import json
-import os
 import re
 import shlex
 import signal
 import socket
-import subprocess
-import sys
 from pathlib import Path
 from typing import Final
 
 import pytest
 
+from tests.clients.forked_process import flightstack, flightstack_done
 from tests.documented_commands import commands_in
 
 TUTORIAL: Final = (Path(__file__).parents[1] / "docs" / "tutorial.md").read_text(encoding="utf-8")
 PORT: Final = "5790"
 
 
-def run(line: str, folder: Path) -> str:
-    words = [sys.executable, "-m", "missions", *shlex.split(line)[1:]]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False, timeout=200.0)
+def run(line: str) -> str:
+    done = flightstack_done(*shlex.split(line)[1:])
     assert done.returncode == 0, (line, done.stderr)
+    assert isinstance(done.stdout, str)
     return done.stdout
 
 
@@ -31,16 +30,14 @@ def free_port() -> str:
         return str(server.getsockname()[1])
 
 
-def on_a_link(serve: str, fly: str, folder: Path) -> str:
-    words = [sys.executable, "-m", "missions", *shlex.split(serve)[1:]]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True, env=environment) as server:
-        try:
-            assert server.stdout is not None
-            next(line for line in server.stdout if "tcpin" in line)
-            return run(fly, folder)
-        finally:
-            server.send_signal(signal.SIGINT)
+def on_a_link(serve: str, fly: str) -> str:
+    server = flightstack(*shlex.split(serve)[1:], merged=True)
+    try:
+        next(line for line in server.stdout if "tcpin" in line)
+        return run(fly)
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=60.0)
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +50,9 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, s
     lines = [line.replace(PORT, port) for line in commands_in(TUTORIAL)]
     *alone, serve, fly = lines
     assert "sitl" in serve
-    outputs = {line: run(line, folder) for line in alone}
-    outputs[fly] = on_a_link(serve, fly, folder)
+    with contextlib.chdir(folder):
+        outputs = {line: run(line) for line in alone}
+        outputs[fly] = on_a_link(serve, fly)
     return folder, outputs
 
 

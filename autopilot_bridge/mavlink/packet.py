@@ -22,7 +22,7 @@ class Packet:
 
     __slots__ = ("_frames", "_starts", "data", "message_ids")
 
-    def __init__(self, data: bytes, message_ids: Sequence[int]) -> None:
+    def __init__(self, data: bytes, message_ids: tuple[int, ...]) -> None:
         self.data = data
         self.message_ids = message_ids
         self._frames: list[Frame] | None = None
@@ -33,7 +33,7 @@ class Packet:
         """The packet of one or more frames of one component, of any MAVLink version, signed or not."""
         packet = cls(
             b"".join([frame.raw for frame in frames]) if len(frames) > 1 else frames[0].raw,
-            [frame.message_id for frame in frames],
+            tuple([frame.message_id for frame in frames]),
         )
         packet._frames = list(frames)
         return packet

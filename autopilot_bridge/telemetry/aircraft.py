@@ -101,3 +101,18 @@ class AircraftState:
         if reading.time_us < 0:
             return None
         return float(reading.values[interface.AIRSPEED_DIFFERENTIAL_PRESSURE_PA])
+
+
+class AircraftAir:
+    """What both firmwares' common messages report of the air around an aircraft."""
+
+    _aircraft: AircraftState
+
+    def airspeed_m_s(self) -> float:
+        """VFR_HUD's airspeed."""
+        return self._aircraft.airspeed_m_s
+
+    def differential_pressure_hpa(self) -> float:
+        """SCALED_PRESSURE's pitot pressure."""
+        pressure_pa = self._aircraft.pitot_pressure_pa
+        return 0.0 if pressure_pa is None else pressure_pa * 0.01

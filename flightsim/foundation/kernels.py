@@ -17,7 +17,8 @@ from enum import Enum
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from threading import Event
+from typing import Any, BinaryIO, Final, TypeVar
 
 import numba
 import numpy as np
@@ -31,18 +32,26 @@ try:  # Numba promises nothing of these; tests/flightsim/foundation/test_kernels
 except ImportError:  # then Numba's own cache serves, and kernels are called with all their arguments
     dumps = None
 
+try:
+    import fcntl
+except ImportError:  # not on Windows: there every process compiles
+    fcntl = None  # type: ignore[assignment]
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PLAIN: Final = (bool, int, float, complex, str, bytes, type(None), slice, range, np.generic, np.dtype)
 _STAMP_DIGITS: Final = 16
 _BLAS: Final = "scipy.linalg.cython_blas"
+_TURN_CHECK_S: Final = 0.02
+_TURN_CHECKS: Final = 3000  # a process that was stopped while it compiles must not stop all others
 
 
 def kernel(function: Function) -> Function:
     """Compile a function with `numba.njit` on first use and keep the machine code from run to run.
 
     The code is stored beside the module, or in the user's cache folder if that place is not writable; if
-    neither is writable, every process compiles again. Any number of processes may compile at the same time.
+    neither is writable, every process compiles again. Of several processes that need the same code at once,
+    one compiles it and the others wait for it.
     """
     try:
         dispatcher = numba.njit(cache=True)(function)
@@ -60,13 +69,24 @@ def _keep(dispatcher: Any, file: "_CacheFile") -> None:
     """Keep the machine code of a function in this file."""
     cache = dispatcher._cache
     cache._cache_file = file
-    cache.load_overload = partial(_load, cache.load_overload)
+    cache.load_overload = partial(_load, cache.load_overload, file)
+    dispatcher.compile = partial(_compile, dispatcher.compile, file)
 
 
-def _load(load_overload: Callable[..., Any], *arguments: Any) -> Any:
+def _load(load_overload: Callable[..., Any], file: "_CacheFile", *arguments: Any) -> Any:
     """Machine code from the cache, or None; the first thing that Numba does with a kernel that is used."""
     _import_array_functions()
-    return load_overload(*arguments)
+    found = load_overload(*arguments)
+    if found is None and file.begin_turn():  # another process may have compiled it in the meantime
+        found = load_overload(*arguments)
+    return found
+
+
+def _compile(compile_now: Callable[..., Any], file: "_CacheFile", *arguments: Any) -> Any:
+    try:
+        return compile_now(*arguments)
+    finally:
+        file.end_turn()
 
 
 @cache
@@ -287,6 +307,7 @@ class _CacheFile:
         self._base = base
         self._function = function
         self._variant = variant
+        self._turn: BinaryIO | None = None
 
     def beside(self, name: str, function: Callable[..., Any], variant: str) -> "_CacheFile":
         """The file of a function that calls the kernel, in one of several variants with separate files."""
@@ -310,6 +331,36 @@ class _CacheFile:
             finally:
                 part.unlink(missing_ok=True)
             self._remove(keep=path.name.split(".")[-3])
+
+    def begin_turn(self) -> bool:
+        """Wait until no other process compiles the kernel, for a limited time. False: there was no wait."""
+        if fcntl is None or self._turn is not None:  # a kernel that calls itself with other types
+            return False
+        with suppress(OSError):  # a folder that is not writable, or a file system without locks
+            pause = Event()
+            turn = open(self._turn_path, "wb")  # noqa: SIM115  # until the end of the turn
+            for _ in range(_TURN_CHECKS):
+                try:
+                    fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    pause.wait(_TURN_CHECK_S)
+                else:
+                    self._turn = turn
+                    return True
+            turn.close()
+        return False
+
+    def end_turn(self) -> None:
+        """Let another process compile; nothing if this one did not."""
+        turn, self._turn = self._turn, None
+        if turn is not None:
+            with suppress(OSError):
+                self._turn_path.unlink()
+            turn.close()
+
+    @property
+    def _turn_path(self) -> Path:
+        return self._folder / f"{self._base}.lock"
 
     def flush(self) -> None:
         """Forget everything."""

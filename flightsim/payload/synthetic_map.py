@@ -16,20 +16,17 @@ from numpy.typing import NDArray
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
 from flightsim.foundation.main_field import MainField
 from flightsim.home import Home
+from flightsim.payload.area_grid import AreaGrid
 from flightsim.payload.magnetic_map import MagneticMap
 
 Array = NDArray[np.float64]
 
-_MAX_POINTS = 4_000_000
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SyntheticMapParameters:
+class SyntheticMapParameters(AreaGrid):
     """A map to be made.
 
     Attributes:
-        south_m, west_m, north_m, east_m: edges, local NED of home.
-        spacing_m: of the grid lines; edges are stretched to the next line.
         height_m: above home, what the map is valid at: the height to fly at.
         anomaly_nt: root mean square of the anomaly.
         source_depth_m: of the rock below the survey height.
@@ -54,40 +51,11 @@ class SyntheticMapParameters:
     raised_m: float = 0.0
 
     def __post_init__(self) -> None:
-        require_finite(
-            south_m=self.south_m,
-            west_m=self.west_m,
-            north_m=self.north_m,
-            east_m=self.east_m,
-            height_m=self.height_m,
-        )
-        require_positive(spacing_m=self.spacing_m, source_depth_m=self.source_depth_m)
-        require_positive(shallow_depth_m=self.shallow_depth_m)
-        require_not_negative(shallow_anomaly_nt=self.shallow_anomaly_nt)
-        require_not_negative(raised_m=self.raised_m)
+        AreaGrid.__post_init__(self)
+        require_finite(height_m=self.height_m)
+        require_positive(source_depth_m=self.source_depth_m, shallow_depth_m=self.shallow_depth_m)
+        require_not_negative(shallow_anomaly_nt=self.shallow_anomaly_nt, raised_m=self.raised_m)
         require_not_negative(anomaly_nt=self.anomaly_nt, spectral_exponent=self.spectral_exponent)
-        for low, high, names in (
-            (self.south_m, self.north_m, "south_m and north_m"),
-            (self.west_m, self.east_m, "west_m and east_m"),
-        ):
-            if not high - low >= self.spacing_m:
-                raise ValueError(
-                    f"{names} = {low}, {high} are not accepted: apart by {self.spacing_m} m or more is"
-                )
-        rows, columns = self.shape
-        if rows * columns > _MAX_POINTS:
-            raise ValueError(
-                f"spacing_m = {self.spacing_m} is not accepted: it makes {rows} x {columns} points; "
-                f"up to {_MAX_POINTS} are"
-            )
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns of the grid."""
-        return (
-            math.ceil((self.north_m - self.south_m) / self.spacing_m - 1e-9) + 1,
-            math.ceil((self.east_m - self.west_m) / self.spacing_m - 1e-9) + 1,
-        )
 
 
 def synthetic_map(

@@ -14,63 +14,35 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_positive
+from flightsim.foundation.checks import require_positive
 from flightsim.foundation.random_streams import RandomStreams
+from flightsim.payload.area_grid import AreaGrid
 
 Array = NDArray[np.float64]
 
-_MAX_POINTS: Final = 4_000_000
 _STEPS_PER_LINE: Final = 2.0  # samples of a line of sight per grid spacing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TerrainSpec:
-    """Terrain to be generated. Edges are local NED of home.
+class TerrainSpec(AreaGrid):
+    """Terrain to be generated; beyond its edges it continues with its edge heights.
 
     Attributes:
-        south_m, west_m, north_m, east_m: edges; beyond them the terrain continues with its edge heights.
-        spacing_m: distance of the grid lines.
         relief_m: standard deviation of the heights.
         hurst: Hurst exponent; a larger one makes smoother ground.
         stream: number of the terrain; terrains of one seed with different numbers are independent.
     """
 
-    south_m: float
-    west_m: float
-    north_m: float
-    east_m: float
     spacing_m: float = 5.0
     relief_m: float = 10.0
     hurst: float = 0.8
     stream: int = 0
 
     def __post_init__(self) -> None:
-        require_finite(south_m=self.south_m, west_m=self.west_m, north_m=self.north_m, east_m=self.east_m)
-        require_positive(spacing_m=self.spacing_m, relief_m=self.relief_m)
+        AreaGrid.__post_init__(self)
+        require_positive(relief_m=self.relief_m)
         if not 0.0 < self.hurst < 1.0:
             raise ValueError(f"hurst = {self.hurst} is not accepted: a number between 0 and 1 is")
-        for low, high, names in (
-            (self.south_m, self.north_m, "south_m and north_m"),
-            (self.west_m, self.east_m, "west_m and east_m"),
-        ):
-            if not high - low >= self.spacing_m:
-                raise ValueError(
-                    f"{names} = {low}, {high} are not accepted: apart by {self.spacing_m} m or more is"
-                )
-        rows, columns = self.shape
-        if rows * columns > _MAX_POINTS:
-            raise ValueError(
-                f"spacing_m = {self.spacing_m} is not accepted: it makes {rows} x {columns} points; "
-                f"up to {_MAX_POINTS} are"
-            )
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns of the grid."""
-        return (
-            math.ceil((self.north_m - self.south_m) / self.spacing_m - 1e-9) + 1,
-            math.ceil((self.east_m - self.west_m) / self.spacing_m - 1e-9) + 1,
-        )
 
     def made(self, seed: int) -> "Terrain":
         """The terrain of a world's seed."""

@@ -1,7 +1,7 @@
 """One flight of a team that searches together, including takeoff and landing of every vehicle."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
@@ -12,14 +12,14 @@ from estimators.occupancy.placed_readings import PlacedReading
 from estimators.occupancy.survey_map import SurveyMap
 from missions.errors import MissionError
 from missions.kind import VehicleKind
+from missions.layers import Layers
 from missions.occupancy.field_watch import FieldWatch
 from missions.occupancy.investigation import Identify, Investigation
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
-from missions.occupancy.steering import Steering, steering
-from missions.occupancy.traffic import Traffic
+from missions.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.firmware import Mode
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
@@ -33,8 +33,6 @@ SEARCH: Final = "search"
 
 _FIELD_YEAR: Final = 2026.0  # of the main field, whose direction changes little
 
-_TAKEOFF_S: Final = 300.0  # longest time of one vehicle's takeoff, for the vehicles that wait for it
-_LANDING_S: Final = 900.0
 _MODE_AGE_US: Final = 2_500_000  # within this time heartbeats report a change of mode
 _RING: Final = 0.25  # of the area: distance from its centre at which the searchers of a team start
 
@@ -99,7 +97,7 @@ class SearchTeam:
         self._options = tuple(options)
         self._map = survey_map
         self._frame = survey_map.frame()
-        self._traffic = Traffic([own.own_altitude_m for own in options])
+        self._layers = Layers(vehicles, [own.own_altitude_m for own in options], busy_s=first.search_time_s)
         # vehicles that are not embedded boot at different times: the first one's clock is the team's
         now_us = self._vehicles[0].clock.time_us
         self._offsets_us = [now_us - vehicle.clock.stamp_us for vehicle in self._vehicles]
@@ -122,15 +120,11 @@ class SearchTeam:
         await run_concurrently([self._fly_one(index) for index in range(len(self._vehicles))])
 
     async def _fly_one(self, index: int) -> None:
-        vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic
+        vehicle, own = self._vehicles[index], self._options[index]
         notes, clock = vehicle.notes, vehicle.clock
         notes.begin("checks", clock.stamp_us)
         await self._check(vehicle, own)
-        traffic.checked(index)
-        await self._wait(vehicle, lambda: traffic.may_rise(index), "the layers above to be taken", _TAKEOFF_S)
-        notes.begin("takeoff", clock.stamp_us)
-        await vehicle.takeoff(own.own_altitude_m)
-        traffic.risen(index)
+        await self._layers.take_off(index)
         notes.begin(SEARCH, clock.stamp_us)
         if not self.over:
             speed_m_s = own.speed_m_s or 0.0
@@ -139,22 +133,7 @@ class SearchTeam:
             ) as flight:
                 await self._search(index, flight)
         self.search.leave(index)
-        notes.begin("return", clock.stamp_us)
-        if not traffic.may_land(index):
-            await vehicle.hold()
-            await self._wait(
-                vehicle,
-                lambda: traffic.may_land(index),
-                "the layers below to be empty",
-                _LANDING_S,
-                flying=True,
-            )
-        if vehicle.kind is VehicleKind.FIXED_WING:
-            await vehicle.wing.land_along()
-        else:
-            await vehicle.return_to_launch(timeout_s=_LANDING_S)
-        traffic.down(index)
-        notes.end(clock.stamp_us)
+        await self._layers.land(index)
 
     async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
         """Check what needs a received vehicle, while the vehicle still stands on the ground."""
@@ -165,23 +144,6 @@ class SearchTeam:
         await require_quiet(vehicle, threshold_nt=own.threshold_nt)
         if vehicle.kind is VehicleKind.FIXED_WING:
             await vehicle.wing.prepare_piloting()
-
-    async def _wait(
-        self, vehicle: "Vehicle", ready: Callable[[], bool], what: str, one_s: float, *, flying: bool = False
-    ) -> None:
-        """Wait for the other vehicles; the time limit grows with their number."""
-
-        def look() -> bool:
-            if flying and not vehicle.armed:
-                raise MissionError(
-                    f"the vehicle disarmed while it waited for {what}; {vehicle.link.last_received()}"
-                )
-            return ready()
-
-        searching_s = 0.0 if flying else self._options[0].search_time_s
-        await vehicle.link.wait_until(
-            look, what=what, on=("HEARTBEAT",), timeout_s=searching_s + one_s * len(self._vehicles)
-        )
 
     async def _search(self, index: int, flight: Steering) -> None:
         """Fly from cell to cell until the search is over."""

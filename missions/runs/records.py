@@ -91,30 +91,31 @@ class FlightRecorder:
     def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
         self.failure = ""
         self._log = log
-        self._write = log.write
+        self._write: Callable[[int, bytes], None] = log.write
         self._epoch_us = epoch_us
         self._unix_time_us = unix_time_us
         self._unlogged: tuple[list[int], list[bytes]] = [], []
 
     def record(self, packet: Packet, time_us: int) -> None:
         """Log frames that were sent or received together at vehicle time `time_us`."""
-        self._keep(packet.data, time_us)
+        self.record_truth(time_us, packet.data)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Log one frame of truth."""
-        self._keep(frame, time_us)
-
-    def _keep(self, packet: bytes, time_us: int) -> None:
         stamp_us = self._unix_time_us() if self._epoch_us is None else self._epoch_us + time_us
-        if self.failure:
-            times_us, packets = self._unlogged
-            times_us.append(stamp_us)
-            packets.append(packet)
-            return
         try:
-            self._write(stamp_us, packet)
+            self._write(stamp_us, frame)
         except TlogError as error:
-            self.failure = str(error)
+            self._fail(error)
+
+    def _fail(self, error: TlogError) -> None:
+        self.failure = self.failure or str(error)
+        self._write = self._keep_unlogged
+
+    def _keep_unlogged(self, stamp_us: int, packet: bytes) -> None:
+        times_us, packets = self._unlogged
+        times_us.append(stamp_us)
+        packets.append(packet)
 
     def flush(self) -> None:
         """Pass all data to the operating system, so that `failure` is up to date."""
@@ -134,4 +135,4 @@ class FlightRecorder:
         try:
             write()
         except TlogError as error:
-            self.failure = self.failure or str(error)
+            self._fail(error)

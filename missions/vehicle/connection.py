@@ -41,6 +41,7 @@ _HEARTBEAT_PERIOD_S: Final = 1.0
 _STREAM_LIMIT: Final = 4096
 _AT_ONCE: Final = 64  # largest number of messages that are read in a row without giving other tasks a turn
 _TIMESTAMPED: Final = {2: 8, 30: 0, 31: 0, 32: 0, 33: 0}  # message id: offset of time_boot_ms in the payload
+_MOST_LOOKED_UP: Final = 1024  # on a link packets may have any message ids
 _POLL_S: Final = 0.002  # for links without a file descriptor
 
 
@@ -58,6 +59,9 @@ class Recorder(Protocol):
 
 
 Listener = Callable[[Frame], None]
+Wanted = tuple[tuple[int, int], ...]
+"""Index in a packet, and message id, of each frame that has listeners."""
+_NOT_LOOKED_UP: Final[Wanted] = ((-1, -1),)
 
 
 class Connection:
@@ -102,6 +106,7 @@ class Connection:
         self._listeners: dict[int, list[Listener]] = {}
         # listeners that depend on the order, by message id; packets with a key are looked at more closely too
         self._in_order = Counter([SETUP_SIGNING])
+        self._wanted: dict[tuple[int, ...], Wanted | None] = {}  # by message ids of a packet
         self._observed = clock if isinstance(clock, TelemetryClock) else None
         self._clock_source = vehicle_system_id
         self._tasks: list[asyncio.Task[None]] = []
@@ -171,17 +176,32 @@ class Connection:
             self._on_packet(Packet.of([frame]))
 
     def _on_packet(self, packet: Packet) -> None:
-        listeners = self._listeners
-        if not self._recorder_acts and self._in_order.keys().isdisjoint(packet.message_ids):
-            if self._recorder is not None:
-                self._recorder.record(packet, self.clock.time_us)
-            self._newest.put(packet)
-            for index, message_id in enumerate(packet.message_ids):
-                if message_id in listeners:
-                    frame = packet.frame(index)
-                    for listener in tuple(listeners[message_id]):
-                        listener(frame)
+        wanted = self._wanted.get(packet.message_ids, _NOT_LOOKED_UP)
+        if wanted is _NOT_LOOKED_UP:
+            wanted = self._look_up(packet.message_ids)
+        if wanted is None:
+            self._on_frames(packet)
             return
+        if self._recorder is not None:
+            self._recorder.record(packet, self.clock.time_us)
+        self._newest.put(packet)
+        for index, message_id in wanted:
+            frame = packet.frame(index)
+            for listener in tuple(self._listeners.get(message_id, ())):
+                listener(frame)
+
+    def _look_up(self, message_ids: tuple[int, ...]) -> "Wanted | None":
+        """Which frames of such a packet have listeners. None: their order counts."""
+        wanted = None
+        if not self._recorder_acts and self._in_order.keys().isdisjoint(message_ids):
+            wanted = tuple((k, number) for k, number in enumerate(message_ids) if number in self._listeners)
+        if len(self._wanted) >= _MOST_LOOKED_UP:
+            self._wanted.clear()
+        self._wanted[message_ids] = wanted
+        return wanted
+
+    def _on_frames(self, packet: Packet) -> None:
+        listeners = self._listeners
         begin = 0
         for index, message_id in enumerate(packet.message_ids):
             if message_id in listeners:
@@ -319,11 +339,13 @@ class Connection:
         self._listeners.setdefault(message_id, []).append(listener)
         if in_order:
             self._in_order[message_id] += 1
+        self._wanted.clear()
 
         def stop() -> None:
             listeners = self._listeners.get(message_id, [])
             if listener not in listeners:
                 return
+            self._wanted.clear()
             listeners.remove(listener)
             if not listeners:
                 del self._listeners[message_id]

@@ -54,8 +54,7 @@ class NewestFrames:
         component = packet.sender
         known = self._packets.get(component)
         newest = self._add(component) if known is None else known
-        for message_id in packet.message_ids:
-            newest[message_id] = packet
+        newest.update(dict.fromkeys(packet.message_ids, packet))
 
     def _add(self, component: ComponentId) -> dict[int, Packet]:
         if len(self._packets) >= MAX_COMPONENTS:

@@ -144,6 +144,7 @@ def test_legs_count_early() -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_lands_on_the_point(flavour: str) -> None:
     """In wind that fades towards the ground."""
     corners = (*RECTANGLE[:2], (-600.0, -600.0))

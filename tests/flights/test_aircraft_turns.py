@@ -20,6 +20,7 @@ PLACE = (150.0, 150.0)
 
 
 @pytest.mark.parametrize(("flavour", "radius_m"), [("px4", 100.0), ("ardupilot", -150.0)])
+@pytest.mark.sampled(1)
 def test_circle(flavour: str, radius_m: float) -> None:
     flight = AircraftFlight(flavour, seed=2, environment=LIGHT)
     flight.take_off(80.0)
@@ -38,6 +39,7 @@ def test_circle(flavour: str, radius_m: float) -> None:
 
 
 @pytest.mark.parametrize("course", [False, True])
+@pytest.mark.sampled(1)
 def test_arduplane_heading_in_wind(course: bool) -> None:
     """MAV_CMD_GUIDED_CHANGE_HEADING: course over ground (0) or heading (1)."""
     flight = AircraftFlight("ardupilot", seed=2, environment=LIGHT)
@@ -59,6 +61,7 @@ def test_arduplane_heading_in_wind(course: bool) -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_attitude_steps(flavour: str) -> None:
     """Offboard and guided attitudes: each bank is reached within 3 s, without much overshoot."""
     flight = AircraftFlight(flavour, seed=2, environment=LIGHT)

@@ -95,6 +95,7 @@ def test_ground_station_lost_ardupilot() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_a_silent_ground_station_changes_nothing_by_default(flavour: str) -> None:
     flight = hovering(flavour)
     before = flight.mode
@@ -145,6 +146,7 @@ FENCES = {
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_the_fence_turns_the_vehicle_back(flavour: str) -> None:
     flight = hovering(flavour, **FENCES[flavour])
     guided_north(flight, 4.0)
@@ -165,6 +167,7 @@ def test_the_fence_turns_the_vehicle_back(flavour: str) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("failure", slow_after(1, [OFF, STUCK, GARBAGE]))
+@pytest.mark.sampled(1)
 def test_without_gps_the_vehicle_lands(flavour: str, failure: int) -> None:
     flight = hovering(flavour)
     lost_s = flight.time_s
@@ -183,6 +186,7 @@ def test_without_gps_the_vehicle_lands(flavour: str, failure: int) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_without_gps_at_cruise_the_vehicle_sinks_level_and_disarms(flavour: str) -> None:
     flight = hovering(flavour, height_m=20.0)
     guided_north(flight, 8.0)
@@ -244,6 +248,7 @@ def test_the_vehicle_holds_its_place_with_a_poor_sensor(unit: int, failure: int)
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("unit", [GYRO, ACCEL])
+@pytest.mark.sampled(1)
 def test_a_broken_inertial_sensor_breaks_no_software(flavour: str, unit: int) -> None:
     """There is one of each: the vehicle may crash, but numbers stay numbers and it goes on talking."""
     flight = hovering(flavour, height_m=6.0)
@@ -258,6 +263,7 @@ def test_a_broken_inertial_sensor_breaks_no_software(flavour: str, unit: int) ->
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_a_weak_motor_is_carried_and_a_dead_one_breaks_no_software(flavour: str) -> None:
     flight = hovering(flavour, height_m=8.0)
     flight.vehicle.vehicle.set_motor_effectiveness(1, 0.75)

@@ -112,6 +112,7 @@ def test_circles_to_the_left(flavour: str) -> None:
     ("flavour", "launch"),
     [("px4", "catapult"), ("ardupilot", "hand"), slow("px4", "hand"), slow("ardupilot", "catapult")],
 )
+@pytest.mark.sampled(1)
 def test_launched(flavour: str, launch: str) -> None:
     flight = AircraftFlight(flavour, launch=launch, environment=WIND)
     flight.get_ready()
@@ -133,6 +134,7 @@ def test_launched(flavour: str, launch: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_no_crew_launches_an_aircraft_that_does_not_ask(flavour: str) -> None:
     flight = AircraftFlight(flavour, launch="catapult")
     flight.get_ready()

@@ -120,6 +120,7 @@ def test_arduplane_guided_attitudes_go_on_without_gps() -> None:
 
 @pytest.mark.parametrize("failure", slow_after(1, [STUCK, OFF]))
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_airspeed_fails(flavour: str, failure: int) -> None:
     flight = circling(flavour, 80.0)
     mode = flight.mode
@@ -140,6 +141,7 @@ def test_airspeed_fails(flavour: str, failure: int) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_motor_fails(flavour: str) -> None:
     """It glides, at a speed that carries it, down to the ground."""
     flight = circling(flavour, 80.0)
@@ -182,6 +184,7 @@ def set_real(flight: AircraftFlight, name: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_battery_runs_low(flavour: str) -> None:
     if flavour == "px4":
         flight = circling(flavour, 60.0, COM_LOW_BAT_ACT=3)

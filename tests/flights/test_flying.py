@@ -57,6 +57,7 @@ def fly_with_sticks(flight: Flight, mode: str) -> dict[str, float]:
     return figures
 
 
+@pytest.mark.sampled(1)
 def test_position_mode_moves_and_stops_with_the_stick(flight: Flight) -> None:
     figures = fly_with_sticks(flight, "position" if flight.flavour == "px4" else "loiter")
     # half a stick after dead zone and expo is 0.23 (PX4) of 10 m/s; ArduPilot has less expo
@@ -68,6 +69,7 @@ def test_position_mode_moves_and_stops_with_the_stick(flight: Flight) -> None:
     assert 0.4 < figures["climb_m_s"] < 2.5
 
 
+@pytest.mark.sampled(1)
 def test_altitude_mode_tilts_with_the_stick_and_keeps_the_height(flight: Flight) -> None:
     figures = fly_with_sticks(flight, "altitude" if flight.flavour == "px4" else "alt_hold")
     assert 4.0 < figures["tilt_deg"] < 16.0
@@ -77,6 +79,7 @@ def test_altitude_mode_tilts_with_the_stick_and_keeps_the_height(flight: Flight)
     assert 0.4 < figures["climb_m_s"] < 2.5
 
 
+@pytest.mark.sampled(1)
 def test_stabilized_mode_gives_thrust_to_the_throttle(flight: Flight) -> None:
     figures = fly_with_sticks(flight, "stabilized" if flight.flavour == "px4" else "stabilize")
     assert 4.0 < figures["tilt_deg"] < 16.0
@@ -94,6 +97,7 @@ def test_loiter_without_a_pilot_holds() -> None:
     assert flight.speed_m_s < 0.3
 
 
+@pytest.mark.sampled(1)
 def test_circle(flight: Flight) -> None:
     nan = math.nan
     if flight.flavour == "px4":
@@ -145,6 +149,7 @@ def test_circle(flight: Flight) -> None:
     assert flight.mode == ("0x1030000" if flight.flavour == "px4" else "circle")
 
 
+@pytest.mark.sampled(1)
 def test_stops_at_once(flight: Flight) -> None:
     flight.repeat(10.0, lambda _: flight.position_setpoint(velocity_ned_m_s=(6.0, 0.0, 0.0)))
     flight.fly(1.0)
@@ -159,6 +164,7 @@ def test_stops_at_once(flight: Flight) -> None:
     assert 4.0 < flight.position_ned_m[0] - start_m < 13.0
 
 
+@pytest.mark.sampled(1)
 def test_reposition(flight: Flight) -> None:
     home = flight.newest["HOME_POSITION"]
     yaw = math.nan if flight.flavour == "px4" else 0.0
@@ -192,6 +198,7 @@ def test_reposition(flight: Flight) -> None:
     assert (4.5 < fastest < 5.7) if flight.flavour == "px4" else (6.0 < fastest < 8.5)
 
 
+@pytest.mark.sampled(1)
 def test_position_step(flight: Flight) -> None:
     here = local(flight)
     distance_m = 15.0 if flight.flavour == "px4" else 30.0
@@ -250,6 +257,7 @@ def test_attitude_targets(flight: Flight) -> None:
 @pytest.mark.parametrize(
     ("flavour", "height_m"), [("px4", 5.0), ("ardupilot", 45.0), slow("px4", 45.0), slow("ardupilot", 5.0)]
 )
+@pytest.mark.sampled(1)
 def test_return_from_afar(flavour: str, height_m: float) -> None:
     flight = Flight(flavour, seed=2)
     flight.take_off(height_m)

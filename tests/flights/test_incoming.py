@@ -47,6 +47,7 @@ def by_odometry(flavour: str, message: str = "odometry") -> tuple[Flight, Tracke
 
 @pytest.mark.parametrize("message", ["odometry", pytest.param("vision", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_a_quadrotor_without_gps_flies_by_odometry(flavour: str, message: str) -> None:
     flight, _ = by_odometry(flavour, message)
     flight.repeat(10.0, lambda _: flight.position_setpoint(PLACE, yaw_rad=0.5))
@@ -140,6 +141,7 @@ class Leader:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_follows_a_leader_and_holds_when_it_is_lost(flavour: str) -> None:
     flight = Flight(flavour, parameters=FOLLOW[flavour])
     flight.take_off(10.0)
@@ -203,6 +205,7 @@ def land(flight: Flight) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_lands_at_the_target_its_camera_sees(flavour: str) -> None:
     flight = to_land(flavour)
     land(flight)
@@ -255,6 +258,7 @@ def test_a_target_lost_in_the_descent_is_searched_and_then_done_without(flavour:
 
 @pytest.mark.parametrize("slide", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_stops_before_a_wall(flavour: str, slide: bool) -> None:
     parameters = (
         {"CP_DIST": 3.0, "CP_GO_NO_DATA": float(slide)}

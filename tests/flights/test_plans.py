@@ -56,6 +56,7 @@ def test_all_three_plans_as_a_ground_station_sends_and_reads_them(flavour: str, 
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
     payload = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
     flight = Flight(flavour, payload=payload)
@@ -108,6 +109,7 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_the_fence_sends_the_vehicle_to_a_rally_point(flavour: str) -> None:
     parameters = (
         {"GF_ACTION": 3, "RTL_RETURN_ALT": 12.0, "RTL_DESCEND_ALT": 6.0}

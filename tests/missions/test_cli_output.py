@@ -60,6 +60,7 @@ def test_without_any_output_a_sitl_runs() -> None:
 
 
 @pytest.mark.parametrize("closed", ["2>&-", "2>&- <&-", ">&- 2>&- <&-"])
+@pytest.mark.sampled(1)
 def test_without_an_error_output_a_command_runs(closed: str, log: str) -> None:
     done = run(closed, "log", "play", log, "--link", "udpout:127.0.0.1:9")
     assert done.returncode == 0

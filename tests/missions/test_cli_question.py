@@ -105,6 +105,7 @@ ERASE_QUESTION = "delete all logs (3) of vehicle 1? Type yes (or y): "
         (END_OF_FILE, 1, "not flown: not confirmed"),
     ],
 )
+@pytest.mark.sampled(3)
 def test_what_is_typed_is_the_answer_and_the_link_is_kept_up_meanwhile(
     answer: str, code: int, reported: str
 ) -> None:
@@ -149,6 +150,7 @@ def test_ctrl_c_at_the_question_before_a_flight_ends_it() -> None:
         ("no\n", 1, "not confirmed, nothing was done"),
     ],
 )
+@pytest.mark.sampled(1)
 def test_a_vehicle_s_logs_are_erased_after_a_yes(answer: str, code: int, reported: str) -> None:
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
     with at_terminal("-c", ERASE) as terminal:
@@ -183,6 +185,7 @@ def test_ctrl_c_at_a_question_about_a_vehicle_is_no_answer_and_the_end() -> None
         ),
     ],
 )
+@pytest.mark.sampled(1)
 def test_where_the_input_is_closed_no_user_can_be_asked(words: str, reported: str) -> None:
     done = subprocess.run(
         ["/bin/sh", "-c", f'exec "{sys.executable}" -m missions {words} <&-'],

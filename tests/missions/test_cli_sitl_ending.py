@@ -107,6 +107,7 @@ def test_terminated_where_nothing_can_be_raised_it_does_not_start(
 
 
 @pytest.mark.parametrize("number", ASKING)
+@pytest.mark.sampled(1)
 def test_terminated_in_flight_it_ends_in_good_order(
     number: signal.Signals, cards: Path, tmp_path: Path, in_flight: Callable[..., None]
 ) -> None:

@@ -48,6 +48,7 @@ def pattern_s(vehicle: Vehicle) -> float:
 
 
 @both
+@pytest.mark.sampled(1)
 def test_a_multicopter_flies_its_second_mission(flavour: str) -> None:
     options = FlightOptions(pattern="sector", width_m=30.0, height_m=30.0, via=Via.WAYPOINTS)
     first, second = fly_in_a_row(flavour, "iris", [options, options])

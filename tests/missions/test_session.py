@@ -375,6 +375,7 @@ def test_poor_tracking_is_reported(scripted, tmp_path, capsys, monkeypatch, offs
 
 
 @pytest.mark.parametrize(("bound", "code"), [("1.5", 1), ("2", 0)])
+@pytest.mark.sampled(1)
 def test_a_bound_of_the_path_error_is_a_check(scripted, tmp_path, capsys, monkeypatch, bound, code):
     lissajous_off_by(monkeypatch, 1.9)
     given = command_line(

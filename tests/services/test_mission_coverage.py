@@ -36,6 +36,7 @@ def accepted(flavour: str, kind: AirframeKind) -> set[int]:
 
 
 @pytest.mark.parametrize("firmware", list(itertools.product(FLAVOUR_NAMES, AirframeKind)))
+@pytest.mark.sampled(1)
 def test_what_is_stored_would_be_taken_again(firmware: tuple[str, AirframeKind]) -> None:
     """A stored plan is judged by the same rules when the vehicle boots."""
     rules = get_flavour(*firmware).services.missions.rules

@@ -226,6 +226,7 @@ class Sink:
 @pytest.mark.parametrize("flavour", POLICIES)
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(traffic=st.lists(st.tuples(MESSAGES, st.booleans(), st.sampled_from([0, 1, 20, 600])), max_size=25))
+@pytest.mark.sampled(1)
 def test_whatever_arrives_nothing_raises(flavour: str, traffic: list[tuple[Any, bool, int]]) -> None:
     here, there = Sink(), Sink()
 

@@ -362,6 +362,7 @@ TRIPLE = st.tuples(NUMBER, NUMBER, NUMBER)
     scalars=st.tuples(NUMBER, NUMBER),
     place=st.tuples(st.integers(-(2**31), 2**31 - 1), st.integers(-(2**31), 2**31 - 1)),
 )
+@pytest.mark.sampled(1)
 def test_no_setpoint_ever_reaches_the_control_laws_broken(
     flavour: str, kind: str, frame: int, mask: int, triples: tuple, scalars: tuple, place: tuple
 ) -> None:

@@ -52,6 +52,7 @@ async def set_out(vehicle: Vehicle, north_m: float) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
 @pytest.mark.parametrize("leg_m", [400.0, 25.0])
+@pytest.mark.sampled(1)
 def test_in_a_mission(flavour: str, leg_m: float) -> None:
     flying = Flying(flavour)
 
@@ -79,6 +80,7 @@ def test_in_a_mission(flavour: str, leg_m: float) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
+@pytest.mark.sampled(1)
 def test_on_the_way_to_a_place_and_to_the_next_one(flavour: str) -> None:
     flying = Flying(flavour)
 
@@ -95,6 +97,7 @@ def test_on_the_way_to_a_place_and_to_the_next_one(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
+@pytest.mark.sampled(1)
 def test_on_the_way_home(flavour: str) -> None:
     flying = Flying(flavour)
 

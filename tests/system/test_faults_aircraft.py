@@ -49,6 +49,7 @@ def healthy(flight: AircraftFlight, bit: int) -> bool:
 
 @pytest.mark.parametrize("failure", [OFF, STUCK])
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_airspeed_lost_is_reported(flavour: str, failure: int) -> None:
     flight = circling(flavour)
     lost_text, found_text = TEXTS[flavour]
@@ -79,6 +80,7 @@ def test_px4_uses_an_airspeed_sensor_again_where_it_may() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_gps_lost_is_reported(flavour: str) -> None:
     """Dead reckoning on airspeed: PX4 tells how well the position is still known, ArduPilot no longer calls
     it absolute.
@@ -130,6 +132,7 @@ def test_failures_that_an_aircraft_can_not_have() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_an_aileron_that_sticks(flavour: str) -> None:
     """Where it was in the circle: held against by the other controls, the aircraft flies on."""
     flight = circling(flavour)

@@ -74,6 +74,7 @@ class Station:
 
 
 @pytest.mark.parametrize("impairment", [BAD, AWFUL], ids=["5 %", "30 %"])
+@pytest.mark.sampled(1)
 def test_a_file_goes_there_and_comes_back(impairment: Impairment) -> None:
     station = Station(impairment)
     data = random.Random(3).randbytes(4000)

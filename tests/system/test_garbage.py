@@ -165,6 +165,7 @@ def hovering(flavour: str) -> Flying:
 
 
 @pytest.mark.parametrize("kind", LINKS)
+@pytest.mark.sampled(1)
 def test_random_bytes(kind: str, garbage: list[bytes]) -> None:
     flying = hovering("px4")
     watch = Watch(flying)
@@ -177,6 +178,7 @@ def test_random_bytes(kind: str, garbage: list[bytes]) -> None:
 
 
 @pytest.mark.parametrize("kind", LINKS)
+@pytest.mark.sampled(1)
 def test_damaged_frames(kind: str, damage: list[bytes]) -> None:
     flying = hovering("px4")
     watch = Watch(flying)

@@ -92,6 +92,7 @@ def scene(flavour: str) -> Iterator[Scene]:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_every_message_at_a_kilohertz(flavour: str) -> None:
     with scene(flavour) as there:
         client = there.client()
@@ -105,6 +106,7 @@ def test_every_message_at_a_kilohertz(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_storms_of_requests(flavour: str) -> None:
     with scene(flavour) as there:
         client, other = there.client(), there.client(254)
@@ -131,6 +133,7 @@ def test_the_same_request_again_and_again_is_answered_once_a_tick() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_parameters_set_faster_than_they_can_be(flavour: str) -> None:
     name = b"MPC_LAND_SPEED" if flavour == "px4" else b"LAND_SPEED_HIGH"
     with scene(flavour) as there:
@@ -145,6 +148,7 @@ def test_parameters_set_faster_than_they_can_be(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_an_upload_left_open_is_given_up(flavour: str) -> None:
     with scene(flavour) as there:
         rude, true = there.client(66), there.client()

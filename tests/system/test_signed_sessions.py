@@ -68,6 +68,7 @@ def recorded() -> tuple[list[bytes], int]:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_a_signed_session_flies(flavour: str) -> None:
     flying = Flying(flavour, key=KEY, reach=Reach.NETWORK)
     flying.take_off(10.0)
@@ -134,6 +135,7 @@ def left_alone() -> Attacked:
 
 @pytest.mark.parametrize("same_link", [True, False], ids=["same link", "other link"])
 @pytest.mark.parametrize("attack", REASONS)
+@pytest.mark.sampled(3)
 def test_an_attacker_changes_nothing_at_all(
     attack: str, same_link: bool, recorded: tuple[list[bytes], int], left_alone: Attacked
 ) -> None:

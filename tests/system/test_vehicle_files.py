@@ -116,6 +116,7 @@ def card() -> MemoryCard:
     ("flavour", "first", "path"),
     [("px4", 0, ("log", "2025-01-01", "00_00_00.tlog")), ("ardupilot", 1, ("LOGS", "00000001.tlog"))],
 )
+@pytest.mark.sampled(1)
 def test_a_flight_is_logged_listed_and_downloaded(
     flavour: str, first: int, path: tuple[str, ...], tmp_path: Path
 ) -> None:
@@ -282,6 +283,7 @@ def test_a_damaged_parameter_file_is_kept_and_reported(flavour: str, tmp_path: P
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_reboot_starts_again_from_zero(flavour: str) -> None:
     name, value = CHANGED[flavour]
     client = Client(flavour, card())

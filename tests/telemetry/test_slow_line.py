@@ -52,6 +52,7 @@ class Client:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_streams_fit_a_line_of_57600_baud(flavour: str) -> None:
     """Every stream runs, the fast ones in proportion, the slow ones and the heartbeat whole."""
     free, slow = Client(flavour, None), Client(flavour, BAUD_57600)

@@ -123,6 +123,7 @@ def test_what_is_lost_at_the_end_is_reported_too(show: Show) -> None:
 
 
 @pytest.mark.parametrize("under_way", ["photo", "video", "nothing"])
+@pytest.mark.sampled(1)
 def test_a_picture_process_that_dies_is_reported_when_it_matters(show: Show, under_way: str) -> None:
     process = show.service._process
     assert process is not None

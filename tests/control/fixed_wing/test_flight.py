@@ -86,6 +86,7 @@ def test_airspeed_step_costs_no_height(airspeed: float) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.sampled(1)
 def test_moderate_turbulence_and_wind(seed: int) -> None:
     wind = Environment(wind_ned_m_s=(4.2, -4.2, 0.0), turbulence=Turbulence.MODERATE)
     flown = rig(environment=wind, seed=seed)

@@ -31,6 +31,7 @@ def rig(name: str, environment: Environment | None = None) -> Rig:
 
 
 @pytest.mark.parametrize("name", POWERED)
+@pytest.mark.sampled(1)
 def test_height_airspeed_and_heading_are_held(name: str) -> None:
     flown = rig(name)
     log = flown.run(20.0)
@@ -65,6 +66,7 @@ def test_height_step(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ("sgs126", *slow_after(2, POWERED)))
+@pytest.mark.sampled(1)
 def test_airspeeds_between_the_limits(name: str) -> None:
     flown = rig(name)
     envelope = flown.envelope
@@ -76,6 +78,7 @@ def test_airspeeds_between_the_limits(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", (*POWERED, "sgs126"))
+@pytest.mark.sampled(2)
 def test_turn_onto_a_course_in_moderate_turbulence(name: str) -> None:
     windy = Environment(wind_ned_m_s=(4.0, 4.0, 0.0), turbulence=Turbulence.MODERATE)
     flown = rig(name, windy)

@@ -48,6 +48,7 @@ def converged_at(kind, seed, seconds, far_m=1500.0):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.sampled(1)
 def test_it_converges_within_30_s(kind):
     times, nees = zip(*(converged_at(kind, seed, 35.0) for seed in range(6)), strict=True)
     assert sum(time is not None and time <= 30.0 for time in times) >= 5

@@ -97,6 +97,7 @@ def processed(readings, survey_map=None, **parameters):
 
 
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.sampled(1)
 def test_levels_of_the_lines_are_found_at_the_crossings(seed):
     levels_nt = 3.0 * np.random.default_rng(100 + seed).standard_normal(len(plan().lines))
     result = processed(flown(seed, levels_nt=levels_nt), published(), map_error_nt=0.0)

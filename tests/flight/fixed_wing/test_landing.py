@@ -91,6 +91,7 @@ def test_turbulence_leaves_it_on_the_runway() -> None:
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (5.0, 3.0)])
 @pytest.mark.parametrize("radius", [120.0, -120.0])
+@pytest.mark.sampled(1)
 def test_without_a_leg_it_circles_down_and_lands_against_the_wind(
     wind: tuple[float, float], radius: float
 ) -> None:

@@ -64,6 +64,7 @@ def cross_track(log: np.ndarray, start: Place, end: Place) -> tuple[np.ndarray, 
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (-3.5, 4.9, 0.0)])
+@pytest.mark.sampled(1)
 def test_whole_flight_from_runway_to_runway(wind: tuple[float, float, float]) -> None:
     """6 m/s of wind and moderate turbulence: cross-track RMS under 5 m, height under 2, airspeed under 1."""
     turbulence = "moderate" if any(wind) else "none"

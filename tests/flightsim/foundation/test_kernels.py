@@ -11,6 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from flightsim.foundation import kernels
 from flightsim.foundation.kernels import bound, compiled_for, kernel, source_stamp
 from flightsim.foundation.rotations import quaternion_from_euler
 
@@ -166,10 +167,10 @@ def package(tmp_path: Path) -> Package:
 
 
 def test_code_is_kept_until_a_constant_of_another_module_changes(package: Package) -> None:
-    both = [package.start(), package.start()]  # processes may compile at the same time
-    assert [finished(process)[0] for process in both] == [13.0, 13.0]
+    both = [package.start(), package.start()]  # one of them compiles, the other one waits for the code
+    assert sorted(finished(process) for process in both) == [(13.0, 0), (13.0, 1)]
+    assert not list((package.parts / "__pycache__").glob("*.lock"))
     (old,) = package.cached()
-    assert package.run() == (13.0, 1)
     package.write("layout", SOURCES["layout"].replace("FACTOR = 2.0", "FACTOR = 3.0"))
     assert package.run() == (19.0, 0)
     (new,) = package.cached()  # the old code is gone
@@ -177,6 +178,20 @@ def test_code_is_kept_until_a_constant_of_another_module_changes(package: Packag
     new.write_bytes(new.read_bytes()[:100])  # a damaged file is compiled anew
     assert package.run() == (19.0, 0)
     assert package.run() == (19.0, 1)
+
+
+def test_a_process_that_stops_while_it_compiles_does_not_stop_the_others(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(kernels, "_TURN_CHECKS", 2)
+    one, other = (kernels._CacheFile(tmp_path, "name", kernels.kernel) for _ in range(2))
+    assert one.begin_turn()
+    assert not one.begin_turn()  # a kernel that calls itself
+    assert not other.begin_turn()
+    one.end_turn()
+    assert other.begin_turn()
+    other.end_turn()
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_a_writable_package_folder_the_users_cache_serves(package: Package, tmp_path: Path) -> None:

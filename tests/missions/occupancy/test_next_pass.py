@@ -82,6 +82,7 @@ def test_a_pass_far_away_tells_nothing_and_one_across_more_than_the_same_again()
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.sampled(1)
 def test_a_target_is_named_after_the_passes_that_it_takes(seed):
     rng = np.random.default_rng(seed)
     found, source = search(), target(rng)

@@ -116,6 +116,7 @@ def fly(direction, entry, *, seconds=150.0, **world):
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("number", slow_after(3, range(len(ENTRIES))))
+@pytest.mark.sampled(2)
 def test_the_circle_is_reached_from_everywhere_and_held(direction, number):
     """4 m/s of wind from somewhere, gusts of 0.7 m/s; every other target moves at 2 m/s."""
     wind, course = 1.3 * number, 0.7 * number

@@ -36,6 +36,7 @@ def request(path: Path, flavour: str = "px4", **more) -> RunRequest:
 
 
 @both
+@pytest.mark.sampled(1)
 def test_a_plan_is_flown_with_its_fence_rally_points_and_jumps(flavour: str, tmp_path: Path) -> None:
     path = write(tmp_path)
     result = fly(find_mission(str(path)), request(path, flavour, picture=True))
@@ -114,6 +115,7 @@ def test_an_aircraft_flies_its_plan_and_lands(flavour: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(("flavour", "suffix"), [("px4", ".plan"), ("ardupilot", ".waypoints")])
+@pytest.mark.sampled(1)
 def test_a_pattern_is_written_and_flown_from_its_file(flavour: str, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"l2{suffix}"
     requested = RunRequest(

@@ -61,6 +61,7 @@ def test_a_trial_that_kills_its_process_each_time_becomes_a_row(expected: Path, 
 
 
 @pytest.mark.parametrize("engine", [Inline(), Pool(2)], ids=["inline", "pool"])
+@pytest.mark.sampled(1)
 def test_a_trial_that_never_ends_becomes_a_row(expected: Path, tmp_path: Path, engine: Any) -> None:
     study = troubled(tmp_path, endless=(2, 6))
     results = results_of(study, tmp_path / "study", engine=engine, time_limit_s=0.5)
@@ -169,6 +170,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.sampled(1)
 def test_workers_end_with_the_process_they_work_for(tmp_path: Path, ending: signal.Signals) -> None:
     assert NEVER_DONE.name == "small"
     program = tmp_path / "program.py"

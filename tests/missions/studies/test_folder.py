@@ -85,6 +85,7 @@ def test_two_processes_do_not_compute_one_study(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["part-000001.parquet", "rows.parquet", "summary.json", "study.png"])
+@pytest.mark.sampled(1)
 def test_a_full_disk_keeps_what_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.firmware.ardupilot import messages as ardupilot
 from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_flags
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
-from autopilot_bridge.telemetry.aircraft import AircraftState
+from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.telemetry.common import TelemetrySources
 from autopilot_bridge.telemetry.streams import Builder, Values
 from flightsim import interface
@@ -43,7 +43,7 @@ _TARGET_MASK: Final = 0xFDF8
 _ABSOLUTE: Final = mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_PRED_POS_HORIZ_ABS
 
 
-class ArduPlaneMessages(ArdupilotMessages):
+class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
     """Builders of what ArduPlane sends."""
 
     def __init__(self, sources: TelemetrySources) -> None:
@@ -57,15 +57,6 @@ class ArduPlaneMessages(ArdupilotMessages):
             _M.MAVLINK_MSG_ID_AIRSPEED: self.airspeed,
             _M.MAVLINK_MSG_ID_AOA_SSA: self.flow_angles,
         }
-
-    def airspeed_m_s(self) -> float:
-        """VFR_HUD's airspeed."""
-        return self._aircraft.airspeed_m_s
-
-    def differential_pressure_hpa(self) -> float:
-        """SCALED_PRESSURE's pitot pressure."""
-        pressure_pa = self._aircraft.pitot_pressure_pa
-        return 0.0 if pressure_pa is None else pressure_pa * 0.01
 
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, throttle, rudder; disarmed neutral and throttle off."""

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.firmware.px4 import messages as px4
 from autopilot_bridge.firmware.px4.messages import Px4Messages
 from autopilot_bridge.flight.context import LandedState
-from autopilot_bridge.telemetry.aircraft import AircraftState
+from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.telemetry.common import NAN, TelemetrySources
 from autopilot_bridge.telemetry.streams import Builder, Values
 
@@ -39,7 +39,7 @@ _PLACE_MASK: Final = 0xDF8  # velocity, acceleration, yaw and yaw rate are not g
 _NOTHING: Final = (NAN,) * 8
 
 
-class Px4PlaneMessages(Px4Messages):
+class Px4PlaneMessages(AircraftAir, Px4Messages):
     """Builders of what PX4 sends on a fixed wing."""
 
     def __init__(self, sources: TelemetrySources) -> None:
@@ -54,15 +54,6 @@ class Px4PlaneMessages(Px4Messages):
             _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self.nav_controller_output,
             _M.MAVLINK_MSG_ID_WIND_COV: self.wind_cov,
         }
-
-    def airspeed_m_s(self) -> float:
-        """VFR_HUD's airspeed."""
-        return self._aircraft.airspeed_m_s
-
-    def differential_pressure_hpa(self) -> float:
-        """SCALED_PRESSURE's pitot pressure."""
-        pressure_pa = self._aircraft.pitot_pressure_pa
-        return 0.0 if pressure_pa is None else pressure_pa * 0.01
 
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, rudder, motor; 900 us for outputs without an actuator."""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from missions.errors import PlanError
-from missions.occupancy.steering import CourseReference
 from missions.planning.limits import MulticopterLimits
+from missions.steering import CourseReference
 
 LIMITS = MulticopterLimits()
 STEP_S = 0.04
