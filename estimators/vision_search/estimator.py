@@ -158,7 +158,10 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
     # the camera
 
     def _on_detection(self, _time_us: int, camera: Camera, message: Message) -> Outcome:
-        if message.type != _FIDUCIAL or message.src_component not in CAMERA_COMPONENTS:
+        if message.src_component not in CAMERA_COMPONENTS:
+            return Outcome.IGNORED
+        camera.count_detection(message.src_component, int(message.time_usec))
+        if message.type != _FIDUCIAL:
             return Outcome.IGNORED
         angles = (message.angle_x, message.angle_y)
         if not all(map(math.isfinite, angles)):
@@ -197,6 +200,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     def _on_scan(self, camera: Camera, system_id: int, scan: CameraScan) -> Outcome:
         p = self.parameters
+        complete = camera.is_complete(scan.time_us, scan.detections)
         detections = camera.detections(scan.time_us)
         if p.own_vehicle not in (0, system_id):
             return Outcome.IGNORED
@@ -207,6 +211,9 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         self._note_clock(camera, system_id, scan)
         if not camera.is_due(scan.time_us, p.frame_period_s):
             camera.counts["too_soon"] += 1
+            return Outcome.IGNORED
+        if not complete and not detections:  # what was detected is lost: it may have been the target
+            camera.counts["incomplete"] += 1
             return Outcome.IGNORED
         if camera.knows(scan.number, scan.time_us):
             camera.counts["repeated"] += 1
@@ -333,7 +340,10 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         counts: Counter[str] = Counter()
         for camera in self._cameras.values():
             counts.update(camera.counts)
-        names = ("used", "received", "repeated", "late", "too_soon", "too_low", "without_pose", "impossible")
+        names = (
+            *("used", "received", "repeated", "late", "too_soon", "too_low", "without_pose", "incomplete"),
+            "impossible",
+        )
         found: dict[str, float | str] = {f"frames_{name}": float(counts[name]) for name in names}
         found["detections"] = float(self.detections)
         found["detections_of_other_tags"] = float(sum(self._other_tags.values()))

@@ -49,6 +49,7 @@ class Camera:
     weights: DetectionWeights | None = None
     component: int | None = None
     _pending: dict[tuple[int, int], list[tuple[float, float]]] = field(default_factory=dict)
+    _counted: dict[tuple[int, int], int] = field(default_factory=dict)
     _known: dict[tuple[int, int], None] = field(default_factory=dict)
 
     def looks(self, component: int) -> bool:
@@ -65,6 +66,17 @@ class Camera:
             pairs.append(pair)
         while len(self._pending) > _KEPT:
             del self._pending[min(self._pending, key=lambda key: key[1])]
+
+    def count_detection(self, component: int, exposed_us: int) -> None:
+        """Count a detection of whatever kind, to know whether all of a frame were received."""
+        key = (component, exposed_us)
+        self._counted[key] = self._counted.pop(key, 0) + 1
+        while len(self._counted) > _KEPT:
+            del self._counted[next(iter(self._counted))]
+
+    def is_complete(self, exposed_us: int, expected: int) -> bool:
+        """Whether as many detections were received as the end of a frame reports."""
+        return self._counted.pop((self.component or 0, exposed_us), 0) >= expected
 
     def detections(self, exposed_us: int) -> tuple[tuple[float, float], ...]:
         """The detections of a frame that has ended."""
