@@ -46,10 +46,6 @@ def takes_off_and_circles(flavour: str, model: str, height_m: float) -> None:
     assert flight.actuators_finite
 
 
-def test_a_cub_takes_off_and_circles() -> None:
-    takes_off_and_circles("px4", "j3cub", 80.0)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["aerosonde", "j3cub", "c172x", "t37"])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

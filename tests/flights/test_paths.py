@@ -21,9 +21,10 @@ from tests.slow import slow, slow_after
 LISSAJOUS = ("L1", "L2", "L3", "L4")
 IAMSAR = ("sector", "parallel-sweep", "expanding-square")
 SETPOINT_FLIGHTS = {
-    "still": [("L1", "px4"), ("L4", "ardupilot")],
-    "windy": [("L1", "ardupilot"), ("L3", "px4")],
     "still, the others": [("L3", "px4"), ("L2", "ardupilot")],
+    "still": [("L1", "px4"), ("L4", "ardupilot")],
+    "windy, the others": [("L3", "px4")],
+    "windy": [("L1", "ardupilot")],
 }
 RMS_MAX_M = {"still": 0.3, "windy": 0.6}
 FOLLOWING_MAX_M = {"still": 0.12, "windy": 0.2}
@@ -59,7 +60,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return run
 
 
-@pytest.mark.parametrize("flights", slow_after(1, ["windy", "still", "still, the others"]))
+@pytest.mark.parametrize("flights", slow_after(1, reversed(SETPOINT_FLIGHTS)))
 def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
     air = flights.split(",")[0]
     for seed, (name, flavour) in enumerate(SETPOINT_FLIGHTS[flights], start=1):
