@@ -84,7 +84,7 @@ def frames_of(source: str, *, timeout_s: float | None = None) -> Iterator[TimedP
                     continue
                 yield TimedPicture(
                     time_us=round(frame.pts * frame.time_base * 1_000_000),
-                    pixels=frame.to_ndarray(format="bgr24"),
+                    pixels=np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8),
                 )
         except av.error.EOFError:
             return

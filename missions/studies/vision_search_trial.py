@@ -45,7 +45,7 @@ MOMENTS_S: Final = (30, 60, 120, 180, 240, 300)
 """Times from the begin of the search at which the belief of a flight is recorded."""
 
 _ESTIMATE_PERIOD: Final = "estimate_period_s=10"
-_ERRORS: Final[Mapping[str, float]] = MappingProxyType(
+_ERRORS: Final[Mapping[str, Any]] = MappingProxyType(
     {
         "place_sigma_m": 0.1,
         "height_sigma_m": 0.2,
