@@ -173,9 +173,11 @@ def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
         (table,) = next(iter(done.fleet.runners.values())).tables.values()
         states = mission._flown.team.search.states[index]
         rows = np.array([state.row() for state in states])
-        assert len(rows) == len(table.time_us)
+        assert len(rows) > 20
         for name, values in zip(states[0].COLUMNS, rows.T, strict=True):
-            assert np.array_equal(table[name], values), name
+            assert np.array_equal(table[name][: len(rows)], values), (
+                name
+            )  # the flight goes on after the search
 
 
 @pytest.mark.slow
