@@ -1,9 +1,11 @@
 """Whole searches in embedded worlds: a target that is found and localized, a team over a lossy link."""
 
 import json
+import math
 import socket
 import threading
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,9 +17,12 @@ from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
 from estimators.messages import read_message
+from flightsim.payload import PayloadParameters, PinholeModel
 from flightsim.world_spec import WorldSpec
 from missions.cli.main import run_command_line
 from missions.embedded import HiddenTag, vision_search_world
+from missions.embedded.tag_search import search_camera
+from missions.embedded.worlds import carrying
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
 from missions.vision_search.mission import VisionSearchMission
@@ -183,10 +188,17 @@ def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
 @pytest.mark.slow
 def test_a_film_of_a_flight_has_the_estimates_of_the_flight(tmp_path):
     """The pictures of the camera, kept without loss, give the same detections and estimates, to the bit."""
-    hidden = HiddenTag(place_ne_m=(8.0, -5.0), film=True)
-    result = flown(tmp_path / "run", hidden=hidden, passes=1, search_time_s=60.0)
+    options = VisionSearchOptions(**{**SMALL, "tag_size_m": 1.5}, passes=1, search_time_s=60.0)
+    small = PinholeModel(width_px=320, height_px=180, horizontal_fov_rad=math.radians(70.0))
+    camera = replace(search_camera(1.5, film=True), model=small)
+    world = carrying(WorldSpec.of_team(1, seed=4), PayloadParameters(camera=camera))
+    world = vision_search_world(world, options, HiddenTag(place_ne_m=(8.0, -5.0)))
+    request = RunRequest(
+        options=options, world=world, out=tmp_path / "run", picture=False, estimator="vision-search"
+    )
+    result = fly(VisionSearchMission(), request)
     film, log = result.folder / "camera1.mp4", result.folder / "flight.tlog"
-    words = [str(film), "--camera", str(film.with_suffix(".toml")), "--log", str(log), "--tag-size", "0.6"]
+    words = [str(film), "--camera", str(film.with_suffix(".toml")), "--log", str(log), "--tag-size", "1.5"]
     assert run_command_line(["vision", *words, "--out", str(tmp_path / "again")]) == 0
     copy = tmp_path / "again" / "flight.tlog"
 
