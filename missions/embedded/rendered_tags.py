@@ -18,6 +18,7 @@ from estimators.vision import (
 )
 from flightsim.payload import CameraView, Detection, ImagerParameters, PinholeModel
 from flightsim.picture import Renderer, Scenery
+from missions.embedded.picture_geometry import picture_geometry
 
 __all__ = ["RenderedTags", "RenderedTagsReader", "TagPicture"]
 
@@ -119,14 +120,7 @@ class RenderedTagsReader:
         return self._detector
 
     def _geometry_at(self, zoom: float) -> CameraGeometry:
-        model, imager = self._model, self._imager
-        return CameraGeometry(
-            width_px=model.width_px,
-            height_px=model.height_px,
-            focal_px=(model.focal_px * zoom,) * 2,
-            centre_px=model.centre_px,
-            distortion=() if imager.distortion.none else imager.distortion.coefficients,
-        )
+        return picture_geometry(self._model, self._imager, zoom)
 
     @property
     def geometry(self) -> CameraGeometry:
