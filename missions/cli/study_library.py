@@ -217,7 +217,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     help="Of the searched square, m.",
                 ),
                 click.Option(
-                    ["--passes"], type=click.IntRange(1, 100), default=6, help="Over the target, of each."
+                    ["--passes"], type=click.IntRange(1, 100), default=4, help="Over the target, of each."
                 ),
             ),
             build=_vision_search,
