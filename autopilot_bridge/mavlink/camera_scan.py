@@ -1,7 +1,7 @@
-"""The end of a camera's frame in a TUNNEL message: a picture was searched, with what result, by which camera.
+"""The messages of a camera that searches its pictures: each detection, and the end of each frame.
 
 LANDING_TARGET reports what was detected. It cannot report that a picture shows nothing, which a search must
-know. docs/mavlink/camera_scan.md documents the payload.
+know; a TUNNEL message does. docs/mavlink/camera_scan.md documents its payload.
 
 All numbers are little-endian: version (uint8), kind (uint8), detections (uint16), number (uint32), time
 (uint64, microseconds since boot, of the exposure), width and height (uint16), focal length (float32, pixels),
@@ -19,11 +19,22 @@ from pymavlink.dialects.v20 import all as dialect
 
 from flightsim.foundation.vectors import Vector
 
-__all__ = ["CAMERA_SCAN_PAYLOAD", "CameraScan", "camera_scan_message", "read_camera_scan"]
+__all__ = [
+    "CAMERA_COMPONENTS",
+    "CAMERA_SCAN_PAYLOAD",
+    "CameraScan",
+    "camera_scan_message",
+    "detection_message",
+    "read_camera_scan",
+]
 
 CAMERA_SCAN_PAYLOAD: Final = 0xF517
 """Payload type; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""
 
+CAMERA_COMPONENTS: Final = range(100, 106)
+"""Component ids of cameras (MAV_COMP_ID_CAMERA to CAMERA6)."""
+
+_MOST_TAG: Final = 255
 _VERSION: Final = 1
 _END_OF_FRAME: Final = 1
 _LAYOUT: Final = struct.Struct("<BBHIQHHf5f3f3f")
@@ -55,6 +66,44 @@ class CameraScan:
     distortion: tuple[float, ...]
     mount_rad: Vector | None
     position_frd_m: Vector
+
+
+def detection_message(
+    time_us: int,
+    tag_id: int | None,
+    *,
+    angle_x_rad: float,
+    angle_y_rad: float,
+    distance_m: float,
+    size_rad: float,
+) -> Any:
+    """LANDING_TARGET of one detection.
+
+    Args:
+        time_us: vehicle time of the exposure.
+        tag_id: number of the tag, 255 for all from 255 on; None: what was detected has no tag.
+        angle_x_rad, angle_y_rad: of its centre off the optical axis, right and down, each in its plane.
+        distance_m: from the camera.
+        size_rad: angle that its mean side covers.
+    """
+    return dialect.MAVLink_landing_target_message(
+        time_us,
+        _MOST_TAG if tag_id is None else min(tag_id, _MOST_TAG),
+        dialect.MAV_FRAME_BODY_FRD,
+        angle_x_rad,
+        angle_y_rad,
+        distance_m,
+        size_rad,
+        size_rad,
+        0.0,
+        0.0,
+        0.0,
+        [1.0, 0.0, 0.0, 0.0],
+        dialect.LANDING_TARGET_TYPE_VISION_OTHER
+        if tag_id is None
+        else dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL,
+        0,
+    )
 
 
 def camera_scan_message(scan: CameraScan) -> Any:

@@ -74,9 +74,9 @@ class SearchLikelihood:
     detections: tuple[Pair, ...]
 
 
-def search_likelihood_message(likelihood: SearchLikelihood) -> Any:
-    """The TUNNEL message of a likelihood, to all systems and components. Of a quaternion x, y and z are sent,
-    with w not negative.
+def search_likelihood_message(likelihood: SearchLikelihood, *, target_system: int = 0) -> Any:
+    """The TUNNEL message of a likelihood, to the components of one system, or of all (0). Of a quaternion x,
+    y and z are sent, with w not negative.
     """
     m = likelihood
     w, *vector = m.q_ned_from_mount
@@ -101,7 +101,9 @@ def search_likelihood_message(likelihood: SearchLikelihood) -> Any:
         *m.distortion,
         *(value for pair in pairs for value in pair),
     )
-    return dialect.MAVLink_tunnel_message(0, 0, SEARCH_LIKELIHOOD_PAYLOAD, len(payload), list(payload))
+    return dialect.MAVLink_tunnel_message(
+        target_system, 0, SEARCH_LIKELIHOOD_PAYLOAD, len(payload), list(payload)
+    )
 
 
 def read_search_likelihood(payload_type: int, length: int, payload: Sequence[int]) -> SearchLikelihood | None:

@@ -88,7 +88,7 @@ class CameraComponent(CameraActions):
         self.tracker.update(frame)
         for detection in frame.detections:
             self.send(landing_target(detection))
-        if self.device.parameters.reader is not None:
+        if self.device.parameters.reader is not None and frame.searched:
             self.send(self._scan(frame))
 
     # inside

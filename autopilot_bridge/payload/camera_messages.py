@@ -4,6 +4,7 @@ import math
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.camera_scan import detection_message
 from autopilot_bridge.payload.camera_state import SENSOR_WIDTH_MM, CameraState
 from autopilot_bridge.payload.component import fixed_text
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -16,7 +17,6 @@ DEFINITION_FILE: Final = "camera.xml"
 _DEFINITION_URI: Final = f"mftp:///{DEFINITION_FILE}"
 _FILM_WIDTH_MM: Final = 36.0
 _FORWARD: Final = (1.0, 0.0, 0.0)
-_NO_NUMBER: Final = 255
 _UNKNOWN_DEGE7: Final = 2**31 - 1
 _FARTHEST_M: Final = 20_000.0  # at greater distances the ground is no plane
 
@@ -167,22 +167,13 @@ def ground_point(
 
 def landing_target(detection: Detection) -> Any:
     """LANDING_TARGET of a detection."""
-    tagged = detection.target_id >= 0
-    return mavlink.MAVLink_landing_target_message(
+    return detection_message(
         detection.time_us,
-        detection.target_id if 0 <= detection.target_id < _NO_NUMBER else _NO_NUMBER,
-        mavlink.MAV_FRAME_BODY_FRD,
-        detection.angle_x_rad,
-        detection.angle_y_rad,
-        detection.distance_m,
-        detection.size_rad,
-        detection.size_rad,
-        0.0,
-        0.0,
-        0.0,
-        [1.0, 0.0, 0.0, 0.0],
-        mavlink.LANDING_TARGET_TYPE_VISION_FIDUCIAL if tagged else mavlink.LANDING_TARGET_TYPE_VISION_OTHER,
-        0,
+        detection.target_id if detection.target_id >= 0 else None,
+        angle_x_rad=detection.angle_x_rad,
+        angle_y_rad=detection.angle_y_rad,
+        distance_m=detection.distance_m,
+        size_rad=detection.size_rad,
     )
 
 

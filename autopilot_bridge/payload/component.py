@@ -4,9 +4,8 @@ Source: MAVLink heartbeat protocol, command protocol, and "requesting messages" 
 """
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, decode
 from autopilot_bridge.mavlink import dialect as mavlink
@@ -25,7 +24,7 @@ _NEVER_US: Final = 1 << 62
 _SECOND_US: Final = 1_000_000
 
 
-class Component(ABC):
+class Component:
     """One component of a vehicle's MAVLink system.
 
     Args:
@@ -33,7 +32,13 @@ class Component(ABC):
         mav_type: MAV_TYPE, for the heartbeat.
         send: sends packed frames.
         rates_hz: messages that are streamed from the start, by message id.
+
+    Attributes:
+        commands_only: messages that are no commands are not decoded.
+        next_us: time of the next stream that is due.
     """
+
+    commands_only: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -59,7 +64,7 @@ class Component(ABC):
         self._default_rates_hz = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz}
         self._intervals_us = {m: round(1e6 / rate_hz) for m, rate_hz in self._default_rates_hz.items()}
         self._due_us = dict.fromkeys(self._intervals_us, _SECOND_US)
-        self._next_us = _SECOND_US
+        self.next_us = _SECOND_US
         self._time_us = 0
 
     # sending
@@ -67,7 +72,7 @@ class Component(ABC):
     def step(self, time_us: int) -> None:
         """Send the streams that are due."""
         self._time_us = time_us
-        if time_us < self._next_us:
+        if time_us < self.next_us:
             return
         # the receiver of a message may at once request others, or stop streams: iterate over a copy
         for message_id, due_us in [item for item in self._due_us.items() if item[1] <= time_us]:
@@ -75,7 +80,7 @@ class Component(ABC):
             if interval_us is not None:
                 self._due_us[message_id] = max(due_us + interval_us, time_us + 1)
                 self.send(self._builders[message_id](time_us))
-        self._next_us = min(self._due_us.values(), default=_NEVER_US)
+        self.next_us = min(self._due_us.values(), default=_NEVER_US)
 
     def send(self, message: Any) -> None:
         """Frame a message and send it."""
@@ -88,22 +93,28 @@ class Component(ABC):
 
     # receiving
 
-    def receive(self, frame: Frame) -> None:
-        """Handle one frame of another system or component. Contents are untrusted and never raise."""
+    def receive(self, frame: Frame, time_us: int) -> None:
+        """Handle one frame of another system or component. Contents are untrusted and never raise.
+
+        Args:
+            frame: the frame.
+            time_us: vehicle time of the newest step.
+        """
+        self._time_us = time_us
         if frame.target_system not in (0, self.system_id):
             return
         if frame.target_component not in (0, self.component_id):
             return
-        message = decode(frame)
         sender = (frame.system_id, frame.component_id)
         if frame.message_id in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
-            self._on_command(message, sender)
-        else:
-            self._on_message(message, sender)
+            self._on_command(decode(frame), sender)
+        elif not self.commands_only:
+            self._on_message(decode(frame), sender)
 
-    @abstractmethod
     def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Handle a message that is not a command and is addressed to this component or to all."""
+        """Handle a message that is not a command and is addressed to this component or to all; not called
+        if `commands_only`.
+        """
 
     def _on_command(self, message: Any, sender: tuple[int, int]) -> None:
         handler = self._handlers.get(message.command)
@@ -157,7 +168,7 @@ class Component(ABC):
                 interval_us = 1e6 / rate_hz
             self._intervals_us[message_id] = max(round(interval_us), round(1e6 / MAX_RATE_HZ))
             self._due_us[message_id] = self._time_us
-        self._next_us = min(self._due_us.values(), default=_NEVER_US)
+        self.next_us = min(self._due_us.values(), default=_NEVER_US)
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
     def _on_get_interval(self, message: Any, sender: tuple[int, int]) -> int | None:

@@ -5,7 +5,7 @@ In single precision a field of 50,000 nT is reported to 0.004 nT.
 """
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.component import Component, fixed_text
@@ -18,6 +18,8 @@ _NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
 
 class MagnetometerComponent(Component):
     """Sends every reading when it comes."""
+
+    commands_only = True
 
     def __init__(self, *, system_id: int, send: Callable[[bytes], None]) -> None:
         super().__init__(
@@ -35,6 +37,3 @@ class MagnetometerComponent(Component):
                 (reading.time_us // 1000) & 0xFFFFFFFF, _NAME, reading.total_field_nt
             )
         )
-
-    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Ignore the message: the magnetometer uses commands only."""

@@ -3,7 +3,7 @@
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.vehicle_range import VehicleRange, range_message
@@ -19,6 +19,8 @@ class RangeRadioComponent(Component):
     Args:
         sigma_m: standard deviation of the ranges, which the radio reports with them.
     """
+
+    commands_only = True
 
     def __init__(self, *, system_id: int, send: Callable[[bytes], None], sigma_m: float) -> None:
         super().__init__(
@@ -44,6 +46,3 @@ class RangeRadioComponent(Component):
                     )
                 )
             )
-
-    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Ignore the message: the radio uses commands only."""

@@ -32,6 +32,8 @@ class PayloadStation:
         self.parser = FrameParser()
         self.components: list[Component] = []
         self._payload = payload
+        self._time_us = 0
+        self._idle_until_us = 0
         self.camera: CameraComponent | None = None
         self._magnetometer: MagnetometerComponent | None = None
         if payload.camera is not None:
@@ -67,6 +69,9 @@ class PayloadStation:
 
     def step(self, time_us: int) -> None:
         """One physics step: the devices, then the messages of their components."""
+        self._time_us = time_us
+        if time_us < self._idle_until_us:
+            return
         payload = self._payload
         payload.step(time_us)
         if self.camera is not None and payload.frame is not None:
@@ -81,9 +86,11 @@ class PayloadStation:
             self._moving_points.update(payload.points)
         for component in self.components:
             component.step(time_us)
+        self._idle_until_us = min(payload.next_us, *[component.next_us for component in self.components])
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the link, in any pieces; damaged ones are dropped and counted."""
         for frame in self.parser.feed(data):
             for component in self.components:
-                component.receive(frame)
+                component.receive(frame, self._time_us)
+            self._idle_until_us = 0  # it may have changed what is sent, and when

@@ -3,7 +3,7 @@
 """
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.target_scan import scan_messages
@@ -15,6 +15,8 @@ TARGET_SENSOR_COMPONENT: Final = int(mavlink.MAV_COMP_ID_USER2)
 
 class TargetSensorComponent(Component):
     """Sends every scan when it is taken."""
+
+    commands_only = True
 
     def __init__(self, *, system_id: int, send: Callable[[bytes], None]) -> None:
         super().__init__(
@@ -29,6 +31,3 @@ class TargetSensorComponent(Component):
         """Send a scan that was taken on this step."""
         for message in scan_messages(scan.number, scan.time_us, scan.detections):
             self.send(message)
-
-    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Ignore the message: the sensor uses commands only."""

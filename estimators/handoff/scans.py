@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.moving_points import MovingPoints
-from estimators.handoff.ground_points import on_ground
 from estimators.tracking.line_of_sight import GimbalAttitude, gimbal_from_camera
+from estimators.vision.ground_points import on_ground
 from flightsim.foundation.vectors import between, from_euler, rotate
 
 Array = NDArray[np.float64]

@@ -31,6 +31,7 @@ __all__ = [
     "fit_compensation",
     "load_compensation",
     "mean_cycle",
+    "noise_figure_nt",
 ]
 
 Array = NDArray[np.float64]
@@ -43,6 +44,7 @@ _RIDGE: Final = 1e-6
 _LEAST_TURN_RAD: Final = math.radians(5.0)
 _HEADINGS: Final = 4
 _CYCLES: Final = 3  # of each manoeuvre
+_NOISE_DRAWS: Final = 20
 _TREND: Final = 2  # degree of what geology does during a manoeuvre
 FORMAT: Final = "flightstack-compensation-1"
 
@@ -165,6 +167,28 @@ def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
             f"a figure of merit of {len(manoeuvres)} manoeuvres; accepted: 12, three on each of four headings"
         )
     return math.fsum(float(np.ptp(mean_cycle(values, rate_hz=rate_hz))) for values in manoeuvres)
+
+
+def noise_figure_nt(manoeuvres: Sequence[Array], noise_nt: float, *, rate_hz: float) -> float:
+    """The figure of merit that white noise alone makes: no compensation makes it smaller.
+
+    Survey contracts are written for noise of some 0.01 nT, which makes next to nothing of 1 to 2 nT. The
+    magnetometer of a small aircraft has more, and a figure of merit near this one tells nothing of the
+    aircraft.
+
+    Args:
+        manoeuvres: as of `figure_of_merit_nt`; only their lengths count.
+        noise_nt: standard deviation of a reading.
+        rate_hz: of the readings.
+    """
+    rng = np.random.default_rng(0)
+    drawn = [
+        figure_of_merit_nt(
+            [noise_nt * rng.standard_normal(len(values)) for values in manoeuvres], rate_hz=rate_hz
+        )
+        for _ in range(_NOISE_DRAWS)
+    ]
+    return math.fsum(drawn) / _NOISE_DRAWS
 
 
 def mean_cycle(values_nt: Array, *, rate_hz: float) -> Array:

@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 
 MAX_DETECTIONS: Final = 2
 """Detections of the target in one frame that a likelihood counts; of one target at most one is true."""
-_MOST_WEIGHT: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,10 +125,8 @@ class SightModel:
 class PoseErrors:
     """Standard deviations of a vehicle's own pose, and how long the errors last.
 
-    The errors of successive frames are correlated. `n` detections with errors of a first-order Gauss-Markov
-    process have the information 1 + (n - 1) (1 - rho) / (1 + rho) about a constant, in units of that of one,
-    with rho = exp(-dt / tau). So the likelihood of each detection but the first gets the variance times
-    (1 + rho) / (1 - rho): together they have the right information, whoever receives them.
+    Errors of successive frames are those of first-order Gauss-Markov processes; of the mount they stay.
+    `DetectionWeights` takes them into account.
 
     Attributes:
         forward_m, right_m: of the place, along and across the heading.
@@ -156,14 +153,6 @@ class PoseErrors:
             if not (math.isfinite(value) and value >= 0.0):
                 raise EstimatorError(f"{name} {value:g} is not possible; give 0 or more")
 
-    def weights(self, since_s: float | None) -> tuple[float, float]:
-        """Factors of the variances of place and of angles.
-
-        Args:
-            since_s: time since the vehicle's last detection; None: there was none.
-        """
-        return _weight(since_s, self.place_time_s), _weight(since_s, self.attitude_time_s)
-
     def covariances(self, q_ned_from_frd: Quaternion, q_frd_from_mount: Quaternion) -> tuple[Array, Array]:
         """Covariances of a pose, without weights.
 
@@ -187,13 +176,6 @@ class PoseErrors:
         return place, rotation
 
 
-def _weight(since_s: float | None, time_s: float) -> float:
-    if since_s is None or time_s == 0.0:
-        return 1.0
-    rho = math.exp(-max(0.0, since_s) / time_s)
-    return min(_MOST_WEIGHT, (1.0 + rho) / max(1.0 - rho, 1.0 / _MOST_WEIGHT))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CameraSight:
     """One frame: where a camera was, how well this is known, and what it detected.
@@ -203,7 +185,7 @@ class CameraSight:
         q_ned_from_mount: attitude of the camera's axes.
         place_m2: (3, 3) covariance of the place, NED.
         rotation_rad2: (3, 3) covariance of the rotation about the camera's axes.
-        weights: factors of both variances in the likelihood of a detection's place (`PoseErrors.weights`);
+        weights: factors of both variances in the likelihood of a detection's place (`DetectionWeights`);
             not in that of being in view.
         width_px, height_px: size of the picture; its centre is on the optical axis.
         focal_px: focal length.

@@ -5,7 +5,6 @@ neighbour, and two groups that meet become one unless the lower peak stands out 
 persistence of Chazal, Guibas, Oudot and Skraba 2013, "Persistence-based clustering in Riemannian manifolds").
 """
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import Final
@@ -13,7 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.kernels import kernel
+
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 _ANGLE_BINS: Final = 60
 _MOST_BINS: Final = 40
@@ -72,41 +74,61 @@ def _smooth(density: Array) -> Array:
     return density
 
 
-def _groups(density: Array) -> NDArray[np.int64]:
+def _groups(density: Array) -> Indices:
     """Number of the group of each cell of the flattened histogram; -1: none."""
-    rows, columns, angles = density.shape
     values = density.ravel()
     order = np.flatnonzero(values > _EMPTY * values.max())
     order = order[np.argsort(-values[order], kind="stable")]
     parent = np.full(values.size, -1, dtype=np.int64)
-    heights = values.tolist()
-    steps = [step for step in itertools.product((-1, 0, 1), repeat=3) if any(step)]
-
-    def root(cell: int) -> int:
-        while parent[cell] != cell:
-            parent[cell] = parent[parent[cell]]
-            cell = int(parent[cell])
-        return cell
-
-    for cell in order.tolist():
-        row, column, angle = cell // (columns * angles), cell // angles % columns, cell % angles
-        roots = set()
-        for down, right, turn in steps:
-            if 0 <= row + down < rows and 0 <= column + right < columns:
-                beside = ((row + down) * columns + column + right) * angles + (angle + turn) % angles
-                if parent[beside] >= 0:
-                    roots.add(root(beside))
-        if not roots:
-            parent[cell] = cell
-            continue
-        ranked = sorted(roots, key=lambda peak: (-heights[peak], peak))
-        parent[cell] = ranked[0]
-        for peak in ranked[1:]:
-            if heights[peak] < _STANDS_OUT * heights[cell]:
-                parent[peak] = ranked[0]
-    for cell in order.tolist():
-        parent[cell] = root(cell)
+    _join(order, values, density.shape[0], density.shape[1], density.shape[2], parent)
     return parent
+
+
+@kernel
+def _join(order: Indices, heights: Array, rows: int, columns: int, angles: int, parent: Indices) -> None:
+    """Join cells to groups, from the densest down; a group has the number of its peak.
+
+    Args:
+        order: cells, the densest first.
+        heights: (rows * columns * angles,) density.
+        rows, columns, angles: of the histogram.
+        parent: (rows * columns * angles,) -1 everywhere; after it, the group of each cell.
+    """
+    roots = np.empty(26, dtype=np.int64)  # one for each neighbour
+    for cell in order:
+        row, column, angle = cell // (columns * angles), cell // angles % columns, cell % angles
+        count = 0
+        best = -1
+        for down in range(-1, 2):
+            for right in range(-1, 2):
+                if not (0 <= row + down < rows and 0 <= column + right < columns):
+                    continue
+                for turn in range(-1, 2):
+                    turned = (angle + turn) % angles
+                    beside = ((row + down) * columns + column + right) * angles + turned
+                    if parent[beside] < 0:
+                        continue
+                    peak = _root(parent, beside)
+                    roots[count] = peak
+                    count += 1
+                    higher = best < 0 or heights[peak] > heights[best]
+                    if higher or (heights[peak] == heights[best] and peak < best):
+                        best = peak
+        parent[cell] = cell if best < 0 else best
+        for k in range(count):
+            if roots[k] != best and heights[roots[k]] < _STANDS_OUT * heights[cell]:
+                parent[roots[k]] = best
+    for cell in order:
+        parent[cell] = _root(parent, cell)
+
+
+@kernel
+def _root(parent: Indices, cell: int) -> int:
+    """The peak of a cell's group; the way to it becomes shorter."""
+    while parent[cell] != cell:
+        parent[cell] = parent[parent[cell]]
+        cell = parent[cell]
+    return cell
 
 
 def _mode_of(points: Array, weights: Array, weight: float) -> Mode:

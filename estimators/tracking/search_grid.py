@@ -196,15 +196,18 @@ class SearchGrid:
             [layout.south_m + (mean_row + 0.5) * side, layout.west_m + (mean_column + 0.5) * side]
         )
         across = cross / total
-        within = 1.0 / 12.0
-        covariance = side**2 * np.array([[row2 / total + within, across], [across, column2 / total + within]])
-        return mean, covariance
+        between = np.array([[row2 / total, across], [across, column2 / total]])
+        # the place within a cell counts where a belief is narrower than that, and not once more where the
+        # cells themselves show its width
+        variances, axes = np.linalg.eigh(between)
+        covariance = side**2 * (axes * np.maximum(variances, 1.0 / 12.0)) @ axes.T
+        return mean, np.asarray(covariance)
 
     @property
     def entropy_nats(self) -> float:
-        p = self.probability()
-        p = p[p > 0.0]
-        return float(-np.sum(p * np.log(p))) + 2.0 * math.log(self.layout.cell_m)
+        if self.scale is Scale.LOG:
+            return _entropy(self.probability(), 1.0) + 2.0 * math.log(self.layout.cell_m)
+        return _entropy(self._cells, 1.0 / self._summed()) + 2.0 * math.log(self.layout.cell_m)
 
     def shares(self, layout: GridLayout) -> Array:
         own = self.layout
@@ -241,6 +244,18 @@ def _spread_by_three(p: Array, variance: float) -> Array:
     moved[0] += 0.5 * variance * p[0]
     moved[-1] += 0.5 * variance * p[-1]
     return moved
+
+
+@kernel
+def _entropy(cells: Cells, scale: float) -> float:
+    """Entropy of the cells, nats, whose probability is their number times a factor."""
+    total = 0.0
+    for i in range(cells.shape[0]):
+        for j in range(cells.shape[1]):
+            p = float(cells[i, j]) * scale
+            if p > 0.0:
+                total -= p * math.log(p)
+    return total
 
 
 @kernel

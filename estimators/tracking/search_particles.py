@@ -23,10 +23,14 @@ from flightsim.foundation.kernels import kernel
 __all__ = ["SearchParticles"]
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+Draws = NDArray[np.uint16]
 
 _BINS: Final = 64  # along each axis, over the particles: for the distance to neighbours
 _SPREAD: Final = 0.4  # of that distance, standard deviation per axis; of a uniform cell it is 0.29
+_DRAWS: Final = 4  # numbers of 16 bits in one of the generator's: two for each axis
+_DRAW_UNIT: Final = (
+    math.sqrt(6.0) / 2.0**16
+)  # the sum of two of them has the standard deviation 1 in this unit
 
 
 class SearchParticles:
@@ -95,18 +99,7 @@ class SearchParticles:
             self._rates += change
         else:
             places += motion.walk_m_sqrt_s * math.sqrt(dt_s) * self._rng.standard_normal(shape)
-        self._reflect()
-
-    def _reflect(self) -> None:
-        """Particles that have left the area come back, as at a wall."""
-        for places, rates, low, high in zip(self._places, self._rates, self._low, self._high, strict=True):
-            outside = (places < low) | (places > high)
-            if outside.any():
-                span = high - low
-                folded = np.mod(places[outside] - low, 2.0 * span)
-                back = folded > span
-                places[outside] = low + np.where(back, 2.0 * span - folded, folded)
-                rates[outside] *= np.where(back, -1.0, 1.0)
+        _reflect(places, self._rates, self._low, self._high)
 
     def update(self, sight: CameraSight) -> float:
         reach_m = math.dist(self._low, self._high) + math.dist(sight.place_ned_m[:2], self._low)
@@ -126,14 +119,12 @@ class SearchParticles:
 
     def _resample(self) -> None:
         count = self._weights.size
-        chosen = np.empty(count, dtype=np.int64)
-        systematic(self._weights, float(self._rng.random()), chosen)
-        spacing = np.empty(count)
-        _spacings(self._places, *_box_of(self._places), spacing)
-        jitter = _SPREAD * spacing[chosen] * self._rng.standard_normal((2, count))
-        self._places = self._places[:, chosen] + jitter
-        self._rates = self._rates[:, chosen]
-        self._reflect()
+        draws = self._rng.bit_generator.random_raw(count).astype("<u8").view("<u2").reshape(count, _DRAWS)
+        places, rates = np.empty_like(self._places), np.empty_like(self._rates)
+        start = float(self._rng.random())
+        _regenerate(self._places, self._rates, self._weights, start, draws, places, rates)
+        _reflect(places, rates, self._low, self._high)
+        self._places, self._rates = places, rates
         self._weights[:] = 1.0 / count
         self.resampled += 1
 
@@ -197,15 +188,62 @@ def _box_of(places: Array) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _spacings(places: Array, south: float, west: float, side_n: float, side_e: float, out: Array) -> None:
-    """Distance between neighbours about each particle: the root of its bin's area for each particle in it."""
-    bins = np.zeros((_BINS, _BINS))
-    count = places.shape[1]
-    row = np.empty(count, np.int64)
-    column = np.empty(count, np.int64)
+def _reflect(places: Array, rates: Array, low: Array, high: Array) -> None:
+    """Particles that have left the area come back, as at a wall."""
+    for axis in range(places.shape[0]):
+        span = high[axis] - low[axis]
+        for i in range(places.shape[1]):
+            past = places[axis, i] - low[axis]
+            if past < 0.0 or past > span:
+                past = past % (2.0 * span)
+                if past > span:
+                    past = 2.0 * span - past
+                    rates[axis, i] = -rates[axis, i]
+                places[axis, i] = low[axis] + past
+
+
+@kernel
+def _regenerate(
+    places: Array,
+    rates: Array,
+    weights: Array,
+    start: float,
+    draws: Draws,
+    new_places: Array,
+    new_rates: Array,
+) -> None:
+    """Resample, and spread each copy by its share of the distance to the neighbours of its original: the root
+    of a bin's area for each particle in it. The spread has a triangular density along each axis, close to the
+    optimal kernel (Musso, Oudjane and Le Gland 2001), and costs a tenth of a Gaussian's.
+
+    Args:
+        places, rates: (2, n).
+        weights: (n,), sum one.
+        start: uniform in 0..1.
+        draws: (n, 4) uniform in 0..65535.
+        new_places, new_rates: (2, n), the result.
+    """
+    count = weights.size
+    south, west, north, east = places[0, 0], places[1, 0], places[0, 0], places[1, 0]
     for i in range(count):
-        row[i] = min(_BINS - 1, int((places[0, i] - south) / side_n))
-        column[i] = min(_BINS - 1, int((places[1, i] - west) / side_e))
-        bins[row[i], column[i]] += 1.0
+        south, north = min(south, places[0, i]), max(north, places[0, i])
+        west, east = min(west, places[1, i]), max(east, places[1, i])
+    side_n, side_e = max((north - south) / _BINS, 1e-6), max((east - west) / _BINS, 1e-6)
+    bins = np.zeros(_BINS * _BINS)
+    where = np.empty(count, np.int64)
     for i in range(count):
-        out[i] = math.sqrt(side_n * side_e / bins[row[i], column[i]])
+        row = min(_BINS - 1, int((places[0, i] - south) / side_n))
+        where[i] = row * _BINS + min(_BINS - 1, int((places[1, i] - west) / side_e))
+        bins[where[i]] += 1.0
+    for k in range(bins.size):
+        if bins[k] > 0.0:
+            bins[k] = _SPREAD * _DRAW_UNIT * math.sqrt(side_n * side_e / bins[k])
+    chosen = np.empty(count, np.int64)
+    systematic(weights, start, chosen)
+    for i in range(count):
+        one = chosen[i]
+        spread = bins[where[one]]
+        for axis in range(2):
+            off = float(draws[i, 2 * axis]) + float(draws[i, 2 * axis + 1]) - 65535.0
+            new_places[axis, i] = places[axis, one] + spread * off
+            new_rates[axis, i] = rates[axis, one]

@@ -92,9 +92,13 @@ class VehicleTrack:
         """
         self._places.add(time_us, pos_ned_m)
 
+    def attitude_at(self, time_us: int) -> Quaternion | None:
+        """The attitude at a time; None: none near it is known."""
+        return self._attitudes.at(time_us, between)
+
     def at(self, time_us: int) -> VehiclePose | None:
         """The pose at a time; None: no attitude or no position near it is known."""
-        q = self._attitudes.at(time_us, between)
+        q = self.attitude_at(time_us)
         place = self._places.at(time_us, _mixed)
         return None if q is None or place is None else VehiclePose(q_ned_from_frd=q, pos_ned_m=place)
 

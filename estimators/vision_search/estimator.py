@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
-from autopilot_bridge.mavlink.camera_scan import CameraScan, read_camera_scan
+from autopilot_bridge.mavlink.camera_scan import CAMERA_COMPONENTS, CameraScan, read_camera_scan
 from autopilot_bridge.mavlink.search_likelihood import (
     SearchLikelihood,
     read_search_likelihood,
@@ -31,7 +31,6 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 __all__ = ["VisionSearchEstimator"]
 
 _AUTOPILOT: Final = 1
-_CAMERA: Final = 100
 _FIDUCIAL: Final = int(dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL)
 _MOST_TAG: Final = 255
 _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
@@ -159,7 +158,10 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
     # the camera
 
     def _on_detection(self, _time_us: int, camera: Camera, message: Message) -> Outcome:
-        if message.type != _FIDUCIAL or message.src_component != _CAMERA:
+        if message.src_component not in CAMERA_COMPONENTS:
+            return Outcome.IGNORED
+        camera.count_detection(message.src_component, int(message.time_usec))
+        if message.type != _FIDUCIAL:
             return Outcome.IGNORED
         angles = (message.angle_x, message.angle_y)
         if not all(map(math.isfinite, angles)):
@@ -169,16 +171,20 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         if message.target_num != self.parameters.tag_id:
             self._other_tags[min(int(message.target_num), _MOST_TAG)] += 1
             return Outcome.IGNORED
-        camera.take_detection(int(message.time_usec), *angles)
+        camera.take_detection(message.src_component, int(message.time_usec), *angles)
         return Outcome.USED
 
     def _on_tunnel(self, time_us: int, camera: Camera, message: Message) -> Outcome:
         content = (message.payload_type, message.payload_length, message.payload)
         scan = read_camera_scan(*content)
-        if scan is not None and message.src_component == _CAMERA:
+        if scan is not None and message.src_component in CAMERA_COMPONENTS:
+            if not camera.looks(message.src_component):
+                return Outcome.IGNORED
             return self._on_scan(camera, message.src_system, scan)
         likelihood = read_search_likelihood(*content)
         if likelihood is None or likelihood.tag_id != self.parameters.tag_id:
+            return Outcome.IGNORED
+        if self.parameters.own_vehicle and message.target_system not in (0, self.parameters.own_vehicle):
             return Outcome.IGNORED
         if self._origin() is None:
             return Outcome.WAITING
@@ -194,6 +200,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     def _on_scan(self, camera: Camera, system_id: int, scan: CameraScan) -> Outcome:
         p = self.parameters
+        complete = camera.is_complete(scan.time_us, scan.detections)
         detections = camera.detections(scan.time_us)
         if p.own_vehicle not in (0, system_id):
             return Outcome.IGNORED
@@ -205,16 +212,20 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         if not camera.is_due(scan.time_us, p.frame_period_s):
             camera.counts["too_soon"] += 1
             return Outcome.IGNORED
-        likelihood = likelihood_of(camera, scan, detections, self._errors, frame, p.tag_id)
+        if not complete and not detections:  # what was detected is lost: it may have been the target
+            camera.counts["incomplete"] += 1
+            return Outcome.IGNORED
+        if camera.knows(scan.number, scan.time_us):
+            camera.counts["repeated"] += 1
+            return Outcome.REPEATED
+        likelihood = likelihood_of(
+            camera, scan, detections, self._errors, frame, tag_id=p.tag_id, pixel_sigma_px=p.pixel_sigma_px
+        )
         if likelihood is None:
             camera.counts["without_pose"] += 1
             return Outcome.WAITING
-        if not camera.is_new(scan.number, scan.time_us):
-            camera.counts["repeated"] += 1
-            return Outcome.REPEATED
+        camera.is_new(scan.number, scan.time_us)
         camera.last_used_us = scan.time_us
-        if detections:
-            camera.last_detected_us = scan.time_us
         message = search_likelihood_message(likelihood)
         sent = read_search_likelihood(message.payload_type, message.payload_length, message.payload)
         if sent is None:
@@ -292,16 +303,16 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         """The home of the centre vehicle."""
         return None if self._frame is None else self._frame.origin
 
-    def likelihoods(self) -> list[MAVLinkMessage]:
+    def take_likelihoods(self) -> list[SearchLikelihood]:
         """The likelihoods of the own vehicle's frames since the last call, for the other vehicles."""
         outbox, self._outbox = self._outbox, []
-        return [search_likelihood_message(item) for item in outbox]
+        return outbox
 
     def publish(self) -> Sequence[MAVLinkMessage]:
         """The likelihoods of the own vehicle's frames since the last call, and, after a detection,
         FOLLOW_TARGET with the mean and its standard deviations.
         """
-        messages = self.likelihoods()
+        messages: list[MAVLinkMessage] = [search_likelihood_message(item) for item in self.take_likelihoods()]
         estimate, frame = self._unpublished, self._frame
         self._unpublished = None
         if estimate is None or frame is None:
@@ -329,7 +340,10 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         counts: Counter[str] = Counter()
         for camera in self._cameras.values():
             counts.update(camera.counts)
-        names = ("used", "received", "repeated", "late", "too_soon", "too_low", "without_pose", "impossible")
+        names = (
+            *("used", "received", "repeated", "late", "too_soon", "too_low", "without_pose", "incomplete"),
+            "impossible",
+        )
         found: dict[str, float | str] = {f"frames_{name}": float(counts[name]) for name in names}
         found["detections"] = float(self.detections)
         found["detections_of_other_tags"] = float(sum(self._other_tags.values()))

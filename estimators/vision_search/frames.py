@@ -13,6 +13,7 @@ from autopilot_bridge.mavlink.camera_scan import CameraScan
 from autopilot_bridge.mavlink.search_likelihood import SearchLikelihood
 from estimators.messages import Message
 from estimators.tracking.camera_sight import MAX_DETECTIONS, CameraSight, PoseErrors
+from estimators.tracking.detection_weights import DetectionWeights
 from estimators.vision.vehicle_track import VehicleTrack
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import from_euler, product, rotate
@@ -34,7 +35,8 @@ class Camera:
         offset_us: from its vehicle time to the time common to all.
         counts: frames by what became of them.
         last_used_us: exposure of the last frame that was used.
-        last_detected_us: exposure of the last detection that was used.
+        weights: of its detections; None: there was none yet.
+        component: of the camera: the first one that has ended a frame.
     """
 
     track: VehicleTrack = field(default_factory=VehicleTrack)
@@ -44,25 +46,48 @@ class Camera:
     offset_us: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     last_used_us: int | None = None
-    last_detected_us: int | None = None
-    _pending: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    weights: DetectionWeights | None = None
+    component: int | None = None
+    _pending: dict[tuple[int, int], list[tuple[float, float]]] = field(default_factory=dict)
+    _counted: dict[tuple[int, int], int] = field(default_factory=dict)
     _known: dict[tuple[int, int], None] = field(default_factory=dict)
 
-    def take_detection(self, exposed_us: int, angle_x_rad: float, angle_y_rad: float) -> None:
+    def looks(self, component: int) -> bool:
+        """Whether a component that ends a frame is the vehicle's searching camera."""
+        if self.component is None:
+            self.component = component
+        return component == self.component
+
+    def take_detection(self, component: int, exposed_us: int, angle_x_rad: float, angle_y_rad: float) -> None:
         """Keep a detection until the frame's end is received; one that is received twice counts once."""
-        pairs = self._pending.setdefault(exposed_us, [])
+        pairs = self._pending.setdefault((component, exposed_us), [])
         pair = (math.tan(angle_x_rad), math.tan(angle_y_rad))
         if pair not in pairs:
             pairs.append(pair)
         while len(self._pending) > _KEPT:
-            del self._pending[min(self._pending)]
+            del self._pending[min(self._pending, key=lambda key: key[1])]
+
+    def count_detection(self, component: int, exposed_us: int) -> None:
+        """Count a detection of whatever kind, to know whether all of a frame were received."""
+        key = (component, exposed_us)
+        self._counted[key] = self._counted.pop(key, 0) + 1
+        while len(self._counted) > _KEPT:
+            del self._counted[next(iter(self._counted))]
+
+    def is_complete(self, exposed_us: int, expected: int) -> bool:
+        """Whether as many detections were received as the end of a frame reports."""
+        return self._counted.pop((self.component or 0, exposed_us), 0) >= expected
 
     def detections(self, exposed_us: int) -> tuple[tuple[float, float], ...]:
         """The detections of a frame that has ended."""
-        found = self._pending.pop(exposed_us, [])
-        for older in [time_us for time_us in self._pending if time_us < exposed_us]:
+        found = self._pending.pop((self.component or 0, exposed_us), [])
+        for older in [key for key in self._pending if key[1] < exposed_us]:
             del self._pending[older]
         return tuple(found[:MAX_DETECTIONS])
+
+    def knows(self, number: int, exposed_us: int) -> bool:
+        """Whether a frame was received before, by whatever message."""
+        return (number, exposed_us) in self._known
 
     def is_new(self, number: int, exposed_us: int) -> bool:
         """Whether a frame was not received before, by whatever message; it is remembered."""
@@ -79,12 +104,6 @@ class Camera:
         last_us = self.last_used_us
         return last_us is None or exposed_us < last_us or (exposed_us - last_us) >= 1e6 * period_s - 1e3
 
-    def since_detection_s(self, exposed_us: int) -> float | None:
-        """Time since the vehicle's last detection; None: there was none."""
-        if self.last_detected_us is None or exposed_us < self.last_detected_us:
-            return None
-        return (exposed_us - self.last_detected_us) * 1e-6
-
 
 def likelihood_of(
     camera: Camera,
@@ -92,7 +111,9 @@ def likelihood_of(
     detections: tuple[tuple[float, float], ...],
     errors: PoseErrors,
     frame: LocalFrame,
+    *,
     tag_id: int,
+    pixel_sigma_px: float,
 ) -> SearchLikelihood | None:
     """The parameters of a frame's likelihood; None: no pose near its time is known, or the camera is on a
     gimbal.
@@ -105,6 +126,17 @@ def likelihood_of(
     north_m, east_m, down_m = (p + a for p, a in zip(pose.pos_ned_m, arm, strict=True))
     lat_deg, lon_deg, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
     place, rotation = errors.covariances(pose.q_ned_from_frd, q_frd_from_mount)
+    weight = 1.0
+    if detections:
+        if camera.weights is None:
+            camera.weights = DetectionWeights(errors, pixel_sigma_px / scan.focal_px)
+        weight = camera.weights.take(
+            scan.time_us,
+            height_m=-down_m,
+            q_ned_from_frd=pose.q_ned_from_frd,
+            q_frd_from_mount=q_frd_from_mount,
+            ray=detections[0],
+        )
     return SearchLikelihood(
         tag_id=tag_id,
         number=scan.number,
@@ -115,7 +147,7 @@ def likelihood_of(
         q_ned_from_mount=product(pose.q_ned_from_frd, q_frd_from_mount),
         place_m2=(place[0, 0], place[0, 1], place[1, 1], place[2, 2]),
         rotation_rad2=(*rotation[0], rotation[1, 1], rotation[1, 2], rotation[2, 2]),
-        weights=errors.weights(camera.since_detection_s(scan.time_us)) if detections else (1.0, 1.0),
+        weights=(weight, weight),
         width_px=scan.width_px,
         height_px=scan.height_px,
         focal_px=scan.focal_px,

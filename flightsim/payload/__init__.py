@@ -46,6 +46,7 @@ from flightsim.payload.target_motion import (
     Trajectory,
 )
 from flightsim.payload.target_sensor import ScanDisturbance, TargetScan, TargetSensor, TargetSensorParameters
+from flightsim.payload.target_shape import TargetShape
 from flightsim.payload.targets import NO_TAG, GroundTarget, GroundTargetParameters, GroundTargets
 from flightsim.payload.terrain import Terrain, TerrainSpec
 from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
@@ -109,6 +110,7 @@ __all__ = [
     "TargetScan",
     "TargetSensor",
     "TargetSensorParameters",
+    "TargetShape",
     "TargetView",
     "Terrain",
     "TerrainSpec",

@@ -303,9 +303,14 @@ class Camera:
                     position_ned_m=(float(north_m), float(east_m), float(down_m)),
                     size_m=target.parameters.size_m,
                     tag_id=target.parameters.tag_id,
+                    shape=target.parameters.shape,
+                    course_rad=math.atan2(east_m_s, north_m_s),
                 )
-                for target, (north_m, east_m, down_m) in zip(
-                    targets.targets, targets.positions_ned_m.tolist(), strict=True
+                for target, (north_m, east_m, down_m), (north_m_s, east_m_s, _) in zip(
+                    targets.targets,
+                    targets.positions_ned_m.tolist(),
+                    targets.velocities_ned_m_s.tolist(),
+                    strict=True,
                 )
             ),
             exposure_s=self.parameters.exposure_s,
@@ -362,12 +367,15 @@ class Camera:
         uniforms, normals = self._uniforms[self._row], self._normals[self._row]
         self._row += 1
         found: list[Detection] = []
+        searched = True
         if self.reader is not None:
-            found = list(self.reader.read(self.view(time_us)))
+            read = self.reader.read(self.view(time_us))
+            searched = read is not None
+            found = [] if read is None else list(read)
         elif self._gimbal is None or not self._gimbal.retracted:
             found = self._detections(time_us, uniforms, normals) + self._false_detections(time_us)
             found.sort(key=lambda detection: (detection.u_px, detection.v_px))
-        frame = CameraFrame(time_us, self._number, tuple(found))
+        frame = CameraFrame(time_us, self._number, tuple(found), searched)
         self._number += 1
         return frame
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from flightsim.payload.target_shape import TargetShape
+
 Vector = tuple[float, float, float]
 
 
@@ -13,11 +15,15 @@ class TargetView:
         position_ned_m: local NED of home.
         size_m: extent.
         tag_id: what can be read off it; -1: nothing.
+        shape: what it looks like without a tag.
+        course_rad: direction of its motion, clockwise from north.
     """
 
     position_ned_m: Vector
     size_m: float
     tag_id: int
+    shape: TargetShape = TargetShape.BALL
+    course_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

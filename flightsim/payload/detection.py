@@ -54,11 +54,14 @@ class CameraFrame:
         time_us: when it was exposed.
         number: counts from 0.
         detections: from left to right, so that their order carries no information.
+        searched: whether the frame says anything about targets; a detector of moving ones has nothing to
+            compare its first frames with.
     """
 
     time_us: int
     number: int
     detections: tuple[Detection, ...]
+    searched: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +90,8 @@ class SeenTargets:
 class FrameReader(Protocol):
     """Detects targets in the pictures of one camera."""
 
-    def read(self, view: CameraView) -> Sequence[Detection]:
-        """The detections in the picture of a view."""
+    def read(self, view: CameraView) -> Sequence[Detection] | None:
+        """The detections in the picture of a view; None: the frame was not searched."""
 
 
 class FrameReaderParameters(Protocol):

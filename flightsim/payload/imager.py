@@ -2,16 +2,19 @@
 
 import math
 from dataclasses import dataclass, field, fields
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 20
-_CONVERGED = 1e-12
+_ITERATIONS: Final = 20
+_CONVERGED: Final = 1e-12
+_LARGEST_LEFT: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,14 +68,7 @@ class BrownDistortion:
             ValueError: the lens folds the picture there: no ray, or more than one, is seen at a place.
         """
         rays = np.array(seen, dtype=np.float64)
-        with np.errstate(over="ignore", invalid="ignore"):
-            for _ in range(_ITERATIONS):
-                step = seen - self.distorted(rays)
-                rays += step
-                if float(np.abs(step).max(initial=0.0)) < _CONVERGED:
-                    return rays
-            left = float(np.abs(seen - self.distorted(rays)).max(initial=0.0))
-        if not left < 1e-6:
+        if not _undistort(rays.reshape(-1, 2), np.array(self.coefficients)) < _LARGEST_LEFT:
             raise ValueError(
                 f"the distortion {self.coefficients} is not accepted: it folds the picture at its edges; "
                 "smaller coefficients, or a smaller field of view, are"
@@ -109,3 +105,29 @@ class ImagerParameters:
     def noise_sigma(self, level: float) -> float:
         """One sigma of a sample, levels."""
         return math.sqrt(self.read_noise**2 + self.shot_noise * level)
+
+
+@kernel
+def _undistort(points: Array, coefficients: Array) -> float:
+    """Replace the places (n, 2) at which rays are seen by the rays; returns the largest remaining distance,
+    or infinity.
+    """
+    k1, k2, p1, p2, k3 = coefficients
+    largest = 0.0
+    for i in range(points.shape[0]):
+        u, v = points[i, 0], points[i, 1]
+        x, y, left = u, v, math.inf
+        for _ in range(_ITERATIONS):
+            r2 = x * x + y * y
+            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            dx = u - (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x))
+            dy = v - (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)
+            x += dx
+            y += dy
+            left = max(abs(dx), abs(dy))
+            if not left >= _CONVERGED:
+                break
+        points[i, 0], points[i, 1] = x, y
+        if not left <= largest:
+            largest = left if left == left else math.inf
+    return largest

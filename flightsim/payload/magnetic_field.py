@@ -72,8 +72,8 @@ class MagneticField:
             total += gradient * (height_m - background.height_m)
         for signature in self.signatures:
             drift_n, drift_e = signature.velocity_ne_m_s
-            north, east = np.float64(north_m - drift_n * time_s), np.float64(east_m - drift_e * time_s)
-            total += float(signature.anomaly_nt(north, east, height_m, self._field_ned_nt))
+            north, east = north_m - drift_n * time_s, east_m - drift_e * time_s
+            total += signature.anomaly_at_nt(north, east, height_m, self._field_ned_nt)
         return total if self._daily is None else total + self._daily.at_nt(time_s)
 
     def total_at_nt(self, north_m: Array, east_m: Array, height_m: float) -> Array:

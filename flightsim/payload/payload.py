@@ -162,6 +162,15 @@ class Payload:
                 seeds=seeds,
             )
 
+    @property
+    def next_us(self) -> int:
+        """Time before which steps have nothing to do and may be left out: a magnetometer alone rests between
+        its readings, other devices move or look in every step.
+        """
+        if self.gimbal or self.camera or self.target_sensor or self.range_radio or not self.magnetometer:
+            return 0
+        return self.magnetometer.next_us
+
     def step(self, time_us: int) -> None:
         """One physics step ending at `time_us`: gimbal, then what hangs on it, then the others."""
         if self.gimbal is not None:

@@ -78,23 +78,25 @@ class SurveyMagnetometer:
     Attributes:
         parameters: as given.
         reading: newest delivered reading; None before the first.
+        next_us: time of the next measurement or delivery; steps before it may be left out.
     """
 
     __slots__ = (
         "_body_field",
-        "_countdown",
         "_decay",
         "_drift_nt",
         "_drive_nt",
+        "_due_us",
         "_field",
         "_home_frame",
-        "_interval_steps",
+        "_interval_us",
         "_latency_us",
         "_permanent_nt",
         "_rng",
         "_truth",
         "_vehicle_field",
         "_waiting",
+        "next_us",
         "parameters",
         "reading",
     )
@@ -121,9 +123,9 @@ class SurveyMagnetometer:
             ValueError: the rate doesn't divide the physics rate.
         """
         p = self.parameters = parameters or SurveyMagnetometerParameters()
-        self._interval_steps = steps_per_sample(p.rate_hz, physics_rate_hz)
+        self._interval_us = steps_per_sample(p.rate_hz, physics_rate_hz) * (1_000_000 // physics_rate_hz)
         self._latency_us = round(p.latency_s * physics_rate_hz) * 1_000_000 // physics_rate_hz
-        self._countdown = 0
+        self.next_us = self._due_us = 0
         self._truth = truth
         self._field = field
         self._home_frame = HomeFrame(field.home)
@@ -139,15 +141,18 @@ class SurveyMagnetometer:
 
     def step(self, time_us: int) -> MagneticReading | None:
         """One physics step; the reading that is delivered on it, if there is one."""
-        if self._countdown:
-            self._countdown -= 1
-        else:
-            self._countdown = self._interval_steps - 1
+        if time_us < self.next_us:
+            return None
+        if time_us >= self._due_us:
+            self._due_us = time_us + self._interval_us
             self._waiting.append(MagneticReading(time_us, self._measure(time_us * 1e-6)))
-        if self._waiting and self._waiting[0].time_us + self._latency_us <= time_us:
-            self.reading = self._waiting.popleft()
-            return self.reading
-        return None
+        delivered: MagneticReading | None = None
+        if self._waiting[0].time_us + self._latency_us <= time_us:
+            delivered = self.reading = self._waiting.popleft()
+        self.next_us = self._due_us
+        if self._waiting:
+            self.next_us = min(self._due_us, self._waiting[0].time_us + self._latency_us)
+        return delivered
 
     def _measure(self, time_s: float) -> float:
         p, truth = self.parameters, self._truth

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_positive
 from flightsim.payload.target_motion import TargetMotion
+from flightsim.payload.target_shape import TargetShape
 
 Array = NDArray[np.float64]
 
@@ -23,11 +24,13 @@ class GroundTargetParameters:
         motion: `Static`, `ConstantVelocity`, `Circle`, `RandomWalk`, or one's own.
         size_m: extent, as a camera sees it from any side.
         tag_id: id that a camera reads (AprilTag); `NO_TAG`: it looks like any other.
+        shape: what it looks like in pictures without a tag; detections by the models do not depend on it.
     """
 
     motion: TargetMotion
     size_m: float = 2.0
     tag_id: int = NO_TAG
+    shape: TargetShape = TargetShape.BALL
 
     def __post_init__(self) -> None:
         require_positive(size_m=self.size_m)

@@ -52,6 +52,7 @@ _SUN_BGR: Final = (236.0, 250.0, 255.0)
 _SUN_COSINE: Final = math.cos(math.radians(0.6))
 _GLOW_COSINE: Final = math.cos(math.radians(15.0))
 _PAD_M: Final = 3.0
+_TERRAIN_STEPS: Final = 8
 
 
 @kernel
@@ -108,6 +109,19 @@ def _runway_paint(along: float, across: float, length_m: float, width_m: float, 
 
 
 @kernel
+def _height_at(heights: Array, grid: Array, north: float, east: float) -> float:
+    """Height of the ground, bilinear; beyond the edges that of the nearest edge."""
+    rows, columns = heights.shape
+    y = min(max((north - grid[0]) / grid[2], 0.0), rows - 1.0)
+    x = min(max((east - grid[1]) / grid[2], 0.0), columns - 1.0)
+    i, j = min(int(y), rows - 2), min(int(x), columns - 2)
+    fy, fx = y - i, x - j
+    south = heights[i, j] + (heights[i, j + 1] - heights[i, j]) * fx
+    north_row = heights[i + 1, j] + (heights[i + 1, j + 1] - heights[i + 1, j]) * fx
+    return float(south + (north_row - south) * fy)
+
+
+@kernel
 def paint_landscape(
     r_ned_from_mount: Array,
     eye_ned_m: Array,
@@ -116,13 +130,16 @@ def paint_landscape(
     centre_v_px: float,
     scenery: Array,
     texture: NDArray[np.float32],
+    heights: Array,
+    grid: Array,
     out: NDArray[np.uint8],
 ) -> None:
     """Fill a picture (height, width, 3), BGR; pixel (i, j) shows the ray through its middle.
 
     `r_ned_from_mount` (3, 3) has the optical axis, the picture's right and its down as columns. `centre_u_px`
     and `centre_v_px` are where that axis meets the picture, which may be a part of a larger one. An eye at or
-    under the ground sees it from 5 cm over it.
+    under the ground sees it from 5 cm over it. `heights` (rows, columns) are those of the ground over a grid
+    whose first place and spacing are `grid` (south, west, spacing); without rows it is level.
     """
     height, width = out.shape[0], out.shape[1]
     height_m = max(0.05, -eye_ned_m[2])
@@ -151,6 +168,11 @@ def paint_landscape(
                     out[row, column, c] = np.uint8(sky + (_SUN_BGR[c] - sky) * glow)
                 continue
             depth = height_m / dd
+            if heights.shape[0] > 1:
+                # fixed point: it converges where the ground is less steep than the ray
+                for _ in range(_TERRAIN_STEPS):
+                    at_n, at_e = eye_ned_m[0] + depth * dn, eye_ned_m[1] + depth * de
+                    depth = max(0.05, height_m - _height_at(heights, grid, at_n, at_e)) / dd
             range_m = depth * stretch
             north, east = eye_ned_m[0] + depth * dn, eye_ned_m[1] + depth * de
             haze = 1.0 - math.exp(-range_m / scenery[VISIBILITY_M])

@@ -1,7 +1,7 @@
 """From a camera's view to its picture."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
-from flightsim.payload.camera_view import CameraView
+from flightsim.payload.camera_view import CameraView, TargetView
 from flightsim.payload.imager import ImagerParameters
+from flightsim.payload.target_shape import TargetShape, paint_of
+from flightsim.payload.terrain import Terrain
 from flightsim.picture import landscape_kernel as k
 from flightsim.picture.exposure import Exposure
 from flightsim.picture.ground_texture import ground_texture
 from flightsim.picture.pose import rotation_of
+from flightsim.picture.target_bodies import draw_body
 from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag, tag_box, tag_may_show
 from flightsim.picture.window import Window
 
@@ -63,6 +66,8 @@ class Renderer:
         scenery: of the world.
         imager: lens and sensor; ideal by default.
         seed: of the noise.
+        terrain: heights of the ground, on which the targets stand then; None: it is level. It must not be
+            steeper than the rays that meet it: one place is found for each, what hides another is not.
 
     Raises:
         ValueError: the distortion folds the picture.
@@ -76,6 +81,7 @@ class Renderer:
         scenery: Scenery | None = None,
         imager: ImagerParameters | None = None,
         seed: int = 0,
+        terrain: Terrain | None = None,
     ) -> None:
         require_not_negative(aperture_px_m=aperture_px_m)
         self.model = model
@@ -84,6 +90,11 @@ class Renderer:
         self._texture = ground_texture()
         self._imager = imager or ImagerParameters()
         self._seed = seed
+        self._terrain = terrain
+        self._heights = np.zeros((0, 0)) if terrain is None else np.ascontiguousarray(terrain.height_m)
+        self._grid = (
+            np.zeros(3) if terrain is None else np.array([terrain.south_m, terrain.west_m, terrain.spacing_m])
+        )
         self._exposures: dict[tuple[int, float], Exposure] = {}
         self._exposure(model.width_px, 1.0)
         numbers = self._numbers = np.zeros(k.SCENERY)
@@ -136,6 +147,8 @@ class Renderer:
             0.5 * size_px[1] - part.top,
             self._numbers,
             self._texture,
+            self._heights,
+            self._grid,
             picture,
         )
         camera_from_ned = camera_from_gimbal(r_ned_from_mount).T
@@ -145,13 +158,24 @@ class Renderer:
             return math.dist(view.targets[index].position_ned_m, view.eye_ned_m)
 
         for index in sorted(range(len(view.targets)), key=distance_m, reverse=True):
-            target = view.targets[index]
+            target = self._placed(view.targets[index])
             if shows_tag(target):
                 draw_tag(picture, part, size_px, target, camera_from_ned, eye, focal_px)
+            elif target.shape is not TargetShape.BALL:
+                paint = paint_of(index)
+                draw_body(picture, part, size_px, target, paint, camera_from_ned, eye, focal_px, sun)
             else:
                 draw_ball(picture, part, size_px, target, camera_from_ned, eye, focal_px, sun)
         sharp = self._defocused(picture, view, r_ned_from_mount, scale)
         return exposure.expose(sharp, view, window, part)
+
+    def _placed(self, target: TargetView) -> TargetView:
+        """A target on the terrain."""
+        if self._terrain is None:
+            return target
+        north, east, down = target.position_ned_m
+        height = float(self._terrain.at(np.array([north]), np.array([east]))[0])
+        return replace(target, position_ned_m=(north, east, down - height))
 
     def tag_window(self, view: CameraView, margin_px: int) -> Window | None:
         """The part of the picture around the tags of a view; None: all of it, or nothing, may be needed."""

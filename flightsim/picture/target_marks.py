@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flightsim.payload.camera_model import camera_from_gimbal
 from flightsim.payload.camera_view import CameraView, TargetView
+from flightsim.picture.patches import LARGEST_PX, NEAREST_M, blend, box_of, part_of
 from flightsim.picture.pose import rotation_of
 from flightsim.picture.window import Window
 
@@ -28,8 +29,6 @@ _MARGIN_BGR: Final = (0.0, 215.0, 255.0)
 _BALL_BGR: Final = np.array((36.0, 36.0, 220.0))
 _FINE: Final = 4  # subpixels, each way
 _TEXELS_PER_CELL: Final = 16
-_NEAREST_M: Final = 0.1
-_LARGEST_PX: Final = 20_000.0  # a plate that fills more than the picture many times over is not painted
 
 
 def shows_tag(target: TargetView) -> bool:
@@ -75,13 +74,13 @@ def draw_tag(
 ) -> None:
     """Lay a tag's plate on the ground; `picture` is the part `window` of one of a size."""
     seen = (_plate_corners(target) - eye) @ camera_from_ned.T
-    if seen[:, 2].min() < _NEAREST_M:
+    if seen[:, 2].min() < NEAREST_M:
         return
     width, height = size_px
     pixels = focal_px * seen[:, :2] / seen[:, 2:] + (0.5 * width, 0.5 * height)
-    if not np.abs(pixels).max() < _LARGEST_PX:
+    if not np.abs(pixels).max() < LARGEST_PX:
         return
-    box = _box(pixels.min(axis=0), pixels.max(axis=0), window)
+    box = box_of(pixels.min(axis=0), pixels.max(axis=0), window)
     if box is None:
         return
     left, top, right, bottom = box
@@ -104,7 +103,7 @@ def draw_tag(
     if fine > 1:
         colour = cv2.resize(colour, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
         mask = cv2.resize(mask, (right - left, bottom - top), interpolation=cv2.INTER_AREA).astype(np.uint8)
-    _blend(_part(picture, window, box), colour, mask / 255.0)
+    blend(part_of(picture, window, box), colour, mask / 255.0)
 
 
 def draw_ball(
@@ -120,15 +119,15 @@ def draw_ball(
     """Put a ball where the target is, lit by the sun; `picture` is the part `window` of one of a size."""
     sight = np.asarray(target.position_ned_m) - eye
     seen = camera_from_ned @ sight
-    if seen[2] < _NEAREST_M:
+    if seen[2] < NEAREST_M:
         return
     width, height = size_px
     centre = focal_px * seen[:2] / seen[2] + (0.5 * width, 0.5 * height)
     range_m = float(np.linalg.norm(sight))
     radius = focal_px * 0.5 * target.size_m / range_m
-    if not radius < _LARGEST_PX:
+    if not radius < LARGEST_PX:
         return
-    box = _box(centre - radius - 1.0, centre + radius + 1.0, window)
+    box = box_of(centre - radius - 1.0, centre + radius + 1.0, window)
     if box is None:
         return
     left, top, right, bottom = box
@@ -142,25 +141,7 @@ def draw_ball(
     depth = np.sqrt(np.clip(1.0 - (distance / max(radius, 1e-9)) ** 2, 0.0, 1.0))
     lit = np.clip((x * facing[0] + y * facing[1]) / max(radius, 1e-9) - depth * facing[2], 0.0, 1.0)
     colour = (0.6 + 0.4 * lit)[:, :, None] * _BALL_BGR
-    _blend(_part(picture, window, box), colour, np.clip(cover, 0.0, 1.0))
-
-
-def _box(low: Array, high: Array, window: Window) -> tuple[int, int, int, int] | None:
-    """The pixels of a part of a picture that a box covers: left, top, right, bottom; None: none."""
-    left, top = max(window.left, math.floor(low[0])), max(window.top, math.floor(low[1]))
-    right, bottom = min(window.right, math.ceil(high[0])), min(window.bottom, math.ceil(high[1]))
-    return (left, top, right, bottom) if left < right and top < bottom else None
-
-
-def _part(picture: Picture, window: Window, box: tuple[int, int, int, int]) -> Picture:
-    """Those pixels of a part of a picture."""
-    left, top, right, bottom = box
-    return picture[top - window.top : bottom - window.top, left - window.left : right - window.left]
-
-
-def _blend(part: Picture, colour: NDArray[Any], cover: Array) -> None:
-    share = cover[:, :, None]
-    part[:] = np.round(part * (1.0 - share) + colour * share).astype(np.uint8)
+    blend(part_of(picture, window, box), colour, np.clip(cover, 0.0, 1.0))
 
 
 def tag_may_show(view: CameraView, half_width: float, half_height: float) -> bool:
@@ -201,7 +182,7 @@ def tag_box(view: CameraView, focal_px: float) -> tuple[Array, Array] | None:
     camera_from_ned = camera_from_gimbal(rotation_of(view.q_ned_from_mount)).T
     plates = [_plate_corners(target) for target in view.targets if shows_tag(target)]
     seen = (np.concatenate(plates) - view.eye_ned_m) @ camera_from_ned.T
-    if seen[:, 2].min() < _NEAREST_M:
+    if seen[:, 2].min() < NEAREST_M:
         return None
     offsets = focal_px * seen[:, :2] / seen[:, 2:]
     return offsets.min(axis=0), offsets.max(axis=0)

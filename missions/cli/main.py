@@ -23,6 +23,7 @@ _COMMANDS: Final = {
     "log": ("missions.cli.log", "log", "Look into logs, and make others of them."),
     "estimate": ("missions.cli.estimate", "estimate", "An estimator on a live link, a process of its own."),
     "replay": ("missions.cli.replay", "replay", "Logs through an estimator, and how far off it was."),
+    "vision": ("missions.cli.vision", "vision", "Tags in a video: a live stream's, or a log's."),
     "vehicle": ("missions.cli.vehicle", "vehicle", "Talk to a vehicle: info, parameters, logs, health."),
     "map": ("missions.cli.map", "magnetic_map", "Make magnetic maps from other files, and look into them."),
     "study": ("missions.cli.study", "study", "Monte Carlo: the papers' experiments."),

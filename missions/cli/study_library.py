@@ -39,9 +39,10 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
 
 
 def _magnetic_search(given: Given) -> "Study[Any, Any]":
+    from missions.occupancy.suspect import Identify
     from missions.studies.magnetic_search import study
 
-    return study()
+    return study([Identify(way) for way in given["identify"]])
 
 
 def _multi_target(given: Given) -> "Study[Any, Any]":
@@ -163,7 +164,15 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "evidence of classes, in the worlds of fly occupancy. The searchers are points that turn at "
                 "one rate."
             ),
-            options=(),
+            options=(
+                click.Option(
+                    ["--identify"],
+                    type=click.Choice(["threshold", "trace", "bayes"]),
+                    multiple=True,
+                    default=("threshold", "trace", "bayes"),
+                    help="Ways that are compared; repeat.",
+                ),
+            ),
             build=_magnetic_search,
         ),
         "multi-target": StudyCommand(
@@ -208,7 +217,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     help="Of the searched square, m.",
                 ),
                 click.Option(
-                    ["--passes"], type=click.IntRange(1, 100), default=6, help="Over the target, of each."
+                    ["--passes"], type=click.IntRange(1, 100), default=4, help="Over the target, of each."
                 ),
             ),
             build=_vision_search,

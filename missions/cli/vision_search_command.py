@@ -19,6 +19,7 @@ def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
         place_ne_m=given["target"],
         speed_m_s=given["target_speed"],
         misalignment_rad=math.radians(given["misalignment"]),
+        film=given["film"],
     )
     return vision_search_world(world, options, hidden)
 
@@ -98,6 +99,13 @@ COMMAND: Final = MissionCommand(
         option("--search-seed", type=int, default=0, help="Of the random numbers of filter and link."),
         option("--target", scope=Scope.EMBEDDED, type=PLACE, help="True place, m. [default: drawn]"),
         option("--target-speed", scope=Scope.EMBEDDED, type=float, default=0.0, help="Of the target, m/s."),
+        option(
+            "--film",
+            scope=Scope.EMBEDDED,
+            is_flag=True,
+            show_default=False,
+            help="Keep each camera's pictures as a lossless video, for `flightstack vision`; slow and large.",
+        ),
         option(
             "--misalignment",
             scope=Scope.EMBEDDED,

@@ -6,6 +6,7 @@ from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from missions.embedded.hidden_tag import HiddenTag, vision_search_world
+    from missions.embedded.rendered_motion import MotionSource, RenderedMotion
     from missions.embedded.rendered_tags import RenderedTags
     from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedSitl, alone, model_kind
     from missions.embedded.survey_worlds import survey_world
@@ -29,6 +30,8 @@ __all__ = [
     "EmbeddedSitl",
     "HiddenTag",
     "MotionKind",
+    "MotionSource",
+    "RenderedMotion",
     "RenderedTags",
     "TagTarget",
     "TargetField",
@@ -60,6 +63,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         "RenderedTags": _RENDERED_TAGS,
         **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.walking_targets"),
+        **dict.fromkeys(("MotionSource", "RenderedMotion"), "missions.embedded.rendered_motion"),
         **dict.fromkeys(("HiddenTag", "vision_search_world"), "missions.embedded.hidden_tag"),
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),

@@ -30,6 +30,7 @@ class HiddenTag:
         speed_m_s: of its random walk in the area; 0: it stays.
         misalignment_rad: standard deviation, about each axis, of the angles by which each camera is turned on
             its mount; its vehicle does not know them.
+        film: keep all pictures of each camera as a video.
 
     Raises:
         PlanError: a value is not possible.
@@ -38,6 +39,7 @@ class HiddenTag:
     place_ne_m: tuple[float, float] | None = None
     speed_m_s: float = 0.0
     misalignment_rad: float = math.radians(0.3)
+    film: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.speed_m_s <= 15.0:
@@ -64,7 +66,7 @@ def vision_search_world(
     """
     hidden = hidden or HiddenTag()
     streams = RandomStreams(world.seed)
-    camera = search_camera(options.tag_size_m)
+    camera = search_camera(options.tag_size_m, film=hidden.film)
     vehicles = []
     for index, vehicle in enumerate(world.vehicles):
         if vehicle.payload.camera is None:

@@ -3,7 +3,7 @@
 """
 
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from estimators.vision import (
 )
 from flightsim.payload import CameraView, Detection, ImagerParameters, PinholeModel
 from flightsim.picture import Renderer, Scenery
+from missions.embedded.picture_geometry import picture_geometry
 
 __all__ = ["RenderedTags", "RenderedTagsReader", "TagPicture"]
 
@@ -46,6 +47,14 @@ class TagPicture:
         return bytes(data)
 
 
+class FrameWriter(Protocol):
+    """Keeps pictures."""
+
+    def write(self, time_us: int, picture: Picture) -> None:
+        """Add a picture (height, width, 3), BGR, of a vehicle time."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderedTags:
     """Renders what a camera sees, and detects the tags in it.
@@ -55,11 +64,13 @@ class RenderedTags:
         scenery: of the world.
         skip: render only the part of a frame around the tags, and no frame in whose view no tag can lie. The
             detections are the same: the detector finds no tag where there is none.
+        film: keep all pictures as a lossless video in the run folder; then none is skipped.
     """
 
     detector: TagDetectorParameters = field(default_factory=TagDetectorParameters)
     scenery: Scenery = field(default_factory=Scenery)
     skip: bool = True
+    film: bool = False
 
     def start(
         self, *, model: PinholeModel, imager: ImagerParameters, blur_px_m: float, seed: int
@@ -76,6 +87,7 @@ class RenderedTagsReader:
     """Renders and searches the frames of one camera.
 
     Attributes:
+        film: the video to which all pictures are written; None: none.
         kept: the first picture with a detection; None: there was none yet.
         rendered: number of frames that were rendered.
         skipped: number of frames that were not.
@@ -96,32 +108,41 @@ class RenderedTagsReader:
         )
         self._zoom = 0.0
         self._detector = self._detector_at(1.0)
+        self.film: FrameWriter | None = None
         self.kept: TagPicture | None = None
         self.rendered = 0
         self.skipped = 0
 
     def _detector_at(self, zoom: float) -> TagDetector:
         if zoom != self._zoom:
-            model, imager = self._model, self._imager
-            geometry = CameraGeometry(
-                width_px=model.width_px,
-                height_px=model.height_px,
-                focal_px=(model.focal_px * zoom,) * 2,
-                centre_px=model.centre_px,
-                distortion=() if imager.distortion.none else imager.distortion.coefficients,
-            )
             self._zoom = zoom
-            self._detector = TagDetector(geometry, self._parameters.detector)
+            self._detector = TagDetector(self._geometry_at(zoom), self._parameters.detector)
         return self._detector
+
+    def _geometry_at(self, zoom: float) -> CameraGeometry:
+        return picture_geometry(self._model, self._imager, zoom)
+
+    @property
+    def geometry(self) -> CameraGeometry:
+        """Of the camera without zoom."""
+        return self._geometry_at(1.0)
+
+    @property
+    def films(self) -> bool:
+        """Whether the pictures are to be kept as a video."""
+        return self._parameters.film
 
     def read(self, view: CameraView) -> tuple[Detection, ...]:
         """The tags in the picture of a view."""
-        if self._parameters.skip and not self._renderer.may_show_tag(view):
+        skip = self._parameters.skip and self.film is None
+        if skip and not self._renderer.may_show_tag(view):
             self.skipped += 1
             return ()
         self.rendered += 1
-        window = self._renderer.tag_window(view, _MARGIN_PX) if self._parameters.skip else None
+        window = self._renderer.tag_window(view, _MARGIN_PX) if skip else None
         picture = self._renderer.render(view, window=window)
+        if self.film is not None:
+            self.film.write(view.time_us, picture)
         corner = (0, 0) if window is None else (window.left, window.top)
         found = self._detector_at(view.zoom).detect(picture, corner_px=corner)
         if found and self.kept is None:

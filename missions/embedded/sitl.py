@@ -10,12 +10,13 @@ from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
 from estimators.errors import LogError
 from estimators.logs.new_file import new_file
+from estimators.vision.video import VideoError
 from flightsim.airframe import load_airframe
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
-from missions.embedded.rendered_tags import RenderedTagsReader
+from missions.embedded.films import readers_of, start_films
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 
@@ -28,6 +29,7 @@ class EmbeddedSitl:
     Args:
         world: description of the world.
         publish_to: path to which a generated magnetic map is written.
+        films_to: folder for the videos of cameras whose pictures are kept; None: they are not kept.
         speedup: simulated seconds per wall second at most; None: as fast as the machine can.
         max_flight_s: vehicle time, s, after which a run that has not ended fails.
 
@@ -39,7 +41,7 @@ class EmbeddedSitl:
 
     Raises:
         ValueError: a value is not accepted; the message names it and what is accepted.
-        MissionError: a generated map can't be written.
+        MissionError: a generated map or a video can't be written.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class EmbeddedSitl:
         world: WorldSpec,
         *,
         publish_to: Path | None = None,
+        films_to: Path | None = None,
         speedup: float | None = None,
         max_flight_s: float = MAX_FLIGHT_S,
     ) -> None:
@@ -60,11 +63,15 @@ class EmbeddedSitl:
             self.published_map = publish_to
         self.links: list[Link] = [sitl.connect(index) for index in range(len(world.vehicles))]
 
+        self._films = [] if films_to is None else start_films(sitl, films_to)
+
         def advance() -> None:
             try:
                 sitl.advance()
             except VehicleDivergedError as error:
                 raise MissionError(f"the simulation ended: {error}") from error
+            except VideoError as error:
+                raise MissionError(str(error)) from error
 
         self.loop = VirtualTimeLoop(
             advance, lambda: sitl.time_us, speedup=speedup, max_time_us=round(max_flight_s * 1e6)
@@ -92,11 +99,9 @@ class EmbeddedSitl:
         file name.
         """
         found = {}
-        for vehicle in self.sitl.vehicles:
-            camera = None if vehicle.payload is None else vehicle.payload.camera
-            reader = None if camera is None else camera.device.reader
-            if isinstance(reader, RenderedTagsReader) and reader.kept is not None:
-                found[f"tag{vehicle.specification.system_id}.png"] = reader.kept.drawn()
+        for system_id, _, reader in readers_of(self.sitl):
+            if reader.kept is not None:
+                found[f"tag{system_id}.png"] = reader.kept.drawn()
         return found
 
     def on_truth(self, listener: TruthListener) -> None:
@@ -104,8 +109,10 @@ class EmbeddedSitl:
         self.sitl.on_truth(listener)
 
     def close(self) -> None:
-        """Close every link."""
+        """Close every link, and finish the videos."""
         self.sitl.close()
+        for film in self._films:
+            film.close()
         for link in self.links:
             link.close()
 

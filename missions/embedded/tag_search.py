@@ -95,12 +95,13 @@ class TagTarget:
         )
 
 
-def search_camera(tag_size_m: float, *, skip: bool = True) -> CameraParameters:
+def search_camera(tag_size_m: float, *, skip: bool = True, film: bool = False) -> CameraParameters:
     """The downward camera of the search.
 
     Args:
         tag_size_m: side of the tags, for their distance.
         skip: don't render frames in whose view no tag can lie.
+        film: keep all pictures as a video.
 
     Raises:
         PlanError: the size is not possible.
@@ -116,12 +117,17 @@ def search_camera(tag_size_m: float, *, skip: bool = True) -> CameraParameters:
         exposure_s=0.004,
         imager=_IMAGER,
         max_zoom=1.0,
-        reader=RenderedTags(detector=detector, skip=skip),
+        reader=RenderedTags(detector=detector, skip=skip, film=film),
     )
 
 
 def tag_search_world(
-    world: WorldSpec, options: FlightOptions, target: TagTarget | None = None, *, skip: bool = True
+    world: WorldSpec,
+    options: FlightOptions,
+    target: TagTarget | None = None,
+    *,
+    skip: bool = True,
+    film: bool = False,
 ) -> WorldSpec:
     """The world of a search for a tag.
 
@@ -131,12 +137,13 @@ def tag_search_world(
         options: the pattern.
         target: the target, drawn from the world's seed.
         skip: don't render frames in whose view no tag can lie.
+        film: keep all pictures of each camera as a video.
 
     Raises:
         PlanError: the target is not possible.
     """
     target = target or TagTarget()
-    world = carrying(world, PayloadParameters(camera=search_camera(target.size_m, skip=skip)))
+    world = carrying(world, PayloadParameters(camera=search_camera(target.size_m, skip=skip, film=film)))
     if world.targets:
         return world
     rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("tag_search", "target")))

@@ -1,17 +1,18 @@
 """Compares the readings of a vehicle's survey magnetometer with the map, and reports anomalies."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.mavlink import decode
+from autopilot_bridge.mavlink import field_reader
 from estimators.occupancy.detection import Anomaly, AnomalyDetector
 from estimators.occupancy.placed_readings import PlacedReading, ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
-from missions.vehicle.telemetry import position
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
+
+_read_position: Final = field_reader("GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt")
 
 SampleListener = Callable[[PlacedReading, float, bool], None]
 """Called with each placed reading, the map's value there, and whether it belongs to an anomaly."""
@@ -52,7 +53,7 @@ class FieldWatch:
         vehicle = self._vehicle
         self._stops = [
             vehicle.payload.on_total_field(self._on_reading),
-            vehicle.link.connection.listen("GLOBAL_POSITION_INT", self._on_position),
+            vehicle.link.connection.listen("GLOBAL_POSITION_INT", self._on_position, in_order=False),
         ]
 
     def stop(self) -> None:
@@ -68,8 +69,8 @@ class FieldWatch:
     def _on_position(self, frame: Any) -> None:
         if frame.system_id != self._vehicle.system_id or frame.component_id != AUTOPILOT_COMPONENT:
             return
-        place = position(decode(frame))
-        for reading in self.placer.add_position(place.time_us, place.lat_deg, place.lon_deg, place.alt_m):
+        time_ms, lat, lon, alt_mm = _read_position(frame)
+        for reading in self.placer.add_position(time_ms * 1000, lat * 1e-7, lon * 1e-7, alt_mm * 1e-3):
             map_nt = self._map.total_nt(reading.north_m, reading.east_m, reading.height_m)
             anomaly = self.detector.update(
                 reading.time_us, reading.total_nt, map_nt, reading.north_m, reading.east_m

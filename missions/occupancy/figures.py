@@ -5,13 +5,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from missions.occupancy.heading_score import HeadingScore, heading_score
-from missions.occupancy.investigation import Suspect
 from missions.occupancy.separation import least_separation_m
+from missions.occupancy.suspect import Suspect
 
 if TYPE_CHECKING:
     from estimators.occupancy.detection import Anomaly
     from missions.mission import Debriefing
-    from missions.occupancy.search import Candidate, Search
+    from missions.occupancy.candidate import Candidate
+    from missions.occupancy.search import Search
     from missions.occupancy.team import Searcher, SearchTeam
     from missions.runs.score import FlightScore
 

@@ -13,8 +13,8 @@ from estimators.tracking.grid import GridLayout
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
-from missions.occupancy.investigation import Identify
 from missions.occupancy.search import SearchParameters
+from missions.occupancy.suspect import Identify
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
 

@@ -14,7 +14,8 @@ from matplotlib.patches import Rectangle
 
 if TYPE_CHECKING:
     from missions.mission import Debriefing
-    from missions.occupancy.search import Search, Snapshot
+    from missions.occupancy.search import Search
+    from missions.occupancy.snapshots import Snapshot
     from missions.occupancy.team import SearchTeam
 
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")

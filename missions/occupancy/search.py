@@ -13,21 +13,19 @@ from numpy.typing import NDArray
 from estimators.magnetic_identification.anomaly import Anomaly as Identified
 from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import Anomaly, DetectionModel
-from estimators.occupancy.localisation import gaussian_centre
 from estimators.occupancy.occupancy_map import OccupancyMap
 from estimators.occupancy.placed_readings import PlacedReading
 from estimators.tracking.grid import Cell, GridLayout
 from missions.errors import PlanError
+from missions.occupancy.candidate import Candidate
 from missions.occupancy.decision import Decision, DecisionParameters, decide
-from missions.occupancy.investigation import Investigation, Suspect, Verdict
+from missions.occupancy.investigation import Investigation
+from missions.occupancy.snapshots import Snapshot, Snapshots
+from missions.occupancy.suspect import Suspect, Verdict
 
 Array = NDArray[np.float64]
 
-_FAR_M: Final = 250.0  # largest distance of a centre from the peaks
 _STEP_M: Final = 5.0  # shortest stretch of track for an update
-_KEPT_SCORES: Final = 10_000_000  # numbers kept in snapshots: 80 MB
-_LEAST_SNAPSHOTS: Final = 16
-_EVENTS_KEPT: Final = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,56 +61,6 @@ class SearchParameters:
             raise PlanError(f"`confirmations` {self.confirmations} is not 1 or more")
 
 
-@dataclass(slots=True, kw_only=True)
-class Candidate:
-    """A place at which anomalies were detected.
-
-    Attributes:
-        anomalies: (searcher, anomaly), in the order of time.
-        noise_nt: standard deviation of a reading.
-    """
-
-    anomalies: list[tuple[int, Anomaly]]
-    noise_nt: float = 0.5
-
-    @property
-    def passes(self) -> int:
-        """Number of passes that detected it."""
-        return len(self.anomalies)
-
-    @property
-    def place_ne_m(self) -> tuple[float, float]:
-        """Centre of a Gaussian fitted to the readings; when they do not determine it, the weighted mean of
-        the peaks.
-        """
-        weights = np.array([abs(anomaly.peak_nt) for _, anomaly in self.anomalies])
-        places = np.array([(anomaly.north_m, anomaly.east_m) for _, anomaly in self.anomalies])
-        north_m, east_m = (weights @ places / weights.sum()).tolist()
-        profile = np.array([reading for _, anomaly in self.anomalies for reading in anomaly.profile])
-        if len(profile):
-            centre = gaussian_centre(profile[:, 0], profile[:, 1], profile[:, 2], noise_nt=self.noise_nt)
-            if centre is not None and math.dist(centre, (north_m, east_m)) <= _FAR_M:
-                return centre
-        return north_m, east_m
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshot:
-    """The map at one moment.
-
-    Attributes:
-        time_us: vehicle time.
-        scores: (rows, columns).
-        places_ne_m: position of each searcher; NaN: not yet received.
-        event: the snapshot was stored because an anomaly was reported.
-    """
-
-    time_us: int
-    scores: Array
-    places_ne_m: tuple[tuple[float, float], ...]
-    event: bool = False
-
-
 class Search:
     """Shared by all searchers of a team.
 
@@ -123,8 +71,6 @@ class Search:
         found: the candidate that is the target; None while searching.
         found_us: time at which it was found.
         detection_curve: (time, cumulative probability of detection), one entry per update.
-        snapshots: the map after anomalies and at even intervals, which are increased when there are too many
-            snapshots.
     """
 
     def __init__(
@@ -154,12 +100,16 @@ class Search:
         self.found: Candidate | Suspect | None = None
         self.found_us = -1
         self.detection_curve: list[tuple[int, float]] = []
-        self.snapshots: list[Snapshot] = []
         self._decisions = tuple(decisions)
         self._targets: list[Cell | None] = [None] * len(self._decisions)
         self._places: list[tuple[float, float]] = [(math.nan, math.nan)] * len(self._decisions)
         self._searched: list[tuple[float, float] | None] = [None] * len(self._decisions)
-        self._snapshot_interval_us = round(snapshot_interval_s * 1e6)
+        self._snapshots = Snapshots(snapshot_interval_s)
+
+    @property
+    def snapshots(self) -> list[Snapshot]:
+        """The map after anomalies and at even intervals."""
+        return self._snapshots.kept
 
     def report_place(
         self, searcher: int, time_us: int, north_m: float, east_m: float, *, anomalous: bool = False
@@ -176,7 +126,7 @@ class Search:
             self._searched[searcher] = place
             self.map.search(last, place, self.parameters.detection)
             self.detection_curve.append((time_us, self.map.probability_of_detection))
-        if not self.snapshots or time_us - self.snapshots[-1].time_us >= self._snapshot_interval_us:
+        if self._snapshots.due(time_us):
             self._keep_snapshot(time_us, event=False)
 
     def report_anomaly(self, searcher: int, anomaly: Anomaly, time_us: int | None = None) -> None:
@@ -202,7 +152,7 @@ class Search:
         if self.found is None and candidate.passes >= parameters.confirmations:
             self.found = candidate
             self.found_us = anomaly.time_us if time_us is None else time_us
-        if sum(snapshot.event for snapshot in self.snapshots) < _EVENTS_KEPT:
+        if self._snapshots.room_for_event():
             self._keep_snapshot(anomaly.time_us if time_us is None else time_us, event=True)
 
     def report_reading(self, searcher: int, reading: PlacedReading, map_nt: float) -> None:
@@ -274,7 +224,7 @@ class Search:
             )
         if suspect.verdict is Verdict.TARGET and self.found is None:
             self.found, self.found_us = suspect, time_us
-        if sum(snapshot.event for snapshot in self.snapshots) < _EVENTS_KEPT:
+        if self._snapshots.room_for_event():
             self._keep_snapshot(time_us, event=True)
 
     def begin(self, time_us: int) -> None:
@@ -302,11 +252,7 @@ class Search:
             self.investigation.leave(searcher)
 
     def _keep_snapshot(self, time_us: int, *, event: bool) -> None:
-        layout = self.map.layout
-        if len(self.snapshots) >= max(_LEAST_SNAPSHOTS, _KEPT_SCORES // (layout.rows * layout.columns)):
-            self.snapshots = [s for k, s in enumerate(self.snapshots) if s.event or k % 2 == 0]
-            self._snapshot_interval_us *= 2
-        self.snapshots.append(
+        self._snapshots.add(
             Snapshot(
                 time_us=time_us, scores=self.map.scores.copy(), places_ne_m=tuple(self._places), event=event
             )

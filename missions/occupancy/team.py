@@ -14,11 +14,12 @@ from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.layers import Layers
 from missions.occupancy.field_watch import FieldWatch
-from missions.occupancy.investigation import Identify, Investigation
+from missions.occupancy.investigation import Investigation
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
+from missions.occupancy.suspect import Identify
 from missions.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.firmware import Mode

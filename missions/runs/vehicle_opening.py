@@ -99,7 +99,10 @@ class VehicleOpener:
         folder.published.append(folder.path / MAP_NAME)
         try:
             sitl = EmbeddedSitl(
-                request.embedded_world, publish_to=folder.path / MAP_NAME, speedup=request.speedup
+                request.embedded_world,
+                publish_to=folder.path / MAP_NAME,
+                films_to=folder.path,
+                speedup=request.speedup,
             )
         except ValueError as error:
             raise PlanError(str(error)) from error

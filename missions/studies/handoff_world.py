@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.handoff.ground_points import CameraAxes, on_ground
 from estimators.relative_pose import LevelMotion, PoseMeasurement
+from estimators.vision.ground_points import CameraAxes, on_ground
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
 from flightsim.foundation.random_streams import RandomStreams
@@ -48,7 +48,10 @@ class HandoffSetting:
         tilt_sigma_rad, tilt_time_s: errors of roll and of pitch, and their correlation time. In
             docs/attitude.md the attitude filter's mean squared errors are 0.1 to 1.6 deg^2.
         half_view: half of the image's width and height, as tangents (60 by 47 degrees).
-        pixel_rad: noise of an image point.
+        pixel_rad: noise of an image point. This, `detected` and `false_points` are those of the frame
+            differences on rendered video (docs/handoff.md): `python -m benchmarks.moving_objects --seconds
+            12 --seeds 2 --only study`.
+        seen_m: height over the ground of the middle of a target, which is what is seen: half of a person's.
         detected: probability that a target in view gives a point.
         false_points: mean number of false points in a frame.
     """
@@ -74,9 +77,10 @@ class HandoffSetting:
     tilt_sigma_rad: float = 0.012
     tilt_time_s: float = 5.0
     half_view: tuple[float, float] = (0.577, 0.433)
-    pixel_rad: float = 0.002
-    detected: float = 0.9
-    false_points: float = 1.0
+    pixel_rad: float = 0.00175
+    seen_m: float = 0.9
+    detected: float = 0.736
+    false_points: float = 0.003
 
     def __post_init__(self) -> None:
         check_fields(
@@ -213,7 +217,7 @@ class HandoffWorld:
         s, a = self.setting, self._aircraft[which]
         camera = CameraAxes.towards(*pointing, a.height_m)
         level = self.seen_from(which, self.targets)
-        points = camera.project(np.column_stack((level, np.full(len(level), a.height_m))))
+        points = camera.project(np.column_stack((level, np.full(len(level), a.height_m - s.seen_m))))
         inside = np.all(np.abs(points) < s.half_view, axis=1)  # NaN behind the camera is outside
         seen = inside & (a.rng.random(len(level)) < s.detected)
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))

@@ -6,6 +6,7 @@ search takes seconds.
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,8 +14,8 @@ import numpy as np
 
 from missions.embedded.point_searchers import search_with_points
 from missions.occupancy.figures import NAMED_WITHIN_M
-from missions.occupancy.investigation import Identify
 from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.suspect import Identify
 from missions.studies.design import grid
 from missions.studies.results import Results
 from missions.studies.study import Study
@@ -70,27 +71,33 @@ def trial(cell: Cell, seed: int) -> SearchRow:
 
 
 def summarise(results: Results) -> dict[str, Any]:
-    """`searches`, by way of identification: what was named, time and error; and the difference of time to the
-    threshold, in pairs of equal seeds. The time of a search that does not name the target is infinite.
+    """`searches`, by way of identification: what was named, time and error; and, if the threshold is one of
+    the ways, the difference of time to it in pairs of equal seeds. The time of a search that does not name
+    the target is infinite.
     """
     named = results.values("target_named") > 0.0
     never_s = np.where(named, results.values("time_s"), math.inf)
     blocks: dict[str, Any] = {}
     for k, cell in enumerate(results.cells):
-        both = named[k] & named[0]
-        later_s = results.values("time_s")[k, both] - results.values("time_s")[0, both]
-        blocks[str(cell["identify"])] = {
+        blocks[str(cell["identify"])] = block = {
             "target_named": round(float(named[k].mean()), 4),
             "false_anomaly_named": round(float(np.nanmean(results.values("false_anomaly_named")[k])), 4),
             "time_s_median": _finite(float(np.median(never_s[k]))),
             "error_m_median": _finite(float(np.median(results.values("error_m")[k, named[k]])))
             if named[k].any()
             else None,
-            "sooner_than_threshold": round(float(np.mean(never_s[k] < never_s[0])), 4),
-            "later_than_threshold": round(float(np.mean(never_s[k] > never_s[0])), 4),
-            "pairs_that_both_name_it": int(both.sum()),
-            "time_to_threshold_s_median_of_pairs": _finite(float(np.median(later_s))) if both.any() else None,
         }
+        if results.cells[0]["identify"] == Identify.THRESHOLD:
+            both = named[k] & named[0]
+            later_s = results.values("time_s")[k, both] - results.values("time_s")[0, both]
+            block |= {
+                "sooner_than_threshold": round(float(np.mean(never_s[k] < never_s[0])), 4),
+                "later_than_threshold": round(float(np.mean(never_s[k] > never_s[0])), 4),
+                "pairs_that_both_name_it": int(both.sum()),
+                "time_to_threshold_s_median_of_pairs": _finite(float(np.median(later_s)))
+                if both.any()
+                else None,
+            }
     return {"searches": blocks}
 
 
@@ -110,12 +117,12 @@ def report(results: Results) -> list[str]:
             for value in (
                 block["time_s_median"],
                 block["error_m_median"],
-                block["time_to_threshold_s_median_of_pairs"],
+                block.get("time_to_threshold_s_median_of_pairs"),
             )
         ]
         lines.append(
             f"{name:10s} {block['target_named']:8.3f} {block['false_anomaly_named']:8.3f} {shown[0]:>8s} "
-            f"{shown[1]:>9s} {block['pairs_that_both_name_it']:6d} {shown[2]:>9s}"
+            f"{shown[1]:>9s} {block.get('pairs_that_both_name_it', '-'):>6} {shown[2]:>9s}"
         )
     lines.append(
         "time: median, where a search that does not name the target never does; later: than threshold,"
@@ -124,15 +131,20 @@ def report(results: Results) -> list[str]:
     return lines
 
 
-def study() -> Study[Cell, SearchRow]:
-    """The study."""
+def study(ways: Collection[Identify] = tuple(Identify)) -> Study[Cell, SearchRow]:
+    """The study.
+
+    Args:
+        ways: of identification that are compared, the threshold first.
+    """
+    compared = [way.value for way in Identify if way in ways]
     return Study(
         name="magnetic-search",
         description="A team names a magnetic target among false anomalies: Lum et al. 2005, figure 8.",
         trial=trial,
         parameters=Cell,
         row=SearchRow,
-        design=grid(identify=tuple(way.value for way in Identify)),
+        design=grid(identify=compared),
         runs=100,
         success="target_named",
         metrics=("time_s", "error_m", "passes"),

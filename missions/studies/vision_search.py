@@ -18,7 +18,7 @@ from missions.studies.design import grid
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, paired_difference, rate_of
 from missions.studies.study import Study
-from missions.studies.vision_search_trial import BELIEFS, TEAMS, Cell, Localized, VisionSearchTrial
+from missions.studies.vision_search_trial import BELIEFS, MOMENTS_S, TEAMS, Cell, Localized, VisionSearchTrial
 
 __all__ = ["error_budget", "study"]
 
@@ -46,7 +46,7 @@ _POSE: Final = (
 _COLOURS: Final = {"one": "#1769aa", "two": "#c2410c"}
 
 
-def study(model: str = "aerosonde", side_m: float = 1000.0, passes: int = 6) -> Study[Cell, Localized]:
+def study(model: str = "aerosonde", side_m: float = 1000.0, passes: int = 4) -> Study[Cell, Localized]:
     """The study.
 
     Args:
@@ -134,11 +134,25 @@ def summarise(results: Results) -> Mapping[str, Any]:
         "error_m_ci95": [_rounded(value) for value in difference.ci95],
         "localized_s": _rounded(sooner.mean),
         "localized_s_ci95": [_rounded(value) for value in sooner.ci95],
+        **_narrower(results, cells),
     }
     found["pose_errors"] = {
         name: _rounded(figures_of(_figure(results, f"pose_{name}").ravel()).median) for name in _POSE
     }
     found["table_ii"] = error_budget()
+    return found
+
+
+def _narrower(results: Results, cells: Mapping[str, int]) -> dict[str, Any]:
+    """By how much the belief of two is narrower than that of one, at the end and at times of the search."""
+    found: dict[str, Any] = {}
+    names = {"sigma_m": f"{MAIN}_sigma_m"}
+    names |= {f"sigma_at_{moment_s}_s_m": f"{MAIN}_sigma_at_{moment_s}_m" for moment_s in MOMENTS_S}
+    for name, figure in names.items():
+        sigma = _figure(results, figure)
+        gap = paired_difference(sigma[cells["two"]], sigma[cells["one"]])
+        found[name] = _rounded(gap.mean)
+        found[f"{name}_ci95"] = [_rounded(value) for value in gap.ci95]
     return found
 
 
@@ -183,6 +197,14 @@ def lines_of(results: Results) -> list[str]:
     if gap["error_m"] is not None and gap["error_m_ci95"][0] is not None:
         low, high = gap["error_m_ci95"]
         lines.append(f"two minus one ({MAIN}): error {gap['error_m']:+.2f} m ({low:+.2f} to {high:+.2f})")
+        low, high = gap["localized_s_ci95"]
+        lines.append(f"two minus one: localized {gap['localized_s']:+.0f} s ({low:+.0f} to {high:+.0f})")
+        for moment_s in (None, *MOMENTS_S):
+            name = "sigma_m" if moment_s is None else f"sigma_at_{moment_s}_s_m"
+            if gap[name] is not None and gap[f"{name}_ci95"][0] is not None:
+                low, high = gap[f"{name}_ci95"]
+                when = "at the end" if moment_s is None else f"after {moment_s} s"
+                lines.append(f"  sigma {when}: {gap[name]:+.2f} m ({low:+.2f} to {high:+.2f})")
     return lines
 
 

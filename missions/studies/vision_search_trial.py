@@ -8,8 +8,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from estimators.library import make_estimator
 from estimators.log_replay import replay
@@ -22,7 +26,9 @@ from missions.studies.study import run_of
 from missions.vision_search.figures import ELLIPSE_95
 from missions.vision_search.options import VisionSearchOptions
 
-__all__ = ["BELIEFS", "TEAMS", "Cell", "Localized", "VisionSearchTrial"]
+__all__ = ["BELIEFS", "MOMENTS_S", "TEAMS", "Cell", "Localized", "VisionSearchTrial"]
+
+Array = NDArray[np.float64]
 
 TEAMS: Final[Mapping[str, int]] = MappingProxyType({"one": 1, "two": 2})
 
@@ -35,7 +41,24 @@ BELIEFS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 )
 """The paper's three representations, as settings of the estimator."""
 
-_ESTIMATE_PERIOD: Final = "estimate_period_s=20"
+MOMENTS_S: Final = (30, 60, 120, 180, 240, 300)
+"""Times from the begin of the search at which the belief of a flight is recorded."""
+
+_ESTIMATE_PERIOD: Final = "estimate_period_s=10"
+_ERRORS: Final[Mapping[str, Any]] = MappingProxyType(
+    {
+        "place_sigma_m": 0.1,
+        "height_sigma_m": 0.2,
+        "yaw_sigma_rad": 0.005,
+        "tilt_sigma_rad": 0.0025,
+        "mount_sigma_rad": math.radians(0.3),
+        "place_time_s": 30.0,
+        "attitude_time_s": 100.0,
+    }
+)
+"""Errors that the filter expects: of `pose_errors` in flights with other seeds than the study's, and of the
+cameras' mounts those with which they are drawn.
+"""
 _PARAMETERS: Final = MappingProxyType(
     {"COM_LOW_BAT_ACT": 0.0}
 )  # some searches outlast the battery's failsafe
@@ -64,8 +87,9 @@ class Localized:
         search_s: duration of the search.
         sim_time_s: time from boot to the end.
         figures: of each belief ("fine", "coarse", "particles") its `error_m`, `sigma_m` and
-            `distance_squared` (Mahalanobis), as "fine_error_m"; and the vehicles' pose errors, root mean
-            squares over the team, as "pose_pitch_rad".
+            `distance_squared` (Mahalanobis), as "fine_error_m", and its width at `MOMENTS_S`, as
+            "fine_sigma_at_120_m"; and the vehicles' pose errors, root mean squares over the team, as
+            "pose_pitch_rad".
     """
 
     completed: bool
@@ -89,7 +113,7 @@ class VisionSearchTrial:
 
     model: str = "aerosonde"
     side_m: float = 1000.0
-    passes: int = 6
+    passes: int = 4
 
     def __call__(self, cell: Cell, seed: int) -> Localized:
         """Fly the search. The same seed has the same place of the target for both teams."""
@@ -101,6 +125,7 @@ class VisionSearchTrial:
             passes=self.passes * TEAMS[cell.aircraft],
             tag_size_m=3.0,
             search_seed=run,
+            **_ERRORS,
         )
         world = WorldSpec.of_team(options.vehicles, model=self.model, seed=seed)
         world = vision_search_world(world, options)
@@ -111,7 +136,8 @@ class VisionSearchTrial:
         place = summary["target_north_m"], summary["target_east_m"]
         figures = _pose_figures(summary)
         for name, settings in BELIEFS.items():
-            figures |= _replayed(name, settings, options, result.folder / "flight.tlog", place)
+            log = result.folder / "flight.tlog"
+            figures |= _replayed(name, settings, options, log, place, summary["began_us"])
         localized_s = summary["localized_s"]
         return Localized(
             completed=result.outcome == "completed",
@@ -134,9 +160,14 @@ def _pose_figures(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _replayed(
-    name: str, settings: tuple[str, ...], options: VisionSearchOptions, log: Any, place: tuple[float, float]
+    name: str,
+    settings: tuple[str, ...],
+    options: VisionSearchOptions,
+    log: Path,
+    place: tuple[float, float],
+    began_us: int,
 ) -> dict[str, float]:
-    """The end of one belief over the log of a flight."""
+    """One belief over the log of a flight: at its end, and its width at the moments before."""
     parameters = options.estimator_parameters
     chosen = {setting.partition("=")[0] for setting in (*settings, _ESTIMATE_PERIOD)}
     own = [
@@ -158,9 +189,21 @@ def _replayed(
     sn, se, rho = last["north_sigma_m"], last["east_sigma_m"], last["north_east_correlation"]
     a, b = n / sn, e / se
     distance = (a * a + b * b - 2.0 * rho * a * b) / (1.0 - rho * rho)
-    return {
+    times_s = (table.time_us - began_us) * 1e-6
+    sigma_m = _sigma_m(table["north_sigma_m"], table["east_sigma_m"], table["north_east_correlation"])
+    moments = {}
+    for moment_s in MOMENTS_S:
+        index = int(np.searchsorted(times_s, moment_s, side="right")) - 1
+        if index >= 0:
+            moments[f"{name}_sigma_at_{moment_s}_m"] = float(sigma_m[index])
+    return moments | {
         f"{name}_error_m": math.hypot(n, e),
-        f"{name}_sigma_m": math.sqrt(sn * se) * (1.0 - rho * rho) ** 0.25,
+        f"{name}_sigma_m": float(sigma_m[-1]),
         f"{name}_distance_squared": distance,
         f"{name}_inside": float(distance <= ELLIPSE_95),
     }
+
+
+def _sigma_m(north_m: Array, east_m: Array, correlation: Array) -> Array:
+    """The fourth root of the covariance's determinant."""
+    return np.asarray(np.sqrt(north_m * east_m) * (1.0 - correlation**2) ** 0.25)

@@ -188,6 +188,7 @@ def _calibration_figures(made: Calibration) -> dict[str, Any]:
     return {
         "figure_of_merit_nt": _rounded(made.figure_of_merit_nt),
         "figure_of_merit_before_nt": _rounded(made.figure_of_merit_before_nt),
+        "figure_of_merit_noise_nt": _rounded(made.figure_of_merit_noise_nt),
         "improvement": _rounded(made.improvement, 2),
     }
 
@@ -197,7 +198,8 @@ def report_lines(summary: Mapping[str, Any]) -> Sequence[str]:
     if "figure_of_merit_nt" in summary:
         return (
             f"figure of merit {summary['figure_of_merit_before_nt']:.1f} nT before compensation, "
-            f"{summary['figure_of_merit_nt']:.2f} nT after, improvement ratio {summary['improvement']:.1f}: "
+            f"{summary['figure_of_merit_nt']:.2f} nT after ({summary['figure_of_merit_noise_nt']:.2f} nT by "
+            f"noise alone), improvement ratio {summary['improvement']:.1f}: "
             f"{COMPENSATION}",
         )
     if "lines" not in summary:

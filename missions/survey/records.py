@@ -13,8 +13,9 @@ from estimators.survey.compensation import (
     figure_of_merit_nt,
     fit_compensation,
     mean_cycle,
+    noise_figure_nt,
 )
-from estimators.survey.processing import aircraft_field_nt
+from estimators.survey.processing import aircraft_field_nt, white_noise_nt
 from estimators.survey.readings import SurveyReadings, placed_readings
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.main_field import MainField
@@ -56,6 +57,7 @@ class Calibration:
         compensation: the coefficients.
         figure_of_merit_nt: of the compensated readings: sum of the peak-to-peak values of twelve manoeuvres.
         figure_of_merit_before_nt: of the readings as they were.
+        figure_of_merit_noise_nt: what the white noise of the readings alone makes of it.
         improvement: improvement ratio: standard deviation of the readings during the manoeuvres before
             compensation over that after it, of the mean cycles.
         before_nt, after_nt: readings of the manoeuvres of the second box, less their level, by label.
@@ -64,6 +66,7 @@ class Calibration:
     compensation: Compensation
     figure_of_merit_nt: float
     figure_of_merit_before_nt: float
+    figure_of_merit_noise_nt: float
     improvement: float
     before_nt: dict[str, Array] = field(default_factory=dict)
     after_nt: dict[str, Array] = field(default_factory=dict)
@@ -113,9 +116,13 @@ def calibrated(
         np.concatenate([mean_cycle(values, rate_hz=rate_hz) for values in parts.values()]).std()
         for parts in (before, after)
     ]
+    flown = list(after.values())
+    numbers = np.repeat(np.arange(len(flown)), [len(values) for values in flown])
+    noise_nt = white_noise_nt(np.concatenate(flown), numbers)
     return Calibration(
         compensation=compensation,
-        figure_of_merit_nt=figure_of_merit_nt(list(after.values()), rate_hz=rate_hz),
+        figure_of_merit_nt=figure_of_merit_nt(flown, rate_hz=rate_hz),
+        figure_of_merit_noise_nt=noise_figure_nt(flown, noise_nt, rate_hz=rate_hz),
         figure_of_merit_before_nt=figure_of_merit_nt(list(before.values()), rate_hz=rate_hz),
         improvement=float(spreads[0] / max(float(spreads[1]), 1e-12)),
         before_nt=before,

@@ -252,6 +252,10 @@ class Connection:
             self._drain()
             await asyncio.sleep(0.05 if current else _POLL_S)
 
+    def keep_of_another_link(self, frame: Frame) -> None:
+        """Record a frame that another link has carried, such as one between vehicles."""
+        self._record(Packet.of([frame]))
+
     # sending
 
     def speak_as(self, system_id: int, component_id: int) -> None:

@@ -39,6 +39,7 @@ _CLIMBED_M: Final = 1.0  # below a takeoff's altitude; above this height the tak
 _CIRCLE_M: Final = 80.0
 _NO_MISSION: Final = 0xFFFF  # MISSION_CURRENT.seq
 _HEARTBEATS_AWAY: Final = 3
+_LEAST_M_PER_DEG: Final = 100_000.0  # of latitude, below the true 110,574 m: rejects distant positions
 _STARTED: Final = (dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_PAUSED)
 
 
@@ -121,6 +122,8 @@ class MissionStep:
             return False
         if math.isinf(self.radius_m):
             return alt_m >= self.place.alt_m
+        if abs(lat_deg - self.place.lat_deg) * _LEAST_M_PER_DEG > self.radius_m:
+            return False
         return math.hypot(*self._frame.ned_from_geodetic(lat_deg, lon_deg, alt_m)) <= self.radius_m
 
 

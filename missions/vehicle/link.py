@@ -63,8 +63,8 @@ class VehicleLink:
         self._last_ack: Any = None
         self.heartbeat_us: int | None = None
         self.on_regained: Callable[[], None] = lambda: None
-        # newest usable telemetry, and the time at which it was examined
-        self._usable: dict[type, tuple[Any, int]] = {}
+        # newest usable telemetry: its message, the value, and the time at which it was examined
+        self._usable: dict[type, tuple[MAVLinkMessage, Any, int]] = {}
         self.first_heartbeat_us = 0
         self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
@@ -208,13 +208,14 @@ class VehicleLink:
         message = self.message(name)
         if message is None:
             return None
-        value: T | None = convert(message)
+        before = self._usable.get(kind)
+        known = before is not None and before[0] is message  # converted once
+        value: T | None = before[1] if before is not None and known else convert(message)
         now_us = self.clock.time_us
         if value is not None:
-            self._usable[kind] = (value, now_us)
+            self._usable[kind] = (message, value, now_us)
             return value
-        before = self._usable.get(kind)
-        return before[0] if before is not None and now_us - before[1] <= _USABLE_FOR_US else None
+        return before[1] if before is not None and now_us - before[2] <= _USABLE_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
         """Home as reported by the vehicle, or None."""

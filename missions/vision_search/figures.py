@@ -66,6 +66,7 @@ def search_figures(team: "VisionSearchTeam", debriefing: "Debriefing") -> Mappin
     return {
         "search_end": search.reason or "not ended",
         "search_s": _since(began_us, ended_us) or 0.0,
+        "began_us": began_us,
         "localized": search.localized_us >= 0,
         "localized_s": _since(began_us, search.localized_us),
         "passes": search.passes,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
+from autopilot_bridge.mavlink.search_likelihood import search_likelihood_message
 from estimators.runner import Runner
 from estimators.vision_search import AreaEstimate, VisionSearchEstimator, VisionSearchParameters
 
@@ -41,6 +42,8 @@ class LinkQuality:
 
 class CameraWatch:
     """Passes each vehicle's messages to its own estimator, and the likelihoods to those of the others.
+
+    What a vehicle receives of the others is in the log, when it is received, with the vehicle as its target.
 
     Args:
         vehicles: the vehicles of the team.
@@ -123,10 +126,11 @@ class CameraWatch:
 
     def _send(self, index: int) -> None:
         """Send the new likelihoods of a vehicle, as its onboard computer would."""
-        for message in self.estimators[index].likelihoods():
-            (frame,) = self._parsers[index].feed(self._encoders[index].encode(message))
-            for other in range(len(self._runners)):
+        for likelihood in self.estimators[index].take_likelihoods():
+            for other, vehicle in enumerate(self._vehicles):
                 if other != index:
+                    message = search_likelihood_message(likelihood, target_system=vehicle.system_id)
+                    (frame,) = self._parsers[index].feed(self._encoders[index].encode(message))
                     self._send_to(other, frame)
 
     def _send_to(self, other: int, frame: Any) -> None:
@@ -145,4 +149,5 @@ class CameraWatch:
         while self._under_way and self._under_way[0][0] <= now_us:
             _, _, other, frame = heapq.heappop(self._under_way)
             self.counts["delivered"] += 1
+            self._vehicles[other].link.connection.keep_of_another_link(frame)
             self._feed(other, frame)

@@ -443,18 +443,25 @@ def test_a_gaussian_s_volume() -> None:
 
 
 def test_the_field_is_the_published_map_and_the_targets(tmp_path: Path) -> None:
-    """What a mission does: it loads the file, and reading - map is the target alone, at any height."""
+    """What a mission does: it loads the file, and reading - map is the targets alone, at any height."""
     published = made()
     published.save(tmp_path / "area.npz")
     target = GaussianSignature(north_m=400.0, east_m=-300.0, amplitude_nt=30.0)
-    field = MagneticField(published, [target])
+    wreck = DipoleSignature(north_m=-200.0, east_m=500.0, height_m=-40.0, moment_ned_a_m2=(2e5, 3e4, -1e5))
+    field = MagneticField(published, [target, wreck])
+    earth = MainField(published.home, 2026.0)
     onboard = MagneticMap.load(tmp_path / "area.npz")
     rng = np.random.default_rng(6)
     for north_m, east_m in rng.uniform(-2000.0, 2000.0, (50, 2)).tolist():
         for height_m in (60.0, 100.0, 130.0):
             reading = field.total_nt(north_m, east_m, height_m)
             background = onboard.interpolate(np.array(north_m), np.array(east_m), height_m)
-            expected = target.anomaly_nt(np.float64(north_m), np.float64(east_m), height_m, np.zeros(3))
+            expected = sum(
+                signature.anomaly_nt(
+                    np.float64(north_m), np.float64(east_m), height_m, earth.total_nt * earth.direction_ned
+                )
+                for signature in (target, wreck)
+            )
             assert reading - float(background) == pytest.approx(float(expected), abs=1e-8)
             assert reading == pytest.approx(
                 float(field.total_at_nt(np.array(north_m), np.array(east_m), height_m)), abs=1e-8

@@ -1,6 +1,7 @@
 """Pictures against the geometry of the detections, and against detectors that others wrote."""
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -19,7 +20,9 @@ from flightsim.payload import (
     PinholeModel,
     ResolutionDetection,
     Static,
+    TargetShape,
     TargetView,
+    Terrain,
 )
 from flightsim.picture import Renderer, Scenery
 from tests.rotations import rotation_matrix
@@ -234,6 +237,70 @@ def test_a_smaller_picture_shows_the_same():
     assert blob_centre(small, red(small)) == pytest.approx((0.5 * u, 0.5 * v), abs=0.5)
 
 
+SMALL = PinholeModel(width_px=320, height_px=240)
+
+
+def pixels_of(view, places_ned_m):
+    camera_from_ned = rotation_matrix(view.q_ned_from_mount).T[[1, 2, 0]]
+    return SMALL.project((np.asarray(places_ned_m) - view.eye_ned_m) @ camera_from_ned.T)
+
+
+# of a vehicle the front is highest in the picture, a little over the ground, of a person the head
+@pytest.mark.parametrize(
+    ("shape", "size_m", "ahead_m", "height_m"),
+    [(TargetShape.VEHICLE, 4.5, 2.25, 0.85), (TargetShape.PERSON, 1.75, 0.1, 1.75)],
+)
+def test_a_body_stands_where_it_is(shape, size_m, ahead_m, height_m):
+    """What differs from the empty picture is the target with its shadow."""
+    north, east = 21.0, 3.0
+    body = TargetView(
+        position_ned_m=(north, east, 0.0), size_m=size_m, tag_id=-1, shape=shape, course_rad=0.6
+    )
+    view = CameraView(time_us=0, eye_ned_m=(0.0, 0.0, -20.0), q_ned_from_mount=quaternion(3, -42, 5))
+    renderer = Renderer(SMALL)
+    empty, shown = renderer.render(view), renderer.render(replace(view, targets=(body,)))
+    changed = np.abs(shown.astype(int) - empty).max(axis=2) > 8
+    top_m = size_m if shape is TargetShape.PERSON else 0.33 * size_m
+    feet, top = pixels_of(view, [(north, east, 0.0), (north, east, -top_m)])
+    v, u = np.nonzero(changed)
+    front = (north + ahead_m * math.cos(0.6), east + ahead_m * math.sin(0.6), -height_m)
+    assert v.min() + 0.5 == pytest.approx(pixels_of(view, [front])[0][1], abs=3.0)
+    assert changed[round(0.5 * (feet[1] + top[1])), round(0.5 * (feet[0] + top[0]))]
+    if shape is TargetShape.PERSON:  # a car lies on most of its own shadow
+        # the sun is in the south-east at 45 degrees: the shadow is north-west, as long as the body is high
+        away = 0.6 * top_m * np.array([-math.cos(math.radians(150)), -math.sin(math.radians(150)), 0.0])
+        u_px, v_px = np.round(pixels_of(view, [np.array((north, east, 0.0)) + away])[0] - 0.5).astype(int)
+        assert shown[v_px, u_px].sum() < 0.85 * empty[v_px, u_px].sum()
+    assert np.hypot(u - feet[0], v - feet[1]).max() < 1.5 * SMALL.focal_px * size_m / 20.0
+
+
+def test_terrain_moves_the_ground_by_its_parallax():
+    """A plateau looks as level ground does from as much less height, and targets stand on it."""
+    plateau = Terrain(south_m=-500.0, west_m=-500.0, spacing_m=250.0, height_m=np.full((5, 5), 8.0))
+    ball = TargetView(position_ned_m=(14.0, -2.0, 0.0), size_m=2.0, tag_id=-1)
+    high = CameraView(
+        time_us=0, eye_ned_m=(0.0, 0.0, -30.0), q_ned_from_mount=quaternion(4, -55, 0), targets=(ball,)
+    )
+    low = replace(high, eye_ned_m=(0.0, 0.0, -22.0))
+    raised = Renderer(SMALL, terrain=plateau).render(high)
+    level = Renderer(SMALL).render(low)
+    same = np.abs(raised.astype(int) - level).max(axis=2) <= 1
+    assert same.mean() > 0.99
+    assert (np.abs(raised.astype(int) - Renderer(SMALL).render(high)).max(axis=2) > 1).mean() > 0.5
+
+
+def test_a_slope_is_where_its_rays_meet_it():
+    """A mark at home, on a slope, is where projection puts its place."""
+    north_m = np.linspace(-100.0, 100.0, 21)
+    slope = Terrain(
+        south_m=-100.0, west_m=-100.0, spacing_m=10.0, height_m=np.repeat(5.0 + 0.2 * north_m[:, None], 21, 1)
+    )
+    view = CameraView(time_us=0, eye_ned_m=(-25.0, 4.0, -30.0), q_ned_from_mount=quaternion(0, -45, 0))
+    picture = Renderer(SMALL, terrain=slope).render(view)
+    v, u = np.nonzero((picture > 190).all(axis=2))
+    assert (u.mean() + 0.5, v.mean() + 0.5) == pytest.approx(pixels_of(view, [(0.0, 0.0, -5.0)])[0], abs=2.0)
+
+
 @pytest.mark.parametrize("eye", [(0.0, 0.0, 0.0), (1e7, -1e7, -1e5), (0.0, 0.0, 30.0)])
 @pytest.mark.parametrize("attitude", [(0, 0, 0), (180, 0, 0), (0, 90, 0), (45, -90, 0)])
 def test_strange_places_make_pictures_too(eye, attitude):
@@ -242,6 +309,7 @@ def test_strange_places_make_pictures_too(eye, attitude):
         for north in (-0.3, 0.0, 0.3, 1e5)
         for tag in (-1, 3, 586, 587)
     )
+    targets += tuple(replace(target, shape=TargetShape.VEHICLE) for target in targets)
     view = CameraView(
         time_us=0, eye_ned_m=eye, q_ned_from_mount=quaternion(*attitude), zoom=6.0, targets=targets
     )

@@ -151,7 +151,8 @@ def test_px4_habits() -> None:
 def test_arduplane_habits() -> None:
     flight = flight_of("ardupilot")
     assert (flight.return_altitude_m, flight.return_climbs) == (100.0, False)
-    assert flight_of("ardupilot", RTL_ALTITUDE=-1.0).return_climbs
+    as_high_as_now = flight_of("ardupilot", RTL_ALTITUDE=-1.0)
+    assert (as_high_as_now.return_climbs, as_high_as_now.return_descend_altitude_m) == (True, math.inf)
     assert flight.return_destination is ReturnDestination.HOME
     assert (
         flight_of("ardupilot", RTL_AUTOLAND=1).return_destination

@@ -55,7 +55,9 @@ _MAY_BE_ZERO: Final = frozenset(
         "manual_expo",
     }
 )
-_MAY_BE_INFINITE: Final = frozenset({"acceptance_altitude_m", "glide_slope_min_m", "position_lost_wait_s"})
+_MAY_BE_INFINITE: Final = frozenset(
+    {"acceptance_altitude_m", "glide_slope_min_m", "position_lost_wait_s", "return_descend_altitude_m"}
+)
 
 
 _PERIODS: Final = 2.5  # of the guidance over the time of a turn through a radian and of a bank's reversal
@@ -159,7 +161,7 @@ class FixedWingFlightParameters:
     surface_wind: SurfaceWindParameters = field(default_factory=SurfaceWindParameters)
 
     return_altitude_m: float = 60.0  # RTL_RETURN_ALT | RTL_ALTITUDE
-    return_descend_altitude_m: float = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE
+    return_descend_altitude_m: float = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE, or infinite
     return_climbs: bool = True  # PX4 climbs and never descends on the way; ArduPilot flies at the altitude
     glide_slope_min_m: float = math.inf  # GLIDE_SLOPE_MIN: higher above the target, the way there is a slope
     return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN

@@ -21,8 +21,8 @@ from estimators.handoff import (
     align,
     blended,
 )
-from estimators.handoff.ground_points import CameraAxes, on_ground
 from estimators.relative_pose import LevelMotion, PoseMode
+from estimators.vision.ground_points import CameraAxes, on_ground
 
 STEP_US = 100_000
 POSE = PoseMode(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from estimators.occupancy.detection import AnomalyDetector
 from estimators.occupancy.localisation import gaussian_centre
-from missions.occupancy.search import Candidate
+from missions.occupancy.candidate import Candidate
 
 TARGET = (430.0, -270.0)
 

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from estimators.errors import EstimatorError
-from estimators.survey.compensation import direction_cosines, figure_of_merit_nt, fit_compensation
+from estimators.survey.compensation import (
+    direction_cosines,
+    figure_of_merit_nt,
+    fit_compensation,
+    noise_figure_nt,
+)
 from flightsim import truth as t
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
@@ -113,6 +118,20 @@ def test_the_figure_of_merit_falls_by_ten_times_and_more(seed):
     after = figure_of_merit_nt([compensated[s] for s in slices], rate_hz=RATE_HZ)
     assert before > 10.0 * after
     assert fitted.improvement > 10.0
+
+
+def test_noise_alone_has_the_figure_of_merit_that_is_stated_for_it():
+    rng = np.random.default_rng(5)
+    flown = [np.zeros(round(length_s * RATE_HZ)) for length_s in (12.0, 15.0, 24.0)] * 4
+    stated = noise_figure_nt(flown, 0.2, rate_hz=RATE_HZ)
+    trend = [0.1 * np.arange(len(values)) for values in flown]
+    drawn = [
+        figure_of_merit_nt([0.2 * rng.standard_normal(len(t)) + t for t in trend], rate_hz=RATE_HZ)
+        for _ in range(20)
+    ]
+    assert stated == pytest.approx(np.mean(drawn), rel=0.1)
+    # whatever the compensation, a figure of merit does not fall far below it
+    assert min(drawn) > 0.7 * stated
 
 
 def test_a_compensation_of_another_aircraft_does_not_help():

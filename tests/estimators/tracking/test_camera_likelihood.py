@@ -192,18 +192,6 @@ def test_a_camera_on_the_ground_says_nothing():
     assert frame.at(np.zeros(3), np.arange(3.0)).tolist() == [1.0, 1.0, 1.0]
 
 
-def test_correlated_detections_have_the_information_of_a_gauss_markov_process():
-    """n detections of a constant with errors of variance 1: against the inverse of their covariance."""
-    errors, dt_s, count = PoseErrors(place_time_s=4.0), 0.5, 9
-    information = 1.0 + (count - 1) / errors.weights(dt_s)[0]
-    times = dt_s * np.arange(count)
-    covariance = np.exp(-np.abs(times[:, None] - times) / 4.0)
-    assert information == pytest.approx(float(np.linalg.inv(covariance).sum()))
-    assert errors.weights(None) == (1.0, 1.0)
-    assert errors.weights(1e4)[0] == pytest.approx(1.0)
-    assert PoseErrors().weights(0.1) == (1.0, 1.0)
-
-
 @pytest.mark.parametrize(
     ("make", "reported"),
     [

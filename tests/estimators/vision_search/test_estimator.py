@@ -297,3 +297,22 @@ def test_a_reset_discards_the_belief():
 def test_impossible_parameters_are_named(changes, reported):
     with pytest.raises(ValueError, match=reported):
         parameters(**changes)
+
+
+def test_a_frame_whose_detections_were_lost_is_not_one_without_the_target():
+    runner = Runner(VisionSearchEstimator(parameters()))
+    flight = Flight(runner)
+    flight.look(*TAG)
+    before = runner.estimator.belief.probability_of_detection
+    flight.time_s += 0.25
+    flight.number += 1
+    flight.pose(*TAG)
+    assert flight.end(detections=1) is Outcome.IGNORED
+    assert runner.remarks["frames_incomplete"] == 1
+    assert runner.estimator.belief.probability_of_detection == before
+    flight.time_s += 0.25
+    flight.number += 1
+    flight.pose(*TAG)
+    flight.detection(0.1, 0.1, tag=7)  # another tag, and that is all
+    assert flight.end(detections=1) is not Outcome.IGNORED
+    assert runner.remarks["frames_used"] == 2

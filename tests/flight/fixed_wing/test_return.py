@@ -78,6 +78,22 @@ def test_arduplane_circles_home_at_its_altitude_the_other_way_round() -> None:
     assert mass.airspeed == pytest.approx(30.0, abs=0.3)
 
 
+def test_arduplane_returns_at_its_present_height_with_a_negative_altitude() -> None:
+    """RTL_ALTITUDE -1."""
+    parameters = replace(
+        ARDUPILOT,
+        return_altitude_m=5.0,
+        return_climbs=True,
+        return_climb_min_m=0.0,
+        return_descend_altitude_m=math.inf,
+    )
+    mass = PointMass((900.0, 400.0, -130.0), 1.0, (0.0, 0.0), parameters)
+    mass.fly(ReturnTask())
+    log = mass.run(130.0)
+    assert np.hypot(*log[-1, :2]) == pytest.approx(90.0, rel=0.05)
+    assert -log[:, 2] == pytest.approx(130.0, abs=1.0)
+
+
 def test_arduplane_glides_down_on_its_way_home() -> None:
     """Higher than GLIDE_SLOPE_MIN above the return altitude it loses the height over the whole way."""
     parameters = replace(ARDUPILOT, glide_slope_min_m=15.0)

@@ -21,10 +21,10 @@ from flightsim.world_spec import WorldSpec
 from missions.cli import main as cli
 from missions.embedded import occupancy_world
 from missions.errors import PlanError
-from missions.occupancy.investigation import Identify
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.suspect import Identify
 from missions.runs.records import FlightRecords
 from missions.runs.request import RunRequest
 from missions.runs.session import fly

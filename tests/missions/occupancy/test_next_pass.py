@@ -11,9 +11,10 @@ from estimators.occupancy.detection import MapError
 from estimators.tracking.grid import GridLayout
 from missions.occupancy import investigation
 from missions.occupancy.decision import DecisionParameters
-from missions.occupancy.investigation import Identify, Investigation, Verdict
+from missions.occupancy.investigation import Investigation
 from missions.occupancy.next_pass import candidate_passes, mixture_information
 from missions.occupancy.search import Search, SearchParameters
+from missions.occupancy.suspect import Identify, Verdict
 from tests.estimators.magnetic_identification.encounters import (
     CORRELATION_M,
     DIRECTION,

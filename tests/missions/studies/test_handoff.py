@@ -35,7 +35,9 @@ def test_targets_stay_in_their_area_and_the_noise_is_the_papers():
 
 
 def test_a_frame_shows_the_targets_where_they_are():
-    setting = HandoffSetting(tilt_sigma_rad=0.0, pixel_rad=1e-6, height_sigma_m=0.0, false_points=0.0)
+    setting = HandoffSetting(
+        tilt_sigma_rad=0.0, pixel_rad=1e-6, height_sigma_m=0.0, false_points=0.0, detected=0.9, seen_m=0.0
+    )
     world = HandoffWorld(setting, 5)
     world.advance((0.0, 0.0))
     seen = []

@@ -8,8 +8,8 @@ import pytest
 
 from missions.embedded.point_searchers import search_with_points
 from missions.embedded.worlds import drawn_target
-from missions.occupancy.investigation import Identify
 from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.suspect import Identify
 from missions.studies import run_trial
 from missions.studies.magnetic_search import report, study, summarise
 
@@ -53,6 +53,22 @@ def test_the_time_of_a_search_that_does_not_name_the_target_is_infinite():
     assert (bayes["pairs_that_both_name_it"], bayes["time_to_threshold_s_median_of_pairs"]) == (1, -10.0)
     assert bayes["error_m_median"] == 6.0
     assert "bayes" in report(results)[2]
+
+
+def test_without_the_threshold_nothing_is_compared_with_it():
+    chosen = study([Identify.BAYES, Identify.TRACE])
+    assert [cell["identify"] for cell in chosen.design.cells] == ["trace", "bayes"]
+    columns = {
+        "target_named": [[1, 0], [1, 1]],
+        "false_anomaly_named": [[0, 1], [0, 0]],
+        "time_s": [[100.0, 20.0], [90.0, 200.0]],
+        "error_m": [[8.0, 900.0], [4.0, 6.0]],
+    }
+    results = SimpleNamespace(
+        cells=chosen.design.cells, values=lambda name: np.array(columns[name], dtype=np.float64)
+    )
+    assert "sooner_than_threshold" not in summarise(results)["searches"]["trace"]
+    assert [line.split()[-2:] for line in report(results)[1:3]] == [["-", "-"]] * 2
 
 
 @pytest.mark.slow

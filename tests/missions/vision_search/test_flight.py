@@ -1,20 +1,33 @@
 """Whole searches in embedded worlds: a target that is found and localized, a team over a lossy link."""
 
 import json
+import math
+import socket
+import threading
+import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
+from autopilot_bridge.mavlink.search_likelihood import SEARCH_LIKELIHOOD_PAYLOAD, read_search_likelihood
+from autopilot_bridge.tlog import TlogReader
 from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
+from estimators.messages import read_message
+from flightsim.payload import PayloadParameters, PinholeModel
 from flightsim.world_spec import WorldSpec
+from missions.cli.main import run_command_line
 from missions.embedded import HiddenTag, vision_search_world
+from missions.embedded.tag_search import search_camera
+from missions.embedded.worlds import carrying
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
+from tests.clients.sitl_process import free_port
 
 SMALL = {"altitude_m": 15.0, "area_m": (-20.0, -20.0, 20.0, 20.0), "step_m": 8.0, "tag_size_m": 0.6}
 
@@ -108,3 +121,98 @@ def test_a_search_without_a_target_ends_with_its_time(tmp_path):
     assert not summary["localized"] and summary["search_end"] == "the search time is over"
     assert summary["beliefs"][0]["probability_of_detection"] > 0.8
     assert summary["beliefs"][0]["estimator_remarks"]["detections_of_other_tags"] > 0
+
+
+def send_again(log, port):
+    """Send the vehicle's own frames of a log to a UDP port, 20 times as fast as they were received."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        sent_us = 0
+        for time_us, frame in TlogReader(log):
+            if frame.component_id not in (1, 100):
+                continue
+            if time_us - sent_us > 20_000:
+                sent_us = time_us
+                time.sleep(0.001)
+            link.sendto(frame.raw, ("127.0.0.1", port))
+
+
+@pytest.mark.slow
+def test_live_on_a_link_and_replayed_it_has_the_same_numbers_too(run, tmp_path):
+    result, _ = run
+    port, live, again = free_port(), tmp_path / "live", tmp_path / "again"
+    settings = [f"--set={setting}" for setting in result.summary["estimator"]["settings"]]
+    sender = threading.Thread(target=send_again, args=(result.folder / "flight.tlog", port), daemon=True)
+    sender.start()
+    link = ["--connect", f"udpin:127.0.0.1:{port}", "--silence", "3"]
+    run_command_line(["estimate", "vision-search", *link, *settings, "--no-picture", "--out", str(live)])
+    sender.join()
+    log = [str(live / "flight.tlog"), "--estimator", "vision-search"]
+    assert run_command_line(["replay", *log, *settings, "--no-picture", "--out", str(again)]) == 0
+    embedded, *others = (np.load(folder / "estimates.npz") for folder in (result.folder, live, again))
+    for column in embedded.files:
+        for other in others:
+            assert np.array_equal(other[column], embedded[column], equal_nan=True), column
+
+
+@pytest.mark.slow
+def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
+    """A replay as one of the vehicles has the belief that it had, to the bit, over a lossy link too."""
+    mission = VisionSearchMission()
+    result = flown(tmp_path / "run", mission=mission, vehicles=2, passes=2, link_loss=0.3, link_delay_s=0.5)
+    log = result.folder / "flight.tlog"
+    received = [
+        (message.src_system, message.target_system, read_search_likelihood(
+            message.payload_type, message.payload_length, message.payload))
+        for _, frame in TlogReader(log) if frame.definition.name == "TUNNEL"
+        for message in [read_message(frame)] if message.payload_type == SEARCH_LIKELIHOOD_PAYLOAD
+    ]  # fmt: skip
+    assert len(received) == result.summary["likelihoods"]["delivered"] > 100
+    assert {(sender, target) for sender, target, _ in received} == {(1, 2), (2, 1)}
+    assert all(likelihood is not None for _, _, likelihood in received)
+    for index in range(2):
+        settings = [
+            setting for setting in result.summary["estimator"]["settings"] if "own_vehicle" not in setting
+        ]
+        settings += [f"own_vehicle={index + 1}"]
+        done = replay(open_log(log), partial(make_estimator, "vision-search", settings))
+        (table,) = next(iter(done.fleet.runners.values())).tables.values()
+        states = mission._flown.team.search.states[index]
+        rows = np.array([state.row() for state in states])
+        assert len(rows) > 20
+        for name, values in zip(states[0].COLUMNS, rows.T, strict=True):
+            assert np.array_equal(table[name][: len(rows)], values), (
+                name
+            )  # the flight goes on after the search
+
+
+@pytest.mark.slow
+def test_a_film_of_a_flight_has_the_estimates_of_the_flight(tmp_path):
+    """The pictures of the camera, kept without loss, give the same detections and estimates, to the bit."""
+    options = VisionSearchOptions(**{**SMALL, "tag_size_m": 1.5}, passes=1, search_time_s=60.0)
+    small = PinholeModel(width_px=320, height_px=180, horizontal_fov_rad=math.radians(70.0))
+    camera = replace(search_camera(1.5, film=True), model=small)
+    world = carrying(WorldSpec.of_team(1, seed=4), PayloadParameters(camera=camera))
+    world = vision_search_world(world, options, HiddenTag(place_ne_m=(8.0, -5.0)))
+    request = RunRequest(
+        options=options, world=world, out=tmp_path / "run", picture=False, estimator="vision-search"
+    )
+    result = fly(VisionSearchMission(), request)
+    film, log = result.folder / "camera1.mp4", result.folder / "flight.tlog"
+    words = [str(film), "--camera", str(film.with_suffix(".toml")), "--log", str(log), "--tag-size", "1.5"]
+    assert run_command_line(["vision", *words, "--out", str(tmp_path / "again")]) == 0
+    copy = tmp_path / "again" / "flight.tlog"
+
+    def of_camera(path):
+        return [frame.payload for _, frame in TlogReader(path) if frame.component_id == 100
+                and frame.definition.name in ("LANDING_TARGET", "TUNNEL")]  # fmt: skip
+
+    flown_frames, seen_again = of_camera(log), of_camera(copy)
+    assert len(seen_again) > 100
+    assert seen_again == flown_frames[: len(seen_again)]
+    assert len(flown_frames) - len(seen_again) <= 2  # the log ends before they would have been received
+    settings = result.summary["estimator"]["settings"]
+    done = replay(open_log(copy), partial(make_estimator, "vision-search", settings))
+    (table,) = next(iter(done.fleet.runners.values())).tables.values()
+    with np.load(result.folder / "estimates.npz") as recorded:
+        for column in table.columns:
+            assert np.array_equal(table[column], recorded[column][: len(table.time_us)]), column

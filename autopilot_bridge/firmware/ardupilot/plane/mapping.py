@@ -164,8 +164,9 @@ def flight_parameters(
     values["takeoff_throttle_ramp_s"] = clamp(100.0 / slew, 0.0, 15.0) if slew > 0.0 else 0.0
     values["landing_abort_climb_m"] = tuned.landing_abort_climb_m
     values["return_altitude_m"] = store.limited("RTL_ALTITUDE")
-    values["return_climbs"] = store.get("RTL_ALTITUDE") < 0.0  # -1: stays at the present height
-    values["return_descend_altitude_m"] = values["return_altitude_m"]
+    keeps_height = store.get("RTL_ALTITUDE") < 0.0  # -1: it stays at the present height
+    values["return_climbs"] = keeps_height
+    values["return_descend_altitude_m"] = math.inf if keeps_height else values["return_altitude_m"]
     least_drop_m = store.get("GLIDE_SLOPE_MIN")
     values["glide_slope_min_m"] = least_drop_m if least_drop_m > 0.0 else math.inf
     values["return_loiter_time_s"] = -1.0

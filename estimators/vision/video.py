@@ -1,0 +1,161 @@
+"""Pictures from outside: recorded videos and live streams (FFmpeg, by PyAV), and a writer of lossless
+videos.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import EstimatorError
+
+__all__ = ["Film", "TimedPicture", "VideoError", "frames_of", "is_stream"]
+
+Picture = NDArray[np.uint8]
+
+_MICROSECOND: Final = Fraction(1, 1_000_000)
+_STREAMS: Final = (
+    "rtsp://",
+    "rtsps://",
+    "rtmp://",
+    "udp://",
+    "rtp://",
+    "srt://",
+    "tcp://",
+    "http://",
+    "https://",
+)
+_LOSSLESS: Final = {"qp": "0", "preset": "ultrafast"}
+_RTSP: Final = {"rtsp_transport": "tcp", "fflags": "nobuffer"}
+
+
+class VideoError(EstimatorError):
+    """A video can't be opened, or its stream has ended; the message names it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimedPicture:
+    """One frame of a video.
+
+    Attributes:
+        time_us: its time in the video; a stream's begins anywhere.
+        pixels: (height, width, 3), BGR.
+    """
+
+    time_us: int
+    pixels: Picture
+
+
+def is_stream(source: str) -> bool:
+    """Whether a video is the address of a live stream, and not a file."""
+    return source.lower().startswith(_STREAMS)
+
+
+def frames_of(source: str, *, timeout_s: float | None = None) -> Iterator[TimedPicture]:
+    """The frames of a video, as they come.
+
+    Args:
+        source: a file, or the address of a stream (RTSP over TCP).
+        timeout_s: of a stream, to open it and between frames.
+
+    Raises:
+        VideoError: it can't be opened or decoded, or has no pictures; a stream was silent for so long. The
+            end of a file, or of a stream by its server, ends the iteration.
+    """
+    options = dict(_RTSP) if source.lower().startswith("rtsp") else {}
+    try:
+        container = av.open(source, options=options, timeout=timeout_s)
+    except (av.error.FFmpegError, OSError) as error:
+        raise VideoError(f"can't open the video {source}: {error.strerror or error}") from error
+    with container:
+        if not container.streams.video:
+            raise VideoError(f"{source} has no video in it")
+        stream = container.streams.video[0]
+        try:
+            for frame in container.decode(stream):
+                if frame.pts is None or frame.time_base is None:
+                    continue
+                yield TimedPicture(
+                    time_us=round(frame.pts * frame.time_base * 1_000_000),
+                    pixels=np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8),
+                )
+        except av.error.EOFError:
+            return
+        except (av.error.FFmpegError, OSError) as error:
+            raise VideoError(f"the video {source} broke off: {error.strerror or error}") from error
+
+
+class Film:
+    """Writes a lossless video (H.264 without quantization, in MP4): its frames are those written, to the bit.
+
+    Args:
+        path: the file; it must not exist.
+        width_px, height_px: of the pictures.
+
+    Raises:
+        VideoError: the file exists, or can't be created.
+    """
+
+    def __init__(self, path: Path, *, width_px: int, height_px: int) -> None:
+        self._path = path
+        try:
+            self._file = path.open("xb")
+        except OSError as error:
+            raise VideoError(f"can't create the video {path}: {error.strerror}") from error
+        self._container: Any = av.open(self._file, "w", format="mp4")
+        stream = self._container.add_stream("libx264rgb", rate=30)
+        stream.width, stream.height, stream.pix_fmt = width_px, height_px, "bgr24"
+        stream.codec_context.time_base = _MICROSECOND
+        stream.codec_context.options = dict(_LOSSLESS)
+        self._stream = stream
+        self.frames = 0
+
+    def write(self, time_us: int, picture: Picture) -> None:
+        """Add a picture (height, width, 3), BGR; times increase, from 0.
+
+        Raises:
+            VideoError: the file can't be written.
+        """
+        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+        frame.pts, frame.time_base = time_us, _MICROSECOND
+        with self._reporting():
+            for packet in self._stream.encode(frame):
+                self._container.mux(packet)
+        self.frames += 1
+
+    def close(self) -> None:
+        """Finish the file; a second call does nothing.
+
+        Raises:
+            VideoError: its end can't be written.
+        """
+        if self._file.closed:
+            return
+        with self._reporting(), self._file, self._container:
+            if self.frames:
+                for packet in self._stream.encode(None):
+                    self._container.mux(packet)
+
+    @contextmanager
+    def _reporting(self) -> Iterator[None]:
+        try:
+            yield
+        except (av.error.FFmpegError, OSError) as error:
+            raise VideoError(
+                f"can't write the video {self._path}: {error.strerror}; check the disk"
+            ) from error
+
+    def __enter__(self) -> "Film":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

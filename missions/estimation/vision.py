@@ -1,0 +1,59 @@
+"""The vision process: pictures of a live stream next to a link, or of a video next to its log, become the
+messages of a camera that reads tags.
+"""
+
+from typing import Any
+
+from autopilot_bridge.clock.pacing import wall_time_s
+from estimators.vision import PictureWatch, load_camera
+from missions.estimation.vision_live import next_to_link
+from missions.estimation.vision_recording import over_log
+from missions.estimation.vision_request import (
+    COMPLETED,
+    FAILED,
+    INTERRUPTED,
+    OnProgress,
+    VisionProgress,
+    VisionRequest,
+    VisionResult,
+)
+from missions.runs.run_folder import write_summary
+
+__all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "VisionProgress", "VisionRequest", "VisionResult", "watch"]
+
+
+def watch(request: VisionRequest, on_progress: OnProgress | None = None) -> VisionResult:
+    """Search the pictures of a video. Blocks until it is done.
+
+    Of a stream, the messages are sent on the link; of a recording, they are put into a copy of its log, in
+    place of those that a camera with the same component id has sent in flight. Either way flight.tlog in the
+    run folder has what `flightstack replay` needs.
+
+    Raises:
+        EstimatorError: the camera's file, the video or the log is of no use.
+        PlanError: the run folder can't be made.
+        BridgeError: the link can't be opened, or the log can't be read.
+    """
+    pictures = PictureWatch(load_camera(request.camera), request.detector)
+    begun_s = wall_time_s()
+    if request.log is not None:
+        folder, outcome, reason, more = over_log(request, request.log, pictures, on_progress)
+    else:
+        folder, outcome, reason, more = next_to_link(request, pictures, on_progress)
+    difference = pictures.clocks.difference()
+    summary: dict[str, Any] = {
+        "outcome": outcome,
+        "reason": reason,
+        "video": request.video,
+        "frames": pictures.frames,
+        "frames_without_attitude": pictures.without_attitude,
+        "detections": sum(pictures.tags.values()),
+        "tags": {str(tag): count for tag, count in sorted(pictures.tags.items())},
+        "clocks_apart_s": None if difference is None else round(difference.apart_s, 3),
+        "warnings": pictures.warnings(),
+        **more,
+        "wall_time_s": round(wall_time_s() - begun_s, 3),
+        "command": request.command,
+    }
+    write_summary(folder, summary)
+    return VisionResult(outcome=outcome, reason=reason, folder=folder, summary=summary)

@@ -1,0 +1,191 @@
+"""The vision process over a live stream: the messages of the pictures are sent on the vehicle's link."""
+
+import asyncio
+import signal
+from contextlib import suppress
+from typing import Any, Final
+
+from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
+from autopilot_bridge.clock.pacing import wall_time_s
+from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
+from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.tlog import TlogWriter
+from estimators.errors import EstimatorError
+from estimators.messages import read_message
+from estimators.vision import PictureWatch
+from missions.errors import LinkClosed
+from missions.estimation.picture_source import LivePictures
+from missions.estimation.rates import interval_request
+from missions.estimation.vision_request import (
+    COMPLETED,
+    FAILED,
+    INTERRUPTED,
+    Ended,
+    OnProgress,
+    VisionRequest,
+    progress_of,
+)
+from missions.runs.ending import end_signals
+from missions.runs.records import FlightRecorder
+from missions.runs.run_folder import LOG_NAME, create_run_folder
+from missions.runs.signing import client_signing
+from missions.vehicle.connection import Connection
+
+__all__ = ["next_to_link"]
+
+_AUTOPILOT: Final = 1
+_ATTITUDE_HZ: Final = 25.0
+_LOOK_S: Final = 0.25
+_WATCHED: Final = ("ATTITUDE", "LOCAL_POSITION_NED")
+
+
+def next_to_link(request: VisionRequest, pictures: PictureWatch, on_progress: OnProgress | None) -> Ended:
+    assert request.connect is not None
+    address = parse_address(request.connect, VEHICLE_FORMS)
+    if isinstance(address, ReplayLog):
+        raise EstimatorError(f"`connect` {address}: that is a log; give it as `log`, with a recording")
+    link = open_link(address)
+    try:
+        request.on_open()
+        folder = create_run_folder(request.out, "vision")
+        log = TlogWriter(folder / LOG_NAME)
+        recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
+        try:
+            loop = asyncio.new_event_loop()
+            process = _Live(request, link, pictures, recorder)
+            for number in end_signals(signal.SIGINT, signal.SIGTERM):
+                loop.add_signal_handler(number, process.stop)
+            run(process.run(on_progress), loop)
+        finally:
+            recorder.close()
+    finally:
+        link.close()
+    reason = process.reason or recorder.failure
+    outcome = COMPLETED
+    if reason:
+        outcome = FAILED
+    elif process.stopped and request.duration_s is not None:
+        outcome = INTERRUPTED
+    return folder, outcome, reason, {"connect": request.connect, **process.figures}
+
+
+class _Live:
+    """One run on an open link."""
+
+    def __init__(
+        self, request: VisionRequest, link: Link, pictures: PictureWatch, recorder: FlightRecorder
+    ) -> None:
+        self._request, self._watch = request, pictures
+        self._clock = TelemetryClock()
+        self._connection = Connection(
+            link,
+            self._clock,
+            recorder,
+            identity=(request.system_id or 1, request.component_id),
+            vehicle_system_id=request.system_id,
+            signing=client_signing(request.signing_key),
+        )
+        self._stop = asyncio.Event()
+        self._vehicle: int | None = None
+        self._received = 0
+        self.stopped = False
+        self.reason = ""
+        self.figures: dict[str, Any] = {}
+
+    def stop(self) -> None:
+        """Request the end of the run."""
+        self.stopped = True
+        self._stop.set()
+
+    async def run(self, on_progress: OnProgress | None) -> None:
+        """Run until the duration is over, the link is silent, there is no video, or the user stops it."""
+        request, clock = self._request, self._clock
+        stops = [self._connection.listen(name, self._take) for name in _WATCHED]
+        async with self._connection:
+            live = LivePictures(
+                request.video,
+                now_us=lambda: None if clock.vehicle_time_us is None else clock.stamp_us,
+                rate=lambda: clock.rate,
+                latency_s=self._watch.camera.latency_s,
+                timeout_s=request.silence_s,
+            )
+            searching = asyncio.get_running_loop().create_task(self._search(live))
+            try:
+                await self._supervise(live, searching, on_progress)
+            finally:
+                live.close()
+                searching.cancel()
+                await asyncio.gather(searching, return_exceptions=True)
+                for stop in stops:
+                    stop()
+        self.figures = {
+            "pictures_received": live.received,
+            "pictures_dropped": live.dropped,
+            "video_breaks": live.breaks,
+        }
+
+    async def _supervise(
+        self, live: LivePictures, searching: "asyncio.Task[None]", on_progress: OnProgress | None
+    ) -> None:
+        request, clock = self._request, self._clock
+        begun_s = received_s = wall_time_s()
+        count, first_us = 0, None
+        while not self.stopped:
+            self._meet()
+            if self._received != count:
+                count, received_s = self._received, wall_time_s()
+            if first_us is None and clock.vehicle_time_us is not None:
+                first_us = clock.time_us
+            if searching.done():
+                self.reason = str(searching.exception() or "the search of the pictures has ended")
+                return
+            if wall_time_s() - received_s > request.silence_s:
+                self.reason = (
+                    f"no attitude was received on {request.connect} for {request.silence_s:g} s; "
+                    "is the vehicle on, and sending there?"
+                )
+                return
+            if (
+                not live.received
+                and first_us is not None
+                and wall_time_s() - begun_s > 2.0 * request.silence_s
+            ):
+                why = f" ({live.failure})" if live.failure else ""
+                self.reason = f"no picture was received from {request.video}{why}"
+                return
+            since_us = 0 if first_us is None else clock.time_us - first_us
+            if on_progress is not None:
+                on_progress(progress_of(self._watch, since_us, live.failure if live.broken else ""))
+            if request.duration_s is not None and since_us >= request.duration_s * 1e6:
+                return
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._stop.wait(), _LOOK_S)
+
+    def _meet(self) -> None:
+        """Take the vehicle's system id, and request its attitude, once it is known."""
+        if self._vehicle is not None:
+            return
+        known = self._connection.autopilots_received
+        wanted = self._request.system_id
+        if wanted is None and known:
+            wanted = known[0]
+        if wanted in known and wanted is not None:
+            self._vehicle = wanted
+            self._connection.speak_as(wanted, self._request.component_id)
+            self._connection.send(interval_request(wanted, "ATTITUDE", _ATTITUDE_HZ))
+
+    def _take(self, frame: Frame) -> None:
+        if frame.component_id == _AUTOPILOT and self._vehicle in (None, frame.system_id):
+            self._received += 1
+            self._watch.handle(read_message(frame))
+
+    async def _search(self, live: LivePictures) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            exposed_us, picture = await live.next()
+            if self._vehicle is None:
+                continue
+            found = await loop.run_in_executor(None, self._watch.detect, exposed_us, picture)
+            for message in self._watch.messages(exposed_us, found):
+                with suppress(LinkClosed):
+                    self._connection.send(message)

@@ -1,0 +1,128 @@
+"""The vision process over a recorded video: its log is copied, with the messages of the pictures."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from autopilot_bridge.mavlink import Frame, FrameEncoder
+from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD
+from autopilot_bridge.tlog import TlogReader, TlogWriter
+from estimators.errors import EstimatorError
+from estimators.messages import read_message
+from estimators.vehicle_time import VehicleTime, stamp_field
+from estimators.vision import PictureWatch, TagDetection
+from estimators.vision.video import TimedPicture, VideoError, frames_of
+from missions.estimation.vision_request import (
+    COMPLETED,
+    FAILED,
+    Ended,
+    OnProgress,
+    VisionRequest,
+    progress_of,
+)
+from missions.runs.run_folder import LOG_NAME, create_run_folder
+
+__all__ = ["over_log"]
+
+_AUTOPILOT: Final = 1
+
+
+def over_log(
+    request: VisionRequest, log: Path, pictures: PictureWatch, on_progress: OnProgress | None
+) -> Ended:
+    """Copy the log, with the messages of the pictures at the times at which they would have been sent."""
+    reader = TlogReader(log)
+    system_id = request.system_id or _first_autopilot(reader)
+    film = _Recording(request.video, pictures)
+    folder = create_run_folder(request.out, "vision")
+    encoder = FrameEncoder(system_id, request.component_id)
+    times, begin_us = VehicleTime(), None
+    with TlogWriter(folder / LOG_NAME) as copy:
+        for stamp_us, frame in reader:
+            definition = frame.definition
+            if (frame.system_id, frame.component_id) == (system_id, _AUTOPILOT) and stamp_field(
+                definition.name, definition.field_names
+            ) is not None:
+                message = read_message(frame)
+                now_us = times.stamp(message)
+                if begin_us is None:
+                    begin_us = now_us
+                for exposed_us, found in film.searched(begin_us, now_us):
+                    for item in pictures.messages(exposed_us, found):
+                        copy.write(stamp_us, encoder.encode(item))
+                    if on_progress is not None:
+                        on_progress(progress_of(pictures, exposed_us))
+                pictures.handle(message)
+            if not _replaced(frame, system_id, request.component_id):
+                copy.write(stamp_us, frame.raw)
+    reason = ""
+    if not pictures.frames:
+        reason = (
+            f"no picture of {request.video} lies in the time of {log}: the first one is of "
+            f"{film.first_us * 1e-6:.2f} s of vehicle time, and the log begins at "
+            f"{(begin_us or 0) * 1e-6:.2f} s; "
+            f"correct start_us in {request.camera}"
+        )
+    more = {"log": str(log), "frames_before_the_log": film.before, "frames_after_the_log": film.rest()}
+    return folder, FAILED if reason else COMPLETED, reason, more
+
+
+class _Recording:
+    """The pictures of a recorded video, in step with a log.
+
+    Attributes:
+        first_us: vehicle time of the first picture.
+        before: number of pictures from before the log's begin.
+    """
+
+    def __init__(self, video: str, pictures: PictureWatch) -> None:
+        self._pictures = pictures
+        self._start_us = pictures.camera.start_us
+        self._latency_us = round(pictures.camera.latency_s * 1e6)
+        self._frames = frames_of(video)
+        first = next(self._frames, None)
+        if first is None:
+            raise VideoError(f"{video} has no picture in it")
+        pictures.check_size(first.pixels)
+        self._next: TimedPicture | None = first
+        self.first_us = self._start_us + first.time_us
+        self.before = 0
+
+    def searched(self, begin_us: int, now_us: int) -> Iterator[tuple[int, tuple[TagDetection, ...]]]:
+        """Vehicle times of the exposures, and the tags, of the pictures that are received before a time.
+
+        Args:
+            begin_us: of the log; what was received before it is left out.
+            now_us: the time.
+        """
+        while self._next is not None:
+            exposed_us = self._start_us + self._next.time_us
+            received_us = exposed_us + self._latency_us
+            if received_us >= now_us:
+                return
+            if received_us < begin_us:
+                self.before += 1
+            else:
+                yield exposed_us, self._pictures.detect(exposed_us, self._next.pixels)
+            self._next = next(self._frames, None)
+
+    def rest(self) -> int:
+        """Number of pictures that were not searched yet."""
+        return 0 if self._next is None else 1 + sum(1 for _ in self._frames)
+
+
+def _first_autopilot(reader: TlogReader) -> int:
+    for _, frame in reader:
+        if frame.component_id == _AUTOPILOT:
+            return frame.system_id
+    raise EstimatorError(f"{reader.path} has no message of an autopilot; give the log of a vehicle")
+
+
+def _replaced(frame: Frame, system_id: int, component_id: int) -> bool:
+    """Whether a frame is a detection, or the end of a picture, of the camera that the process stands for."""
+    if (frame.system_id, frame.component_id) != (system_id, component_id):
+        return False
+    name = frame.definition.name
+    return name == "LANDING_TARGET" or (
+        name == "TUNNEL" and read_message(frame).payload_type == CAMERA_SCAN_PAYLOAD
+    )

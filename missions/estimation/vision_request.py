@@ -1,0 +1,129 @@
+"""What a vision process is asked for, and what it reports."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import SigningKey
+from autopilot_bridge.mavlink.camera_scan import CAMERA_COMPONENTS
+from estimators.errors import EstimatorError
+from estimators.vision import PictureWatch, TagDetectorParameters
+from estimators.vision.video import is_stream
+
+__all__ = [
+    "COMPLETED",
+    "FAILED",
+    "INTERRUPTED",
+    "Ended",
+    "OnProgress",
+    "VisionProgress",
+    "VisionRequest",
+    "VisionResult",
+    "progress_of",
+]
+
+COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
+SILENCE_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisionRequest:
+    """The settings of a vision process.
+
+    Attributes:
+        video: address of a stream, or the file of a recording.
+        camera: file that describes the camera.
+        connect: connection string of the vehicle's link; of a stream.
+        log: the vehicle's log; of a recording.
+        detector: parameters of the detector.
+        system_id: of the vehicle; None: the first autopilot received.
+        component_id: of the camera that the process is.
+        duration_s: vehicle time since the vehicle was first received; None: until it is stopped.
+        silence_s: wall time without a message of the vehicle, or without a first picture, after which the run
+            fails.
+        out: run folder; None: the next `runs/vision-<n>`.
+        command: the command line, for the summary.
+        signing_key: shared with the vehicle; None: unsigned.
+        on_open: called once the link is open.
+
+    Raises:
+        EstimatorError: a value is not possible.
+    """
+
+    video: str
+    camera: Path
+    connect: str | None = None
+    log: Path | None = None
+    detector: TagDetectorParameters = field(default_factory=TagDetectorParameters)
+    system_id: int | None = None
+    component_id: int = CAMERA_COMPONENTS[0]
+    duration_s: float | None = None
+    silence_s: float = SILENCE_S
+    out: Path | None = None
+    command: str = ""
+    signing_key: SigningKey | None = None
+    on_open: Callable[[], object] = lambda: None
+
+    def __post_init__(self) -> None:
+        if (self.connect is None) == (self.log is None):
+            raise EstimatorError("give `connect` for a stream, or `log` for a recording, and not both")
+        if is_stream(self.video) != (self.connect is not None):
+            needed = "`connect`, the vehicle's link" if is_stream(self.video) else "`log`, the vehicle's log"
+            raise EstimatorError(f"the video {self.video} needs {needed}")
+        if self.component_id not in CAMERA_COMPONENTS:
+            raise EstimatorError(
+                f"component id {self.component_id} is not a camera's; "
+                f"give {CAMERA_COMPONENTS[0]} to {CAMERA_COMPONENTS[-1]}"
+            )
+        for name, value in (("duration_s", self.duration_s), ("silence_s", self.silence_s)):
+            if value is not None and not 0.0 < value < math.inf:
+                raise EstimatorError(f"{name} {value:g} is not accepted; give seconds, above 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisionProgress:
+    """Progress of the run, for display.
+
+    Attributes:
+        time_s: vehicle time since the vehicle was first received, or of the newest picture of a recording.
+        frames: number of searched pictures.
+        detections: number of detections in them.
+        trouble: what is wrong now; "": nothing.
+    """
+
+    time_s: float
+    frames: int
+    detections: int
+    trouble: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisionResult:
+    """The result of a run.
+
+    Attributes:
+        outcome: `COMPLETED`, `FAILED` or `INTERRUPTED`.
+        reason: why it failed; "" otherwise.
+        folder: run folder, with flight.tlog and summary.json.
+        summary: content of summary.json.
+    """
+
+    outcome: str
+    reason: str
+    folder: Path
+    summary: dict[str, Any]
+
+
+OnProgress = Callable[[VisionProgress], None]
+
+Ended = tuple[Path, str, str, dict[str, Any]]
+"""Run folder, outcome, reason, and further entries of the summary."""
+
+
+def progress_of(pictures: PictureWatch, time_us: int, trouble: str = "") -> VisionProgress:
+    """The progress of a run at a time."""
+    return VisionProgress(
+        time_s=time_us * 1e-6, frames=pictures.frames, detections=sum(pictures.tags.values()), trouble=trouble
+    )
