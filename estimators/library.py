@@ -20,6 +20,7 @@ from estimators.interface import Estimator
 ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "attitude": "estimators.attitude",
+        "handoff": "estimators.handoff",
         "lissajous": "estimators.lissajous",
         "magnetic-identification": "estimators.magnetic_identification",
         "multi-target": "estimators.multi_target",

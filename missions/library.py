@@ -53,6 +53,12 @@ def _vision_search() -> Mission[Any]:
     return VisionSearchMission()
 
 
+def _handoff() -> Mission[Any]:
+    from missions.handoff.mission import HandoffMission
+
+    return HandoffMission()
+
+
 def _survey() -> Mission[Any]:
     from missions.survey.mission import SurveyMission
 
@@ -73,6 +79,7 @@ class _NamedMissions(Mapping[str, Mission[Any]]):
             "orbit": _orbit,
             "occupancy": _occupancy,
             "multi-target": _multi_target,
+            "handoff": _handoff,
             "survey": _survey,
             "vision-search": _vision_search,
         }

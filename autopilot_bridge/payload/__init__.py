@@ -1,5 +1,5 @@
-"""MAVLink components beside the autopilot: target sensor (26), range radio (27), camera (100), gimbal
-(154), survey magnetometer (158).
+"""MAVLink components beside the autopilot: target sensor (26), range radio (27), moving-point camera
+(28), camera (100), gimbal (154), survey magnetometer (158).
 
 Each represents one device of `flightsim.payload`. They do no I/O: they take decoded messages and device
 outputs, and produce frames.
@@ -11,6 +11,7 @@ from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
 from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MAGNETOMETER_COMPONENT, MagnetometerComponent
+from autopilot_bridge.payload.moving_points import MOVING_POINT_COMPONENT, MovingPointComponent
 from autopilot_bridge.payload.range_radio import RANGE_RADIO_COMPONENT, RangeRadioComponent
 from autopilot_bridge.payload.station import PayloadStation
 from autopilot_bridge.payload.target_sensor import TARGET_SENSOR_COMPONENT, TargetSensorComponent
@@ -19,12 +20,14 @@ __all__ = [
     "CAMERA_COMPONENT",
     "GIMBAL_COMPONENT",
     "MAGNETOMETER_COMPONENT",
+    "MOVING_POINT_COMPONENT",
     "RANGE_RADIO_COMPONENT",
     "TARGET_SENSOR_COMPONENT",
     "CameraComponent",
     "Component",
     "GimbalComponent",
     "MagnetometerComponent",
+    "MovingPointComponent",
     "PayloadStation",
     "RangeRadioComponent",
     "TargetSensorComponent",

@@ -8,6 +8,7 @@ from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
 from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MagnetometerComponent
+from autopilot_bridge.payload.moving_points import MovingPointComponent
 from autopilot_bridge.payload.range_radio import RangeRadioComponent
 from autopilot_bridge.payload.target_sensor import TargetSensorComponent
 from flightsim.payload import Payload
@@ -59,6 +60,12 @@ class PayloadStation:
             sigma_m = payload.range_radio.parameters.sigma_m
             self._range_radio = RangeRadioComponent(system_id=system_id, send=send, sigma_m=sigma_m)
             self.components.append(self._range_radio)
+        self._moving_points: MovingPointComponent | None = None
+        if payload.moving_points is not None:
+            self._moving_points = MovingPointComponent(
+                system_id=system_id, send=send, sigma=payload.moving_points.parameters.pixel_rad
+            )
+            self.components.append(self._moving_points)
 
     def step(self, time_us: int) -> None:
         """One physics step: the devices, then the messages of their components."""
@@ -75,6 +82,8 @@ class PayloadStation:
             self._target_sensor.update(payload.scan)
         if self._range_radio is not None and payload.ranges:
             self._range_radio.update(payload.ranges)
+        if self._moving_points is not None and payload.points is not None:
+            self._moving_points.update(payload.points)
         for component in self.components:
             component.step(time_us)
         self._idle_until_us = min(payload.next_us, *[component.next_us for component in self.components])

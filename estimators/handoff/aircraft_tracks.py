@@ -19,33 +19,45 @@ class AircraftTracks:
     Args:
         tracker: of the objects.
         keep_s: time for which places are kept.
+        reckoning: motion that is advanced elsewhere; None: `move` advances it.
 
     Attributes:
         reckoning: motion of the aircraft since the start.
         history: past places of the tracks, in the frame of `reckoning`.
+        time_us: time of the newest frame.
     """
 
-    def __init__(self, tracker: RecursiveRansac, keep_s: float) -> None:
+    def __init__(
+        self, tracker: RecursiveRansac, keep_s: float, reckoning: DeadReckoning | None = None
+    ) -> None:
         self.tracker = tracker
-        self.reckoning = DeadReckoning()
+        self.reckoning = reckoning or DeadReckoning()
         self.history = TrackHistory(keep_s)
+        self.time_us = 0
         self._places: dict[int, tuple[float, float]] = {}
 
     def move(self, dt_s: float, motion: LevelMotion) -> None:
         """Move the aircraft by a time."""
         self.reckoning.advance(dt_s, motion)
 
-    def scan(self, time_us: int, level: Array, covariances: Array) -> None:
+    def scan(
+        self, time_us: int, level: Array, covariances: Array, taken: DeadReckoning | None = None
+    ) -> None:
         """Process the measurements of one frame.
 
         Args:
-            time_us: its time; the motion must have been advanced to it.
-            level: (n, 2) forward and right in the present level frame.
+            time_us: its time.
+            level: (n, 2) forward and right in the level frame of that time.
             covariances: (n, 2, 2) theirs.
+            taken: the motion at that time; None: the present one.
         """
-        c, s = math.cos(self.reckoning.heading_rad), math.sin(self.reckoning.heading_rad)
+        if time_us <= self.time_us:
+            return
+        self.time_us = time_us
+        reckoning = self.reckoning if taken is None else taken
+        c, s = math.cos(reckoning.heading_rad), math.sin(reckoning.heading_rad)
         turn = np.array([[c, -s], [s, c]])
-        self.tracker.scan(time_us, self.reckoning.placed(level), turn @ covariances @ turn.T)
+        self.tracker.scan(time_us, reckoning.placed(level), turn @ covariances @ turn.T)
         self._places = {
             track.number: (float(track.state[0]), float(track.state[1])) for track in self.tracker.tracks
         }
@@ -56,9 +68,20 @@ class AircraftTracks:
         """Tracks after the newest frame, in the frame of the reckoning, by number."""
         return self._places
 
-    def level(self) -> Mapping[int, tuple[float, float]]:
-        """The same in the present level frame: forward and right."""
+    def level(self, taken: DeadReckoning | None = None) -> Mapping[int, tuple[float, float]]:
+        """The same in the level frame of a motion, None: the present one; forward and right."""
         if not self._places:
             return {}
-        moved = self.reckoning.level(np.array(list(self._places.values()))).tolist()
+        moved = (taken or self.reckoning).level(np.array(list(self._places.values()))).tolist()
         return {number: (row[0], row[1]) for number, row in zip(self._places, moved, strict=True)}
+
+    def velocity(self, number: int | None) -> tuple[float, float]:
+        """Velocity of a track against the frame of the reckoning, forward and right of the present level
+        frame; 0: there is no such track.
+        """
+        track = next((track for track in self.tracker.tracks if track.number == number), None)
+        if track is None:
+            return 0.0, 0.0
+        c, s = math.cos(self.reckoning.heading_rad), math.sin(self.reckoning.heading_rad)
+        x, y = track.state[2:4].tolist()
+        return c * x + s * y, -s * x + c * y

@@ -22,6 +22,7 @@ class TrackWindows:
         handoff: (n, 2) forward and right by track number of the handoff aircraft.
         target: (n, 2) the tracker's target; None: it has no window.
         others: the tracker's other tracks, by number.
+        identity: probability that the tracker's target still is the designated one.
     """
 
     time_us: int
@@ -29,6 +30,7 @@ class TrackWindows:
     handoff: Mapping[int, Array]
     target: Array | None
     others: Mapping[int, Array] = field(default_factory=dict)
+    identity: float = 1.0
 
 
 class TrackComparison(ABC):

@@ -7,6 +7,7 @@ from its start; the present position and heading in it make a window for any tim
 """
 
 import math
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -52,6 +53,48 @@ class DeadReckoning:
         """Places (..., 2) of the frame of the reckoning, in the present level frame."""
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
         found: Array = (places - (self.x_m, self.y_m)) @ np.array([[c, -s], [s, c]])
+        return found
+
+
+class ReckonedPath:
+    """A dead reckoning with its past, for measurements that come later than they were taken.
+
+    Args:
+        keep_s: time for which it is kept.
+
+    Attributes:
+        newest: the present state.
+        time_us: its time; None: there is none yet.
+    """
+
+    def __init__(self, keep_s: float) -> None:
+        self._keep_us = round(1e6 * keep_s)
+        self.newest = DeadReckoning()
+        self.time_us: int | None = None
+        self._past: deque[tuple[int, float, float, float]] = deque()
+
+    def advance(self, time_us: int, dt_s: float, motion: LevelMotion) -> None:
+        """Move by a time that ends at `time_us`."""
+        self.newest.advance(dt_s, motion)
+        self.time_us = time_us
+        state = self.newest
+        self._past.append((time_us, state.x_m, state.y_m, state.heading_rad))
+        while self._past[0][0] < time_us - self._keep_us:
+            self._past.popleft()
+
+    def at(self, time_us: int) -> DeadReckoning | None:
+        """The state at a time, linear between samples; None: it is not kept, or is still to come."""
+        past = self._past
+        if not past or not past[0][0] <= time_us <= past[-1][0]:
+            return None
+        after = bisect_left(past, (time_us,))
+        after_us, *later = past[after]
+        before_us, *earlier = past[max(0, after - 1)]
+        share = 1.0 if after_us == before_us else (time_us - before_us) / (after_us - before_us)
+        found = DeadReckoning()
+        found.x_m, found.y_m, found.heading_rad = (
+            a + share * (b - a) for a, b in zip(earlier, later, strict=True)
+        )
         return found
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from flightsim.foundation.checks import require_positive
 
 Array = NDArray[np.float64]
 
-_TARGET = 0  # number of the target in the history of the tracker's tracks; its other tracks follow
+_OLD_US: Final = 1_000_000  # windows that end earlier are not compared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,14 +24,19 @@ class TrackerReport:
     """What the tracking aircraft reports of one time.
 
     Attributes:
-        motion: its motion.
-        target: forward and right of its target in its level frame; None: it has no track of it.
-        others: the same of its other tracks, by number from 1.
+        tracks: forward and right of its tracks in its level frame, by number.
+        number: of the track that is its target; None: it has no track of it.
+        identity: probability that this track still is the designated target.
     """
 
-    motion: LevelMotion
-    target: tuple[float, float] | None = None
-    others: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    tracks: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    number: int | None = None
+    identity: float = 1.0
+
+    @property
+    def target(self) -> tuple[float, float] | None:
+        """Forward and right of the target; None: it has no track of it."""
+        return None if self.number is None else self.tracks.get(self.number)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +70,10 @@ class HandoffProcess:
         tracks: own tracks; they must be kept for the span of the windows.
         comparison: decides for a track.
         windows: the windows that are compared.
+        tracker: motion of the tracking aircraft that is advanced elsewhere; None: `step` advances it.
 
     Attributes:
+        report: the newest report; None: there is none yet.
         converged_us: time at which the relative pose first was converged; None: not yet.
         decided_us: time of the decision.
     """
@@ -76,16 +84,19 @@ class HandoffProcess:
         tracks: AircraftTracks,
         comparison: TrackComparison,
         windows: WindowParameters | None = None,
+        tracker: DeadReckoning | None = None,
     ) -> None:
         self.pose = pose
         self.tracks = tracks
         self.comparison = comparison
         self.windows = windows or WindowParameters()
+        self.report: TrackerReport | None = None
         self.converged_us: int | None = None
         self.decided_us: int | None = None
-        self._tracker = DeadReckoning()
+        self._tracker = tracker or DeadReckoning()
         self._reported = TrackHistory(1.5 * self.windows.span_s + 1.0)
-        self._report: TrackerReport | None = None
+        self._reported_us = 0
+        self._target: Array | None = None  # place of the tracker's target in the frame of its reckoning
         self._time_us: int | None = None
         self._compared_us: int | None = None
 
@@ -93,69 +104,114 @@ class HandoffProcess:
         self,
         time_us: int,
         own: LevelMotion,
+        tracker: LevelMotion,
         report: TrackerReport,
         measured: PoseMeasurement,
         frame: tuple[Array, Array] | None,
     ) -> None:
-        """Process one time.
+        """Process one time at which everything is known.
 
         Args:
             time_us: a time later than that of the last step.
             own: motion since then.
+            tracker: the same of the tracking aircraft.
             report: of the tracker, of this time.
             measured: range, depth and relative heading.
             frame: places (n, 2) and covariances (n, 2, 2) of moving objects, in the present level frame;
                 None: there is no frame of this time.
         """
         dt_s = 0.0 if self._time_us is None else (time_us - self._time_us) * 1e-6
-        self._time_us, self._report = time_us, report
-        self.pose.predict(dt_s, own, report.motion)
+        self._time_us = time_us
+        self.pose.predict(dt_s, own, tracker)
         self.pose.update(measured)
         self.tracks.move(dt_s, own)
-        self._tracker.advance(dt_s, report.motion)
-        if report.target is not None:
-            seen = {_TARGET: report.target, **report.others}
-            places = self._tracker.placed(np.array(list(seen.values()))).tolist()
-            self._reported.add(time_us, [(k, *place) for k, place in zip(seen, places, strict=True)])
+        self._tracker.advance(dt_s, tracker)
+        self.receive(time_us, report, self._tracker)
         if frame is not None:
             self.tracks.scan(time_us, *frame)
-        if self.pose.converged and self.converged_us is None:
+        self.compare(time_us)
+
+    def receive(self, time_us: int, report: TrackerReport, taken: DeadReckoning) -> None:
+        """Process a report.
+
+        Args:
+            time_us: time of the report; an older one than the newest is ignored.
+            report: the report.
+            taken: motion of the tracking aircraft at that time.
+        """
+        if time_us < self._reported_us:
+            return
+        self._reported_us, self.report = time_us, report
+        places = taken.placed(np.array(list(report.tracks.values()))) if report.tracks else np.zeros((0, 2))
+        placed = dict(zip(report.tracks, places, strict=True))
+        self._target = None if report.number is None else placed.get(report.number)
+        self._reported.add(time_us, [(k, float(x), float(y)) for k, (x, y) in placed.items()])
+
+    def compare(self, time_us: int) -> None:
+        """Compare the tracks, if the pose is known and it is time for it.
+
+        Args:
+            time_us: present time, to which pose and both motions were moved.
+        """
+        best = self.pose.best if self.pose.converged else None
+        if best is None:
+            return
+        if self.converged_us is None:
             self.converged_us = time_us
         every_us = round(1e6 * self.windows.every_s)
-        if self.pose.converged and (self._compared_us is None or time_us - self._compared_us >= every_us):
-            self._compare(time_us, every_us)
-
-    def _compare(self, time_us: int, every_us: int) -> None:
-        best = self.pose.best
-        assert best is not None  # converged
+        if self._compared_us is not None and time_us - self._compared_us < every_us:
+            return
         self._compared_us = time_us
-        times_us = time_us + every_us * np.arange(1 - self.windows.samples, 1)
-        own = {
-            number: self.tracks.reckoning.level(window)
-            for number in self.tracks.places
-            if (window := self.tracks.history.window(number, times_us)) is not None
-        }
-        reported = {
-            number: self._tracker.level(window)
-            for number in self._reported.numbers
-            if (window := self._reported.window(number, times_us)) is not None
-        }
-        target = reported.pop(_TARGET, None)
+        end_us = min(self.tracks.time_us, self._reported_us)
+        times_us = end_us + every_us * np.arange(1 - self.windows.samples, 1)
+        if time_us - end_us > _OLD_US:
+            times_us = times_us[:0]
+        own = self._windows(self.tracks.history, self.tracks.reckoning, times_us)
+        reported = self._windows(self._reported, self._tracker, times_us)
+        report = self.report
+        target = None if report is None or report.number is None else reported.pop(report.number, None)
         self.comparison.update(
-            TrackWindows(time_us=time_us, times_us=times_us, handoff=own, target=target, others=reported),
+            TrackWindows(
+                time_us=time_us,
+                times_us=times_us,
+                handoff=own,
+                target=target,
+                others=reported,
+                identity=1.0 if report is None else report.identity,
+            ),
             best,
         )
         if self.comparison.decided is not None and self.decided_us is None:
             self.decided_us = time_us
 
+    @staticmethod
+    def _windows(
+        history: TrackHistory, reckoning: DeadReckoning, times_us: NDArray[np.int64]
+    ) -> dict[int, Array]:
+        """Windows of the tracks that reach over all times, in the present level frame."""
+        if not len(times_us):
+            return {}
+        return {
+            number: reckoning.level(window)
+            for number in history.numbers
+            if (window := history.window(number, times_us)) is not None
+        }
+
+    def by_pose(self) -> tuple[float, float] | None:
+        """Forward and right of the tracker's target in the present level frame, by report and relative pose;
+        None: not known.
+        """
+        best = self.pose.best if self.pose.converged else None
+        if best is None or self._target is None:
+            return None
+        (place,) = self._tracker.level(self._target[None]).tolist()
+        return best.from_tracker(*place)
+
     def target(self) -> tuple[float, float] | None:
         """Forward and right of the target in the present level frame: by relative pose, by the track after
         the decision, and between them as the score of the best track rises (45); None: not known.
         """
-        best = self.pose.best
-        relative = None
-        if self.pose.converged and best is not None and self._report is not None and self._report.target:
-            relative = best.from_tracker(*self._report.target)
+        relative = self.by_pose()
         own = self.tracks.level()
         decided = self.comparison.decided
         if decided is not None and decided in own:

@@ -4,6 +4,7 @@ Nothing that an autopilot has estimated is used: its attitude, heading and rate 
 """
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
@@ -25,6 +26,8 @@ class AircraftState:
     """What is known about one aircraft.
 
     Attributes:
+        on_motion: called with the time of each inertial sample, the time since the one before, and the motion
+            in it; None: not called.
         filter: roll, pitch, biases and angle of attack.
         height_m: pressure altitude; NaN: not known.
         heading_rad: magnetic heading; NaN: not known.
@@ -32,6 +35,7 @@ class AircraftState:
     """
 
     def __init__(self) -> None:
+        self.on_motion: Callable[[int, float, LevelMotion], None] | None = None
         self.filter = AttitudeEstimator(
             AttitudeParameters(vehicle=VehicleKind.FIXED_WING, airspeed=AirspeedSource.PRESSURE)
         )
@@ -120,11 +124,20 @@ class AircraftState:
         cr, sr = math.cos(e.roll_rad), math.sin(e.roll_rad)
         cp, sp = math.cos(e.pitch_rad), math.sin(e.pitch_rad)
         lower = sr * y + cr * z
-        for axis, speed in enumerate((cp * x + sp * lower, cr * y - sr * z, -sp * x + cp * lower)):
-            self._path_m[axis] += dt_s * speed
         # the rate of the Euler yaw: e_3' R omega of equation 2 leaves out phi_dot sin(theta)
-        self._turned_rad += dt_s * (sr * q + cr * r) / max(0.1, cp)
+        yaw_rate = (sr * q + cr * r) / max(0.1, cp)
+        motion = LevelMotion(
+            forward_m_s=cp * x + sp * lower,
+            right_m_s=cr * y - sr * z,
+            down_m_s=-sp * x + cp * lower,
+            yaw_rate_rad_s=yaw_rate,
+        )
+        for axis, speed in enumerate((motion.forward_m_s, motion.right_m_s, motion.down_m_s)):
+            self._path_m[axis] += dt_s * speed
+        self._turned_rad += dt_s * yaw_rate
         self._span_s += dt_s
+        if self.on_motion is not None:
+            self.on_motion(time_us, dt_s, motion)
 
     def _compass(self, time_us: int, message: Message, e: AttitudeEstimate) -> None:
         unit = 1.0 if message.name == "HIGHRES_IMU" else 1e-3

@@ -56,6 +56,7 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
 
     Attributes:
         pose: the belief.
+        own, other: both aircraft.
     """
 
     NAME: ClassVar[str] = "relative-pose"
@@ -64,7 +65,7 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
 
     def __init__(self, parameters: RelativePoseSettings | None = None) -> None:
         super().__init__(parameters)
-        self._own, self._other = AircraftState(), AircraftState()
+        self.own, self.other = AircraftState(), AircraftState()
         self._guard = InputGuard()
         self.reset()
 
@@ -72,14 +73,14 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
     def needs(self) -> tuple[Need, ...]:
         """The messages that both aircraft must send; the ranges come from `vehicle` alone."""
         ranges = Need(messages=("TUNNEL",), rate_hz=0.0, purpose="ranges of the radio", optional=True)
-        return (*self._own.needs, ranges)
+        return (*self.own.needs, ranges)
 
     def reset(self) -> None:
         """Discard everything except the parameters."""
         p = self.parameters
         self.pose: RelativePoseBelief = ParticlePose(p) if p.belief == "particles" else GaussianBank(p)
-        self._own.reset()
-        self._other.reset()
+        self.own.reset()
+        self.other.reset()
         self._guard.reset()
         self._moved_us: int | None = None
         self._number: int | None = None
@@ -93,11 +94,11 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
             return Outcome.IGNORED
         if message.name == "TUNNEL":
             return self._on_range(time_us, message)
-        aircraft = self._own if message.src_system == p.vehicle else self._other
+        aircraft = self.own if message.src_system == p.vehicle else self.other
         outcome = aircraft.take(time_us, message)
         if outcome is Outcome.TIME_JUMP:
             self.reset()
-        elif outcome is Outcome.USED and aircraft is self._own and self._due(time_us):
+        elif outcome is Outcome.USED and aircraft is self.own and self._due(time_us):
             return self._step(time_us, math.nan)
         return outcome
 
@@ -122,7 +123,7 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
         return self._step(time_us, measured.range_m)
 
     def _step(self, time_us: int, range_m: float) -> Outcome:
-        own, other = self._own, self._other
+        own, other = self.own, self.other
         for aircraft in (own, other):
             if aircraft.newest_us is None or time_us - aircraft.newest_us > _OLD_US:
                 return Outcome.WAITING

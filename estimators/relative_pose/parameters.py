@@ -1,6 +1,6 @@
 """Parameters of the beliefs about the relative pose."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 from flightsim.foundation.checks import (
@@ -65,6 +65,7 @@ class RelativePoseParameters:
     converged_sigma_m: float = 20.0
 
     def __post_init__(self) -> None:
+        own = {field.name for field in fields(RelativePoseParameters)}  # derived classes check theirs
         check_fields(
             self,
             require_positive,
@@ -73,7 +74,7 @@ class RelativePoseParameters:
                 "converged_weight": require_probability,
                 "jitter": require_not_negative,
             },
-            unchecked=("seed",),
+            unchecked=("seed", *(field.name for field in fields(self) if field.name not in own)),
         )
         for name, least in (("particles", 10), ("start_particles", self.particles), ("components", 8)):
             if not least <= getattr(self, name) <= _MOST:

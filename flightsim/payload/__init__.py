@@ -26,6 +26,7 @@ from flightsim.payload.imager import BrownDistortion, ImagerParameters
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
 from flightsim.payload.magnetic_spec import InducedDipole, MagneticSpec, SignatureSpec, magnetic_field_of
+from flightsim.payload.moving_points import MovingPointCamera, MovingPointParameters, MovingPointScan
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.range_radio import MeasuredRange, RadioOutage, RangeRadio, RangeRadioParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
@@ -84,6 +85,9 @@ __all__ = [
     "MagneticSpec",
     "MainField",
     "MeasuredRange",
+    "MovingPointCamera",
+    "MovingPointParameters",
+    "MovingPointScan",
     "Payload",
     "PayloadParameters",
     "PictureDetection",

@@ -1,5 +1,5 @@
 """The payload of one vehicle, composed and stepped together: gimbal, camera, survey magnetometer, target
-sensor, range radio.
+sensor, range radio, moving-point camera.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,6 +13,7 @@ from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.detection import CameraFrame
 from flightsim.payload.gimbal import Gimbal, GimbalParameters
 from flightsim.payload.magnetic_field import MagneticField
+from flightsim.payload.moving_points import MovingPointCamera, MovingPointParameters, MovingPointScan
 from flightsim.payload.range_radio import MeasuredRange, RangeRadio, RangeRadioParameters
 from flightsim.payload.survey_magnetometer import (
     MagneticReading,
@@ -33,17 +34,20 @@ class PayloadParameters:
     magnetometer: SurveyMagnetometerParameters | None = None
     target_sensor: TargetSensorParameters | None = None
     range_radio: RangeRadioParameters | None = None
+    moving_points: MovingPointParameters | None = None
 
 
 class Payload:
     """Mission payload of one vehicle. Call `step` once per physics step, after the vehicle's.
 
     Attributes:
-        gimbal, camera, magnetometer, target_sensor, range_radio: the devices; None: not carried.
+        gimbal, camera, magnetometer, target_sensor, range_radio, moving_points: the devices; None: not
+            carried.
         frame: the camera's frame delivered on this step, or None.
         reading: the magnetometer's reading delivered on this step, or None.
         scan: the target sensor's scan taken on this step, or None.
         ranges: the ranges that the radio measured on this step.
+        points: the scan that the moving-point camera delivered on this step, or None.
     """
 
     __slots__ = (
@@ -51,6 +55,8 @@ class Payload:
         "frame",
         "gimbal",
         "magnetometer",
+        "moving_points",
+        "points",
         "range_radio",
         "ranges",
         "reading",
@@ -98,6 +104,8 @@ class Payload:
         self.scan: TargetScan | None = None
         self.range_radio: RangeRadio | None = None
         self.ranges: tuple[MeasuredRange, ...] = ()
+        self.moving_points: MovingPointCamera | None = None
+        self.points: MovingPointScan | None = None
         if targets is None:
             targets = GroundTargets(seeds=_no_seeds)
         if parameters.gimbal is not None:
@@ -143,6 +151,16 @@ class Payload:
                 physics_rate_hz=physics_rate_hz,
                 seeds=seeds,
             )
+        if parameters.moving_points is not None:
+            self.moving_points = MovingPointCamera(
+                parameters.moving_points,
+                truth=truth,
+                home=home,
+                targets=targets,
+                gimbal=self.gimbal,
+                physics_rate_hz=physics_rate_hz,
+                seeds=seeds,
+            )
 
     @property
     def next_us(self) -> int:
@@ -165,6 +183,8 @@ class Payload:
             self.scan = self.target_sensor.step(time_us)
         if self.range_radio is not None:
             self.ranges = self.range_radio.step(time_us)
+        if self.moving_points is not None:
+            self.points = self.moving_points.step(time_us)
 
 
 def _no_seeds(index: int) -> np.random.SeedSequence:

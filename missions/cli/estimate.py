@@ -65,8 +65,8 @@ class _LiveProgressLine:
 @click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
 @key_option()
 def estimate(**given: Any) -> int:
-    """Run an estimator on a live link: attitude, lissajous, magnetic-identification, multi-target,
-    orbit-target, relative-pose, survey, target-fusion, vision-search, or a Python file.
+    """Run an estimator on a live link: attitude, handoff, lissajous, magnetic-identification,
+    multi-target, orbit-target, relative-pose, survey, target-fusion, vision-search, or a Python file.
 
     It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
     replay of flight.tlog in the run folder gives the same estimates.

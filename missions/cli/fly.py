@@ -67,7 +67,8 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     "--wind",
     metavar="SPEED[@FROM]",
     help="Wind of the day, m/s at 10 m above ground, and degrees it comes from; turns are planned for it, "
-    "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
+    "unless --expect-wind says otherwise. [default: 0; orbit: 4, handoff: 3 from north; "
+    "occupancy: 5 from west]",
 )
 @_embedded(
     "--wind-profile",
@@ -78,7 +79,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_embedded(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
-    help="[default: none; orbit, occupancy: light]",
+    help="[default: none; orbit, occupancy, handoff: light]",
 )
 @_embedded(
     "--gps",
@@ -119,8 +120,8 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_estimator(
     "--estimator",
     metavar="NAME|FILE.py",
-    help="Estimator beside the flight: attitude, lissajous, magnetic-identification, multi-target, "
-    "orbit-target, relative-pose, survey, target-fusion, vision-search.",
+    help="Estimator beside the flight: attitude, handoff, lissajous, magnetic-identification, "
+    "multi-target, orbit-target, relative-pose, survey, target-fusion, vision-search.",
 )
 @_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
@@ -135,7 +136,8 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
     """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy,
-    multi-target, survey, vision-search, a mission file (.plan, .waypoints), or a Python file of your own.
+    multi-target, survey, vision-search, handoff, a mission file (.plan, .waypoints), or a Python file of
+    your own.
 
     `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
     options)`. The run folder gets flight.tlog, summary.json and track.png.

@@ -23,6 +23,7 @@ _MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
     "orbit": ("missions.cli.orbit_command", "COMMAND"),
     "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
     "multi-target": ("missions.cli.multi_target_command", "COMMAND"),
+    "handoff": ("missions.cli.handoff_command", "COMMAND"),
     "survey": ("missions.cli.survey_command", "COMMAND"),
     "vision-search": ("missions.cli.vision_search_command", "COMMAND"),
 }

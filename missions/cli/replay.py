@@ -21,8 +21,8 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     "--estimator",
     required=True,
     metavar="NAME|FILE.py",
-    help="attitude, lissajous, magnetic-identification, multi-target, orbit-target, relative-pose, "
-    "survey, target-fusion, vision-search, or a Python file with an Estimator of your own.",
+    help="attitude, handoff, lissajous, magnetic-identification, multi-target, orbit-target, "
+    "relative-pose, survey, target-fusion, vision-search, or a Python file with an Estimator of your own.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
 @click.option(

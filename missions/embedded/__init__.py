@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from missions.embedded.survey_worlds import survey_world
     from missions.embedded.tag_search import TagTarget, search_camera, tag_search_world
     from missions.embedded.target_fields import TargetField, multi_target_world, terrain_targets_world
+    from missions.embedded.walking_targets import WalkingTargets, handoff_world
     from missions.embedded.worlds import (
         CAMERA,
         MAGNETOMETER,
@@ -34,8 +35,10 @@ __all__ = [
     "RenderedTags",
     "TagTarget",
     "TargetField",
+    "WalkingTargets",
     "alone",
     "carrying",
+    "handoff_world",
     "model_kind",
     "motion_of",
     "multi_target_world",
@@ -60,6 +63,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         "RenderedTags": _RENDERED_TAGS,
         **dict.fromkeys(("MotionSource", "RenderedMotion"), "missions.embedded.rendered_motion"),
+        **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.walking_targets"),
         **dict.fromkeys(("HiddenTag", "vision_search_world"), "missions.embedded.hidden_tag"),
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),

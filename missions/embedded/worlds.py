@@ -75,6 +75,7 @@ def carrying(world: WorldSpec, payload: PayloadParameters) -> WorldSpec:
                     magnetometer=vehicle.payload.magnetometer or payload.magnetometer,
                     target_sensor=vehicle.payload.target_sensor or payload.target_sensor,
                     range_radio=vehicle.payload.range_radio or payload.range_radio,
+                    moving_points=vehicle.payload.moving_points or payload.moving_points,
                 ),
             )
             for vehicle in world.vehicles

@@ -12,6 +12,7 @@ from missions.errors import MissionError
 from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
 from missions.orbit.options import OrbitOptions
+from missions.orbit.roll_flight import follow_rolls
 from missions.orbit.score import ORBIT
 from missions.orbit.target_observer import TICK_HZ, TargetObserver
 from missions.planning.limits import FixedWingLimits
@@ -178,21 +179,14 @@ class OrbitFlight:
             self._tracker.count_anew()  # the target may have been out of sight on the way here
             async with vehicle.guided(TICK_HZ) as guided:
                 entered_us = self._now_us
-                begun = not vehicle.firmware.roll_alone
 
                 def source(_time_s: float) -> AttitudeSetpoint | None:
                     _raise_if_ended(looking)
                     setpoint = self._fly_on(entered_us)
                     return None if self._done() else setpoint
 
-                following = asyncio.ensure_future(guided.follow(source))
-                try:
-                    if not begun:
-                        await self._give_altitude(following)
-                    await following
-                finally:
-                    following.cancel()
-                    await asyncio.gather(following, return_exceptions=True)
+                assert self._pilot is not None
+                await follow_rolls(vehicle, guided, self._pilot, source)
                 self._begin("gps back")
                 await self._regain_gps()
                 back_us = self._now_us + round(_GPS_BACK_S * 1e6)
@@ -213,21 +207,6 @@ class OrbitFlight:
                 "can't be flown "
                 f"without GPS; is its airspeed sensor sound? {self._vehicle.link.last_received()}"
             )
-
-    async def _give_altitude(self, following: "asyncio.Future[None]") -> None:
-        """Send altitude and airspeed, in guided mode, to an autopilot that holds them itself."""
-        from missions.vehicle.firmware import Mode
-
-        vehicle = self._vehicle
-        assert self._pilot is not None
-        await vehicle.link.wait_until(
-            lambda: following.done() or vehicle.link.custom_mode == vehicle.firmware.modes[Mode.GUIDED],
-            what="guided mode",
-            on=("HEARTBEAT",),
-            timeout_s=10.0,
-        )
-        if not following.done():
-            await self._pilot.begin()
 
     def _fly_on(self, entered_us: int) -> AttitudeSetpoint:
         """Compute the current command, and note the state of the flight."""

@@ -30,7 +30,7 @@ RESIDUALS_M: Final[Mapping[Comparison, tuple[float, ...]]] = {
 }
 """Windows and thresholds of the trade-off (figure 9)."""
 
-_BINS: Final = (0.0, 0.9, 0.95, 0.99, 0.995, 0.999, 1.0)
+_BINS: Final = (-1.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.995, 0.999, 1.0)
 _COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
 
 
@@ -107,7 +107,8 @@ def _cell(results: Results, number: int) -> dict[str, Any]:
         "converged_in_30_s": int(np.sum(converged <= 30.0)),
         "mean_stated": _rounded(np.nanmean(results.values("score")[number]) if counts["correct"] else np.nan),
         "causes": _causes(results, number),
-        "calibration": _calibration(results, number),
+        "calibration": _calibration(results, number, "score", "correct"),
+        "calibration_early": _calibration(results, number, "early_score", "early_correct"),
     }
 
 
@@ -121,9 +122,13 @@ def _causes(results: Results, number: int) -> dict[str, int]:
     )
 
 
-def _calibration(results: Results, number: int) -> list[dict[str, Any]]:
-    """Decisions by the score that was stated with them, and how many were right."""
-    scores, correct = results.values("score")[number], results.values("correct")[number]
+def _calibration(results: Results, number: int, score: str, right: str) -> list[dict[str, Any]]:
+    """Tracks by the score that was stated with them, and how many were right.
+
+    Args:
+        score, right: fields of the rows: those of the decision, or those of the first comparison.
+    """
+    scores, correct = results.values(score)[number], results.values(right)[number]
     found = []
     for low, high in pairwise(_BINS):
         inside = (scores > low) & (scores <= high)
@@ -131,7 +136,7 @@ def _calibration(results: Results, number: int) -> list[dict[str, Any]]:
             rate = rate_of(int(correct[inside].sum()), int(inside.sum()))
             found.append(
                 {
-                    "above": low,
+                    "above": max(0.0, low),
                     "decisions": rate.n,
                     "stated": _rounded(float(scores[inside].mean())),
                     "right": _rounded(rate.rate),

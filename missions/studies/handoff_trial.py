@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.comparison import TrackComparison
+from estimators.handoff.designation import Designation
 from estimators.handoff.evidence import EvidenceComparison
 from estimators.handoff.matching import MatchComparison, MatchingParameters, Residual
 from estimators.handoff.process import HandoffProcess, TrackerReport, WindowParameters
@@ -23,16 +24,15 @@ from estimators.relative_pose import (
 )
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
 from missions.orbit.guidance import OrbitGuidance, OrbitParameters
-from missions.studies.handoff_world import HandoffSetting, HandoffWorld
+from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
 
 Array = NDArray[np.float64]
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
-_DESIGNATED_M: Final = 5.0  # a track this close to the target is the one that the operator designates
-_REGAINED_M: Final = 10.0  # a track this close to where the target was lost is taken for it
-_LOST_AFTER_S: Final = 5.0  # after it the operator designates anew
-_RIGHT_M: Final = 15.0  # a track this far from its nearest target is of none
+_SURE: Final = 0.98  # with a smaller probability of the identity the operator designates anew
+_OPERATOR_S: Final = 5.0  # time that it takes
+_APART_M: Final = 10.0  # the operator tells targets apart that are farther from each other
 
 
 class Comparison(StrEnum):
@@ -77,6 +77,8 @@ class Handoff:
         time_s: time of the decision since the start.
         converged_s: time at which the relative pose first was converged.
         score: of the track that was decided for: gamma, or its probability.
+        early_score: of the best track at the first comparison of complete windows.
+        early_correct: whether that track was of the tracked target.
         track_error_m: distance from it to the tracked target.
         tracker_error_m: distance from the place that the tracker reports to the target.
         resets: times that the belief about the pose started anew.
@@ -91,6 +93,8 @@ class Handoff:
     time_s: float | None
     converged_s: float | None
     score: float | None
+    early_score: float | None
+    early_correct: bool | None
     track_error_m: float | None
     tracker_error_m: float | None
     resets: int
@@ -99,45 +103,48 @@ class Handoff:
 
 
 class _Tracker:
-    """The tracking aircraft: its tracks, and which of them an operator has designated as the target."""
+    """The tracking aircraft: its tracks, and an operator who designates the target.
+
+    The operator designates it anew when its track is lost or its identity is doubtful, some seconds later
+    and only when no other target is close to it.
+    """
 
     def __init__(self, world: HandoffWorld, tracks: AircraftTracks) -> None:
         self._world = world
         self.tracks = tracks
-        self.designations = 0
-        self._number: int | None = None
-        self._place: tuple[float, float] | None = None  # last one, in the frame of the reckoning
-        self._seen_us = 0
+        self.designation = Designation()
+        self._doubtful_us: int | None = 0
 
-    def step(self) -> TrackerReport:
-        """Take a frame, and report."""
-        world, which = self._world, HandoffWorld.TRACKER
+    def step(self) -> tuple[LevelMotion, TrackerReport]:
+        """Take a frame; returns the motion since the last one, and the report."""
+        world, which, designation = self._world, HandoffWorld.TRACKER, self.designation
         motion = world.motion(which)
         self.tracks.move(1.0 / world.setting.rate_hz, motion)
         known = self.tracks.level()
-        held = known.get(self._number) if self._number is not None else None
+        held = known.get(designation.number) if designation.number is not None else None
         # without a track the operator holds the camera on the target
-        target = world.seen_from(which, world.targets[:1])[0]
-        self.tracks.scan(world.time_us, *world.frame(which, held or (float(target[0]), float(target[1]))))
-        self._choose(target)
-        known = dict(self.tracks.level())
-        held = known.pop(self._number, None) if self._number is not None else None
-        return TrackerReport(motion=motion, target=held, others=known)
+        true = world.seen_from(which, world.targets)
+        self.tracks.scan(world.time_us, *world.frame(which, held or (float(true[0, 0]), float(true[0, 1]))))
+        designation.update(world.time_us, self.tracks.places)
+        self._operate(true)
+        return motion, TrackerReport(
+            tracks=self.tracks.level(), number=designation.number, identity=designation.probability
+        )
 
-    def _choose(self, target: Array) -> None:
-        world, places = self._world, self.tracks.places
-        if self._number is not None and self._number in places:
-            self._place, self._seen_us = places[self._number], world.time_us
+    def _operate(self, true: Array) -> None:
+        designation, now_us = self.designation, self._world.time_us
+        if designation.number is not None and designation.probability >= _SURE:
+            self._doubtful_us = None
             return
-        lost_s = (world.time_us - self._seen_us) * 1e-6
-        near, within = self._place, _REGAINED_M
-        if near is None or lost_s > _LOST_AFTER_S:
-            near, within = tuple(self.tracks.reckoning.placed(target[None])[0].tolist()), _DESIGNATED_M
-        number = min(places, key=lambda k: math.dist(places[k], near), default=None)
-        if number is not None and math.dist(places[number], near) <= within:
-            if within == _DESIGNATED_M:
-                self.designations += 1
-            self._number, self._place, self._seen_us = number, places[number], world.time_us
+        if self._doubtful_us is None:
+            self._doubtful_us = now_us
+        waited_s = (now_us - self._doubtful_us) * 1e-6
+        close = np.hypot(*(true[1:] - true[0]).T) < _APART_M
+        if waited_s < (_OPERATOR_S if designation.count else 0.0) or close.any():
+            return
+        for number, target in targets_of(self.tracks.level(), true).items():
+            if target == 0:
+                designation.designate(now_us, number, self.tracks.places[number])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,14 +175,19 @@ class HandoffTrial:
             OrbitGuidance(OrbitParameters(radius_m=self.setting.radius_m, direction=d)) for d in (1, -1)
         ]
         rolls = (0.0, 0.0)
-        report = TrackerReport(motion=LevelMotion(forward_m_s=self.setting.airspeed_m_s))
+        report = TrackerReport()
+        early: tuple[float, bool] | None = None
         while world.time_us < 1e6 * self.timeout_s and process.decided_us is None:
             world.advance(rolls)
-            report = tracker.step()
+            motion, report = tracker.step()
             pointing = process.target()
             frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
             own = world.motion(HandoffWorld.HANDOFF)
-            process.step(world.time_us, own, report, world.measured(), frame)
+            process.step(world.time_us, own, motion, report, world.measured(), frame)
+            scores = process.comparison.scores
+            if early is None and scores:
+                best = max(scores, key=lambda number: scores[number])
+                early = scores[best], _target_of(world, HandoffWorld.HANDOFF, process.tracks, best) == 0
             rolls = (
                 _orbit_roll(
                     pilots[0],
@@ -194,7 +206,7 @@ class HandoffTrial:
                     world.roll_rad(HandoffWorld.HANDOFF),
                 ),
             )
-        return _outcome(world, process, tracker, report)
+        return _outcome(world, process, tracker, report, early)
 
     def _ransac(self, seed: int, which: int) -> RecursiveRansac:
         s = self.setting
@@ -254,32 +266,39 @@ def _orbit_roll(
     return pilot.command(state, 0.0, roll_rad).roll_rad
 
 
+def _target_of(world: HandoffWorld, which: int, tracks: AircraftTracks, number: int | None) -> int | None:
+    """The true target of a track of an aircraft; None: it is of none."""
+    found = targets_of(tracks.level(), world.seen_from(which, world.targets))
+    return None if number is None else found.get(number)
+
+
 def _outcome(
-    world: HandoffWorld, process: HandoffProcess, tracker: _Tracker, report: TrackerReport
+    world: HandoffWorld,
+    process: HandoffProcess,
+    tracker: _Tracker,
+    report: TrackerReport,
+    early: tuple[float, bool] | None,
 ) -> Handoff:
     number = process.comparison.decided
     track_error_m = tracker_error_m = score = None
     correct, cause = False, "" if process.converged_us is not None else "pose never converged"
     if report.target is not None:
-        true = world.seen_from(HandoffWorld.TRACKER, world.targets)
-        off = np.hypot(*(true - report.target).T)
-        tracker_error_m = float(off[0])
-        if int(np.argmin(off)) != 0 and off[0] > _DESIGNATED_M:
+        true = world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0]
+        tracker_error_m = math.dist(true, report.target)
+        if _target_of(world, HandoffWorld.TRACKER, tracker.tracks, report.number) != 0:
             cause = "tracker on another target"
     if number is not None:
         score = process.comparison.scores.get(number)
+        target = _target_of(world, HandoffWorld.HANDOFF, process.tracks, number)
         place = process.tracks.level().get(number)
-        off = np.full(len(world.targets), math.inf)
         if place is not None:
-            true = world.seen_from(HandoffWorld.HANDOFF, world.targets)
-            off = np.hypot(*(true - place).T)
-            track_error_m = float(off[0])
-        nearest = int(np.argmin(off))
-        correct = nearest == 0 and bool(off[0] <= _RIGHT_M)
+            true = world.seen_from(HandoffWorld.HANDOFF, world.targets[:1])[0]
+            track_error_m = math.dist(true, place)
+        correct = target == 0
         if correct:
             cause = ""
         elif not cause:
-            cause = "another target" if off[nearest] <= _RIGHT_M else "a track of no target"
+            cause = "a track of no target" if target is None else "another target"
     elif not cause:
         cause = "no decision"
     return Handoff(
@@ -290,9 +309,11 @@ def _outcome(
         time_s=None if process.decided_us is None else process.decided_us * 1e-6,
         converged_s=None if process.converged_us is None else process.converged_us * 1e-6,
         score=score,
+        early_score=None if early is None else early[0],
+        early_correct=None if early is None else early[1],
         track_error_m=track_error_m,
         tracker_error_m=tracker_error_m,
         resets=process.pose.resets,
-        designations=tracker.designations,
+        designations=tracker.designation.count,
         cause=cause,
     )

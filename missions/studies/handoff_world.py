@@ -6,7 +6,9 @@ parameter with a default of our own.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ from flightsim.foundation.checks import check_fields, require_not_negative, requ
 from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
+
+_SHIFT_M: Final = 60.0  # largest common error of the tracks of one aircraft
+_RIGHT_M: Final = 10.0  # a track this far from its nearest target is of none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,3 +251,27 @@ class HandoffWorld:
     def roll_rad(self, which: int) -> float:
         """True roll."""
         return self._aircraft[which].roll_rad
+
+
+def targets_of(tracks: Mapping[int, tuple[float, float]], targets: Array) -> dict[int, int]:
+    """The true target of each track, by the pattern of all: errors of roll and pitch move all tracks of an
+    aircraft alike, by more than targets are apart. Tracks of no target are left out.
+
+    Args:
+        tracks: forward and right by number.
+        targets: (n, 2) true places in the same frame.
+    """
+    if not tracks:
+        return {}
+    places = np.array(list(tracks.values()))
+    off = places[:, None] - targets  # (tracks, targets, 2)
+    # shifts that put one track on one target; none, if all are too far
+    shifts = [np.zeros(2), *off[np.hypot(*off.transpose(2, 0, 1)) < _SHIFT_M]]
+    costs = []
+    for shift in shifts:
+        apart = np.hypot(*(off - shift).transpose(2, 0, 1)).min(axis=1)
+        costs.append(np.minimum(apart, _RIGHT_M).sum() + 0.1 * float(np.hypot(*shift)))
+    apart = np.hypot(*(off - shifts[int(np.argmin(costs))]).transpose(2, 0, 1))
+    return {
+        number: int(row.argmin()) for number, row in zip(tracks, apart, strict=True) if row.min() <= _RIGHT_M
+    }

@@ -17,6 +17,8 @@ CAMERA_COMPONENT: Final = 100
 GIMBAL_COMPONENT: Final = 154
 SURVEY_MAGNETOMETER_COMPONENT: Final = 158
 TARGET_SENSOR_COMPONENT: Final = 26
+RANGE_RADIO_COMPONENT: Final = 27
+MOVING_POINT_COMPONENT: Final = 28
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 
 # within this time the gimbal manager reports which component has the control
@@ -85,6 +87,8 @@ class Payload:
             GIMBAL_COMPONENT: "gimbal",
             SURVEY_MAGNETOMETER_COMPONENT: "survey magnetometer",
             TARGET_SENSOR_COMPONENT: "target sensor",
+            RANGE_RADIO_COMPONENT: "range radio",
+            MOVING_POINT_COMPONENT: "moving-point camera",
         }
 
         def missing() -> list[str]:

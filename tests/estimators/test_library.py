@@ -34,8 +34,8 @@ def test_the_library_alone_imports_no_estimator():
     [
         (
             "atitude",
-            "'atitude' is not known; there are attitude, lissajous, magnetic-identification, multi-target, "
-            "orbit-target, relative-pose, survey, target-fusion, vision-search",
+            "'atitude' is not known; there are attitude, handoff, lissajous, magnetic-identification, "
+            "multi-target, orbit-target, relative-pose, survey, target-fusion, vision-search",
         ),
         ("nowhere.py", "nowhere.py does not exist"),
     ],

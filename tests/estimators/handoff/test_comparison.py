@@ -1,6 +1,7 @@
 """Track comparison: dead reckoning, alignment, scores and evidence, each against an independent authority."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -181,27 +182,32 @@ def test_blending_goes_from_the_pose_to_the_track():
 
 
 def test_the_factor_of_a_pair_is_the_ratio_of_two_gaussians():
-    """Against the densities of scipy."""
+    """Against the densities of scipy, with the covariance of every pair of places written out."""
     rng = np.random.default_rng(4)
-    p = EvidenceParameters()
-    target, times = walk(rng, 41)[::10], 0.1 * np.arange(-40.0, 1.0, 10.0)
-    handoff = seen_by_handoff(target) + rng.normal(0.0, 3.0, (5, 2)) + (4.0, -2.0)
-    prior = np.diag([34.0, 34.0, 0.01**2 + 0.02**2])
+    p = EvidenceParameters(absent=0.5, wrong=0.0)
+    target = walk(rng, 41)
+    handoff = seen_by_handoff(target) + rng.normal(0.0, 3.0, (41, 2)) + (4.0, -2.0)
     comparison = EvidenceComparison(p)
-    factor, _, _ = comparison._factor(handoff, target, POSE, np.zeros(3), prior, times)
+    comparison.update(windows({3: handoff}, target), POSE)
     c, s = math.cos(POSE.heading_rad), math.sin(POSE.heading_rad)
-    same = p.sigma_m**2 * np.eye(10)
-    different = same.copy()
+    target, handoff = target[::10], handoff[::10]
+    times = 0.1 * np.arange(-40.0, 1.0, 10.0)
+    place, heading = 25.0 + p.pose_sigma_m**2, 0.01**2 + p.pose_sigma_rad**2
+    same, different = np.zeros((10, 10)), np.zeros((10, 10))
     for i in range(5):
         for j in range(5):
             x, y = (np.array([-s * t[0] + c * t[1], -c * t[0] - s * t[1]]) for t in (target[i], target[j]))
-            block = 34.0 * np.eye(2) + 0.0005 * np.outer(x, y)
-            same[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += block
-            wide = block + (p.apart_m**2 + times[i] * times[j] * p.speed_m_s**2) * np.eye(2)
-            different[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += wide
+            noise = p.slow_sigma_m**2 * math.exp(-abs(times[i] - times[j]) / p.slow_s)
+            noise += p.sigma_m**2 * (i == j) + place + times[i] * times[j] * p.drift_m_s**2
+            block = noise * np.eye(2) + heading * np.outer(x, y)
+            same[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = block
+            wide = (p.apart_m**2 + times[i] * times[j] * p.speed_m_s**2) * np.eye(2)
+            different[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = block + wide
     off = (handoff - seen_by_handoff(target)).ravel()
-    expected = multivariate_normal.logpdf(off, cov=same) - multivariate_normal.logpdf(off, cov=different)
-    assert factor == pytest.approx(expected)
+    factor = math.exp(
+        multivariate_normal.logpdf(off, cov=same) - multivariate_normal.logpdf(off, cov=different)
+    )
+    assert comparison.scores[3] == pytest.approx(factor / (factor + 1.0))
 
 
 def scene(seed, *, bias=8.0, noise=1.0, absent=False):
@@ -249,11 +255,23 @@ def test_a_target_that_is_not_seen_is_not_decided_for():
     wrong = 0
     for seed in range(30):
         handoff, target, others = scene(seed, absent=True)
-        comparison = EvidenceComparison(EvidenceParameters(hold_s=0.1))
+        comparison = EvidenceComparison(EvidenceParameters(hold_s=0.1, every_s=0.1))
         for k in range(3):
             comparison.update(windows(handoff, target, others, k=2 * k), POSE)
         wrong += comparison.decided is not None
     assert wrong <= 2
+
+
+def test_a_doubtful_identity_of_the_target_bounds_the_probability():
+    rng = np.random.default_rng(6)
+    target = walk(rng, 100)
+    own = {1: seen_by_handoff(target)}
+    comparison = EvidenceComparison()
+    comparison.update(windows(own, target), POSE)
+    sure = comparison.scores[1]
+    doubtful = EvidenceComparison()
+    doubtful.update(replace(windows(own, target), identity=0.75), POSE)
+    assert doubtful.scores[1] == pytest.approx(0.75 * sure)
 
 
 def test_two_targets_side_by_side_are_not_decided_between():
@@ -269,7 +287,7 @@ def test_two_targets_side_by_side_are_not_decided_between():
 
 def test_the_decision_needs_time_above_the_threshold():
     handoff, target, others = scene(2, bias=2.0)
-    comparison = EvidenceComparison(EvidenceParameters(hold_s=1.0))
+    comparison = EvidenceComparison(EvidenceParameters(hold_s=1.0, every_s=0.1))
     for k in range(11):
         assert comparison.decided is None
         comparison.update(windows(handoff, target, others, k=k), POSE)

@@ -92,7 +92,7 @@ def test_the_command_line_says_what_is_wrong(arguments, words, tmp_path, monkeyp
 def test_options_of_other_missions_are_refused_everywhere():
     result = CliRunner().invoke(fly, ["lissajous", "--radius", "100"])
     assert result.exit_code == 2
-    assert "--radius is for orbit, not for lissajous" in result.output
+    assert "--radius is for orbit, handoff, not for lissajous" in result.output
 
 
 def test_help_is_the_missions_own():

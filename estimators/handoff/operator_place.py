@@ -1,0 +1,56 @@
+"""Where the tracker's operator has seen the target: a place on the Earth, relative to the aircraft."""
+
+import math
+
+from estimators.interface import Need
+from estimators.messages import Message
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+
+_OLD_US = 1_000_000
+
+
+class OperatorPlace:
+    """A place from home, in the level frame of an aircraft with GPS.
+
+    Args:
+        north_m, east_m: the place from home; None: the place below the aircraft.
+    """
+
+    def __init__(self, north_m: float | None, east_m: float | None) -> None:
+        self._goal = None if north_m is None or east_m is None else (north_m, east_m)
+        self._frame: LocalFrame | None = None
+        self._own: tuple[int, float, float] | None = None
+        self._yaw_rad = math.nan
+
+    @property
+    def needs(self) -> list[Need]:
+        """Messages of the aircraft that it needs."""
+        return [
+            Need(messages=("HOME_POSITION",), rate_hz=0.0, purpose="home, the origin of the target's place"),
+            Need(messages=("GLOBAL_POSITION_INT",), rate_hz=1.0, wanted_rate_hz=5.0, purpose="position"),
+            Need(messages=("ATTITUDE",), rate_hz=1.0, wanted_rate_hz=10.0, purpose="heading"),
+        ]
+
+    def take(self, time_us: int, message: Message) -> None:
+        """Process a message of the aircraft."""
+        if message.name == "HOME_POSITION":
+            lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
+            if (lat, lon) != (0.0, 0.0) and abs(lat) <= 90.0 and abs(lon) <= 180.0:
+                self._frame = LocalFrame(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt))
+        elif message.name == "GLOBAL_POSITION_INT" and self._frame is not None:
+            north_m, east_m, _ = self._frame.ned_from_geodetic(
+                message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3
+            )
+            self._own = (time_us, north_m, east_m)
+        elif message.name == "ATTITUDE" and math.isfinite(message.yaw):
+            self._yaw_rad = message.yaw
+
+    def level(self, time_us: int) -> tuple[float, float] | None:
+        """Forward and right of the place; None: the position is not known."""
+        if self._goal is None:
+            return (0.0, 0.0)
+        if self._own is None or time_us - self._own[0] > _OLD_US or math.isnan(self._yaw_rad):
+            return None
+        north, east = self._goal[0] - self._own[1], self._goal[1] - self._own[2]
+        c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        return (c * north + s * east, -s * north + c * east)

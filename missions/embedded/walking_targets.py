@@ -1,0 +1,83 @@
+"""The embedded world of a handoff: two aircraft with radios and moving-point cameras, and walking targets."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from flightsim.foundation.random_streams import RandomStreams
+from flightsim.payload import (
+    GimbalParameters,
+    GroundTargetParameters,
+    MovingPointParameters,
+    PayloadParameters,
+    RandomWalk,
+    RangeRadioParameters,
+)
+from flightsim.world_spec import WorldSpec
+from missions.embedded.worlds import carrying
+from missions.errors import PlanError
+from missions.handoff.options import HandoffOptions
+
+__all__ = ["WalkingTargets", "handoff_world"]
+
+_PAYLOAD: Final = PayloadParameters(
+    gimbal=GimbalParameters(), moving_points=MovingPointParameters(), range_radio=RangeRadioParameters()
+)
+_SIZE_M: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkingTargets:
+    """The targets as they truly are.
+
+    Attributes:
+        count: number of targets (paper: 5).
+        area_m: sides of the area in which they walk, north and east (paper: 140 m by 270 m), around the place
+            that the operator has reported.
+        walk_m_s: least and greatest speed.
+    """
+
+    count: int = 5
+    area_m: tuple[float, float] = (140.0, 270.0)
+    walk_m_s: tuple[float, float] = (0.8, 2.0)
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= 50:
+            raise PlanError(f"`count` {self.count} of targets is not in 1..50")
+        if not all(10.0 <= side <= 10_000.0 for side in self.area_m):
+            raise PlanError(f"`area_m` {self.area_m} is not possible; ask for sides of 10..10000 m")
+
+
+def handoff_world(
+    world: WorldSpec, options: HandoffOptions, walking: WalkingTargets | None = None
+) -> WorldSpec:
+    """The world of a handoff.
+
+    Args:
+        world: the rest of the world; targets that it has stay, and no other is added.
+        options: what the operators know.
+        walking: the targets.
+    """
+    world = carrying(world, _PAYLOAD)
+    if world.targets:
+        return world
+    walking = walking or WalkingTargets()
+    rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("handoff", "targets")))
+    north_m, east_m = options.target_ne_m
+    half_n, half_e = 0.5 * walking.area_m[0], 0.5 * walking.area_m[1]
+    targets = []
+    for _ in range(walking.count):
+        n, e = rng.uniform(-1.0, 1.0, 2).tolist()
+        motion = RandomWalk(
+            south_m=north_m - half_n,
+            west_m=east_m - half_e,
+            north_m=north_m + half_n,
+            east_m=east_m + half_e,
+            speed_m_s=float(rng.uniform(*walking.walk_m_s)),
+            start_m=(north_m + n * half_n, east_m + e * half_e),
+            course_rad=float(rng.uniform(-math.pi, math.pi)),
+        )
+        targets.append(GroundTargetParameters(motion=motion, size_m=_SIZE_M))
+    return replace(world, targets=tuple(targets))

@@ -1,0 +1,173 @@
+"""The picture of a handoff: both tracks in a common frame, modes of the pose, and scores over time."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from estimators.reports.picture import tidy
+from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
+
+if TYPE_CHECKING:
+    from missions.handoff.team import HandoffTeam
+    from missions.handoff.watch import Moment
+    from missions.mission import Debriefing
+
+_INK: Final = "#1f2937"
+_GREY: Final = "#9aa3af"
+_BLUE: Final = "#1769aa"
+_RED: Final = "#c2410c"
+_GREEN: Final = "#15803d"
+_LINES: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b45309", "#0f766e", "#be185d", "#64748b")
+
+
+def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debriefing") -> None:
+    """Draw `track.png`. Without truth (aircraft that are not embedded) the frame of the tracks is the handoff
+    aircraft's own dead reckoning, which is not drawn; then only pose and scores are.
+
+    Args:
+        path: the file; it must not exist.
+    """
+    end_us = debriefing.flights[0][0].marks.get("gps_back_at_s", math.inf) * 1e6
+    moments = [moment for moment in team.watch.moments if moment.time_us <= end_us] or team.watch.moments
+    truth = handoff_truth(debriefing.records, [flight[0].system_id for flight in debriefing.flights])
+    figure = Figure(figsize=(12.0, 12.0), dpi=120, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(3, 2, height_ratios=(3.0, 1.2, 1.2))
+    ground, pose = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
+    bearing = figure.add_subplot(grid[1, :])
+    score = figure.add_subplot(grid[2, :], sharex=bearing)
+    figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
+    marks = marks_of(team, debriefing)
+    begin_s = marks.get("GPS lost", moments[0].time_us * 1e-6)
+    if truth is not None:
+        _draw_ground(ground, truth, moments, begin_s, team.options.radius_m)
+    _draw_modes(pose, moments, begin_s)
+    _draw_bearing(bearing, truth, moments)
+    _draw_scores(score, moments, team.options.decision)
+    for axes in (bearing, score):
+        for line, (name, time_s) in enumerate(marks.items()):
+            axes.axvline(time_s, color=_GREY, linewidth=1.0, linestyle="--")
+            if axes is bearing:
+                height = 1.02 + 0.1 * (len(marks) - 1 - line)
+                axes.text(time_s, height, name, fontsize=8, color=_INK, transform=axes.get_xaxis_transform())
+    for axes in (ground, pose, bearing, score):
+        tidy(axes)
+    with path.open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def _draw_ground(
+    axes: Any, truth: HandoffTruth, moments: "list[Moment]", begin_s: float, radius_m: float
+) -> None:
+    during = truth.time_us >= begin_s * 1e6
+    during &= truth.time_us <= moments[-1].time_us
+    for aircraft, colour, name in zip(
+        truth.aircraft, (_BLUE, _RED), ("handoff aircraft", "tracker"), strict=True
+    ):
+        own = aircraft[during]
+        thin = max(1, len(own) // 4000)
+        axes.plot(own[::thin, 1], own[::thin, 0], color=colour, linewidth=0.6, alpha=0.4, label=name)
+    for number, target in enumerate(truth.targets):
+        axes.plot(
+            target[during, 1],
+            target[during, 0],
+            color=_GREY,
+            linewidth=2.5,
+            label="true targets" if number == 0 else None,
+        )
+    decided = [moment.estimate for moment in moments if moment.estimate.decided]
+    tracked = [moment.tracker for moment in moments if moment.tracker and moment.tracker.track]
+    for index, estimates, colour, name in (
+        (1, tracked, _RED, "tracker's track"),
+        (0, decided, _BLUE, "decided track"),
+    ):
+        if estimates:
+            places = truth.placed(index, estimates)
+            axes.plot(places[:, 1], places[:, 0], color=colour, linewidth=1.2, label=name)
+    if len(truth.targets):
+        # the aircraft fly on for some seconds when they leave
+        places = truth.targets[:, during].reshape(-1, 2)
+        margin = 2.5 * radius_m
+        axes.set_xlim(places[:, 1].min() - margin, places[:, 1].max() + margin)
+        axes.set_ylim(places[:, 0].min() - margin, places[:, 0].max() + margin)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_title("over ground, from the first aircraft's start", fontsize=10, color=_INK)
+    axes.set_xlabel("east, m", fontsize=9, color=_INK)
+    axes.set_ylabel("north, m", fontsize=9, color=_INK)
+    axes.legend(fontsize=8, frameon=False, loc="best")
+
+
+def _draw_modes(axes: Any, moments: "list[Moment]", begin_s: float) -> None:
+    """The modes of the pose in the first seconds without GPS, in the handoff aircraft's level frame."""
+    angle = np.linspace(0.0, 2.0 * math.pi, 61)
+    chosen = [moment for moment in moments if moment.modes and moment.time_us >= begin_s * 1e6][:60]
+    for age, moment in enumerate(chosen):
+        shade = 0.25 + 0.75 * age / max(1, len(chosen) - 1)
+        for mode in moment.modes:
+            values, vectors = np.linalg.eigh(mode.covariance[:2, :2])
+            radii = 2.0 * np.sqrt(np.maximum(values, 0.0))
+            outline = vectors @ (radii[:, None] * np.array([np.cos(angle), np.sin(angle)]))
+            axes.plot(
+                mode.right_m + outline[1],
+                mode.forward_m + outline[0],
+                color=_BLUE if moment.estimate.converged else _RED,
+                alpha=shade * max(0.15, mode.weight),
+                linewidth=0.9,
+            )
+    axes.plot([], [], color=_RED, label="modes, not converged")
+    axes.plot([], [], color=_BLUE, label="converged")
+    axes.plot(0.0, 0.0, "^", color=_INK, markersize=8, label="handoff aircraft")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title("tracker in the level frame, 2 sigma, first 30 s", fontsize=10, color=_INK)
+    axes.set_xlabel("right, m", fontsize=9, color=_INK)
+    axes.set_ylabel("forward, m", fontsize=9, color=_INK)
+    axes.legend(fontsize=8, frameon=False, loc="best")
+
+
+def _draw_bearing(axes: Any, truth: HandoffTruth | None, moments: "list[Moment]") -> None:
+    for moment in moments:
+        for mode in moment.modes:
+            axes.plot(
+                moment.time_us * 1e-6,
+                math.degrees(mode.bearing_rad),
+                ".",
+                markersize=3.0,
+                color=_BLUE,
+                alpha=max(0.1, mode.weight),
+            )
+    if truth is not None and moments:
+        times = np.array([moment.time_us for moment in moments], dtype=np.float64)
+        own, other = ([truth.at(time, aircraft) for time in times] for aircraft in truth.aircraft)
+        true = [
+            math.degrees(math.remainder(math.atan2(b[1] - a[1], b[0] - a[0]) - a[2], math.tau))
+            for a, b in zip(own, other, strict=True)
+        ]
+        axes.plot(times * 1e-6, true, ".", markersize=2.0, color=_GREY, label="true")
+    axes.set_ylabel("bearing of the\ntracker, degrees", fontsize=9, color=_INK)
+    axes.set_ylim(-180.0, 180.0)
+    axes.tick_params(labelbottom=False)
+
+
+def _draw_scores(axes: Any, moments: "list[Moment]", decision: float) -> None:
+    numbers = sorted({number for moment in moments for number in moment.scores})
+    for k, number in enumerate(numbers):
+        own = [moment for moment in moments if number in moment.scores]
+        axes.plot(
+            [moment.time_us * 1e-6 for moment in own],
+            [moment.scores[number] for moment in own],
+            ".-",
+            markersize=2.5,
+            linewidth=1.0,
+            color=_LINES[k % len(_LINES)],
+            label=f"track {number}",
+        )
+    axes.axhline(decision, color=_GREEN, linewidth=1.0, linestyle=":")
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_ylabel("probability", fontsize=9, color=_INK)
+    axes.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
+    if numbers:
+        axes.legend(fontsize=7, frameon=False, ncols=min(8, len(numbers)), loc="center left")

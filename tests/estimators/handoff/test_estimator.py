@@ -1,0 +1,263 @@
+"""The estimator `handoff` on the messages of two aircraft over walking targets; inputs that are hostile."""
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
+from autopilot_bridge.mavlink.handoff_messages import (
+    HANDOFF_DECISION_PAYLOAD,
+    TRACK_REPORT_PAYLOAD,
+    HandoffDecision,
+    ReportedTrack,
+    decision_message,
+    track_report_messages,
+)
+from autopilot_bridge.mavlink.moving_points import MovingPoints, moving_points_messages
+from estimators.handoff import HandoffEstimator, HandoffSettings
+from estimators.handoff.designation import Designation
+from estimators.handoff.scans import ScanAssembler
+from estimators.interface import Outcome
+from estimators.runner import Runner
+from tests.estimators.handoff.scenes import APART, HANDOFF, TRACKER, Scene
+
+
+@pytest.fixture(scope="module")
+def decided():
+    scene = Scene()
+    assert scene.fly_until_decided(60.0)
+    scene.fly(3.0)
+    return scene
+
+
+def test_the_decided_track_is_the_trackers_target_and_the_tracker_is_released(decided):
+    target, off_m = decided.target_of(HANDOFF)
+    assert target == decided.target_of(TRACKER)[0] and off_m < 6.0
+    handoff, tracker = decided.estimator(HANDOFF), decided.estimator(TRACKER)
+    assert handoff.decision.decided and handoff.decision.probability >= 0.99
+    assert handoff.decision.target == tracker.designation.number
+    assert tracker.released and handoff.released  # the answer has come back
+    (estimate,) = handoff.estimates
+    assert estimate.decided and estimate.converged and len(estimate.row()) == len(estimate.COLUMNS)
+
+
+def test_the_same_frames_give_the_same_numbers_to_the_bit(decided):
+    for system, role in ((HANDOFF, "handoff"), (TRACKER, "tracker")):
+        settings = decided.estimator(system).parameters
+        assert settings.role == role
+        runner = Runner(HandoffEstimator(settings))
+        rows, sent = [], []
+        for to, frame in decided.frames:
+            if to == system and runner.feed(frame) is Outcome.UPDATED:
+                rows += [estimate.row() for estimate in runner.estimator.estimates]
+                sent += runner.publish()
+        np.testing.assert_array_equal(np.array(rows), np.array(decided.rows_of[system]))
+        assert sent
+
+
+def encoded(message, system, component=191):
+    (frame,) = FrameParser().feed(FrameEncoder(system, component).encode(message))
+    return frame
+
+
+def test_malformed_messages_are_dropped_and_counted(decided):
+    tunnel = dialect.MAVLink_tunnel_message(0, 0, TRACK_REPORT_PAYLOAD, 20, [255] * 128)
+    handoff, tracker = decided.runners[HANDOFF], decided.runners[TRACKER]
+    before = handoff.estimator.counts["malformed"]
+    assert handoff.feed(encoded(tunnel, TRACKER)) is Outcome.IMPLAUSIBLE
+    assert handoff.estimator.counts["malformed"] == before + 1
+    tunnel.payload_type = HANDOFF_DECISION_PAYLOAD
+    assert tracker.feed(encoded(tunnel, HANDOFF)) is Outcome.IMPLAUSIBLE
+    assert tracker.estimator.counts["malformed"] == 1
+
+
+def tracker_with(number):
+    estimator = HandoffEstimator(HandoffSettings(role="tracker"))
+    estimator.designation.designate(0, number, (0.0, 0.0))
+    return Runner(estimator)
+
+
+def decision(**changes):
+    track = ReportedTrack(
+        number=1,
+        place_m=(1.0, 2.0),
+        velocity_m_s=(0.0, 1.0),
+        covariance_m2=(1.0, 0.0, 1.0),
+        velocity_sigma_m_s=0.5,
+    )
+    values = {
+        "system": HANDOFF,
+        "number": 0,
+        "time_us": 5_000_000,
+        "decided": True,
+        "target": 7,
+        "probability": 0.995,
+    }
+    return decision_message(HandoffDecision(**{**values, **changes}, track=track))
+
+
+def test_the_tracker_is_released_by_the_decision_about_its_track_and_by_nothing_else():
+    runner = tracker_with(7)
+    runner.feed(encoded(decision(decided=False), HANDOFF))
+    assert not runner.estimator.released
+    runner.feed(encoded(decision(target=6, time_us=6_000_000), HANDOFF))
+    assert not runner.estimator.released and runner.estimator.counts["decisions_of_another_track"] == 1
+    runner.feed(encoded(decision(time_us=7_000_000, system=4), 4))
+    assert not runner.estimator.released
+    runner.feed(encoded(decision(time_us=5_500_000), HANDOFF))  # late
+    assert not runner.estimator.released
+    runner.feed(encoded(decision(time_us=7_000_000), HANDOFF))
+    assert runner.estimator.released
+
+
+def part(time_us, first, points, total, scan=0):
+    return MovingPoints(
+        scan=scan, time_us=time_us, first=first, total=total, sigma=0.002, points=tuple(points)
+    )
+
+
+def test_scans_are_put_together_from_messages_in_any_order():
+    scans = ScanAssembler()
+    assert scans.add(part(100, 1, [(0.2, 0.0)], 2)) == []
+    (scan,) = scans.add(part(100, 0, [(0.1, 0.0)], 2))
+    assert scan.points == {0: (0.1, 0.0), 1: (0.2, 0.0)}
+    assert scans.add(part(100, 0, [(0.1, 0.0)], 2)) == [] and scans.add(part(50, 0, [], 0)) == []
+    assert scans.add(part(200, 0, [(0.3, 0.0)], 2, scan=1)) == []
+    first, second = scans.add(part(300, 0, [], 0, scan=4))  # the other point was lost
+    assert (len(first.points), first.total, second.total) == (1, 2, 0)
+    assert scans.counts == Counter(complete=2, repeated=1, late=1, incomplete=1, missed=2)
+
+
+def test_an_identity_becomes_doubtful_when_tracks_meet_and_is_restored_by_the_operator():
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0))
+    designation.update(100, {1: (0.0, 0.0), 2: (30.0, 0.0)})
+    assert designation.probability == pytest.approx(1.0)
+    designation.update(200, {1: (0.0, 0.0), 2: (0.2, 0.0)})
+    met = designation.probability
+    assert 0.5 <= met < 0.55
+    designation.update(300, {1: (0.0, 0.0), 2: (30.0, 0.0)})
+    assert designation.probability == met  # it stays doubtful
+    designation.designate(400, 1, (0.0, 0.0))
+    assert designation.probability == 1.0
+    designation.update(500, {3: (2.0, 0.0)})  # lost, and a new track where it was
+    assert designation.number == 3 and designation.probability == pytest.approx(0.9)
+    designation.update(6_000_000, {4: (90.0, 0.0)})
+    assert designation.number is None
+
+
+def test_a_second_track_of_the_same_target_leaves_no_doubt():
+    """It begins beside the target's track, takes its place, and is another target only once it was away."""
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0))
+    designation.update(100, {1: (0.0, 0.0), 2: (1.0, 0.0)})
+    assert designation.probability == 1.0
+    designation.update(200, {2: (1.0, 0.0)})
+    assert designation.number == 2 and designation.probability == pytest.approx(0.99)
+    designation.update(300, {2: (1.0, 0.0), 3: (20.0, 0.0)})
+    designation.update(400, {2: (1.0, 0.0), 3: (2.0, 0.0)})
+    assert designation.probability < 0.6
+
+
+# The bad inputs below take seconds each.
+
+
+@pytest.mark.slow
+def test_delays_losses_and_repetitions_change_the_time_and_not_the_decision():
+    rng = np.random.default_rng(1)
+
+    def poor(now_us, to, frame):
+        copies = [] if rng.random() < 0.3 else [frame] * (1 + (rng.random() < 0.2))
+        return [(now_us + round(1e6 * rng.exponential(0.3)), to, copy) for copy in copies]
+
+    scene = Scene(link=poor)
+    assert scene.fly_until_decided(90.0)
+    scene.fly(8.0)
+    assert scene.target_of(HANDOFF)[0] == scene.target_of(TRACKER)[0]
+    assert scene.estimator(TRACKER).released and scene.estimator(HANDOFF).released
+    assert scene.estimator(HANDOFF).counts["late"] > 0
+
+
+@pytest.mark.slow
+def test_without_any_message_to_it_the_tracker_is_not_released():
+    scene = Scene(link=lambda now_us, to, frame: [(now_us, to, frame)] if to == HANDOFF else [])
+    assert scene.fly_until_decided(60.0)
+    scene.fly(10.0)
+    assert not scene.estimator(TRACKER).released and not scene.estimator(HANDOFF).released
+
+
+@pytest.mark.slow
+def test_without_a_range_for_60_s_nothing_is_decided_and_afterwards_the_right_track():
+    scene = Scene()
+    scene.fly(60.0, ranges=False)
+    assert scene.decided is None
+    assert scene.fly_until_decided(60.0)
+    assert scene.target_of(HANDOFF)[0] == scene.target_of(TRACKER)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("meet_s", [15.0, 30.0, 40.0])
+def test_targets_that_cross_are_not_confused_with_confidence(meet_s):
+    """The designated target and another one walk through the same place."""
+    crossing = [(0.9, 0.4), (-0.9, 0.5), (0.2, -1.2), (-1.0, 0.3)]
+    places = [place for place, _ in APART]
+    meet = np.array(places[0]) + meet_s * np.array(crossing[0])
+    places[1] = tuple(meet - meet_s * np.array(crossing[1]))
+    scene = Scene(list(zip(places, crossing, strict=True)))
+    started = None
+    for _ in range(90):
+        scene.fly(1.0)
+        if started is None and scene.estimator(TRACKER).designation.number is not None:
+            started = scene.target_of(TRACKER)[0]
+        if scene.decided is not None:
+            break
+    if scene.decided is not None:
+        assert scene.target_of(HANDOFF)[0] == started
+
+
+@pytest.mark.slow
+def test_a_target_that_stops_is_lost_and_not_decided_for():
+    scene = Scene()
+    while scene.estimator(TRACKER).designation.number is None:
+        scene.fly(0.5)
+    started, _ = scene.target_of(TRACKER)
+    scene.velocities = scene.velocities.copy()
+    scene.velocities[started] = 0.0
+    scene.fly(40.0)
+    assert scene.decided is None and scene.estimator(TRACKER).designation.number is None
+
+
+@pytest.mark.slow
+def test_two_targets_side_by_side_are_not_decided_between():
+    side = [*APART, ((-20.0, 11.0), (0.9, 0.4))]
+    scene = Scene(side)
+    scene.fly(60.0)
+    handoff = scene.estimator(HANDOFF)
+    if scene.decided is not None:  # the other target was designated
+        assert scene.target_of(HANDOFF)[0] == scene.target_of(TRACKER)[0]
+    else:
+        assert max(handoff.process.comparison.scores.values(), default=0.0) < 0.99
+
+
+@pytest.mark.slow
+def test_messages_of_other_aircraft_change_nothing(decided):
+    """Everything again, and between the frames what a fourth aircraft sends."""
+    settings = decided.estimator(HANDOFF).parameters
+    runner = Runner(HandoffEstimator(settings))
+    strange = [
+        *moving_points_messages(1, 5_000_000, [(0.1, 0.1)], 0.002),
+        *track_report_messages(
+            system=4, report=1, time_us=5_000_000, target=1, identity=1.0, released=True, tracks=[]
+        ),
+        decision(system=4),
+        dialect.MAVLink_highres_imu_message(5_000_000, *([math.nan] * 9), 900.0, 9.0, 90.0, 20.0, 0xFFFF, 0),
+    ]
+    rows = []
+    for count, (to, frame) in enumerate(decided.frames):
+        if to == HANDOFF and runner.feed(frame) is Outcome.UPDATED:
+            rows += [estimate.row() for estimate in runner.estimator.estimates]
+        if count % 10 == 0:
+            runner.feed(encoded(strange[count // 10 % len(strange)], 4, 1))
+    np.testing.assert_array_equal(np.array(rows), np.array(decided.rows_of[HANDOFF]))

@@ -1,0 +1,73 @@
+"""Whole handoffs of two aircraft in an embedded world."""
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+from estimators.library import make_estimator
+from estimators.log_replay import replay
+from estimators.logs import open_log
+from flightsim.world_spec import WorldSpec
+from missions.embedded import handoff_world
+from missions.handoff.mission import HandoffMission
+from missions.handoff.options import HandoffOptions
+from missions.runs.request import RunRequest
+from missions.runs.session import fly
+
+
+def flown(out, *, seed=5, picture=False, settings=(), **changes):
+    options = HandoffOptions(**{"vehicles": 2, "takeover_s": 20.0, **changes})
+    world = handoff_world(WorldSpec.of_team(2, seed=seed, model="aerosonde"), options)
+    request = RunRequest(
+        options=options,
+        world=world,
+        out=out,
+        picture=picture,
+        estimator="handoff",
+        estimator_settings=settings,
+    )
+    return fly(HandoffMission(), request)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return flown(tmp_path_factory.mktemp("runs") / "run", picture=True, timeout_s=200.0)
+
+
+@pytest.mark.slow
+def test_the_tracker_is_released_by_a_decision_only_and_not_by_a_wrong_one(run):
+    """Whether there is a decision depends on the walk of the targets (docs/handoff.md)."""
+    summary = run.summary
+    assert 0.0 < summary["converged_after_s"] < 120.0
+    assert summary["released"] == summary["decided"] == (run.outcome == "completed")
+    if summary["decided"]:
+        assert summary["correct"] and summary["probability"] >= 0.99
+        assert summary["decided_after_s"] <= summary["handed_over_after_s"]
+    else:
+        assert "no track was decided for" in run.reason
+    assert summary["tracker"]["messages_decisions"] > 0
+    assert (run.folder / "track.png").stat().st_size > 50_000
+    json.dumps(summary, allow_nan=False)
+
+
+@pytest.mark.slow
+def test_the_estimator_beside_the_flight_and_a_replay_have_the_same_numbers(run):
+    with np.load(run.folder / "estimates.npz") as file:
+        recorded = {name: file[name] for name in file.files}
+    settings = run.summary["estimator"]["settings"]
+    done = replay(open_log(run.folder / "flight.tlog"), partial(make_estimator, "handoff", settings))
+    (runner,) = done.fleet.runners.values()
+    (table,) = runner.tables.values()
+    assert np.array_equal(recorded["time_us"], table.time_us)
+    for column in table.columns:
+        assert np.array_equal(recorded[column], table[column], equal_nan=True)
+    assert recorded["converged"].any()
+
+
+@pytest.mark.slow
+def test_without_a_decision_in_time_the_flight_fails_and_both_aircraft_land(tmp_path):
+    result = flown(tmp_path / "run", timeout_s=5.0)
+    assert result.outcome == "failed" and "no track was decided for within 5 s" in result.reason
+    assert not result.summary["decided"] and not result.summary["released"]

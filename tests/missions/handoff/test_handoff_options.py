@@ -1,0 +1,79 @@
+"""Options of the handoff: what is refused; its world; the link between the aircraft."""
+
+import math
+
+import numpy as np
+import pytest
+
+from autopilot_bridge.mavlink import dialect
+from flightsim.world_spec import WorldSpec
+from missions.embedded import WalkingTargets, handoff_world
+from missions.errors import PlanError
+from missions.handoff.options import HandoffOptions, check_vehicle
+from missions.handoff.watch import RadioLink
+from missions.planning.limits import FixedWingLimits, MulticopterLimits
+
+
+@pytest.mark.parametrize(
+    ("changes", "reported"),
+    [
+        ({"radius_m": 0.0}, "`radius_m` 0"),
+        ({"decision": 1.0}, "`decision` 1 is not a probability between 0.5 and 1"),
+        ({"link_loss": 1.0}, "`link_loss` 1 is not a share"),
+        ({"link_delay_s": 9.0}, "`link_delay_s` 9 s is not in 0..5 s"),
+        ({"target_ne_m": (math.nan, 0.0)}, "`target_ne_m` is not a place"),
+        ({"timeout_s": -1.0}, "`timeout_s` -1"),
+        ({"estimator_seed": -1}, "`estimator_seed` -1"),
+    ],
+)
+def test_impossible_values_are_named(changes, reported):
+    with pytest.raises(PlanError, match=reported):
+        HandoffOptions(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reported"),
+    [
+        ({"vehicles": 3}, "`vehicles` 3: a handoff is flown by 2 aircraft"),
+        ({"radius_m": 20.0}, "can't be held at .* ask for `radius_m`"),
+        ({"target_ne_m": (40e3, 0.0)}, "from home, more than"),
+        ({"radius_m": 900.0}, "targets are seen too flat"),
+    ],
+)
+def test_what_an_aircraft_cannot_fly_is_refused(changes, reported):
+    check_vehicle(HandoffOptions(vehicles=2), FixedWingLimits())
+    with pytest.raises(PlanError, match=reported):
+        check_vehicle(HandoffOptions(**{"vehicles": 2, **changes}), FixedWingLimits())
+
+
+def test_a_multicopter_is_refused():
+    with pytest.raises(PlanError, match="aircraft with wings"):
+        check_vehicle(HandoffOptions(vehicles=2), MulticopterLimits())
+
+
+def test_the_world_has_walking_targets_and_what_both_aircraft_need():
+    options = HandoffOptions(vehicles=2)
+    world = handoff_world(WorldSpec.of_team(2, seed=4, model="aerosonde"), options, WalkingTargets(count=7))
+    assert len(world.targets) == 7
+    for vehicle in world.vehicles:
+        payload = vehicle.payload
+        assert payload.gimbal and payload.moving_points and payload.range_radio and not payload.camera
+    for target in world.targets:
+        walk = target.motion
+        assert (walk.north_m - walk.south_m, walk.east_m - walk.west_m) == pytest.approx((140.0, 270.0))
+        assert 0.8 <= walk.speed_m_s <= 2.0
+    assert handoff_world(world, options).targets == world.targets
+    with pytest.raises(PlanError, match="`count` 0"):
+        WalkingTargets(count=0)
+
+
+def test_the_link_loses_and_delays_messages_as_it_is_given():
+    link = RadioLink(0.3, 0.2, np.random.default_rng(1))
+    message = dialect.MAVLink_ping_message(0, 0, 0, 0)
+    for now_us in range(0, 2_000_000, 1000):
+        link.send(now_us, 1, message)
+    arrived = {now_us: len(link.due(now_us)) for now_us in range(0, 6_000_000, 50_000)}
+    assert link.counts["sent"] == 2000 and link.counts["lost"] / 2000 == pytest.approx(0.3, abs=0.04)
+    assert sum(arrived.values()) == link.counts["delivered"] == 2000 - link.counts["lost"]
+    behind = 1e-6 * sum(now_us * count for now_us, count in arrived.items()) / sum(arrived.values()) - 1.0
+    assert behind == pytest.approx(0.2 + 0.025, abs=0.06)  # found out every 50 ms
