@@ -62,8 +62,8 @@ __getattr__ = lazy_exports(
     {
         **dict.fromkeys(("MAX_FLIGHT_S", "EmbeddedSitl", "alone", "model_kind"), _SITL),
         "RenderedTags": _RENDERED_TAGS,
-        **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.walking_targets"),
         **dict.fromkeys(("MotionSource", "RenderedMotion"), "missions.embedded.rendered_motion"),
+        **dict.fromkeys(("WalkingTargets", "handoff_world"), "missions.embedded.walking_targets"),
         **dict.fromkeys(("HiddenTag", "vision_search_world"), "missions.embedded.hidden_tag"),
         **dict.fromkeys(("TagTarget", "search_camera", "tag_search_world"), _TAG_SEARCH),
         **dict.fromkeys(("TargetField", "multi_target_world", "terrain_targets_world"), _TARGET_FIELDS),

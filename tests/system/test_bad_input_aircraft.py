@@ -163,7 +163,7 @@ FLY = {
     "occupancy --amplitude 1": ("--amplitude 1 nT", "--threshold 3 nT"),
     "occupancy --sigma 0": ("--sigma 0 m",),
     "occupancy --arg foo=1": ("--arg is for a mission of your own",),
-    "occupancy --radius 100": ("--radius is for orbit, not for occupancy",),
+    "occupancy --radius 100": ("--radius is for orbit, handoff, not for occupancy",),
     "occupancy --via setpoints": ("--via is for lissajous", "not for occupancy"),
     "occupancy --connect udpin:127.0.0.1:0": ("needs the published magnetic map", "--map FILE"),
     "occupancy --connect udpin:127.0.0.1:0 --model aerosonde": ("--model", "--connect"),

@@ -331,7 +331,7 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
     [
         (
             ["level", "--connect", "udpin:127.0.0.1:1"],
-            "there are attitude, lissajous, magnetic-identification, multi-target",
+            "there are attitude, handoff, lissajous, magnetic-identification, multi-target",
         ),
         ([LEVEL, "--connect", "carrier pigeon"], "carrier pigeon"),
         ([LEVEL, "--connect", "flight.tlog"], "that is a log; use flightstack replay"),

@@ -197,7 +197,10 @@ def test_wrong_use_names_value_and_what_is_accepted(tmp_path, capfd, arguments, 
 def test_an_unknown_estimator(tmp_path, capfd):
     log = write_log(tmp_path / "flight.tlog")
     assert replay(log, "--estimator", "atitude") == 2
-    assert "there are attitude, lissajous, magnetic-identification, multi-target" in capfd.readouterr().err
+    assert (
+        "there are attitude, handoff, lissajous, magnetic-identification, multi-target"
+        in capfd.readouterr().err
+    )
 
 
 def test_a_vehicle_that_is_not_in_it(tmp_path, capfd):

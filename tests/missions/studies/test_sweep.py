@@ -87,7 +87,7 @@ def test_a_range_is_drawn_for_each_run() -> None:
         (["orbit", "--vary", "no-gps-fault=perhaps"], "is not yes or no"),
         (["lissajous", "--", "--out", "x"], "--out: the study has the folder"),
         (["lissajous", "--", "--yes"], "--yes"),
-        (["lissajous", "--", "--no-gps-fault"], "--no-gps-fault is for orbit, not for lissajous"),
+        (["lissajous", "--", "--no-gps-fault"], "--no-gps-fault is for orbit, handoff, not for lissajous"),
         (["none.py"], "mission file none.py does not exist"),
     ],
 )
