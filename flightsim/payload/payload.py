@@ -3,7 +3,7 @@ sensor, range radio, moving-point camera.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,7 @@ class Payload:
     """
 
     __slots__ = (
+        "_resting",
         "camera",
         "frame",
         "gimbal",
@@ -161,15 +162,15 @@ class Payload:
                 physics_rate_hz=physics_rate_hz,
                 seeds=seeds,
             )
+        alone = replace(parameters, magnetometer=None) == PayloadParameters()
+        self._resting = self.magnetometer if alone else None
 
     @property
     def next_us(self) -> int:
         """Time before which steps have nothing to do and may be left out: a magnetometer alone rests between
         its readings, other devices move or look in every step.
         """
-        if self.gimbal or self.camera or self.target_sensor or self.range_radio or not self.magnetometer:
-            return 0
-        return self.magnetometer.next_us
+        return self._resting.next_us if self._resting is not None else 0
 
     def step(self, time_us: int) -> None:
         """One physics step ending at `time_us`: gimbal, then what hangs on it, then the others."""

@@ -1,7 +1,7 @@
 """The composed payload and the survey magnetometer: errors as specified, separate streams, bits of a seed."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -20,11 +20,14 @@ from flightsim.payload import (
     GroundTargets,
     MagneticField,
     MagneticMap,
+    MovingPointParameters,
     Payload,
     PayloadParameters,
     RandomWalk,
+    RangeRadioParameters,
     SurveyMagnetometer,
     SurveyMagnetometerParameters,
+    TargetSensorParameters,
 )
 
 Array = NDArray[np.float64]
@@ -114,6 +117,27 @@ def test_removing_a_device_changes_no_other(removed: str) -> None:
     for name in {"gimbal", "magnetometer", "camera"} - {removed}:
         if (removed, name) != ("gimbal", "camera"):
             assert without[name] == whole[name]
+
+
+def test_only_a_magnetometer_alone_rests_between_its_readings() -> None:
+    devices = {
+        "gimbal": GimbalParameters(),
+        "camera": CameraParameters(),
+        "target_sensor": TargetSensorParameters(),
+        "range_radio": RangeRadioParameters(),
+        "moving_points": MovingPointParameters(),
+    }
+    assert {*devices, "magnetometer"} == {field.name for field in fields(PayloadParameters)}
+    alone = PayloadParameters(magnetometer=SurveyMagnetometerParameters())
+
+    def next_us(parameters: PayloadParameters) -> int:
+        payload, _ = make(parameters)
+        payload.step(STEP_US)
+        return payload.next_us
+
+    assert next_us(alone) > STEP_US
+    for name, device in devices.items():
+        assert next_us(replace(alone, **{name: device})) == 0  # type: ignore[arg-type]
 
 
 def test_one_target_more_changes_no_other() -> None:

@@ -1,9 +1,7 @@
 """Whole searches in embedded worlds: found targets, the same numbers on every way, a silent sensor."""
 
 import json
-import socket
 import threading
-import time
 from dataclasses import replace
 from functools import partial
 
@@ -11,7 +9,6 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.tlog import TlogReader
 from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
@@ -23,6 +20,7 @@ from missions.multi_target.mission import MultiTargetMission
 from missions.multi_target.options import MultiTargetOptions, StepLawKind
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
+from tests.clients.sent_again import send_again
 from tests.clients.sitl_process import free_port
 from tests.slow import slow
 
@@ -131,26 +129,13 @@ def test_a_vehicle_without_the_sensor_is_refused_on_the_ground(tmp_path):
     assert dialect.MAV_COMP_ID_USER2 == 26
 
 
-def send_again(log, port):
-    """Send the vehicle's own frames of a log to a UDP port, 20 times as fast as they were received."""
-    own = {1, dialect.MAV_COMP_ID_USER2}
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        sent_us = 0
-        for time_us, frame in TlogReader(log):
-            if frame.component_id not in own:
-                continue
-            if time_us - sent_us > 20_000:
-                sent_us = time_us
-                time.sleep(0.001)
-            link.sendto(frame.raw, ("127.0.0.1", port))
-
-
 @pytest.mark.slow
 def test_live_on_a_link_and_replayed_it_has_the_same_numbers_too(run, tmp_path):
     result, _ = run
     port, live, again = free_port(), tmp_path / "live", tmp_path / "again"
     settings = [f"--set={setting}" for setting in result.summary["estimator"]["settings"]]
-    sender = threading.Thread(target=send_again, args=(result.folder / "flight.tlog", port), daemon=True)
+    own = result.folder / "flight.tlog", port, (1, dialect.MAV_COMP_ID_USER2)
+    sender = threading.Thread(target=send_again, args=own, daemon=True)
     sender.start()
     link = ["--connect", f"udpin:127.0.0.1:{port}", "--silence", "3"]
     run_command_line(["estimate", "multi-target", *link, *settings, "--no-picture", "--out", str(live)])

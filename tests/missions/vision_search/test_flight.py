@@ -2,9 +2,7 @@
 
 import json
 import math
-import socket
 import threading
-import time
 from dataclasses import replace
 from functools import partial
 
@@ -27,6 +25,7 @@ from missions.runs.request import RunRequest
 from missions.runs.session import fly
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
+from tests.clients.sent_again import send_again
 from tests.clients.sitl_process import free_port
 
 SMALL = {"altitude_m": 15.0, "area_m": (-20.0, -20.0, 20.0, 20.0), "step_m": 8.0, "tag_size_m": 0.6}
@@ -123,25 +122,13 @@ def test_a_search_without_a_target_ends_with_its_time(tmp_path):
     assert summary["beliefs"][0]["estimator_remarks"]["detections_of_other_tags"] > 0
 
 
-def send_again(log, port):
-    """Send the vehicle's own frames of a log to a UDP port, 20 times as fast as they were received."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        sent_us = 0
-        for time_us, frame in TlogReader(log):
-            if frame.component_id not in (1, 100):
-                continue
-            if time_us - sent_us > 20_000:
-                sent_us = time_us
-                time.sleep(0.001)
-            link.sendto(frame.raw, ("127.0.0.1", port))
-
-
 @pytest.mark.slow
 def test_live_on_a_link_and_replayed_it_has_the_same_numbers_too(run, tmp_path):
     result, _ = run
     port, live, again = free_port(), tmp_path / "live", tmp_path / "again"
     settings = [f"--set={setting}" for setting in result.summary["estimator"]["settings"]]
-    sender = threading.Thread(target=send_again, args=(result.folder / "flight.tlog", port), daemon=True)
+    own = result.folder / "flight.tlog", port, (1, 100)
+    sender = threading.Thread(target=send_again, args=own, daemon=True)
     sender.start()
     link = ["--connect", f"udpin:127.0.0.1:{port}", "--silence", "3"]
     run_command_line(["estimate", "vision-search", *link, *settings, "--no-picture", "--out", str(live)])
