@@ -102,7 +102,7 @@ class Firmware:
 
     @contextmanager
     def running(
-        self, folder: Path, *, instance: int = 0, speed: float = 1.0
+        self, folder: Path, *, instance: int = 0, speed: float = 1.0, gyro_calibration: bool = False
     ) -> Iterator["subprocess.Popen[bytes]"]:
         """Run an instance in a new folder. It is ended with the context.
 
@@ -110,12 +110,15 @@ class Firmware:
             folder: its output is in firmware.txt there.
             instance: 0 to 9; side by side each needs its own.
             speed: times real time.
+            gyro_calibration: PX4's gyro calibration at rest (IMU_GYRO_CAL_EN). It changes its own timer at
+                every arming, which can damage the list of timers in PX4's POSIX build: `px4_timers`.
         """
         folder.mkdir(parents=True)
         environment = dict(os.environ)
         if self.name == "px4":
             environment["PX4_SIM_MODEL"] = _PX4_MODELS[self.vehicle]
             environment["PX4_SIM_SPEED_FACTOR"] = f"{speed:g}"
+            environment["PX4_PARAM_IMU_GYRO_CAL_EN"] = f"{gyro_calibration:d}"
         with (folder / "firmware.txt").open("wb") as said:
             process = subprocess.Popen(
                 self.command(instance, speed, folder),
