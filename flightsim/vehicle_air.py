@@ -138,6 +138,7 @@ class VehicleAir:
         self._wind_ned_m_s = environment.wind_ned_m_s
         self._profile = environment.profile
         self._values = np.zeros(_END)
+        self._row = BLOCK_STEPS  # of the noise
         self._stir(environment.turbulence.wind_at_20_ft_m_s)
 
     def step(self, steps: int) -> None:
