@@ -36,7 +36,8 @@ class Packet:
             b"".join([frame.raw for frame in frames]) if len(frames) > 1 else frames[0].raw,
             tuple([frame.message_id for frame in frames]),
         )
-        packet._frames, packet._given = [*frames], True
+        packet._frames = [*frames]
+        packet._given = True
         return packet
 
     @classmethod
