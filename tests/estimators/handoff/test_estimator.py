@@ -12,7 +12,9 @@ from autopilot_bridge.mavlink.handoff_messages import (
     TRACK_REPORT_PAYLOAD,
     HandoffDecision,
     ReportedTrack,
+    TrackDesignation,
     decision_message,
+    designation_message,
     track_report_messages,
 )
 from autopilot_bridge.mavlink.moving_points import MovingPoints, moving_points_messages
@@ -110,6 +112,21 @@ def test_the_tracker_is_released_by_the_decision_about_its_track_and_by_nothing_
     assert not runner.estimator.released
     runner.feed(encoded(decision(time_us=7_000_000), HANDOFF))
     assert runner.estimator.released
+
+
+def test_an_operator_designates_a_track_of_this_aircraft_and_no_other(decided):
+    runner = decided.runners[TRACKER]
+    tracker, designation = runner.estimator, runner.estimator.designation
+    other = next(number for number in tracker.sight.tracks.places if number != designation.number)
+    before, count = designation.number, designation.count
+    for system, track in ((HANDOFF, other), (TRACKER, 60_000)):
+        runner.feed(encoded(designation_message(TrackDesignation(system=system, track=track)), 255, 190))
+        assert (designation.number, designation.count) == (before, count)
+    assert tracker.counts["designations_of_no_track"] == 1
+    for number in (other, before):
+        runner.feed(encoded(designation_message(TrackDesignation(system=TRACKER, track=number)), 255, 190))
+        assert designation.number == number and designation.probability == 1.0
+    assert designation.count == count + 2 and tracker.counts["designations"] == 2
 
 
 def part(time_us, first, points, total, scan=0):
