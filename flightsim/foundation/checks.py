@@ -91,18 +91,22 @@ def check_fields(
         but: what some must be instead, by name.
         unchecked: names of those that are checked elsewhere.
     """
-    for name, stated in _stated(record.__class__).items():
+    for name, stated, unlimited in _stated(record.__class__):
         value = getattr(record, name, None)
-        if name in unchecked or (value == math.inf and math.inf in stated):
+        if name in unchecked or (unlimited and value == math.inf):
             continue
-        check = but.get(name) or next(filter(callable, stated), usually)
+        check = but.get(name) or stated or usually
         for part in value if isinstance(value, tuple) else (value,):
             if isinstance(part, int | float) and not isinstance(part, bool | Enum):
                 check(**{name: part})
 
 
 @cache
-def _stated(kind: Any) -> dict[str, tuple[Any, ...]]:
-    """What the types of the fields of a dataclass state beside `float`, by name."""
+def _stated(kind: Any) -> tuple[tuple[str, Any, bool], ...]:
+    """What the type of each field of a dataclass states: its name, a check, whether it may be infinite."""
     hints = get_type_hints(kind, include_extras=True)
-    return {field.name: getattr(hints[field.name], "__metadata__", ()) for field in fields(kind)}
+    stated = {field.name: getattr(hints[field.name], "__metadata__", ()) for field in fields(kind)}
+    return tuple(
+        (name, next((part for part in parts if callable(part)), None), math.inf in parts)
+        for name, parts in stated.items()
+    )
