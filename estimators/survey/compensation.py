@@ -45,9 +45,7 @@ _RIDGE: Final = 1e-6
 _LEAST_TURN_RAD: Final = math.radians(5.0)
 _HEADINGS: Final = 4
 CYCLES: Final = 6
-"""Of each manoeuvre. Their mean has half the noise of a second's readings; three would leave 1.5 nT in the
-figure of merit.
-"""
+"""Of each manoeuvre. White noise of 0.2 nT makes 1.1 nT of the figure of merit by six, 1.5 nT by three."""
 _NOISE_DRAWS: Final = 20
 _TREND: Final = 2  # degree of what geology does during a manoeuvre
 FORMAT: Final = "flightstack-compensation-1"
