@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from autopilot_bridge.mission_plan import MissionItem
     from flightsim.foundation.geodesy import GeodeticPosition
+    from missions.camera_picture import PictureAt
     from missions.notes import FlightNotes
     from missions.outline import Outline
     from missions.runs.records import FlightRecords
@@ -169,6 +170,10 @@ class Mission(Generic[AnyOptions]):
     def title(self, options: AnyOptions) -> str:
         """First words of the picture's title."""
         return self.name
+
+    def pictures(self, debriefing: Debriefing, picture_at: "PictureAt") -> Mapping[str, bytes]:
+        """Pictures of the cameras as PNG, by file name, with what the mission draws in."""
+        return {}
 
     def draw(self, path: "Path", title: str, debriefing: Debriefing) -> None:
         """Draw `track.png`."""

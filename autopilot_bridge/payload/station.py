@@ -23,6 +23,7 @@ class PayloadStation:
         send: sends the components' frames.
 
     Attributes:
+        devices: as given.
         components: all components.
         camera: the camera among them; None: there is none.
         parser: parser of the received bytes; its counters account for every byte.
@@ -31,7 +32,7 @@ class PayloadStation:
     def __init__(self, payload: Payload, *, system_id: int, send: Callable[[bytes], None]) -> None:
         self.parser = FrameParser()
         self.components: list[Component] = []
-        self._payload = payload
+        self.devices = payload
         self._time_us = 0
         self._idle_until_us = 0
         self.camera: CameraComponent | None = None
@@ -72,7 +73,7 @@ class PayloadStation:
         self._time_us = time_us
         if time_us < self._idle_until_us:
             return
-        payload = self._payload
+        payload = self.devices
         payload.step(time_us)
         if self.camera is not None and payload.frame is not None:
             self.camera.update(payload.frame)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink.moving_points import MovingPoints
 from estimators.tracking.line_of_sight import GimbalAttitude, gimbal_from_camera
 from estimators.vision.ground_points import on_ground
-from flightsim.foundation.vectors import between, from_euler, rotate
+from flightsim.foundation.vectors import between, conjugate, from_euler, rotate
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
@@ -123,6 +123,17 @@ class GimbalHistory:
         return GimbalAttitude(
             time_us=time_us, q=between(first.q, second.q, share), from_north=first.from_north
         )
+
+
+def image_point(place_m: Point, gimbal: GimbalAttitude, heading_rad: float, height_m: float) -> Point | None:
+    """Image point of a place on level ground, forward and right; None: it is behind the camera. It is the
+    inverse of `level_places`.
+    """
+    line = (*place_m, height_m)
+    if gimbal.from_north:
+        line = rotate(from_euler(0.0, 0.0, heading_rad), line)
+    ahead, right, down = rotate(conjugate(gimbal.q), line)
+    return (right / ahead, down / ahead) if ahead > 1e-6 else None
 
 
 def level_places(

@@ -8,7 +8,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, read_moving_points
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.dead_reckoning import ReckonedPath
-from estimators.handoff.scans import GimbalHistory, PointScan, ScanAssembler, level_places
+from estimators.handoff.scans import GimbalHistory, Point, PointScan, ScanAssembler, image_point, level_places
 from estimators.interface import Outcome
 from estimators.messages import Message
 from estimators.relative_pose.aircraft import AircraftState
@@ -18,6 +18,11 @@ from estimators.tracking.recursive_ransac import RecursiveRansac
 _AUTOPILOT: Final = 1
 _PATH_S: Final = 5.0  # time in which scans and reports may be late
 _GROUND_SHARE: Final = 0.05  # of a new height on the ground
+
+
+def armed_of(heartbeat: Message) -> bool:
+    """Whether a heartbeat reports that the vehicle is armed."""
+    return bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
 
 
 class GroundHeight:
@@ -59,6 +64,7 @@ class AircraftSight:
         tracks: what moves on the ground.
         height: over the ground.
         counts: scans by what became of them; "malformed" messages.
+        seen: image points of the tracks in the newest scan, by number.
     """
 
     def __init__(
@@ -78,6 +84,7 @@ class AircraftSight:
         self._gimbal = GimbalHistory()
         self._scans = ScanAssembler()
         self.counts: Counter[str] = self._scans.counts
+        self.seen: dict[int, Point] = {}
         state.on_motion = self.path.advance
 
     @property
@@ -100,8 +107,7 @@ class AircraftSight:
                     return Outcome.IMPLAUSIBLE
                 return Outcome.USED if self._gimbal.add(found) else Outcome.LATE
             case "HEARTBEAT" if message.src_component == _AUTOPILOT:
-                armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
-                self.height.armed(armed, self.state.height_m)
+                self.height.armed(armed_of(message), self.state.height_m)
                 return Outcome.USED
         return Outcome.IGNORED
 
@@ -127,4 +133,9 @@ class AircraftSight:
             self.counts["unplaced"] += 1
             return Outcome.WAITING
         self.tracks.scan(scan.time_us, *found, taken=taken)
+        points = {
+            number: image_point(place, gimbal, heading_rad, self.height_m)
+            for number, place in self.tracks.level(taken).items()
+        }
+        self.seen = {number: point for number, point in points.items() if point is not None}
         return Outcome.UPDATED

@@ -68,6 +68,19 @@ class CameraGeometry:
             distortion=distortion,
         )
 
+    def check_size(self, picture: NDArray[np.uint8]) -> None:
+        """Refuse a picture of another size.
+
+        Raises:
+            EstimatorError: it has another size.
+        """
+        height, width = picture.shape[:2]
+        if (width, height) != (self.width_px, self.height_px):
+            raise EstimatorError(
+                f"a picture of {width} x {height} pixels is not of the camera of {self.width_px} x "
+                f"{self.height_px}; calibrate the camera for this size"
+            )
+
     @property
     def matrix(self) -> Array:
         """Intrinsic matrix (3, 3) for pixels that are counted from the edge."""

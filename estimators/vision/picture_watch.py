@@ -7,10 +7,15 @@ together in time.
 
 import math
 from collections import Counter
-from typing import Final
+from typing import Any, ClassVar, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink.camera_scan import CameraScan, camera_scan_message, detection_message
+from autopilot_bridge.mavlink.camera_scan import (
+    CAMERA_SCAN_PAYLOAD,
+    CameraScan,
+    camera_scan_message,
+    detection_message,
+)
 from estimators.messages import Message
 from estimators.vision.camera_file import CameraDescription
 from estimators.vision.clock_check import ClockCheck
@@ -39,6 +44,10 @@ class PictureWatch:
         clocks: compares the rotation in the pictures with the attitude.
     """
 
+    MESSAGES: ClassVar[tuple[str, ...]] = VehicleTrack.MESSAGES
+    REQUESTS: ClassVar[tuple[tuple[str, int, float], ...]] = (("ATTITUDE", 1, 25.0),)
+    NEEDED: ClassVar[str] = "attitude"
+
     def __init__(self, camera: CameraDescription, parameters: TagDetectorParameters | None = None) -> None:
         self.camera = camera
         self._detector = TagDetector(camera.geometry, parameters)
@@ -49,20 +58,19 @@ class PictureWatch:
         self.tags: Counter[int] = Counter()
 
     def handle(self, message: Message) -> None:
-        """Take a message of the vehicle's autopilot."""
+        """Take a message of the vehicle."""
+        if message.src_component != 1:
+            return
         self._track.handle(message)
         if message.name == "ATTITUDE":
             angles = (message.roll, message.pitch, message.yaw)
             if all(map(math.isfinite, angles)):
                 self.clocks.take_attitude(message.time_boot_ms * 1000, *angles)
 
-    def check_size(self, picture: Picture) -> None:
-        """Refuse a picture of another size than the camera's.
-
-        Raises:
-            EstimatorError: it has another size.
-        """
-        self._detector.check_size(picture)
+    @property
+    def found(self) -> int:
+        """Number of detections."""
+        return sum(self.tags.values())
 
     def detect(self, exposed_us: int, picture: Picture) -> tuple[TagDetection, ...]:
         """The tags in a picture (height, width, 3), BGR.
@@ -110,6 +118,23 @@ class PictureWatch:
         self.frames += 1
         messages.append(camera_scan_message(scan))
         return messages
+
+    def makes(self, message: Message) -> bool:
+        """Whether a message is of a kind that it sends."""
+        return message.name == "LANDING_TARGET" or (
+            message.name == "TUNNEL" and message.payload_type == CAMERA_SCAN_PAYLOAD
+        )
+
+    def figures(self) -> dict[str, Any]:
+        """Entries of `summary.json`."""
+        difference = self.clocks.difference()
+        return {
+            "frames": self.frames,
+            "frames_without_attitude": self.without_attitude,
+            "detections": self.found,
+            "tags": {str(tag): count for tag, count in sorted(self.tags.items())},
+            "clocks_apart_s": None if difference is None else round(difference.apart_s, 3),
+        }
 
     def warnings(self) -> list[str]:
         """What is wrong with pictures and attitude."""

@@ -108,19 +108,6 @@ class TagDetector:
         self._wanted = frozenset(p.tag_ids)
         self._sizes_m = dict(p.sizes_m)
 
-    def check_size(self, picture: Picture) -> None:
-        """Refuse a whole picture of another size than the camera's.
-
-        Raises:
-            EstimatorError: it has another size.
-        """
-        height, width = picture.shape[:2]
-        if (width, height) != (self.camera.width_px, self.camera.height_px):
-            raise EstimatorError(
-                f"a picture of {width} x {height} pixels is not of the camera of {self.camera.width_px} x "
-                f"{self.camera.height_px}; calibrate the camera for this size"
-            )
-
     def detect(
         self, picture: Picture, *, corner_px: tuple[int, int] | None = None
     ) -> tuple[TagDetection, ...]:
@@ -134,7 +121,7 @@ class TagDetector:
             EstimatorError: the whole picture has another size than the camera's.
         """
         if corner_px is None:
-            self.check_size(picture)
+            self.camera.check_size(picture)
         height, width = picture.shape[:2]
         grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
         settings = self._detector.getDetectorParameters()

@@ -26,7 +26,13 @@ from flightsim.payload.imager import BrownDistortion, ImagerParameters
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
 from flightsim.payload.magnetic_spec import InducedDipole, MagneticSpec, SignatureSpec, magnetic_field_of
-from flightsim.payload.moving_points import MovingPointCamera, MovingPointParameters, MovingPointScan
+from flightsim.payload.moving_points import (
+    MovingPointCamera,
+    MovingPointParameters,
+    MovingPointScan,
+    PointReader,
+    PointReaderParameters,
+)
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.range_radio import MeasuredRange, RadioOutage, RangeRadio, RangeRadioParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
@@ -92,6 +98,8 @@ __all__ = [
     "PayloadParameters",
     "PictureDetection",
     "PinholeModel",
+    "PointReader",
+    "PointReaderParameters",
     "RadioOutage",
     "RandomWalk",
     "RangeRadio",

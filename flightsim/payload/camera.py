@@ -315,7 +315,7 @@ class Camera:
         if self._countdown:
             self._countdown -= 1
             if self._countdown == 0:
-                self._note_pose(time_us)
+                self.note_pose(time_us)
         else:
             self._countdown = self._interval_steps - 1
             self._waiting.append(self._expose(time_us))
@@ -390,7 +390,7 @@ class Camera:
             found.append(self._detection(time_us, u_px, v_px, size_rad, tag, distance_m))
         return found
 
-    def _note_pose(self, time_us: int) -> None:
+    def note_pose(self, time_us: int) -> None:
         """Keep the pose of the step before an exposure: the difference is the motion that blurs."""
         self._before_us = time_us
         self._q_before[0] = self._truth[t.Q_NED_FROM_FRD]

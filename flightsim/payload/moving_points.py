@@ -2,13 +2,14 @@
 
 It stands for a camera and the front end that finds moving objects in its pictures (Tolman et al. 2021,
 section V-A), at the level of image points: those of the targets in view that move, with noise, misses and
-false points.
+false points. With a `reader` the points are those of a front end in rendered pictures.
 """
 
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ from flightsim.foundation.checks import (
 )
 from flightsim.foundation.vectors import conjugate, from_euler, product, rotate
 from flightsim.home import Home
+from flightsim.payload.camera import Camera, CameraParameters
+from flightsim.payload.camera_view import CameraView
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import GroundTargets
@@ -29,6 +32,24 @@ from flightsim.sensors.suite import steps_per_sample
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
+
+
+class PointReader(Protocol):
+    """Finds what moves in the pictures of one camera."""
+
+    def read(self, view: CameraView) -> tuple[Point, ...] | None:
+        """The moving points in the picture of a view, from left to right; None: it was not searched."""
+
+
+class PointReaderParameters(Protocol):
+    """A front end that works on pictures: a parameter set that starts a reader."""
+
+    @property
+    def camera(self) -> CameraParameters:
+        """What takes the pictures; its rate, its latency and its own detections have no effect."""
+
+    def start(self, seed: int) -> PointReader:
+        """The reader of one camera; what is random comes from the seed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +66,9 @@ class MovingPointParameters:
         least_speed_m_s: a target that is slower does not differ from the ground.
         reach_m: haze and resolution end there.
         mount_pitch_rad: of a camera without a gimbal, against the body.
+        reader: finds the points in rendered pictures; then rate, latency and mount have an effect,
+            `pixel_rad` is what the camera reports, and all else is the reader's. None: they come from the
+            model.
     """
 
     rate_hz: int = 10
@@ -56,6 +80,7 @@ class MovingPointParameters:
     least_speed_m_s: float = 0.3
     reach_m: float = 1500.0
     mount_pitch_rad: float = -0.5 * math.pi
+    reader: PointReaderParameters | None = None
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
@@ -100,6 +125,10 @@ class MovingPointCamera:
             "moving_points_target_0", ... for each target, so that an additional target does not change the
             others.
 
+    Attributes:
+        parameters: as given.
+        reader: finds the points in pictures; None: they come from the model.
+
     Raises:
         ValueError: the rate doesn't divide the physics rate.
     """
@@ -130,20 +159,39 @@ class MovingPointCamera:
             for index in range(len(targets))
         )
         self._waiting: deque[MovingPointScan] = deque()
+        self.reader: PointReader | None = None
+        self._camera: Camera | None = None
+        if parameters.reader is not None:
+            self.reader = parameters.reader.start(int(seeds("moving_points").generate_state(1, np.uint64)[0]))
+            self._camera = Camera(
+                replace(parameters.reader.camera, mount_pitch_rad=parameters.mount_pitch_rad),
+                truth=truth,
+                home=home,
+                targets=targets,
+                gimbal=gimbal,
+                physics_rate_hz=physics_rate_hz,
+                seeds=lambda name: seeds(f"moving_points_{name}"),
+            )
 
     def step(self, time_us: int) -> MovingPointScan | None:
         """One physics step; the scan that is delivered on it, if there is one."""
         if self._countdown:
             self._countdown -= 1
+            if self._countdown == 0 and self._camera is not None:
+                self._camera.note_pose(time_us)
         else:
             self._countdown = self._interval_steps - 1
-            self._waiting.append(MovingPointScan(time_us, self._number, self._points(time_us)))
+            points = self._points(time_us)
+            if points is not None:
+                self._waiting.append(MovingPointScan(time_us, self._number, points))
             self._number += 1
         if self._waiting and time_us - self._waiting[0].time_us >= self._latency_us:
             return self._waiting.popleft()
         return None
 
-    def _points(self, time_us: int) -> tuple[Point, ...]:
+    def _points(self, time_us: int) -> tuple[Point, ...] | None:
+        if self._camera is not None and self.reader is not None:
+            return self.reader.read(self._camera.view(time_us))
         p, targets, gimbal = self.parameters, self._targets, self._gimbal
         if time_us > targets.time_us:
             targets.step(time_us)

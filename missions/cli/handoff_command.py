@@ -22,7 +22,8 @@ def _values(given: Given) -> Mapping[str, Any]:
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
     from missions.embedded import WalkingTargets, handoff_world
 
-    return handoff_world(world, options, WalkingTargets(count=given["targets"]))
+    walking = WalkingTargets(count=given["targets"], pixels=given["camera"] == "pixels", film=given["film"])
+    return handoff_world(world, options, walking)
 
 
 COMMAND: Final = MissionCommand(
@@ -74,6 +75,20 @@ COMMAND: Final = MissionCommand(
         option("--link-delay", type=float, default=0.05, help="Their mean delay, s."),
         option("--estimator-seed", type=int, default=0, help="Of the random numbers of filters and link."),
         option("--targets", scope=Scope.EMBEDDED, type=int, default=5, help="Number of walking targets."),
+        option(
+            "--camera",
+            scope=Scope.EMBEDDED,
+            type=click.Choice(["points", "pixels"]),
+            default="points",
+            help="Moving points by a model, or found in rendered pictures of both cameras; slow.",
+        ),
+        option(
+            "--film",
+            scope=Scope.EMBEDDED,
+            is_flag=True,
+            show_default=False,
+            help="Keep the pictures as lossless videos, for `flightstack vision`; large.",
+        ),
     ),
     made=("missions.handoff.options", "HandoffOptions"),
     values=_values,

@@ -9,10 +9,11 @@ from pathlib import Path
 from autopilot_bridge.sitl import Sitl
 from estimators.vision import CameraDescription
 from estimators.vision.video import Film, VideoError
-from flightsim.payload import Camera
+from flightsim.payload import Camera, MovingPointCamera
+from missions.embedded.rendered_points import RenderedPointsReader
 from missions.embedded.rendered_tags import Picture, RenderedTagsReader
 
-__all__ = ["FlightFilm", "readers_of", "start_films"]
+__all__ = ["FlightFilm", "point_readers_of", "readers_of", "start_films"]
 
 
 class FlightFilm:
@@ -59,9 +60,17 @@ class FlightFilm:
 def readers_of(sitl: Sitl) -> Iterator[tuple[int, Camera, RenderedTagsReader]]:
     """System id, device and reader of each camera whose detections are read off rendered pictures."""
     for vehicle in sitl.vehicles:
-        component = None if vehicle.payload is None else vehicle.payload.camera
-        if component is not None and isinstance(component.device.reader, RenderedTagsReader):
-            yield vehicle.specification.system_id, component.device, component.device.reader
+        device = None if vehicle.payload is None else vehicle.payload.devices.camera
+        if device is not None and isinstance(device.reader, RenderedTagsReader):
+            yield vehicle.specification.system_id, device, device.reader
+
+
+def point_readers_of(sitl: Sitl) -> Iterator[tuple[int, MovingPointCamera, RenderedPointsReader]]:
+    """The same of each moving-point camera whose points are found in rendered pictures."""
+    for vehicle in sitl.vehicles:
+        device = None if vehicle.payload is None else vehicle.payload.devices.moving_points
+        if device is not None and isinstance(device.reader, RenderedPointsReader):
+            yield vehicle.specification.system_id, device, device.reader
 
 
 def start_films(sitl: Sitl, folder: Path) -> list[FlightFilm]:
@@ -77,5 +86,10 @@ def start_films(sitl: Sitl, folder: Path) -> list[FlightFilm]:
                 latency_s=p.latency_s,
             )
             film = reader.film = FlightFilm(folder / f"camera{system_id}.mp4", camera)
+            films.append(film)
+    for system_id, points, finder in point_readers_of(sitl):
+        if finder.films:
+            camera = CameraDescription(geometry=finder.geometry, latency_s=points.parameters.latency_s)
+            film = finder.film = FlightFilm(folder / f"camera{system_id}.mp4", camera)
             films.append(film)
     return films

@@ -16,7 +16,9 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
-from missions.embedded.films import readers_of, start_films
+from missions.camera_picture import CameraPicture
+from missions.embedded.films import point_readers_of, readers_of, start_films
+from missions.embedded.rendered_points import watched
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 
@@ -61,7 +63,11 @@ class EmbeddedSitl:
         if self.published_map is None and sitl.published_map is not None and publish_to is not None:
             publish(sitl.published_map, publish_to)
             self.published_map = publish_to
-        self.links: list[Link] = [sitl.connect(index) for index in range(len(world.vehicles))]
+        self._finders = {system_id: finder for system_id, _, finder in point_readers_of(sitl)}
+        self.links: list[Link] = []
+        for index, vehicle in enumerate(world.vehicles):
+            link, finder = sitl.connect(index), self._finders.get(vehicle.system_id)
+            self.links.append(link if finder is None else watched(link, vehicle.system_id, finder.watch))
 
         self._films = [] if films_to is None else start_films(sitl, films_to)
 
@@ -103,6 +109,13 @@ class EmbeddedSitl:
             if reader.kept is not None:
                 found[f"tag{system_id}.png"] = reader.kept.drawn()
         return found
+
+    def picture_at(self, system_id: int, time_us: int) -> CameraPicture | None:
+        """The picture that the moving-point camera of a vehicle has kept nearest to a time; None: it takes
+        none.
+        """
+        finder = self._finders.get(system_id)
+        return None if finder is None else finder.picture_at(time_us)
 
     def on_truth(self, listener: TruthListener) -> None:
         """Subscribe to frames of truth at 50 Hz, for the log and the score."""

@@ -14,40 +14,56 @@ from flightsim.payload import (
     PayloadParameters,
     RandomWalk,
     RangeRadioParameters,
+    TargetShape,
+    TerrainSpec,
 )
 from flightsim.world_spec import WorldSpec
+from missions.embedded.rendered_points import RenderedPoints
 from missions.embedded.worlds import carrying
 from missions.errors import PlanError
 from missions.handoff.options import HandoffOptions
 
 __all__ = ["WalkingTargets", "handoff_world"]
 
-_PAYLOAD: Final = PayloadParameters(
-    gimbal=GimbalParameters(), moving_points=MovingPointParameters(), range_radio=RangeRadioParameters()
-)
 _SIZE_M: Final = 2.0
+_PERSON_M: Final = 1.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WalkingTargets:
-    """The targets as they truly are.
+    """The targets as they truly are, and how the cameras see them.
 
     Attributes:
         count: number of targets (paper: 5).
         area_m: sides of the area in which they walk, north and east (paper: 140 m by 270 m), around the place
             that the operator has reported.
         walk_m_s: least and greatest speed.
+        pixels: the cameras' points are found in rendered pictures, in which the targets are persons;
+            otherwise they come from a model.
+        film: keep all pictures of each camera as a video.
     """
 
     count: int = 5
     area_m: tuple[float, float] = (140.0, 270.0)
     walk_m_s: tuple[float, float] = (0.8, 2.0)
+    pixels: bool = False
+    film: bool = False
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= 50:
             raise PlanError(f"`count` {self.count} of targets is not in 1..50")
         if not all(10.0 <= side <= 10_000.0 for side in self.area_m):
             raise PlanError(f"`area_m` {self.area_m} is not possible; ask for sides of 10..10000 m")
+        if self.film and not self.pixels:
+            raise PlanError("`film` keeps pictures, and the cameras take none; ask for `camera=pixels`")
+
+    def cameras(self, world: WorldSpec) -> MovingPointParameters:
+        """The moving-point camera of each aircraft."""
+        if not self.pixels:
+            return MovingPointParameters()
+        terrain = world.terrain.made(world.seed) if isinstance(world.terrain, TerrainSpec) else world.terrain
+        reader = RenderedPoints(terrain=terrain, film=self.film)
+        return MovingPointParameters(pixel_rad=reader.sigma, reader=reader)
 
 
 def handoff_world(
@@ -58,12 +74,16 @@ def handoff_world(
     Args:
         world: the rest of the world; targets that it has stay, and no other is added.
         options: what the operators know.
-        walking: the targets.
+        walking: the targets, and the cameras.
     """
-    world = carrying(world, _PAYLOAD)
+    walking = walking or WalkingTargets()
+    payload = PayloadParameters(
+        gimbal=GimbalParameters(), moving_points=walking.cameras(world), range_radio=RangeRadioParameters()
+    )
+    world = carrying(world, payload)
     if world.targets:
         return world
-    walking = walking or WalkingTargets()
+    size_m, shape = (_PERSON_M, TargetShape.PERSON) if walking.pixels else (_SIZE_M, TargetShape.BALL)
     rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("handoff", "targets")))
     north_m, east_m = options.target_ne_m
     half_n, half_e = 0.5 * walking.area_m[0], 0.5 * walking.area_m[1]
@@ -79,5 +99,5 @@ def handoff_world(
             start_m=(north_m + n * half_n, east_m + e * half_e),
             course_rad=float(rng.uniform(-math.pi, math.pi)),
         )
-        targets.append(GroundTargetParameters(motion=motion, size_m=_SIZE_M))
+        targets.append(GroundTargetParameters(motion=motion, size_m=size_m, shape=shape))
     return replace(world, targets=tuple(targets))

@@ -19,11 +19,13 @@ _ROUNDS: Final = 3
 """Number of requests for each alternative of an optional rate."""
 
 
-def interval_request(system_id: int, name: str, rate_hz: float) -> Any:
-    """Message with MAV_CMD_SET_MESSAGE_INTERVAL for an autopilot."""
+def interval_request(
+    system_id: int, name: str, rate_hz: float, component_id: int = dialect.MAV_COMP_ID_AUTOPILOT1
+) -> Any:
+    """Message with MAV_CMD_SET_MESSAGE_INTERVAL for an autopilot, or for another component."""
     return dialect.MAVLink_command_long_message(
         system_id,
-        dialect.MAV_COMP_ID_AUTOPILOT1,
+        component_id,
         dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
         0,
         float(definition(name).message_id),

@@ -1,11 +1,12 @@
 """The vision process: pictures of a live stream next to a link, or of a video next to its log, become the
-messages of a camera that reads tags.
+messages of a camera that reads tags, or of one that finds what moves.
 """
 
 from typing import Any
 
 from autopilot_bridge.clock.pacing import wall_time_s
-from estimators.vision import PictureWatch, load_camera
+from estimators.handoff.motion_watch import MotionWatch
+from estimators.vision import PictureWatch, TagDetectorParameters, load_camera
 from missions.estimation.vision_live import next_to_link
 from missions.estimation.vision_recording import over_log
 from missions.estimation.vision_request import (
@@ -13,6 +14,7 @@ from missions.estimation.vision_request import (
     FAILED,
     INTERRUPTED,
     OnProgress,
+    PictureProcess,
     VisionProgress,
     VisionRequest,
     VisionResult,
@@ -34,22 +36,22 @@ def watch(request: VisionRequest, on_progress: OnProgress | None = None) -> Visi
         PlanError: the run folder can't be made.
         BridgeError: the link can't be opened, or the log can't be read.
     """
-    pictures = PictureWatch(load_camera(request.camera), request.detector)
+    camera = load_camera(request.camera)
+    pictures: PictureProcess[Any]
+    if isinstance(request.detector, TagDetectorParameters):
+        pictures = PictureWatch(camera, request.detector)
+    else:
+        pictures = MotionWatch(camera, request.detector)
     begun_s = wall_time_s()
     if request.log is not None:
         folder, outcome, reason, more = over_log(request, request.log, pictures, on_progress)
     else:
         folder, outcome, reason, more = next_to_link(request, pictures, on_progress)
-    difference = pictures.clocks.difference()
     summary: dict[str, Any] = {
         "outcome": outcome,
         "reason": reason,
         "video": request.video,
-        "frames": pictures.frames,
-        "frames_without_attitude": pictures.without_attitude,
-        "detections": sum(pictures.tags.values()),
-        "tags": {str(tag): count for tag, count in sorted(pictures.tags.items())},
-        "clocks_apart_s": None if difference is None else round(difference.apart_s, 3),
+        **pictures.figures(),
         "warnings": pictures.warnings(),
         **more,
         "wall_time_s": round(wall_time_s() - begun_s, 3),

@@ -3,7 +3,7 @@
 import asyncio
 import signal
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any, Final, Generic
 
 from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
@@ -12,7 +12,6 @@ from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
 from estimators.messages import read_message
-from estimators.vision import PictureWatch
 from missions.errors import LinkClosed
 from missions.estimation.picture_source import LivePictures
 from missions.estimation.rates import interval_request
@@ -21,7 +20,9 @@ from missions.estimation.vision_request import (
     FAILED,
     INTERRUPTED,
     Ended,
+    Found,
     OnProgress,
+    PictureProcess,
     VisionRequest,
     progress_of,
 )
@@ -33,13 +34,12 @@ from missions.vehicle.connection import Connection
 
 __all__ = ["next_to_link"]
 
-_AUTOPILOT: Final = 1
-_ATTITUDE_HZ: Final = 25.0
 _LOOK_S: Final = 0.25
-_WATCHED: Final = ("ATTITUDE", "LOCAL_POSITION_NED")
 
 
-def next_to_link(request: VisionRequest, pictures: PictureWatch, on_progress: OnProgress | None) -> Ended:
+def next_to_link(
+    request: VisionRequest, pictures: PictureProcess[Found], on_progress: OnProgress | None
+) -> Ended:
     assert request.connect is not None
     address = parse_address(request.connect, VEHICLE_FORMS)
     if isinstance(address, ReplayLog):
@@ -69,11 +69,11 @@ def next_to_link(request: VisionRequest, pictures: PictureWatch, on_progress: On
     return folder, outcome, reason, {"connect": request.connect, **process.figures}
 
 
-class _Live:
+class _Live(Generic[Found]):
     """One run on an open link."""
 
     def __init__(
-        self, request: VisionRequest, link: Link, pictures: PictureWatch, recorder: FlightRecorder
+        self, request: VisionRequest, link: Link, pictures: PictureProcess[Found], recorder: FlightRecorder
     ) -> None:
         self._request, self._watch = request, pictures
         self._clock = TelemetryClock()
@@ -81,13 +81,14 @@ class _Live:
             link,
             self._clock,
             recorder,
-            identity=(request.system_id or 1, request.component_id),
+            identity=(request.system_id or 1, request.component),
             vehicle_system_id=request.system_id,
             signing=client_signing(request.signing_key),
         )
         self._stop = asyncio.Event()
         self._vehicle: int | None = None
         self._received = 0
+        self._needed = frozenset(name for name, _, _ in pictures.REQUESTS)
         self.stopped = False
         self.reason = ""
         self.figures: dict[str, Any] = {}
@@ -100,7 +101,7 @@ class _Live:
     async def run(self, on_progress: OnProgress | None) -> None:
         """Run until the duration is over, the link is silent, there is no video, or the user stops it."""
         request, clock = self._request, self._clock
-        stops = [self._connection.listen(name, self._take) for name in _WATCHED]
+        stops = [self._connection.listen(name, self._take) for name in self._watch.MESSAGES]
         async with self._connection:
             live = LivePictures(
                 request.video,
@@ -141,7 +142,7 @@ class _Live:
                 return
             if wall_time_s() - received_s > request.silence_s:
                 self.reason = (
-                    f"no attitude was received on {request.connect} for {request.silence_s:g} s; "
+                    f"no {self._watch.NEEDED} was received on {request.connect} for {request.silence_s:g} s; "
                     "is the vehicle on, and sending there?"
                 )
                 return
@@ -162,7 +163,7 @@ class _Live:
                 await asyncio.wait_for(self._stop.wait(), _LOOK_S)
 
     def _meet(self) -> None:
-        """Take the vehicle's system id, and request its attitude, once it is known."""
+        """Take the vehicle's system id, and request its messages, once it is known."""
         if self._vehicle is not None:
             return
         known = self._connection.autopilots_received
@@ -171,13 +172,15 @@ class _Live:
             wanted = known[0]
         if wanted in known and wanted is not None:
             self._vehicle = wanted
-            self._connection.speak_as(wanted, self._request.component_id)
-            self._connection.send(interval_request(wanted, "ATTITUDE", _ATTITUDE_HZ))
+            self._connection.speak_as(wanted, self._request.component)
+            for name, component_id, rate_hz in self._watch.REQUESTS:
+                self._connection.send(interval_request(wanted, name, rate_hz, component_id))
 
     def _take(self, frame: Frame) -> None:
-        if frame.component_id == _AUTOPILOT and self._vehicle in (None, frame.system_id):
-            self._received += 1
-            self._watch.handle(read_message(frame))
+        if self._vehicle in (None, frame.system_id):
+            message = read_message(frame)
+            self._received += message.name in self._needed
+            self._watch.handle(message)
 
     async def _search(self, live: LivePictures) -> None:
         loop = asyncio.get_running_loop()

@@ -2,21 +2,21 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Final, Generic
 
-from autopilot_bridge.mavlink import Frame, FrameEncoder
-from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD
+from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from estimators.errors import EstimatorError
 from estimators.messages import read_message
 from estimators.vehicle_time import VehicleTime, stamp_field
-from estimators.vision import PictureWatch, TagDetection
 from estimators.vision.video import TimedPicture, VideoError, frames_of
 from missions.estimation.vision_request import (
     COMPLETED,
     FAILED,
     Ended,
+    Found,
     OnProgress,
+    PictureProcess,
     VisionRequest,
     progress_of,
 )
@@ -28,23 +28,24 @@ _AUTOPILOT: Final = 1
 
 
 def over_log(
-    request: VisionRequest, log: Path, pictures: PictureWatch, on_progress: OnProgress | None
+    request: VisionRequest, log: Path, pictures: PictureProcess[Found], on_progress: OnProgress | None
 ) -> Ended:
     """Copy the log, with the messages of the pictures at the times at which they would have been sent."""
     reader = TlogReader(log)
     system_id = request.system_id or _first_autopilot(reader)
     film = _Recording(request.video, pictures)
     folder = create_run_folder(request.out, "vision")
-    encoder = FrameEncoder(system_id, request.component_id)
+    own = (system_id, request.component)
+    encoder = FrameEncoder(*own)
     times, begin_us = VehicleTime(), None
     with TlogWriter(folder / LOG_NAME) as copy:
         for stamp_us, frame in reader:
-            definition = frame.definition
-            if (frame.system_id, frame.component_id) == (system_id, _AUTOPILOT) and stamp_field(
-                definition.name, definition.field_names
-            ) is not None:
-                message = read_message(frame)
-                now_us = times.stamp(message)
+            definition, sender = frame.definition, (frame.system_id, frame.component_id)
+            if (
+                sender == (system_id, _AUTOPILOT)
+                and stamp_field(definition.name, definition.field_names) is not None
+            ):
+                now_us = times.stamp(read_message(frame))
                 if begin_us is None:
                     begin_us = now_us
                 for exposed_us, found in film.searched(begin_us, now_us):
@@ -52,8 +53,9 @@ def over_log(
                         copy.write(stamp_us, encoder.encode(item))
                     if on_progress is not None:
                         on_progress(progress_of(pictures, exposed_us))
-                pictures.handle(message)
-            if not _replaced(frame, system_id, request.component_id):
+            if frame.system_id == system_id and definition.name in pictures.MESSAGES:
+                pictures.handle(read_message(frame))
+            if sender != own or not pictures.makes(read_message(frame)):
                 copy.write(stamp_us, frame.raw)
     reason = ""
     if not pictures.frames:
@@ -67,7 +69,7 @@ def over_log(
     return folder, FAILED if reason else COMPLETED, reason, more
 
 
-class _Recording:
+class _Recording(Generic[Found]):
     """The pictures of a recorded video, in step with a log.
 
     Attributes:
@@ -75,7 +77,7 @@ class _Recording:
         before: number of pictures from before the log's begin.
     """
 
-    def __init__(self, video: str, pictures: PictureWatch) -> None:
+    def __init__(self, video: str, pictures: PictureProcess[Found]) -> None:
         self._pictures = pictures
         self._start_us = pictures.camera.start_us
         self._latency_us = round(pictures.camera.latency_s * 1e6)
@@ -83,13 +85,14 @@ class _Recording:
         first = next(self._frames, None)
         if first is None:
             raise VideoError(f"{video} has no picture in it")
-        pictures.check_size(first.pixels)
+        pictures.camera.geometry.check_size(first.pixels)
         self._next: TimedPicture | None = first
         self.first_us = self._start_us + first.time_us
         self.before = 0
 
-    def searched(self, begin_us: int, now_us: int) -> Iterator[tuple[int, tuple[TagDetection, ...]]]:
-        """Vehicle times of the exposures, and the tags, of the pictures that are received before a time.
+    def searched(self, begin_us: int, now_us: int) -> Iterator[tuple[int, Found]]:
+        """Vehicle times of the exposures, and what was found, of the pictures that are received before a
+        time.
 
         Args:
             begin_us: of the log; what was received before it is left out.
@@ -116,13 +119,3 @@ def _first_autopilot(reader: TlogReader) -> int:
         if frame.component_id == _AUTOPILOT:
             return frame.system_id
     raise EstimatorError(f"{reader.path} has no message of an autopilot; give the log of a vehicle")
-
-
-def _replaced(frame: Frame, system_id: int, component_id: int) -> bool:
-    """Whether a frame is a detection, or the end of a picture, of the camera that the process stands for."""
-    if (frame.system_id, frame.component_id) != (system_id, component_id):
-        return False
-    name = frame.definition.name
-    return name == "LANDING_TARGET" or (
-        name == "TUNNEL" and read_message(frame).payload_type == CAMERA_SCAN_PAYLOAD
-    )

@@ -4,13 +4,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final, Protocol, TypeVar
 
-from autopilot_bridge.mavlink import SigningKey
+from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
 from autopilot_bridge.mavlink.camera_scan import CAMERA_COMPONENTS
 from estimators.errors import EstimatorError
-from estimators.vision import PictureWatch, TagDetectorParameters
-from estimators.vision.video import is_stream
+from estimators.handoff.motion_watch import MotionWatchParameters
+from estimators.messages import Message
+from estimators.vision import CameraDescription, TagDetectorParameters
+from estimators.vision.video import Picture, is_stream
+from missions.vehicle.payload import MOVING_POINT_COMPONENT
 
 __all__ = [
     "COMPLETED",
@@ -18,6 +21,7 @@ __all__ = [
     "INTERRUPTED",
     "Ended",
     "OnProgress",
+    "PictureProcess",
     "VisionProgress",
     "VisionRequest",
     "VisionResult",
@@ -26,6 +30,48 @@ __all__ = [
 
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
 SILENCE_S: Final = 10.0
+
+Found = TypeVar("Found")
+
+
+class PictureProcess(Protocol[Found]):
+    """Searches the pictures of one camera, and is a component on the vehicle's link. Without I/O.
+
+    Attributes:
+        MESSAGES: names of the vehicle's messages that it takes.
+        REQUESTS: name, component and rate in Hz of those that it needs.
+        NEEDED: the first of these, in words.
+        camera: description of the camera.
+        frames: number of searched pictures.
+    """
+
+    MESSAGES: ClassVar[tuple[str, ...]]
+    REQUESTS: ClassVar[tuple[tuple[str, int, float], ...]]
+    NEEDED: ClassVar[str]
+    camera: CameraDescription
+    frames: int
+
+    @property
+    def found(self) -> int:
+        """Number of detections."""
+
+    def handle(self, message: Message) -> None:
+        """Take a message of the vehicle."""
+
+    def detect(self, exposed_us: int, picture: Picture) -> Found:
+        """Search a picture."""
+
+    def messages(self, exposed_us: int, found: Found) -> list[MAVLinkMessage]:
+        """The messages of a searched picture."""
+
+    def makes(self, message: Message) -> bool:
+        """Whether a message is of a kind that it sends."""
+
+    def figures(self) -> dict[str, Any]:
+        """Entries of `summary.json`."""
+
+    def warnings(self) -> list[str]:
+        """What is wrong with its input."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,9 +83,9 @@ class VisionRequest:
         camera: file that describes the camera.
         connect: connection string of the vehicle's link; of a stream.
         log: the vehicle's log; of a recording.
-        detector: parameters of the detector.
+        detector: parameters of the detector: of tags, or of what moves.
         system_id: of the vehicle; None: the first autopilot received.
-        component_id: of the camera that the process is.
+        component_id: of the camera that the process is; None: 100, or 28 for what moves.
         duration_s: vehicle time since the vehicle was first received; None: until it is stopped.
         silence_s: wall time without a message of the vehicle, or without a first picture, after which the run
             fails.
@@ -56,9 +102,9 @@ class VisionRequest:
     camera: Path
     connect: str | None = None
     log: Path | None = None
-    detector: TagDetectorParameters = field(default_factory=TagDetectorParameters)
+    detector: TagDetectorParameters | MotionWatchParameters = field(default_factory=TagDetectorParameters)
     system_id: int | None = None
-    component_id: int = CAMERA_COMPONENTS[0]
+    component_id: int | None = None
     duration_s: float | None = None
     silence_s: float = SILENCE_S
     out: Path | None = None
@@ -72,14 +118,26 @@ class VisionRequest:
         if is_stream(self.video) != (self.connect is not None):
             needed = "`connect`, the vehicle's link" if is_stream(self.video) else "`log`, the vehicle's log"
             raise EstimatorError(f"the video {self.video} needs {needed}")
-        if self.component_id not in CAMERA_COMPONENTS:
-            raise EstimatorError(
-                f"component id {self.component_id} is not a camera's; "
-                f"give {CAMERA_COMPONENTS[0]} to {CAMERA_COMPONENTS[-1]}"
+        if self.component_id is not None and self.component_id not in self._components:
+            accepted = " to ".join(
+                str(number) for number in sorted({self._components[0], self._components[-1]})
             )
+            raise EstimatorError(f"component id {self.component_id} is not a camera's; give {accepted}")
         for name, value in (("duration_s", self.duration_s), ("silence_s", self.silence_s)):
             if value is not None and not 0.0 < value < math.inf:
                 raise EstimatorError(f"{name} {value:g} is not accepted; give seconds, above 0")
+
+    @property
+    def _components(self) -> range:
+        """The component ids of cameras of this kind."""
+        if isinstance(self.detector, TagDetectorParameters):
+            return CAMERA_COMPONENTS
+        return range(MOVING_POINT_COMPONENT, MOVING_POINT_COMPONENT + 1)
+
+    @property
+    def component(self) -> int:
+        """The component id."""
+        return self._components[0] if self.component_id is None else self.component_id
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,8 +180,8 @@ Ended = tuple[Path, str, str, dict[str, Any]]
 """Run folder, outcome, reason, and further entries of the summary."""
 
 
-def progress_of(pictures: PictureWatch, time_us: int, trouble: str = "") -> VisionProgress:
+def progress_of(pictures: PictureProcess[Any], time_us: int, trouble: str = "") -> VisionProgress:
     """The progress of a run at a time."""
     return VisionProgress(
-        time_s=time_us * 1e-6, frames=pictures.frames, detections=sum(pictures.tags.values()), trouble=trouble
+        time_s=time_us * 1e-6, frames=pictures.frames, detections=pictures.found, trouble=trouble
     )

@@ -1,6 +1,7 @@
 """The picture of a handoff: both tracks in a common frame, modes of the pose, and scores over time."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -9,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimators.reports.picture import tidy
+from missions.camera_picture import PictureAt
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
 
 if TYPE_CHECKING:
@@ -58,6 +60,28 @@ def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debri
         tidy(axes)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def camera_pictures(
+    team: "HandoffTeam", system_ids: Sequence[int], picture_at: PictureAt
+) -> dict[str, bytes]:
+    """What each camera saw at the decision, or at the end without one, with the found points and the tracks;
+    the decided track and that of the tracker's target are marked.
+    """
+    watch = team.watch
+    if not watch.moments:
+        return {}
+    moment = next((moment for moment in watch.moments if moment.estimate.decided), watch.moments[-1])
+    marked = (moment.estimate.track, 0 if moment.tracker is None else moment.tracker.track)
+    found = {}
+    for system_id, seen, track in zip(system_ids, watch.seen, marked, strict=True):
+        picture = picture_at(system_id, moment.time_us)
+        if picture is not None:
+            tracks = seen.get(picture.time_us, {})
+            found[f"camera{system_id}.png"] = picture.drawn(
+                [(point, str(number), number == track) for number, point in tracks.items()]
+            )
+    return found
 
 
 def _draw_ground(

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["HandoffWatch", "Moment", "RadioLink"]
 
+Point = tuple[float, float]
+
 _ONBOARD: Final = 191
 _EVERY_US: Final = 500_000
 
@@ -98,6 +100,7 @@ class HandoffWatch:
         link: as given.
         contact: whether the aircraft are in radio contact.
         moments: of the handoff aircraft while there is contact, every half second.
+        seen: of each aircraft while there is contact, image points of its tracks by time of the scan.
     """
 
     def __init__(
@@ -109,6 +112,7 @@ class HandoffWatch:
         self.link = link
         self.contact = False
         self.moments: list[Moment] = []
+        self.seen: tuple[dict[int, dict[int, Point]], ...] = tuple({} for _ in vehicles)
         self._encoders = [FrameEncoder(vehicle.system_id, _ONBOARD) for vehicle in vehicles]
         self._parsers = [FrameParser() for _ in vehicles]
         self._stops: list[Callable[[], None]] = []
@@ -157,8 +161,11 @@ class HandoffWatch:
         for message in self.estimators[index].publish():
             if self.contact:
                 self.link.send(now_us, 1 - index, message)
-        if index == 0 and self.contact:
-            self._note()
+        if self.contact:
+            sight = self.estimators[index].sight
+            self.seen[index][sight.tracks.time_us] = sight.seen
+            if index == 0:
+                self._note()
 
     def _arrive(self, to: int, message: MAVLinkMessage) -> None:
         """A message arrives at an aircraft: it goes to its estimator, and over its link into the log."""

@@ -222,7 +222,8 @@ def _fly_interruptible(
         if request.picture and debriefing.flights:
             with whole(folder / PICTURE_NAME):
                 mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
-            for name, data in stage.pictures().items():
+            drawn = {**stage.pictures(), **mission.pictures(debriefing, stage.picture_at)}
+            for name, data in drawn.items():
                 with whole(folder / name):
                     with (folder / name).open("xb") as file:
                         file.write(data)

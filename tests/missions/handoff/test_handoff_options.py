@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import dialect
+from flightsim.payload import TargetShape
 from flightsim.world_spec import WorldSpec
 from missions.embedded import WalkingTargets, handoff_world
 from missions.errors import PlanError
@@ -66,6 +67,21 @@ def test_the_world_has_walking_targets_and_what_both_aircraft_need():
     assert handoff_world(world, options).targets == world.targets
     with pytest.raises(PlanError, match="`count` 0"):
         WalkingTargets(count=0)
+
+
+def test_with_pixels_the_targets_are_persons_and_the_cameras_search_pictures():
+    world = WorldSpec.of_team(2, seed=4, model="aerosonde")
+    plain = handoff_world(world, HandoffOptions(vehicles=2))
+    seen = handoff_world(world, HandoffOptions(vehicles=2), WalkingTargets(pixels=True, film=True))
+    assert [target.motion for target in seen.targets] == [target.motion for target in plain.targets]
+    assert {target.shape for target in seen.targets} == {TargetShape.PERSON}
+    for one, other in zip(plain.vehicles, seen.vehicles, strict=True):
+        assert one.payload.moving_points.reader is None
+        points = other.payload.moving_points
+        assert points.reader.film and points.rate_hz == one.payload.moving_points.rate_hz
+        assert points.pixel_rad == pytest.approx(1.0 / 554.26, rel=1e-4)
+    with pytest.raises(PlanError, match="`film` keeps pictures, and the cameras take none"):
+        WalkingTargets(film=True)
 
 
 def test_the_link_loses_and_delays_messages_as_it_is_given():

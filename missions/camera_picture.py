@@ -1,0 +1,74 @@
+"""A picture of a camera with what was found in it, for the run folder."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from estimators.vision import CameraGeometry
+
+__all__ = ["CameraPicture", "PictureAt"]
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraPicture:
+    """A picture.
+
+    Attributes:
+        time_us: vehicle time of the exposure.
+        jpeg: the picture, compressed.
+        camera: its geometry.
+        points: what was found in it, as tangents to the right and down.
+    """
+
+    time_us: int
+    jpeg: bytes
+    camera: "CameraGeometry"
+    points: tuple[Point, ...]
+
+    @classmethod
+    def of(
+        cls, time_us: int, pixels: "NDArray[np.uint8]", camera: "CameraGeometry", points: tuple[Point, ...]
+    ) -> "CameraPicture":
+        """Of pixels (height, width, 3), BGR."""
+        import cv2
+
+        _, data = cv2.imencode(".jpg", pixels)
+        return cls(time_us=time_us, jpeg=bytes(data), camera=camera, points=points)
+
+    def drawn(self, tracks: Sequence[tuple[Point, str, bool]]) -> bytes:
+        """The picture as PNG, with a circle around each point and a cross with a text at each track.
+
+        Args:
+            tracks: tangents, text, and whether it is marked.
+        """
+        import cv2
+        import numpy as np
+
+        picture: Any = cv2.imdecode(np.frombuffer(self.jpeg, np.uint8), cv2.IMREAD_COLOR)
+
+        def place(point: Point) -> tuple[int, int]:
+            x, y = self.camera.pixels(np.array([[*point, 1.0]]))[0] - 0.5
+            return round(float(x)), round(float(y))
+
+        for point in self.points:
+            cv2.circle(picture, place(point), 9, (0, 220, 255), 1, cv2.LINE_AA)
+        for point, text, marked in tracks:
+            colour = (0, 0, 255) if marked else (255, 160, 0)
+            x, y = place(point)
+            cv2.drawMarker(picture, (x, y), colour, cv2.MARKER_CROSS, 13, 2 if marked else 1, cv2.LINE_AA)
+            for shade, width in (((0, 0, 0), 3), (colour, 1)):
+                cv2.putText(
+                    picture, text, (x + 9, y - 7), cv2.FONT_HERSHEY_SIMPLEX, 0.45, shade, width, cv2.LINE_AA
+                )
+        _, data = cv2.imencode(".png", picture)
+        return bytes(data)
+
+
+PictureAt = Callable[[int, int], CameraPicture | None]
+"""The picture that the camera of a vehicle has kept nearest to a vehicle time, in microseconds."""
