@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.flight.parameters import ALONG_PLAN, FlightParameters, RallyRule, ReturnDestination
+from autopilot_bridge.flight.parameters import ALONG_PLAN, RallyRule, ReturnDestination
 from autopilot_bridge.flight.plan_reading import (
     PX4_PLANS,
     Command,
@@ -27,7 +27,6 @@ from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 
 if TYPE_CHECKING:
-    from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
     from autopilot_bridge.flight.plan_task import PlanTask
 
 _PREFERENCE_M: Final = 2.0  # home, then the landing, unless another place is closer by more than this (PX4)
@@ -48,18 +47,6 @@ class ReturnPhase(IntEnum):
     LAND = 4
     PLAN = 5
     STAY = 6
-
-
-def cone_height(
-    wanted_m: float, distance_m: float, parameters: FlightParameters | FixedWingFlightParameters
-) -> float:
-    """Height over home of the flight home, which near home is only what the cone around home requires (PX4
-    RTL_CONE_ANG within RTL_MIN_DIST; ArduCopter RTL_CONE_SLOPE everywhere)."""
-    p = parameters
-    if p.return_cone_half_angle_rad <= 0.0 or distance_m > p.return_min_distance_m:
-        return wanted_m
-    floor = min(wanted_m, p.return_descend_altitude_m)
-    return min(wanted_m, max(distance_m / math.tan(p.return_cone_half_angle_rad), floor))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -138,8 +138,6 @@ class FixedWingFlightParameters:
     return_loiter_radius_m: Finite = 80.0  # RTL_LOITER_RAD | RTL_RADIUS; negative: counter-clockwise
     return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE | RTL_AUTOLAND
     rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
-    return_cone_half_angle_rad: NotNegative = 0.0  # RTL_CONE_ANG within RTL_MIN_DIST; 0: off
-    return_min_distance_m: NotNegative = 100.0  # RTL_MIN_DIST
 
     manual_bank_max_rad: float = math.radians(45.0)  # FW_MAN_R_MAX | ROLL_LIMIT_DEG
     manual_pitch_max_rad: float = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MAX_DEG

@@ -20,21 +20,17 @@ from autopilot_bridge.flight.return_place import (
     ReturnPhase,
     ReturnPlace,
     choose_return,
-    cone_height,
     plan_landing,
 )
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 
 
-def return_height(distance_m: float, height_m: float, parameters: FixedWingFlightParameters) -> float:
-    """Height over home to fly home at.
-
-    PX4: never lower than now; otherwise the return altitude within the cone. ArduPilot: the return altitude.
-    """
+def return_height(height_m: float, parameters: FixedWingFlightParameters) -> float:
+    """Height over home to fly home at: the return altitude; PX4: never lower than now."""
     p = parameters
     if not p.return_climbs:
         return p.return_altitude_m
-    return max(height_m + p.return_climb_min_m, cone_height(p.return_altitude_m, distance_m, p))
+    return max(height_m + p.return_climb_min_m, p.return_altitude_m)
 
 
 class ReturnTask(HomewardTask, AircraftTask):
@@ -80,9 +76,8 @@ class ReturnTask(HomewardTask, AircraftTask):
             return
         self._home = np.array(place.ned_m)
         ground_down = float(self._home[2])
-        distance = math.hypot(float(self._home[0]) - state.north_m, float(self._home[1]) - state.east_m)
         height = ground_down - state.down_m
-        wanted = return_height(distance, height, p)
+        wanted = return_height(height, p)
         own_down = place.altitude_down_m
         self._home[2] = own_down if math.isfinite(own_down) else ground_down - wanted
         if p.return_climbs and wanted - height > p.acceptance_altitude_m:

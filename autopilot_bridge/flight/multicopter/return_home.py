@@ -17,7 +17,6 @@ from autopilot_bridge.flight.return_place import (
     ReturnPhase,
     ReturnPlace,
     choose_return,
-    cone_height,
     plan_landing,
 )
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
@@ -27,10 +26,14 @@ from autopilot_bridge.navigation import layout as nav_layout
 def return_height(distance_m: float, height_m: float, parameters: FlightParameters) -> float:
     """Height over home of the flight home.
 
-    It is never lower than the present height; otherwise it is the return altitude within the cone.
+    It is never lower than the present height; otherwise it is the return altitude, near home only as high as
+    the cone around home requires (PX4 RTL_CONE_ANG in RTL_MIN_DIST; ArduCopter RTL_CONE_SLOPE everywhere).
     """
     p = parameters
-    wanted = cone_height(min(p.return_altitude_m, p.return_height_max_m), distance_m, p)
+    wanted = min(p.return_altitude_m, p.return_height_max_m)
+    if p.return_cone_half_angle_rad > 0.0 and distance_m <= p.return_min_distance_m:
+        floor = min(wanted, p.return_descend_altitude_m)
+        wanted = min(wanted, max(distance_m / math.tan(p.return_cone_half_angle_rad), floor))
     return max(height_m, min(max(height_m + p.return_climb_min_m, wanted), p.return_height_max_m))
 
 
