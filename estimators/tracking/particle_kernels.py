@@ -13,7 +13,7 @@ __all__ = ["DRAWS", "add_particles", "count_near", "densities", "reflect", "rege
 
 Array = NDArray[np.float64]
 Draws = NDArray[np.uint16]
-Box = tuple[float, float, float, float]  # south, west, and the sides of a bin
+Box = tuple[float, float, float, float]  # south, west, and bins per metre along each axis
 
 DRAWS: Final = 4
 """Numbers of 16 bits for each particle of a generation, two for each axis: one of the generator's."""
@@ -44,7 +44,7 @@ def reflect(places: Array, rates: Array, low: Array, high: Array) -> None:
 
 @kernel
 def _box_of(places: Array, weights: Array) -> Box:
-    """South, west, and the sides of a bin, of the bins over the particles."""
+    """The bins over the particles."""
     box = (0.0, 0.0, 0.0, 0.0)
     for axis in range(2):
         total, mean, square = 0.0, 0.0, 0.0
@@ -59,32 +59,34 @@ def _box_of(places: Array, weights: Array) -> Box:
             square += weights[i] * (places[axis, i] - mean) ** 2
         reach = _BOX_SIGMAS * math.sqrt(square / total)
         low, high = max(low, mean - reach), min(high, mean + reach)
-        side = max((high - low) / _BINS, 1e-6)
-        box = (low, box[1], side, box[3]) if axis == 0 else (box[0], low, box[2], side)
+        per_m = _BINS / max(high - low, 1e-6 * _BINS)
+        box = (low, box[1], per_m, box[3]) if axis == 0 else (box[0], low, box[2], per_m)
     return box
 
 
 @kernel
 def _bin_of(north: float, east: float, box: Box) -> int:
     """The bin of a place; beyond the box the nearest."""
-    row = min(_BINS - 1.0, max(0.0, (north - box[0]) / box[2]))
-    column = min(_BINS - 1.0, max(0.0, (east - box[1]) / box[3]))
+    row = min(_BINS - 1.0, max(0.0, (north - box[0]) * box[2]))
+    column = min(_BINS - 1.0, max(0.0, (east - box[1]) * box[3]))
     return int(row) * _BINS + int(column)
 
 
 @kernel
-def _sums_of(places: Array, values: Array, box: Box) -> Array:
-    """Sum of a value of the particles in each bin."""
-    bins = np.zeros(_BINS * _BINS)
-    for i in range(values.size):
-        bins[_bin_of(places[0, i], places[1, i], box)] += values[i]
-    return bins
+def _binned(places: Array, weights: Array, box: Box) -> tuple[Array, Array]:
+    """Number of the particles in each bin, and the sum of their weights."""
+    number, probability = np.zeros(_BINS * _BINS), np.zeros(_BINS * _BINS)
+    for i in range(weights.size):
+        k = _bin_of(places[0, i], places[1, i], box)
+        number[k] += 1.0
+        probability[k] += weights[i]
+    return number, probability
 
 
 @kernel
 def _between(north: float, east: float, bins: Array, box: Box) -> float:
     """Value of the bins at a place, linear between their middles; 0 beyond the box."""
-    row, column = (north - box[0]) / box[2], (east - box[1]) / box[3]
+    row, column = (north - box[0]) * box[2], (east - box[1]) * box[3]
     if not (0.0 <= row <= _BINS and 0.0 <= column <= _BINS):
         return 0.0
     row, column = min(_BINS - 1.0, max(0.0, row - 0.5)), min(_BINS - 1.0, max(0.0, column - 0.5))
@@ -98,40 +100,43 @@ def _between(north: float, east: float, bins: Array, box: Box) -> float:
 def densities(places: Array, weights: Array, out: Array) -> None:
     """Probability per square metre about each particle, (n,): of its bin."""
     box = _box_of(places, weights)
-    bins = _sums_of(places, weights, box)
+    _, bins = _binned(places, weights, box)
     for i in range(weights.size):
-        out[i] = max(1e-300, bins[_bin_of(places[0, i], places[1, i], box)]) / (box[2] * box[3])
+        out[i] = max(1e-300, bins[_bin_of(places[0, i], places[1, i], box)]) * box[2] * box[3]
+
+
+@kernel
+def _inverted(gaussians: Array) -> Array:
+    """(m, 6) of Gaussians (m, 5) with a covariance: north, east, the inverse nn, ne, ee, and the density in
+    the middle.
+    """
+    out = np.empty((gaussians.shape[0], 6))
+    for k, (north, east, nn, ne, ee) in enumerate(gaussians):
+        scale = 1.0 / (nn * ee - ne * ne)
+        out[k, 0], out[k, 1] = north, east
+        out[k, 2], out[k, 3], out[k, 4] = scale * ee, -scale * ne, scale * nn
+        out[k, 5] = math.sqrt(scale) / math.tau
+    return out
 
 
 @kernel
 def _squared(north: float, east: float, g: Array) -> float:
-    """Squared distance of a place from a Gaussian (north, east, nn, ne, ee)."""
+    """Squared distance of a place from the middle of an inverted Gaussian."""
     n, e = north - g[0], east - g[1]
-    return (n * n * g[4] - 2.0 * n * e * g[3] + e * e * g[2]) / (g[2] * g[4] - g[3] * g[3])
+    return n * n * g[2] + 2.0 * n * e * g[3] + e * e * g[4]
 
 
 @kernel
 def count_near(places: Array, gaussians: Array) -> int:
     """Number of places within three standard deviations of the Gaussian that has the fewest."""
     least = places.shape[1]
-    for g in gaussians:
+    for g in _inverted(gaussians):
         count = 0
         for i in range(places.shape[1]):
             if _squared(places[0, i], places[1, i], g) < _NEAR:
                 count += 1
         least = min(least, count)
     return least
-
-
-@kernel
-def _drawn_density(north: float, east: float, gaussians: Array) -> float:
-    """Density of equally many places from each Gaussian."""
-    density = 0.0
-    for g in gaussians:
-        distance = _squared(north, east, g)
-        if distance < _GATE:
-            density += math.exp(-0.5 * distance) / math.sqrt(g[2] * g[4] - g[3] * g[3])
-    return density / (math.tau * gaussians.shape[0])
 
 
 @kernel
@@ -159,33 +164,34 @@ def add_particles(
     """
     count, drawn = weights.size, new_weights.size - weights.size
     box = _box_of(places, weights)
-    per_area = 1.0 / (box[2] * box[3])
-    probability = _sums_of(places, weights, box)
-    number = _sums_of(places, np.ones(count), box)
-    for i in range(count):
-        north, east = places[0, i], places[1, i]
-        new_weights[i] = weights[i]
-        new_places[0, i], new_places[1, i] = north, east
-        new_rates[0, i], new_rates[1, i] = rates[0, i], rates[1, i]
-        more = drawn * _drawn_density(north, east, gaussians)
-        if more > 0.0:
-            dense = per_area * _between(north, east, number, box)
-            if dense > 0.0:
-                new_weights[i] *= dense / (dense + more)
+    per_area = box[2] * box[3]
+    number, probability = _binned(places, weights, box)
+    new_places[:, :count], new_rates[:, :count], new_weights[:count] = places, rates, weights
     for k in range(drawn):
         g, i = gaussians[k % gaussians.shape[0]], count + k
         radius, angle = math.sqrt(-2.0 * math.log((k + 0.5) / drawn)), turn_rad + _GOLDEN_RAD * k
         one, other = radius * math.cos(angle), radius * math.sin(angle)
         root = math.sqrt(g[2])
         across = g[3] / root
-        north = g[0] + root * one
-        east = g[1] + across * one + math.sqrt(max(0.0, g[4] - across * across)) * other
-        like = k * count // drawn
-        new_places[0, i], new_places[1, i] = north, east
-        new_rates[0, i], new_rates[1, i] = rates[0, like], rates[1, like]
-        dense = per_area * _between(north, east, number, box)
-        more = drawn * _drawn_density(north, east, gaussians)
-        new_weights[i] = per_area * _between(north, east, probability, box) / (dense + more)
+        new_places[0, i] = g[0] + root * one
+        new_places[1, i] = g[1] + across * one + math.sqrt(max(0.0, g[4] - across * across)) * other
+        new_rates[:, i] = rates[:, k * count // drawn]
+        new_weights[i] = per_area * _between(new_places[0, i], new_places[1, i], probability, box)
+    drawn_density = np.zeros(new_weights.size)
+    for g in _inverted(gaussians):
+        scale = drawn * g[5] / gaussians.shape[0]
+        for i in range(new_weights.size):
+            distance = _squared(new_places[0, i], new_places[1, i], g)
+            if distance < _GATE:
+                drawn_density[i] += scale * math.exp(-0.5 * distance)
+    for i in range(new_weights.size):
+        more = drawn_density[i]
+        if more > 0.0:
+            dense = per_area * _between(new_places[0, i], new_places[1, i], number, box)
+            if i >= count:
+                new_weights[i] /= dense + more
+            elif dense > 0.0:
+                new_weights[i] *= dense / (dense + more)
 
 
 @kernel
@@ -211,10 +217,10 @@ def regenerate(
     """
     count = new_places.shape[1]
     box = _box_of(places, weights)
-    bins = _sums_of(places, np.ones(weights.size), box)
+    bins, _ = _binned(places, weights, box)
     for k in range(bins.size):
         if bins[k] > 0.0:
-            bins[k] = _SPREAD * _DRAW_UNIT * math.sqrt(box[2] * box[3] / bins[k])
+            bins[k] = _SPREAD * _DRAW_UNIT * math.sqrt(1.0 / (box[2] * box[3] * bins[k]))
     chosen = np.empty(count, np.int64)
     systematic(weights, start, chosen)
     for i in range(count):

@@ -33,7 +33,7 @@ __all__ = ["SearchParticles"]
 Array = NDArray[np.float64]
 
 _FEW: Final = 100  # particles within three standard deviations of a detection; with less it gets new ones
-_NEW: Final = 0.25  # their share
+_NEW: Final = 0.1  # their share
 
 
 class SearchParticles:
