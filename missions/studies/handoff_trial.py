@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
-_SURE: Final = 0.98  # with a smaller probability of the identity the operator designates anew
+_SURE: Final = 0.995  # with a smaller probability of the identity, which limits that of the decision, the
+# operator designates anew
 _OPERATOR_S: Final = 5.0  # time that it takes
 _APART_M: Final = 10.0  # the operator tells targets apart that are farther from each other
 

@@ -172,7 +172,7 @@ def test_a_second_track_of_the_same_target_leaves_no_doubt():
     designation.update(100, {1: (0.0, 0.0), 2: (1.0, 0.0)})
     assert designation.probability == 1.0
     designation.update(200, {2: (1.0, 0.0)})
-    assert designation.number == 2 and designation.probability == pytest.approx(0.99)
+    assert designation.number == 2 and designation.probability == pytest.approx(0.995)
     designation.update(300, {2: (1.0, 0.0), 3: (20.0, 0.0)})
     designation.update(400, {2: (1.0, 0.0), 3: (2.0, 0.0)})
     assert designation.probability < 0.6
