@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def _handoff(given: Given) -> "Study[Any, Any]":
     from missions.studies.handoff import study
 
-    return study(given["comparison"], given["belief"], given["window"], given["trade_off"])
+    return study(given["comparison"], given["belief"], given["window"], given["trade_off"], given["camera"])
 
 
 def _lissajous_localization(given: Given) -> "Study[Any, Any]":
@@ -64,8 +64,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
             help=(
                 "Moving-target handoff without GPS: two aircraft in opposite orbits, five walking targets, "
                 "of which one is the tracker's (Tolman et al. 2021, section VII).\n\n"
-                "Image points stand for pixels. The folder gets handoff.png: correct decisions against the "
-                "time that they take."
+                "Image points stand for pixels, unless --camera pixels renders and searches all frames. The "
+                "folder gets handoff.png: correct decisions against the time that they take."
             ),
             options=(
                 click.Option(
@@ -93,6 +93,12 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     ["--trade-off"],
                     is_flag=True,
                     help="Windows of 25 to 100 samples with several thresholds (figure 9), not --window.",
+                ),
+                click.Option(
+                    ["--camera"],
+                    type=click.Choice(["points", "pixels"]),
+                    default="points",
+                    help="Moving points by a model, or found in rendered pictures; slow.",
                 ),
             ),
             build=_handoff,

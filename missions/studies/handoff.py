@@ -39,6 +39,7 @@ def study(
     belief: str = PoseBelief.PARTICLES.value,
     window: int = 100,
     trade_off: bool = False,
+    camera: str = "points",
 ) -> Study[Cell, Handoff]:
     """The study.
 
@@ -47,6 +48,7 @@ def study(
         belief: what estimates the relative pose: "particles" or "gaussians".
         window: samples of the windows.
         trade_off: windows and residual thresholds of figure 9 instead of one of each.
+        camera: "points" of a model, or "pixels": found in rendered pictures.
     """
     kinds = tuple(Comparison) if comparison == "all" else (Comparison(comparison),)
     cells = [
@@ -61,14 +63,20 @@ def study(
             "Moving-target handoff without GPS: five walking targets, of which one is the tracker's "
             "(Tolman et al. 2021)."
         ),
-        trial=HandoffTrial(),
+        trial=HandoffTrial(pixels=camera == "pixels"),
         parameters=Cell,
         row=Handoff,
         design=listed(cells),
         runs=500,
         success="correct",
         metrics=("time_s", "converged_s", "track_error_m"),
-        options={"comparison": comparison, "belief": belief, "window": window, "trade_off": trade_off},
+        options={
+            "comparison": comparison,
+            "belief": belief,
+            "window": window,
+            "trade_off": trade_off,
+            "camera": camera,
+        },
         summarise=summarise,
         report=lines_of,
         draw=draw,

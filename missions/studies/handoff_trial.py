@@ -125,7 +125,9 @@ class _Tracker:
         held = known.get(designation.number) if designation.number is not None else None
         # without a track the operator holds the camera on the target
         true = world.seen_from(which, world.targets)
-        self.tracks.scan(world.time_us, *world.frame(which, held or (float(true[0, 0]), float(true[0, 1]))))
+        frame = world.frame(which, held or (float(true[0, 0]), float(true[0, 1])))
+        if frame is not None:
+            self.tracks.scan(world.time_us, *frame)
         designation.update(world.time_us, self.tracks.places)
         self._operate(true)
         return motion, TrackerReport(
@@ -156,13 +158,15 @@ class HandoffTrial:
     Args:
         setting: targets, aircraft and sensors.
         timeout_s: time without a decision that is a failure.
+        pixels: frames are rendered and searched (`PixelWorld`).
     """
 
     setting: HandoffSetting = field(default_factory=HandoffSetting)
     timeout_s: float = TIMEOUT_S
+    pixels: bool = False
 
     def __call__(self, cell: Cell, seed: int) -> Handoff:
-        world = HandoffWorld(self.setting, seed)
+        world = self._world(seed)
         windows = WindowParameters(samples=cell.window, every_s=1.0 / self.setting.rate_hz)
         keep_s = 1.5 * windows.span_s + 1.0
         tracker = _Tracker(world, AircraftTracks(self._ransac(seed, 0), keep_s))
@@ -217,6 +221,13 @@ class HandoffTrial:
                 ),
             )
         return _outcome(world, process, tracker, report, early)
+
+    def _world(self, seed: int) -> HandoffWorld:
+        if not self.pixels:
+            return HandoffWorld(self.setting, seed)
+        from missions.studies.handoff_pixels import PixelWorld
+
+        return PixelWorld(self.setting, seed)
 
     def _ransac(self, seed: int, which: int) -> RecursiveRansac:
         s = self.setting

@@ -207,12 +207,12 @@ class HandoffWorld:
             + s.heading_sigma_rad * (noise[3] - noise[4]),
         )
 
-    def frame(self, which: int, pointing: tuple[float, float]) -> tuple[Array, Array]:
+    def frame(self, which: int, pointing: tuple[float, float]) -> tuple[Array, Array] | None:
         """Moving objects in a frame of a camera that points at a place of its level frame.
 
         Returns:
             (n, 2) forward and right in the level frame, with the errors of attitude and image, and (n, 2, 2)
-            the covariances that the aircraft gives them.
+            the covariances that the aircraft gives them; None: the frame was not searched.
         """
         s, a = self.setting, self._aircraft[which]
         camera = CameraAxes.towards(*pointing, a.height_m)

@@ -9,6 +9,7 @@ import pytest
 
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.handoff import study
+from missions.studies.handoff_pixels import PixelWorld
 from missions.studies.handoff_trial import Cell, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld
 
@@ -89,3 +90,21 @@ def test_the_trade_off_has_windows_and_thresholds():
     assert ("paper", 100, 15.0) in cells and ("rms", 25, 1.0) in cells and ("evidence", 50, 15.0) in cells
     assert len(set(cells)) == len(cells) == 21
     assert run_trial(study("evidence", "gaussians", window=50), 0, runs=1)["window"] == 50
+
+
+@pytest.mark.slow
+def test_the_front_end_finds_the_walkers_in_the_pictures_of_the_study():
+    """The places agree with the truth within the errors of roll and pitch, which move all of them alike."""
+    world = PixelWorld(HandoffSetting(), 4)
+    which, searched, found, true = HandoffWorld.TRACKER, 0, 0, 0
+    for _ in range(60):
+        world.advance((0.27, 0.0))
+        targets = world.seen_from(which, world.targets)
+        frame = world.frame(which, tuple(targets[0].tolist()))
+        if frame is None:
+            continue
+        searched += 1
+        off = np.hypot(*(frame[0][:, None] - targets).transpose(2, 0, 1)).min(axis=1, initial=np.inf)
+        found, true = found + len(off), true + int((off < 15.0).sum())
+    assert searched == 60 - 16 and found > searched
+    assert true / found > 0.9
