@@ -38,7 +38,7 @@ _LOOK_S: Final = 0.25
 
 
 def next_to_link(
-    request: VisionRequest, pictures: PictureProcess[Found], on_progress: OnProgress | None
+    request: VisionRequest, pictures: PictureProcess[Any], on_progress: OnProgress | None
 ) -> Ended:
     assert request.connect is not None
     address = parse_address(request.connect, VEHICLE_FORMS)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final, Generic
+from typing import Any, Final, Generic
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.tlog import TlogReader, TlogWriter
@@ -28,7 +28,7 @@ _AUTOPILOT: Final = 1
 
 
 def over_log(
-    request: VisionRequest, log: Path, pictures: PictureProcess[Found], on_progress: OnProgress | None
+    request: VisionRequest, log: Path, pictures: PictureProcess[Any], on_progress: OnProgress | None
 ) -> Ended:
     """Copy the log, with the messages of the pictures at the times at which they would have been sent."""
     reader = TlogReader(log)

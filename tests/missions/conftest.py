@@ -432,6 +432,9 @@ class FakeSitl:
     def pictures(self):
         return {}
 
+    def picture_at(self, system_id, time_us):
+        return None
+
     def advance(self):
         self.time_us += STEP_US
         for autopilot in self.autopilots:
