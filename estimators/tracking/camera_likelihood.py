@@ -53,6 +53,7 @@ FAR_U: Final = 43  # pixels; a border farther away does not matter
 FAR_V: Final = 44
 SIZE: Final = 45
 
+_UPPER: Final = np.triu_indices(3)
 _LEAST_DEPTH: Final = 1e-3  # of the height
 _FAR: Final = 4.5  # standard deviations; a border so far away does not matter (3e-6)
 _STEPS_PER_SIGMA: Final = 256
@@ -291,9 +292,8 @@ def _numbers(sight: CameraSight, model: SightModel) -> Array:
     rotation = sight.r_mount_from_ned
     s[NORTH], s[EAST], s[HEIGHT] = sight.place_ned_m[0], sight.place_ned_m[1], sight.height_m
     s[ROTATION : ROTATION + 9] = rotation.ravel()
-    upper = np.triu_indices(3)
-    s[PLACE : PLACE + 6] = (rotation @ sight.place_m2 @ rotation.T)[upper]
-    s[TURN : TURN + 6] = sight.rotation_rad2[upper]
+    s[PLACE : PLACE + 6] = (rotation @ sight.place_m2 @ rotation.T)[_UPPER]
+    s[TURN : TURN + 6] = sight.rotation_rad2[_UPPER]
     s[PLACE_WEIGHT], s[TURN_WEIGHT] = sight.weights
     s[FOCAL] = sight.focal_px
     s[HALF_WIDTH], s[HALF_HEIGHT] = 0.5 * sight.width_px, 0.5 * sight.height_px
@@ -328,7 +328,7 @@ def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightMode
 
 def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box:
     """The box; sets the distances in `s` at which a border does not matter."""
-    rotation = sight.r_mount_from_ned
+    rotation = s[ROTATION : ROTATION + 9].reshape(3, 3)
     edges, slope = _border_of(sight.width_px, sight.height_px, sight.focal_px, sight.distortion)
     border = np.array(edges)
     bounds: Array | None = border

@@ -140,6 +140,23 @@ def count_near(places: Array, gaussians: Array) -> int:
 
 
 @kernel
+def _density_of(places: Array, inverted: Array, drawn: int) -> Array:
+    """Number per square metre at places of what is drawn from inverted Gaussians, equally many from each."""
+    density = np.zeros(places.shape[1])
+    near = np.empty(density.size, np.int64)
+    for g in inverted:
+        scale = drawn * g[5] / inverted.shape[0]
+        count = 0
+        for i in range(density.size):  # apart from the exponentials, which the compiler computes for all else
+            if _squared(places[0, i], places[1, i], g) < _GATE:
+                near[count] = i
+                count += 1
+        for i in near[:count]:
+            density[i] += scale * math.exp(-0.5 * _squared(places[0, i], places[1, i], g))
+    return density
+
+
+@kernel
 def add_particles(
     places: Array,
     rates: Array,
@@ -157,41 +174,37 @@ def add_particles(
 
     Args:
         places, rates: (2, n).
-        weights: (n,), sum one.
+        weights: (n,), sum one; become those beside the new particles.
         gaussians: (m, 5) north, east, covariance nn, ne, ee.
         turn_rad: by which the spiral is turned.
-        new_places, new_rates, new_weights: (2, n + k) and (n + k,), the result.
+        new_places, new_rates, new_weights: (2, k) and (k,), get the new particles.
     """
-    count, drawn = weights.size, new_weights.size - weights.size
+    count, drawn = weights.size, new_weights.size
     box = _box_of(places, weights)
     per_area = box[2] * box[3]
     number, probability = _binned(places, weights, box)
-    new_places[:, :count], new_rates[:, :count], new_weights[:count] = places, rates, weights
+    inverted = _inverted(gaussians)
     for k in range(drawn):
-        g, i = gaussians[k % gaussians.shape[0]], count + k
+        g = gaussians[k % gaussians.shape[0]]
         radius, angle = math.sqrt(-2.0 * math.log((k + 0.5) / drawn)), turn_rad + _GOLDEN_RAD * k
         one, other = radius * math.cos(angle), radius * math.sin(angle)
         root = math.sqrt(g[2])
         across = g[3] / root
-        new_places[0, i] = g[0] + root * one
-        new_places[1, i] = g[1] + across * one + math.sqrt(max(0.0, g[4] - across * across)) * other
-        new_rates[:, i] = rates[:, k * count // drawn]
-        new_weights[i] = per_area * _between(new_places[0, i], new_places[1, i], probability, box)
-    drawn_density = np.zeros(new_weights.size)
-    for g in _inverted(gaussians):
-        scale = drawn * g[5] / gaussians.shape[0]
-        for i in range(new_weights.size):
-            distance = _squared(new_places[0, i], new_places[1, i], g)
-            if distance < _GATE:
-                drawn_density[i] += scale * math.exp(-0.5 * distance)
-    for i in range(new_weights.size):
-        more = drawn_density[i]
-        if more > 0.0:
-            dense = per_area * _between(new_places[0, i], new_places[1, i], number, box)
-            if i >= count:
-                new_weights[i] /= dense + more
-            elif dense > 0.0:
-                new_weights[i] *= dense / (dense + more)
+        new_places[0, k] = g[0] + root * one
+        new_places[1, k] = g[1] + across * one + math.sqrt(max(0.0, g[4] - across * across)) * other
+        like = k * count // drawn
+        new_rates[0, k], new_rates[1, k] = rates[0, like], rates[1, like]
+    more = _density_of(places, inverted, drawn)
+    for i in range(count):
+        if more[i] > 0.0:
+            dense = per_area * _between(places[0, i], places[1, i], number, box)
+            if dense > 0.0:
+                weights[i] *= dense / (dense + more[i])
+    more = _density_of(new_places, inverted, drawn)
+    for k in range(drawn):
+        dense = per_area * _between(new_places[0, k], new_places[1, k], number, box)
+        new_weights[k] = per_area * _between(new_places[0, k], new_places[1, k], probability, box)
+        new_weights[k] /= dense + more[k]
 
 
 @kernel

@@ -127,11 +127,12 @@ class SearchParticles:
     def _refine(self, detected: Array) -> None:
         """Add particles where detections are, (m, 5); what all represent stays the same."""
         drawn = math.ceil(_NEW * self.count)
-        places, rates = (np.empty((2, self._weights.size + drawn)) for _ in range(2))
-        weights = np.empty(places.shape[1])
+        places, rates, weights = np.empty((2, drawn)), np.empty((2, drawn)), np.empty(drawn)
         turn = math.tau * float(self._rng.random())
         add_particles(self._places, self._rates, self._weights, detected, turn, places, rates, weights)
-        self._places, self._rates, self._weights = places, rates, weights
+        self._places = np.hstack((self._places, places))
+        self._rates = np.hstack((self._rates, rates))
+        self._weights = np.hstack((self._weights, weights))
 
     def _resample(self) -> None:
         count = self.count
