@@ -59,6 +59,8 @@ class EvidenceParameters:
         speed_m_s, turn_s: the same of its relative velocity, and the correlation time.
         seen: prior probability that the handoff aircraft has a track of a target that the tracker tracks.
         free: mean number of tracks of other targets.
+        unforeseen: probability that the comparison is wrong for a reason that the model does not have,
+            whatever the tracks show (docs/handoff.md).
         decision: probability of a track that is decided for.
         hold_s: time for which it must stay above.
     """
@@ -84,11 +86,12 @@ class EvidenceParameters:
     turn_s: float = 20.0
     seen: float = 0.8
     free: float = 1.0
+    unforeseen: float = 0.004
     decision: float = 0.99
     hold_s: float = 3.0
 
     def __post_init__(self) -> None:
-        shares = ("decision", "rough", "seen", "wrong")
+        shares = ("decision", "rough", "seen", "unforeseen", "wrong")
         check_fields(self, require_positive, but=dict.fromkeys(shares, require_probability))
 
 
@@ -154,7 +157,7 @@ class EvidenceComparison(TrackComparison):
             for share, scale in ((1.0 - p.rough, 1.0), (p.rough, p.rough_scale))
         ]
         shares = np.exp(np.array(logs) - np.max(logs)).sum(axis=0)
-        shares *= windows.identity / shares.sum()
+        shares *= windows.identity * (1.0 - p.unforeseen) / shares.sum()
         return dict(zip(numbers, shares[:-1].tolist(), strict=True))
 
     def _pairs(self, windows: TrackWindows, target: Array, pose: PoseMode) -> tuple[list[int], _Pairs]:

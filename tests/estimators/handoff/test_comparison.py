@@ -208,7 +208,7 @@ def slopes(function, count):
 def test_the_probabilities_are_those_of_all_hypotheses_written_out():
     """Against the densities of scipy, with each error as a number and derivatives by differences."""
     rng = np.random.default_rng(4)
-    p = EvidenceParameters(wrong=0.0, rough=0.0, decision=0.5)
+    p = EvidenceParameters(wrong=0.0, rough=0.0, unforeseen=0.0, decision=0.5)
     target, other = walk(rng, 41), walk(rng, 41, start=(55.0, 45.0))
     own = {
         k: seen_by_handoff(places) + rng.normal(0.0, 2.0, (41, 2)) + (4.0, -2.0)
@@ -336,6 +336,7 @@ def test_a_doubtful_identity_of_the_target_bounds_the_probability():
     comparison = EvidenceComparison()
     comparison.update(windows(own, target), POSE)
     sure = comparison.scores[1]
+    assert 0.99 < sure < 1.0 - comparison.parameters.unforeseen  # nothing that the tracks show is certain
     doubtful = EvidenceComparison()
     doubtful.update(replace(windows(own, target), identity=0.75), POSE)
     assert doubtful.scores[1] == pytest.approx(0.75 * sure)
