@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import rotate_inverse, yaw_of
+from flightsim.turbulence import BLOCK_STEPS
 
 Array = NDArray[np.float64]
 
-_BLOCK_STEPS: Final = 512
 _LEAST_AIRSPEED_M_S: Final = 1.0  # as for the turbulence that it goes with
 _ROTARY: Final = 1  # added to the spawn key of the turbulence's stream
 
@@ -40,19 +40,31 @@ def roll_gust_sigma_rad_s(sigma_w_m_s: float, length_w_m: float, span_m: float) 
 
 
 @kernel
-def _advance(
+def advance_rotary(
+    constants: Array,
     state: Array,
     normal: float,
-    dt_s: float,
     airspeed_m_s: float,
-    span_m: float,
     scales: Array,
     gust_ned_m_s: Array,
     q_ned_from_frd: Array,
     work: Array,
     out: Array,
 ) -> None:
-    """state = (p_g / sigma, low-passed north, east, down); scales as `turbulence.low_altitude_scales`."""
+    """Advance one step.
+
+    Args:
+        constants: (2,) wing span in m, step in s.
+        state: (4,) p_g / sigma, low-passed north, east, down.
+        normal: unit white noise.
+        airspeed_m_s: true airspeed.
+        scales: (4,) of the turbulence in this step, as of `turbulence.low_altitude_scales`.
+        gust_ned_m_s: (3,) its velocity.
+        q_ned_from_frd: (4,) attitude.
+        work: (3,), written.
+        out: (3,) rotation of the air over ground, body axes, rad/s, written.
+    """
+    span_m, dt_s = constants[0], constants[1]
     travelled_m = max(airspeed_m_s, _LEAST_AIRSPEED_M_S) * dt_s
     vertical_m, lateral_m = 4.0 * span_m / math.pi, 3.0 * span_m / math.pi
     d = travelled_m / vertical_m
@@ -73,54 +85,31 @@ def _advance(
 
 
 class RotaryGusts:
-    """Rotation of the air around one aircraft with wings, in addition to its `DrydenTurbulence`.
+    """State and noise of the rotation of the air around one aircraft with wings, in addition to its
+    `DrydenTurbulence`; `advance_rotary` advances it.
+
+    Args:
+        span_m: wing span.
+        dt_s: step.
+        seed_sequence: the vehicle's stream for turbulence; p_g draws from a separate child stream of it.
 
     Attributes:
-        rates_frd_rad_s: (3,) present rotation of the air over ground, body axes, written in place by `step`.
+        constants, state, work: of `advance_rotary`; the state is the stationary one of p_g, with no slopes.
+        normals: (BLOCK_STEPS,) its noise, drawn by `draw`.
+        rates_frd_rad_s: (3,) present rotation of the air over ground, body axes.
     """
 
     def __init__(self, *, span_m: float, dt_s: float, seed_sequence: np.random.SeedSequence) -> None:
-        """Start in the stationary state of p_g, with no slopes.
-
-        Args:
-            span_m: wing span.
-            dt_s: step.
-            seed_sequence: the vehicle's stream for turbulence; p_g draws from a separate child stream of it.
-        """
-        self._span_m = span_m
-        self._dt_s = dt_s
+        self.constants = np.array([span_m, dt_s])
         own = np.random.SeedSequence(
             entropy=seed_sequence.entropy, spawn_key=(*seed_sequence.spawn_key, _ROTARY)
         )
         self._generator = np.random.Generator(np.random.PCG64(own))
-        self._block = np.empty(_BLOCK_STEPS)
-        self._next = _BLOCK_STEPS
-        self._state = np.array([self._generator.standard_normal(), 0.0, 0.0, 0.0])
-        self._work = np.zeros(3)
+        self.normals = np.empty(BLOCK_STEPS)
+        self.state = np.array([self._generator.standard_normal(), 0.0, 0.0, 0.0])
+        self.work = np.zeros(3)
         self.rates_frd_rad_s = np.zeros(3)
 
-    def step(self, gust_ned_m_s: Array, scales: Array, airspeed_m_s: float, q_ned_from_frd: Array) -> None:
-        """Advance one step.
-
-        Args:
-            gust_ned_m_s: (3,) the turbulence's velocity in this step.
-            scales: (4,) its lengths and intensities, as of `turbulence.low_altitude_scales`.
-            airspeed_m_s: true airspeed.
-            q_ned_from_frd: (4,) attitude.
-        """
-        if self._next == _BLOCK_STEPS:
-            self._generator.standard_normal(out=self._block)
-            self._next = 0
-        _advance(
-            self._state,
-            self._block[self._next],
-            self._dt_s,
-            airspeed_m_s,
-            self._span_m,
-            scales,
-            gust_ned_m_s,
-            q_ned_from_frd,
-            self._work,
-            self.rates_frd_rad_s,
-        )
-        self._next += 1
+    def draw(self) -> None:
+        """Draw the noise of the next `BLOCK_STEPS` steps."""
+        self._generator.standard_normal(out=self.normals)

@@ -20,7 +20,8 @@ from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 
-_BLOCK_STEPS: Final = 512
+BLOCK_STEPS: Final = 512
+"""Steps that one call of a generator serves."""
 _NORMALS_PER_STEP: Final = 5
 _STATE_SIZE: Final = 5
 _SQRT3: Final = math.sqrt(3.0)
@@ -68,39 +69,55 @@ def _second_order(x: Array, i: int, d: float, n1: float, n2: float) -> float:
 
 
 @kernel
-def _advance(
+def advance_turbulence(
+    constants: Array,
     x: Array,
     normals: Array,
-    dt_s: float,
     height_m: float,
     airspeed_m_s: float,
-    wind_at_20_ft_m_s: float,
-    cos_wind: float,
-    sin_wind: float,
     scales: Array,
     out: Array,
 ) -> None:
-    low_altitude_scales(height_m, wind_at_20_ft_m_s, scales)
-    travelled = max(airspeed_m_s, _LEAST_AIRSPEED_M_S) * dt_s
+    """Advance one step.
+
+    Args:
+        constants: (4,) W20 m/s, cosine and sine of the wind's direction, step in s.
+        x: (5,) state of the filters.
+        normals: (5,) unit white noise.
+        height_m: above ground.
+        airspeed_m_s: true airspeed.
+        scales: (4,) lengths and intensities, as of `low_altitude_scales`, written.
+        out: (3,) velocity of the turbulence NED m/s, written.
+    """
+    low_altitude_scales(height_m, constants[0], scales)
+    travelled = max(airspeed_m_s, _LEAST_AIRSPEED_M_S) * constants[3]
     d_u = travelled / scales[0]
     d_w = travelled / scales[1]
     x[0] = math.exp(-d_u) * x[0] + math.sqrt(-math.expm1(-2.0 * d_u)) * normals[0]
     u = scales[2] * x[0]
     v = scales[2] * _second_order(x, 1, d_u, normals[1], normals[2])
     w = scales[3] * _second_order(x, 3, d_w, normals[3], normals[4])
-    out[0] = cos_wind * u - sin_wind * v
-    out[1] = sin_wind * u + cos_wind * v
+    out[0] = constants[1] * u - constants[2] * v
+    out[1] = constants[2] * u + constants[1] * v
     out[2] = w
 
 
 class DrydenTurbulence:
-    """Turbulence velocities for one vehicle.
+    """State and noise of the turbulence around one vehicle; `advance_turbulence` advances it.
 
     The filters move with the air the vehicle passes through, at its true airspeed and at least 1 m/s (the
     frozen field of the standard would stand still around a vehicle drifting with the wind).
 
+    Args:
+        wind_at_20_ft_m_s: W20, sets the intensity.
+        wind_ned_m_s: mean wind; its horizontal direction is the longitudinal axis (north when calm).
+        dt_s: step.
+        seed_sequence: the vehicle's stream for turbulence.
+
     Attributes:
-        velocity_ned_m_s: (3,) present turbulence velocity, written in place by `step`.
+        constants, state: of `advance_turbulence`; the state is the stationary one.
+        normals: (BLOCK_STEPS, 5) its noise, a row for each step, drawn by `draw`.
+        velocity_ned_m_s: (3,) present turbulence velocity.
         scales: (4,) present lengths and intensities, as of `low_altitude_scales`.
     """
 
@@ -112,46 +129,19 @@ class DrydenTurbulence:
         dt_s: float,
         seed_sequence: np.random.SeedSequence,
     ) -> None:
-        """Start in the stationary state.
-
-        Args:
-            wind_at_20_ft_m_s: W20, sets the intensity.
-            wind_ned_m_s: mean wind; its horizontal direction is the longitudinal axis (north when calm).
-            dt_s: step.
-            seed_sequence: the vehicle's stream for turbulence.
-        """
-        self._w20_m_s = wind_at_20_ft_m_s
         direction = math.atan2(wind_ned_m_s[1], wind_ned_m_s[0])
-        self._cos_wind = math.cos(direction)
-        self._sin_wind = math.sin(direction)
-        self._dt_s = dt_s
+        self.constants = np.array([wind_at_20_ft_m_s, math.cos(direction), math.sin(direction), dt_s])
         self._generator = np.random.Generator(np.random.PCG64(seed_sequence))
-        self._block = np.empty((_BLOCK_STEPS, _NORMALS_PER_STEP))
-        self._next = _BLOCK_STEPS
+        self.normals = np.empty((BLOCK_STEPS, _NORMALS_PER_STEP))
         self.scales = np.zeros(4)
         n = self._generator.standard_normal(_STATE_SIZE)
         half, quarter = math.sqrt(0.5), 0.25 / math.sqrt(0.5)
         rest = math.sqrt(0.25 - quarter * quarter)
-        self._state = np.array(
+        self.state = np.array(
             [n[0], half * n[1], quarter * n[1] + rest * n[2], half * n[3], quarter * n[3] + rest * n[4]]
         )
         self.velocity_ned_m_s = np.zeros(3)
 
-    def step(self, height_m: float, airspeed_m_s: float) -> None:
-        """Advance one step at a height above ground and a true airspeed."""
-        if self._next == _BLOCK_STEPS:
-            self._generator.standard_normal(out=self._block)
-            self._next = 0
-        _advance(
-            self._state,
-            self._block[self._next],
-            self._dt_s,
-            height_m,
-            airspeed_m_s,
-            self._w20_m_s,
-            self._cos_wind,
-            self._sin_wind,
-            self.scales,
-            self.velocity_ned_m_s,
-        )
-        self._next += 1
+    def draw(self) -> None:
+        """Draw the noise of the next `BLOCK_STEPS` steps."""
+        self._generator.standard_normal(out=self.normals)

@@ -177,6 +177,7 @@ class Vehicle:
             fdm.resume_integration()
         self._air = VehicleAir(
             fdm,
+            self.truth,
             self.environment,
             ground_alt_m=float(self.home.alt_m),
             physics_rate_hz=self.physics_rate_hz,
@@ -205,7 +206,7 @@ class Vehicle:
             self._steps += 1
             return
         if self._air.stirs:
-            self._air.step(self.truth, self._steps)
+            self._air.step(self._steps)
         surfaces = self._surfaces
         if surfaces is None:
             for set_actuator, value in zip(self._set_actuators, actuators.tolist(), strict=False):

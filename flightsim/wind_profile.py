@@ -10,7 +10,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flightsim.foundation.imperial import M_PER_FT
+from flightsim.foundation.kernels import kernel
+
+Array = NDArray[np.float64]
 
 _REFERENCE_M: Final = 10.0  # height of the wind in weather reports (WMO No. 8, part I, chapter 5)
 _OPEN_ROUGHNESS_M: Final = 0.15 * M_PER_FT
@@ -71,17 +77,34 @@ class WindProfile:
                 f"reference height {self.reference_height_m} m; give a smaller one"
             )
 
+    @property
+    def constants(self) -> Array:
+        """(6,) of `wind_factor`."""
+        law = float(list(WindLaw).index(self.law))
+        laws = self.reference_height_m, self.roughness_length_m, self.exponent, self.gradient_1_m, self.top_m
+        return np.array([law, *laws])
+
     def factor(self, height_m: float) -> float:
         """Wind at a height above ground over the wind at the reference height; not negative."""
-        if self.law is WindLaw.UNIFORM:
-            return 1.0
-        h = min(height_m, self.top_m)
-        if self.law is WindLaw.LOGARITHMIC:
-            z0 = self.roughness_length_m
-            return math.log(h / z0) / math.log(self.reference_height_m / z0) if h > z0 else 0.0
-        if self.law is WindLaw.POWER:
-            return math.pow(max(h, 0.0) / self.reference_height_m, self.exponent)
-        return max(1.0 + self.gradient_1_m * (h - self.reference_height_m), 0.0)
+        return float(wind_factor(self.constants, height_m))
+
+
+_UNIFORM, _LOGARITHMIC, _POWER = 0.0, 1.0, 2.0  # places in `WindLaw`
+
+
+@kernel
+def wind_factor(constants: Array, height_m: float) -> float:
+    """`WindProfile.factor`; constants = (law, reference height, roughness, exponent, gradient, top)."""
+    law, reference_m = constants[0], constants[1]
+    h = min(height_m, constants[5])
+    if law == _UNIFORM:
+        return 1.0
+    if law == _LOGARITHMIC:
+        z0 = constants[2]
+        return math.log(h / z0) / math.log(reference_m / z0) if h > z0 else 0.0
+    if law == _POWER:
+        return math.pow(max(h, 0.0) / reference_m, constants[3])
+    return max(1.0 + constants[4] * (h - reference_m), 0.0)
 
 
 SURFACE_LAYER: Final = WindProfile(law=WindLaw.LOGARITHMIC)

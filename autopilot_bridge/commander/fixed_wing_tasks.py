@@ -20,12 +20,11 @@ from autopilot_bridge.commander.events import (
 )
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
+from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place, VehicleTasks
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing import (
     DescendTask,
-    GuidedKind,
     GuidedTask,
     LandPhase,
     LandTask,
@@ -39,9 +38,8 @@ from autopilot_bridge.flight.fixed_wing import (
     TakeoffTask,
 )
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.plan_reading import is_waypoint, target_of
-from autopilot_bridge.flight.task import FlightTask, IdleTask, OffboardKind, SpeedKind
+from autopilot_bridge.flight.task import FlightTask, IdleTask, SpeedKind
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 
@@ -132,32 +130,14 @@ _MANUAL: Final = {
 _LIFTING_THROTTLE: Final = 0.1
 
 
-class FixedWingTasks:
-    """`VehicleTasks` of a fixed-wing aircraft.
-
-    Args:
-        context: shared with the tasks.
-        missions: the plan the mission task flies.
-        policy: the flavour's rules.
-    """
+class FixedWingTasks(VehicleTasks):
+    """`VehicleTasks` of a fixed-wing aircraft."""
 
     def __init__(self, context: FlightContext, missions: MissionStore, policy: CommanderPolicy) -> None:
-        self._context = context
-        self._missions = missions
-        self._policy = policy
+        super().__init__(context, missions, policy)
         self._phases = PhaseWatch()
-        self.offboard = OffboardTask()
-        self.guided = GuidedTask()
-
-    @property
-    def asks_attitude(self) -> bool:
-        """The offboard stream commands positions, velocities or attitudes."""
-        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
-
-    @property
-    def follows_thrust(self) -> bool:
-        """Guided flight follows attitude setpoints."""
-        return self.guided.kind is GuidedKind.ATTITUDE
+        self.offboard: OffboardTask = OffboardTask()
+        self.guided: GuidedTask = GuidedTask()
 
     def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
         """The initial task of a mode."""
@@ -218,10 +198,6 @@ class FixedWingTasks:
         if not circle.clockwise:
             radius_m = -(abs(self._context.fixed_wing.loiter_radius_m) if radius_m is None else radius_m)
         return LoiterTask(circle.centre_ned_m, radius_m, circle.speed_m_s)
-
-    def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
-        """An aircraft can't turn on the spot."""
-        return None
 
     def ends_on_ground(self, task: FlightTask | None) -> bool:
         """Landings, returns and missions end on the ground."""

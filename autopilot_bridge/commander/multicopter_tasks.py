@@ -1,16 +1,15 @@
 """The flight tasks of a multicopter."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
-from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
+from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place, VehicleTasks
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.heading import Turn
@@ -26,8 +25,8 @@ from autopilot_bridge.flight.multicopter.precision_land import PrecisionLandTask
 from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.task import FlightTask, GuidedKind, IdleTask, OffboardKind, SpeedKind
-from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from autopilot_bridge.flight.task import FlightTask, GuidedKind, IdleTask, SpeedKind
+from autopilot_bridge.mission_plan import MissionStore
 
 _MANUAL: Final = {
     FlightMode.MANUAL: ManualMode.STABILIZED,
@@ -41,32 +40,14 @@ _MANUAL: Final = {
 _YAW_BEHAVIOURS: Final = frozenset(behaviour.value for behaviour in OrbitYaw)
 
 
-class MulticopterTasks:
-    """`VehicleTasks` of a multicopter.
-
-    Args:
-        context: shared with the tasks.
-        missions: the plan the mission task flies.
-        policy: the flavour's rules.
-    """
+class MulticopterTasks(VehicleTasks):
+    """`VehicleTasks` of a multicopter."""
 
     def __init__(self, context: FlightContext, missions: MissionStore, policy: CommanderPolicy) -> None:
-        self._context = context
-        self._missions = missions
-        self._policy = policy
+        super().__init__(context, missions, policy)
         self._target = np.full(3, math.nan)
-        self.offboard = OffboardTask()
-        self.guided = GuidedTask()
-
-    @property
-    def asks_attitude(self) -> bool:
-        """The offboard stream commands positions, velocities or attitudes."""
-        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
-
-    @property
-    def follows_thrust(self) -> bool:
-        """Guided flight follows attitude setpoints."""
-        return self.guided.kind is GuidedKind.ATTITUDE
+        self.offboard: OffboardTask = OffboardTask()
+        self.guided: GuidedTask = GuidedTask()
 
     def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
         """The initial task of a mode."""
@@ -168,14 +149,6 @@ class MulticopterTasks:
     def wants_up(self, context: FlightContext) -> bool:
         """True when the task would turn the motors faster than idle."""
         return bool(context.setpoint[sp.LEVEL] > sp.IDLE) or context.phase is FlightPhase.TAKEOFF
-
-    def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
-        """No events: a multicopter's phases are modes."""
-        return ()
-
-    def distance_to(self, item: MissionItem, context: FlightContext) -> float:
-        """NaN: a multicopter stops at an item's position."""
-        return math.nan
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
         """The circle of an `OrbitTask`, once the vehicle is on it."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.modes import FlightMode
-from flightsim.foundation.checks import check_fields, require_finite
+from flightsim.foundation.checks import NotNegativeOrInf, check_fields, require_finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class CommanderParameters:
     stick_override_offboard: bool
     stick_override_threshold: float
     check_arming: bool
-    position_accuracy_max_m: float = math.inf
+    position_accuracy_max_m: NotNegativeOrInf = math.inf
     position_accuracy_low_m: float = 0.0
     position_accuracy_low_action: FailsafeAction = FailsafeAction.NONE
     manual_long_loss_s: float = 0.0
@@ -80,4 +80,4 @@ class CommanderParameters:
     follow_enabled: bool = True
 
     def __post_init__(self) -> None:
-        check_fields(self, require_finite, unlimited=("position_accuracy_max_m",))
+        check_fields(self, require_finite)

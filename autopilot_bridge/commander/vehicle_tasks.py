@@ -1,12 +1,13 @@
 """The flight tasks of a class of vehicle, for every mode and request, as one object.
 
 The commander, its task runner and its guidance are the same for every vehicle. They use flight tasks only
-through this protocol; `MulticopterTasks` and `FixedWingTasks` implement it.
+through `VehicleTasks`; `MulticopterTasks` and `FixedWingTasks` implement it.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.flight.context import FlightContext, LandedState
 from autopilot_bridge.flight.heading import Turn
-from autopilot_bridge.flight.task import FlightTask, SpeedKind
-from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.flight.task import FlightTask, GuidedKind, OffboardKind, SpeedKind
+from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 
 class SetpointStream:
@@ -137,8 +139,13 @@ class LandDetector(Protocol):
         ...
 
 
-class VehicleTasks(Protocol):
+class VehicleTasks(ABC):
     """Makes the flight tasks of one vehicle.
+
+    Args:
+        context: shared with the tasks.
+        missions: the plan the mission task flies.
+        policy: the flavour's rules.
 
     Attributes:
         offboard: the task that flies streamed setpoints directly (PX4).
@@ -148,16 +155,22 @@ class VehicleTasks(Protocol):
     offboard: Any
     guided: Any
 
+    def __init__(self, context: FlightContext, missions: MissionStore, policy: CommanderPolicy) -> None:
+        self._context = context
+        self._missions = missions
+        self._policy = policy
+
     @property
     def asks_attitude(self) -> bool:
         """The offboard stream commands positions, velocities or attitudes (PX4 shows it in base_mode)."""
-        ...
+        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
 
     @property
     def follows_thrust(self) -> bool:
         """Guided flight follows attitude setpoints (ArduPilot shows it in base_mode)."""
-        ...
+        return bool(self.guided.kind is GuidedKind.ATTITUDE)
 
+    @abstractmethod
     def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
         """The initial task of a mode.
 
@@ -165,12 +178,12 @@ class VehicleTasks(Protocol):
             mode: the mode entered.
             mission_started: a client has started the mission (where the policy requires that on the ground).
         """
-        ...
 
+    @abstractmethod
     def hold(self) -> FlightTask:
         """Hold the present position."""
-        ...
 
+    @abstractmethod
     def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
         """Take off.
 
@@ -179,52 +192,54 @@ class VehicleTasks(Protocol):
             yaw_rad: heading of a multicopter's climb; None: the present one.
             place: the position at which an aircraft circles after the climb; NaN: where the climb ends.
         """
-        ...
 
+    @abstractmethod
     def hold_after_takeoff(self, task: FlightTask | None) -> FlightTask:
         """The task after a take-off: it holds the commanded height, not the height that was reached."""
-        ...
 
+    @abstractmethod
     def reposition(self, place: Place) -> FlightTask:
         """Fly to a position and stay there."""
-        ...
 
+    @abstractmethod
     def guide_to(self, context: FlightContext, place: Place) -> None:
         """Set the target position of the guided task."""
-        ...
 
+    @abstractmethod
     def orbit(self, circle: Circle) -> FlightTask:
         """Circle around a position."""
-        ...
 
     def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
-        """CONDITION_YAW: turn the nose. Returns the task for it; None when the active task does it."""
-        ...
+        """CONDITION_YAW: turn the nose. Returns the task for it; None when the active task does it, and for
+        an aircraft, which can't turn on the spot."""
+        return None
 
+    @abstractmethod
     def ends_on_ground(self, task: FlightTask | None) -> bool:
         """The task lands automatically, and a landing ends the flight."""
-        ...
 
+    @abstractmethod
     def wants_up(self, context: FlightContext) -> bool:
         """On the ground, the task would take off: the automatic disarming waits."""
-        ...
 
     def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
-        """The phase events of the active task since the last call that are reported to pilots."""
-        ...
+        """The phase events of the active task since the last call that are reported to pilots; none of a
+        multicopter, whose phases are modes."""
+        return ()
 
     def distance_to(self, item: MissionItem, context: FlightContext) -> float:
-        """The distance at which an aircraft passed an item, m; NaN where it is not reported."""
-        ...
+        """The distance at which an aircraft passed an item, m; NaN where it is not reported, as of a
+        multicopter, which stops at an item's position."""
+        return math.nan
 
+    @abstractmethod
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
         """The circle being flown, as reported in ORBIT_EXECUTION_STATUS; None: no circle."""
-        ...
 
+    @abstractmethod
     def speed_kind(self, kind: int) -> SpeedKind:
         """The speed that SPEED_TYPE `kind` of DO_CHANGE_SPEED sets on this vehicle."""
-        ...
 
+    @abstractmethod
     def with_speeds(self, parameters: Any, speeds_m_s: Mapping[SpeedKind, float]) -> Any:
         """Flight parameters with the commanded speeds instead of their own."""
-        ...

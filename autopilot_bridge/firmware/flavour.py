@@ -4,14 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
+from autopilot_bridge.control.controller import Array, Controller
 from autopilot_bridge.firmware.external_mapping import GpsSource, own_receiver
 from autopilot_bridge.firmware.services import FirmwareServices
 from autopilot_bridge.firmware.texts import Notice
@@ -25,8 +23,6 @@ from flightsim.airframe import AirframeKind, LaunchKind
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
-
-Array = NDArray[np.float64]
 
 
 class ModeDisplay(NamedTuple):
@@ -60,49 +56,10 @@ class SensorBits:
     health_armed: int
 
 
-class Controller(Protocol):
-    """Control laws of a class of vehicle, as the autopilot holds them.
-
-    Attributes:
-        setpoint: what to fly, written by the flight task.
-        actuators: commands for the vehicle (MAX_ACTUATORS,), written in place by every `step`.
-    """
-
-    setpoint: Array
-    actuators: Array
-
-    @property
-    def thrust(self) -> float:
-        """Collective of a multicopter or throttle of an aircraft, 0..1."""
-        ...
-
-    @property
-    def attitude_setpoint(self) -> Array:
-        """q_ned_from_frd that the attitude loop follows, a view (4,)."""
-        ...
-
-    @property
-    def hover_thrust(self) -> float:
-        """Estimated thrust of level flight, 0..1."""
-        ...
-
-    def step(self) -> None:
-        """One physics step."""
-        ...
-
-    def set_parameters(self, parameters: Any) -> None:
-        """New gains and limits; states stay."""
-        ...
-
-    def set_ground_contact(self, contact: bool) -> None:
-        """The land detector feels the ground."""
-        ...
-
-
 class ControllerFactory(Protocol):
     """Makes the control laws."""
 
-    def __call__(self, parameters: Any, *, physics_rate_hz: int, nav: Array) -> Controller: ...
+    def __call__(self, parameters: Any, *, physics_rate_hz: int, nav: Array) -> Controller[Any]: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

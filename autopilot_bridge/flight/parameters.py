@@ -5,7 +5,6 @@ RTL_*).
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Final
 
 from autopilot_bridge.flight.surroundings_parameters import (
     AvoidanceParameters,
@@ -13,7 +12,15 @@ from autopilot_bridge.flight.surroundings_parameters import (
     Precision,
     PrecisionParameters,
 )
-from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import (
+    Finite,
+    NotNegative,
+    NotNegativeOrInf,
+    PositiveOrInf,
+    Share,
+    check_fields,
+    require_positive,
+)
 
 
 class ReturnDestination(IntEnum):
@@ -57,21 +64,6 @@ class RallyRule:
             raise ValueError(f"limit_m = {self.limit_m} is not positive")
 
 
-_MAY_BE_ZERO: Final = frozenset(
-    {
-        "spoolup_time_s",
-        "takeoff_ramp_time_s",
-        "return_descend_altitude_m",
-        "return_cone_half_angle_rad",
-        "return_min_distance_m",
-        "return_climb_min_m",
-        "return_stays_at_m",
-        "manual_deadzone",
-        "manual_expo",
-    }
-)
-
-
 class YawBehaviour(IntEnum):
     """Where the nose points on the way without a commanded yaw (MPC_YAW_MODE | WP_YAW_BEHAVIOR)."""
 
@@ -109,8 +101,8 @@ class FlightParameters:
 
     takeoff_altitude_m: float = 2.5  # MIS_TAKEOFF_ALT
     takeoff_speed_m_s: float = 1.5  # MPC_TKO_SPEED | WPNAV_SPEED_UP
-    takeoff_ramp_time_s: float = 3.0  # MPC_TKO_RAMP_T | TKOFF_SLEW_TIME
-    spoolup_time_s: float = 1.0  # COM_SPOOLUP_TIME | MOT_SPOOL_TIME
+    takeoff_ramp_time_s: NotNegative = 3.0  # MPC_TKO_RAMP_T | TKOFF_SLEW_TIME
+    spoolup_time_s: NotNegative = 1.0  # COM_SPOOLUP_TIME | MOT_SPOOL_TIME
 
     land_speed_m_s: float = 0.7  # MPC_LAND_SPEED | LAND_SPEED
     land_descend_speed_m_s: float = 1.5  # MPC_Z_V_AUTO_DN | LAND_SPEED_HIGH or WPNAV_SPEED_DN
@@ -118,19 +110,19 @@ class FlightParameters:
     land_fast_altitude_m: float = 10.0  # MPC_LAND_ALT1 | LAND_ALT_LOW: at and above, land_descend_speed
 
     return_altitude_m: float = 30.0  # RTL_RETURN_ALT | RTL_ALT, above home
-    return_descend_altitude_m: float = 10.0  # RTL_DESCEND_ALT | RTL_ALT_FINAL, above home
-    return_loiter_time_s: float = 0.0  # RTL_LAND_DELAY | RTL_LOIT_TIME; negative (PX4 -1): hold, don't land
+    return_descend_altitude_m: NotNegative = 10.0  # RTL_DESCEND_ALT | RTL_ALT_FINAL, above home
+    return_loiter_time_s: Finite = 0.0  # RTL_LAND_DELAY | RTL_LOIT_TIME; negative (PX4 -1): hold, don't land
     return_loiters_high: bool = False  # ArduPilot waits before it descends, PX4 at the descend altitude
     return_speed_m_s: float = 5.0  # MPC_XY_CRUISE | RTL_SPEED
-    return_cone_half_angle_rad: float = math.radians(
+    return_cone_half_angle_rad: NotNegative = math.radians(
         45.0
     )  # RTL_CONE_ANG; ArduPilot: atan(1/RTL_CONE_SLOPE); 0: off
-    return_min_distance_m: float = (
+    return_min_distance_m: NotNegativeOrInf = (
         10.0  # RTL_MIN_DIST: the cone rule works within this range; inf: everywhere
     )
-    return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN
-    return_height_max_m: float = math.inf  # no higher over home; ArduPilot: under FENCE_ALT_MAX
-    return_stays_at_m: float = 0.0  # hovers there at the end; 0: lands | RTL_ALT_FINAL
+    return_climb_min_m: NotNegative = 0.0  # RTL_CLIMB_MIN
+    return_height_max_m: PositiveOrInf = math.inf  # no higher over home; ArduPilot: under FENCE_ALT_MAX
+    return_stays_at_m: NotNegative = 0.0  # hovers there at the end; 0: lands | RTL_ALT_FINAL
     return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE
     rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
 
@@ -146,8 +138,8 @@ class FlightParameters:
     acro_rate_rad_s: float = math.radians(100.0)  # MC_ACRO_R_MAX, MC_ACRO_P_MAX | ACRO_RP_RATE
     acro_yaw_rate_rad_s: float = math.radians(100.0)  # MC_ACRO_Y_MAX | ACRO_Y_RATE
     manual_throttle_min: float = 0.08  # MPC_MANTHR_MIN
-    manual_deadzone: float = 0.1  # MPC_HOLD_DZ
-    manual_expo: float = 0.6  # MPC_XY_MAN_EXPO
+    manual_deadzone: NotNegative = 0.1  # MPC_HOLD_DZ
+    manual_expo: Share = 0.6  # MPC_XY_MAN_EXPO
 
     guided_timeout_s: float = 3.0  # GUID_TIMEOUT
 
@@ -157,20 +149,12 @@ class FlightParameters:
     avoidance: AvoidanceParameters = field(default_factory=AvoidanceParameters)  # CP_* | AVOID_*
 
     def __post_init__(self) -> None:
-        zero = dict.fromkeys(_MAY_BE_ZERO, require_not_negative)
-        check_fields(
-            self,
-            require_positive,
-            but=zero | {"return_loiter_time_s": require_finite},  # negative: for ever
-            unlimited=("return_min_distance_m", "return_height_max_m"),
-        )
+        check_fields(self, require_positive)
         if self.land_fast_altitude_m < self.land_slow_altitude_m:
             raise ValueError(
                 f"land_fast_altitude_m = {self.land_fast_altitude_m} is below "
                 f"land_slow_altitude_m = {self.land_slow_altitude_m}"
             )
-        if self.manual_expo > 1.0:
-            raise ValueError(f"manual_expo = {self.manual_expo} is not in 0..1")
         if self.manual_deadzone >= 1.0:
             raise ValueError(f"manual_deadzone = {self.manual_deadzone} is not in 0..1 (1 excluded)")
         if self.return_cone_half_angle_rad > math.pi / 2.0:

@@ -1,4 +1,4 @@
-"""The target of a return (PX4 RTL_TYPE | ArduPilot RALLY_*), and a return along the plan.
+"""What returns of all classes of vehicle share: height, target (PX4 RTL_TYPE | ArduPilot RALLY_*), plan.
 
 Source: PX4 1.16 navigator/rtl (findRtlDestination), ArduPilot 4.6 AP_Rally.
 """
@@ -8,18 +8,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.parameters import ALONG_PLAN, RallyRule, ReturnDestination
-from autopilot_bridge.flight.plan_reading import Command, PlanRules, is_waypoint, landing_start, target_of
+from autopilot_bridge.flight.plan_reading import (
+    PX4_PLANS,
+    Command,
+    PlanRules,
+    is_waypoint,
+    landing_start,
+    target_of,
+)
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 
 if TYPE_CHECKING:
-    from autopilot_bridge.flight.context import FlightContext
     from autopilot_bridge.flight.plan_task import PlanTask
 
 _PREFERENCE_M: Final = 2.0  # home, then the landing, unless another place is closer by more than this (PX4)
@@ -28,6 +35,18 @@ _TO_LANDING: Final = frozenset(
     {ReturnDestination.LANDING_SEQUENCE, ReturnDestination.LANDING_OR_RALLY, ReturnDestination.CLOSEST}
 )
 _RALLY_POINT: Final = 5100  # MAV_CMD_NAV_RALLY_POINT
+
+
+class ReturnPhase(IntEnum):
+    """The phase of a return; the last two are a multicopter's, whose plan is a phase of its own."""
+
+    CLIMB = 0
+    FLY = 1
+    DESCEND = 2
+    LOITER = 3
+    LAND = 4
+    PLAN = 5
+    STAY = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,42 +191,52 @@ def _away_m(ctx: FlightContext, place: Array) -> float:
     return math.hypot(float(place[0] - here[0]), float(place[1] - here[1]))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReturnPlan:
-    """The plan that a return flies.
+class HomewardTask:
+    """A return that may fly the plan.
+
+    Args:
+        store: the plan, whose landing the parameters may send the return to; None: there is none.
+        first_item: the first item that is flown, as in the mission task.
+        rules: how the firmware flies a plan.
+        plan_task: makes the mission task that flies the plan; None: the return flies no plan.
 
     Attributes:
-        store: the plan; for the way back a separate plan.
-        first_item: the first item that is flown.
-        rules: how it is flown; a return skips the waiting times.
+        phase: see `ReturnPhase`.
+        place: the target of the return; None: there is none.
     """
 
-    store: MissionStore
-    first_item: int
-    rules: PlanRules
+    def __init__(
+        self,
+        store: MissionStore | None = None,
+        *,
+        first_item: int = 0,
+        rules: PlanRules = PX4_PLANS,
+        plan_task: Callable[..., PlanTask] | None = None,
+    ) -> None:
+        super().__init__()
+        self.phase = ReturnPhase.CLIMB
+        self.place: ReturnPlace | None = None
+        self._store = store
+        self._first_item = first_item
+        self._rules = rules
+        self._plan_task = plan_task
+        self._wait_s = 0.0
 
-    @classmethod
-    def of(
-        cls,
-        ctx: FlightContext,
-        store: MissionStore,
-        first_item: int,
-        rules: PlanRules,
-        destination: ReturnDestination,
-        place: ReturnPlace | None,
-    ) -> ReturnPlan:
-        """The plan of a return to `place`, set to the item where it begins."""
+    def _plan_home(
+        self, ctx: FlightContext, destination: ReturnDestination, place: ReturnPlace | None
+    ) -> PlanTask | None:
+        """The task that flies the plan to `place`, from the item where that begins, without the waiting times
+        of the way; the way back is a separate plan. None: there is no plan."""
+        store, first_item, rules = self._store, self._first_item, self._rules
+        if store is None or self._plan_task is None or len(store.items) <= first_item:
+            return None
         begin = None if place is None else place.landing
         if destination in ALONG_PLAN:
             shorter = destination is ReturnDestination.ALONG_PLAN_SHORTER
             own, begin = way_back(ctx, store, first_item, plan_landing(store), shorter=shorter)
             rules = replace(rules, hurries=True, silent=own is not store)
             if own is not store:
-                return cls(store=own, first_item=0, rules=rules)
+                store, first_item = own, 0
         if begin is not None:
             store.current = begin
-        return cls(store=store, first_item=first_item, rules=rules)
-
-    def task(self, make: Callable[..., PlanTask]) -> PlanTask:
-        """The task that flies the plan."""
-        return make(self.store, first_item=self.first_item, rules=self.rules)
+        return self._plan_task(store, first_item=first_item, rules=rules)

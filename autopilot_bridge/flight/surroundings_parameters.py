@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegativeOrInf, Positive, check_fields, require_not_negative
 
 
 class FollowHeight(IntEnum):
@@ -49,9 +49,9 @@ class FollowParameters:
     along_course: bool = True
     height: FollowHeight = FollowHeight.HOME
     relative_altitude: bool = False
-    max_distance_m: float = math.inf
+    max_distance_m: NotNegativeOrInf = math.inf
     timeout_s: float = 2.5
-    gain_1_s: float = 0.5
+    gain_1_s: Positive = 0.5
     smoothing_s: float = 0.5
     swing_speed_m_s: float = 5.0
     yaw: FollowYaw = FollowYaw.FACE_TARGET
@@ -59,13 +59,7 @@ class FollowParameters:
     def __post_init__(self) -> None:
         if len(self.offset_m) != 3 or not all(abs(part) <= 1e4 for part in self.offset_m):
             raise ValueError(f"offset_m {self.offset_m} is not accepted: three numbers within 10 km are")
-        check_fields(
-            self,
-            require_not_negative,
-            but={"gain_1_s": require_positive},
-            unlimited=("max_distance_m",),
-            unchecked=("offset_m",),
-        )
+        check_fields(self, require_not_negative, unchecked=("offset_m",))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,10 +86,10 @@ class AvoidanceParameters:
     go_without_data: bool = True
     slide: bool = False
     timeout_s: float = 0.5
-    deceleration_m_s2: float = 2.0
+    deceleration_m_s2: Positive = 2.0
 
     def __post_init__(self) -> None:
-        check_fields(self, require_not_negative, but={"deceleration_m_s2": require_positive})
+        check_fields(self, require_not_negative)
 
 
 class Precision(IntEnum):

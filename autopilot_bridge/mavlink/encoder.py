@@ -25,8 +25,6 @@ class FrameEncoder:
         system_id, component_id: the sender, 1..255.
     """
 
-    __slots__ = ("_messages", "component_id", "sequence", "system_id")
-
     def __init__(self, system_id: int, component_id: int) -> None:
         for name, value in (("system_id", system_id), ("component_id", component_id)):
             if not 1 <= value <= 255:

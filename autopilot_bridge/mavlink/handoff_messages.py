@@ -1,4 +1,4 @@
-"""Tracks and the decision of a handoff in TUNNEL messages between two aircraft.
+"""Tracks, designation and decision of a handoff in TUNNEL messages between two aircraft.
 
 MAVLink has no message for tracks of targets relative to an aircraft that may not know its position.
 FOLLOW_TARGET and ADSB_VEHICLE have geodetic positions. docs/mavlink/handoff.md documents the payloads. All
@@ -16,18 +16,23 @@ from pymavlink.dialects.v20 import all as dialect
 
 __all__ = [
     "HANDOFF_DECISION_PAYLOAD",
+    "TRACK_DESIGNATION_PAYLOAD",
     "TRACK_REPORT_PAYLOAD",
     "HandoffDecision",
     "ReportedTrack",
+    "TrackDesignation",
     "TrackReport",
     "decision_message",
+    "designation_message",
     "read_decision",
+    "read_designation",
     "read_track_report",
     "track_report_messages",
 ]
 
 TRACK_REPORT_PAYLOAD: Final = 0xF51B
 HANDOFF_DECISION_PAYLOAD: Final = 0xF51C
+TRACK_DESIGNATION_PAYLOAD: Final = 0xF51D
 """Payload types; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""
 
 _VERSION: Final = 1
@@ -37,6 +42,7 @@ _PAYLOAD_SIZE: Final = 128
 _REPORT: Final = struct.Struct("<BBBBIQfHBB")
 _TRACK: Final = struct.Struct("<H8f")
 _DECISION: Final = struct.Struct("<BBBBHIQf")
+_DESIGNATION: Final = struct.Struct("<BBH")
 _TRACKS_PER_MESSAGE: Final = (_PAYLOAD_SIZE - _REPORT.size) // _TRACK.size
 _MOST_TRACKS: Final = 255
 _FAR_M: Final = 1e5
@@ -138,6 +144,19 @@ class HandoffDecision:
     track: ReportedTrack
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackDesignation:
+    """An operator designates a track as the target, or confirms that it is.
+
+    Attributes:
+        system: system id of the tracking aircraft, 1 to 255.
+        track: number of its track, from 1.
+    """
+
+    system: int
+    track: int
+
+
 def track_report_messages(
     *,
     system: int,
@@ -232,6 +251,26 @@ def read_decision(payload_type: int, length: int, payload: Sequence[int]) -> Han
         probability=probability,
         track=track,
     )
+
+
+def designation_message(designation: TrackDesignation) -> Any:
+    """The TUNNEL message of a designation, to all systems and components."""
+    payload = _DESIGNATION.pack(_VERSION, designation.system, designation.track)
+    return _tunnel(TRACK_DESIGNATION_PAYLOAD, payload)
+
+
+def read_designation(payload_type: int, length: int, payload: Sequence[int]) -> TrackDesignation | None:
+    """The content of a TUNNEL message; None for other payloads and for malformed ones. It never raises.
+
+    Args:
+        payload_type, length, payload: fields of the message.
+    """
+    if payload_type != TRACK_DESIGNATION_PAYLOAD or not _DESIGNATION.size <= length <= len(payload):
+        return None
+    version, system, track = _DESIGNATION.unpack_from(bytes(payload[:length]))
+    if version != _VERSION or not system or not track:
+        return None
+    return TrackDesignation(system=system, track=track)
 
 
 def _tunnel(payload_type: int, payload: bytes) -> Any:

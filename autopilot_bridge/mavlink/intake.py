@@ -42,8 +42,6 @@ class _Inbox:
         received_at: number of the last `take` with data of it.
     """
 
-    __slots__ = ("parser", "pieces", "received_at", "size", "understood")
-
     def __init__(self) -> None:
         self.parser = FrameParser()
         self.pieces: deque[bytes] = deque()
@@ -61,8 +59,6 @@ class Intake(Generic[PeerT]):
     Attributes:
         overrun_bytes: bytes dropped unread, because too many bytes of a peer were waiting.
     """
-
-    __slots__ = ("_admit", "_inboxes", "_retired", "_takes", "_waiting", "overrun_bytes")
 
     def __init__(self, admit: Admit | None = None) -> None:
         self.overrun_bytes = 0

@@ -20,12 +20,13 @@ class Packet:
         data, message_ids: as passed to the constructor.
     """
 
-    __slots__ = ("_frames", "_starts", "data", "message_ids")
+    __slots__ = ("_frames", "_given", "_starts", "data", "message_ids")
 
     def __init__(self, data: bytes, message_ids: tuple[int, ...]) -> None:
         self.data = data
         self.message_ids = message_ids
-        self._frames: list[Frame] | None = None
+        self._given = False  # frames that need not be of MAVLink 2, or are signed
+        self._frames: list[Frame | None] = [None] * len(message_ids)  # those that were asked for
         self._starts: list[int] | None = None  # of each frame in `data`, and the end
 
     @classmethod
@@ -35,7 +36,8 @@ class Packet:
             b"".join([frame.raw for frame in frames]) if len(frames) > 1 else frames[0].raw,
             tuple([frame.message_id for frame in frames]),
         )
-        packet._frames = list(frames)
+        packet._frames = [*frames]
+        packet._given = True
         return packet
 
     @classmethod
@@ -52,16 +54,12 @@ class Packet:
     @property
     def sender(self) -> tuple[int, int]:
         """System and component id."""
-        if self._frames is None:
-            return self.data[5], self.data[6]
-        return _sender(self._frames[0])
+        return _sender(self.frame(0)) if self._given else (self.data[5], self.data[6])
 
     @property
     def frames(self) -> list[Frame]:
         """The frames; always the same objects."""
-        if self._frames is None:
-            self._frames = [self.frame(index) for index in range(len(self.message_ids))]
-        return self._frames
+        return [self.frame(index) for index in range(len(self.message_ids))]
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -72,24 +70,26 @@ class Packet:
         return iter(self.frames)
 
     def frame(self, index: int) -> Frame:
-        """One of the frames."""
-        if self._frames is not None:
-            return self._frames[index]
-        starts = self._starts or self._found_starts()
-        raw = self.data[starts[index] : starts[index + 1]]
-        return new_frame((raw, self.message_ids[index], raw[5], raw[6], raw[4], 2, False))
+        """One of the frames; always the same object."""
+        found = self._frames[index]
+        if found is None:
+            starts = self._starts or self._found_starts()
+            raw = self.data[starts[index] : starts[index + 1]]
+            found = new_frame((raw, self.message_ids[index], raw[5], raw[6], raw[4], 2, False))
+            self._frames[index] = found
+        return found
 
     def newest(self, message_id: int) -> Frame:
         """The last frame with an id that is in `message_ids`; always the same object."""
-        frames, ids = self.frames, self.message_ids
-        return next(frames[k] for k in range(len(ids) - 1, -1, -1) if ids[k] == message_id)
+        ids = self.message_ids
+        return self.frame(next(k for k in range(len(ids) - 1, -1, -1) if ids[k] == message_id))
 
     def part(self, begin: int, end: int) -> "Packet":
         """The packet of some of the frames: at least one."""
         if end - begin == len(self.message_ids):
             return self
-        if self._frames is not None:
-            return Packet.of(self._frames[begin:end])
+        if self._given:
+            return Packet.of(self.frames[begin:end])
         starts = self._starts or self._found_starts()
         return Packet(self.data[starts[begin] : starts[end]], self.message_ids[begin:end])
 

@@ -106,8 +106,6 @@ class FrameParser:
     (`signing.LinkSigning` checks them).
     """
 
-    __slots__ = ("_pending", "counters")
-
     def __init__(self) -> None:
         self.counters = ParserCounters()
         self._pending = b""

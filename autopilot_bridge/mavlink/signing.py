@@ -132,8 +132,6 @@ class SigningState:
             signed each half minute of timestamps.
     """
 
-    __slots__ = ("_clock", "_key", "_newest", "_on_save", "_save_at", "_seed", "_streams")
-
     def __init__(
         self,
         key: SigningKey | None = None,
@@ -292,8 +290,6 @@ class LinkSigning:
         link_id: number of the link, 0..255; different for the links of one device.
         policy: the link's policy.
     """
-
-    __slots__ = ("counters", "link_id", "policy", "state")
 
     def __init__(self, state: SigningState, *, link_id: int, policy: LinkSigningPolicy = REQUIRED) -> None:
         if not 0 <= link_id <= 255:

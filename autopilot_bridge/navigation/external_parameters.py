@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, check_fields, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,7 @@ class ExternalParameters:
     position_gate: float = 5.0
     velocity_gate: float = 3.0
     yaw_gate: float = 2.6
-    delay_s: float = 0.0
+    delay_s: NotNegative = 0.0
     offset_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     least_quality: int = 0
     scale: float = 1.0
@@ -48,12 +48,7 @@ class ExternalParameters:
     timeout_s: float = 1.0
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            require_positive,
-            but={"delay_s": require_not_negative},
-            unchecked=("offset_frd_m", "least_quality"),
-        )
+        check_fields(self, require_positive, unchecked=("offset_frd_m", "least_quality"))
         if not all(abs(part) <= 10.0 for part in self.offset_frd_m):
             raise ValueError(
                 f"offset_frd_m {self.offset_frd_m} is not accepted: three numbers within 10 m are"

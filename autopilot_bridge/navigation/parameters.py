@@ -4,24 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
-
-_MAY_BE_ZERO = frozenset(
-    {
-        "barometer_lag_s",
-        "gyro_scale_error",
-        "gyro_cross_axis_error",
-        "rangefinder_noise_fraction",
-        "gps_check_time_s",
-        "barometer_offset_walk_m_per_sqrt_s",
-        "barometer_scale_error",
-        "terrain_walk_m_per_sqrt_s",
-        "terrain_gradient",
-        "airspeed_sensor_heating_k",
-        "airspeed_lag_s",
-        "wind_height_scale",
-    }
-)
+from flightsim.foundation.checks import NotNegative, check_fields, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +116,8 @@ class NavigationParameters:
     gyro_noise_rad_s_sqrt_hz: float = 1.5e-3
     gyro_bias_rad_s: float = 1.75e-3
     gyro_bias_walk_rad_s_sqrt_s: float = 1e-4
-    gyro_scale_error: float = 0.0033
-    gyro_cross_axis_error: float = 0.001
+    gyro_scale_error: NotNegative = 0.0033
+    gyro_cross_axis_error: NotNegative = 0.001
     gyro_scale_tilt_rad: float = 0.2
     accel_noise_m_s2_sqrt_hz: float = 0.035
     accel_bias_m_s2: float = 0.2
@@ -150,7 +133,7 @@ class NavigationParameters:
     gps_required_epv_m: float = 5.0
     gps_required_speed_accuracy_m_s: float = 0.5
     gps_required_hdop: float = 2.5
-    gps_check_time_s: float = 1.0
+    gps_check_time_s: NotNegative = 1.0
     gps_gate: float = 5.0
     gps_velocity_gate: float = 5.0
     gps_timeout_s: float = 7.0
@@ -158,9 +141,9 @@ class NavigationParameters:
     height_timeout_s: float = 5.0
     barometer_gate: float = 5.0
     barometer_noise_m: float = 3.5
-    barometer_lag_s: float = 0.02
-    barometer_offset_walk_m_per_sqrt_s: float = 0.013
-    barometer_scale_error: float = 0.04
+    barometer_lag_s: NotNegative = 0.02
+    barometer_offset_walk_m_per_sqrt_s: NotNegative = 0.013
+    barometer_scale_error: NotNegative = 0.04
     magnetometer_gate: float = 3.0
     magnetometer_noise_gauss: float = 0.05
     magnetometer_bias_gauss: float = 0.01
@@ -171,10 +154,10 @@ class NavigationParameters:
     magnetic_year: float = 2026.0
     rangefinder_gate: float = 5.0
     rangefinder_noise_m: float = 0.03
-    rangefinder_noise_fraction: float = 0.005
+    rangefinder_noise_fraction: NotNegative = 0.005
     rangefinder_max_tilt_rad: float = 0.7
-    terrain_walk_m_per_sqrt_s: float = 0.1
-    terrain_gradient: float = 0.5
+    terrain_walk_m_per_sqrt_s: NotNegative = 0.1
+    terrain_gradient: NotNegative = 0.5
     terrain_timeout_s: float = 5.0
     ground_clearance_m: float = 0.1
     no_aid_noise_m: float = 10.0
@@ -194,14 +177,14 @@ class NavigationParameters:
     airspeed_noise_m_s: float = 0.4
     airspeed_gate: float = 5.0
     airspeed_scale: float = 1.0
-    airspeed_sensor_heating_k: float = 5.0
-    airspeed_lag_s: float = 0.05
+    airspeed_sensor_heating_k: NotNegative = 5.0
+    airspeed_lag_s: NotNegative = 0.05
     airspeed_smoothing_s: float = 0.2
     use_sideslip: bool = True
     sideslip_noise_rad: float = 0.03
     sideslip_gate: float = 5.0
     wind_walk_m_s_sqrt_s: float = 0.02
-    wind_height_scale: float = 0.5
+    wind_height_scale: NotNegative = 0.5
     wind_prior_m_s: float = 5.0
     turbulence_length_m: float = 250.0
     airspeed_checks: bool = True
@@ -213,8 +196,7 @@ class NavigationParameters:
     external: ExternalParameters = field(default_factory=ExternalParameters)
 
     def __post_init__(self) -> None:
-        zero = dict.fromkeys(_MAY_BE_ZERO, require_not_negative)
-        check_fields(self, require_positive, but=zero, unchecked=("mag_ned_gauss",))
+        check_fields(self, require_positive, unchecked=("mag_ned_gauss",))
         given = self.mag_ned_gauss
         if given is not None and not 0.05 <= math.hypot(*given) < math.inf:
             raise ValueError(f"mag_ned_gauss {given} is not a field of the Earth (0.2 to 0.7 gauss), NED")

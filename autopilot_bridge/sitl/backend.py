@@ -113,8 +113,6 @@ class EmulatedBackend:
         autopilot: the emulated autopilot.
     """
 
-    __slots__ = ("_actuators", "_step", "autopilot")
-
     def __init__(self, autopilot: Autopilot) -> None:
         self.autopilot = autopilot
         self._actuators = autopilot.actuators  # written in place

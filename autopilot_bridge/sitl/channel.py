@@ -30,20 +30,6 @@ class LinkChannel:
         motion: set by the autopilot that the channel is added to.
     """
 
-    __slots__ = (
-        "_encoder",
-        "_forward",
-        "_intake",
-        "_memory",
-        "_peers",
-        "_signs",
-        "line",
-        "link",
-        "motion",
-        "name",
-        "signing",
-    )
-
     def __init__(
         self,
         name: str,
@@ -196,8 +182,6 @@ class PeerExchange:
     Args:
         link: any link; one with a single peer at a time has nothing to forward.
     """
-
-    __slots__ = ("_forget", "_link", "_loops", "_router")
 
     def __init__(self, link: Link) -> None:
         self._link = link

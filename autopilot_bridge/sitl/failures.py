@@ -51,8 +51,6 @@ class FailureInjector:
         sensors: its sensors.
     """
 
-    __slots__ = ("_entries", "_lose_radio", "_others", "_sensors", "_signal_lost", "_vehicle")
-
     def __init__(self, vehicle: Vehicle, sensors: SensorSuite) -> None:
         self._vehicle = vehicle
         self._sensors = sensors

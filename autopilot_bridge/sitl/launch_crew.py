@@ -22,8 +22,6 @@ class LaunchCrew:
         step_us: length of a physics step.
     """
 
-    __slots__ = ("_backend", "_lift_off", "_look_us", "_next_us", "_ready_since_us", "_vehicle")
-
     def __init__(self, vehicle: Vehicle, backend: AutopilotBackend, *, step_us: int) -> None:
         self._vehicle = vehicle
         self._backend = backend

@@ -95,8 +95,6 @@ class SharedLink:
 class _Port:
     """One vehicle's part of a shared link; `SharedLink.poll` delivers the received frames."""
 
-    __slots__ = ("_member", "_shared", "channel")
-
     def __init__(self, shared: SharedLink, member: int) -> None:
         self._shared = shared
         self._member = member

@@ -68,8 +68,6 @@ class TruthEncoder:
         truth: layout of `flightsim.truth`, written in place by the vehicle.
     """
 
-    __slots__ = ("_encoder", "_fill", "_record")
-
     def __init__(self, system_id: int, truth: NDArray[np.float64]) -> None:
         if truth.shape != (t.TRUTH_SIZE,):
             raise ValueError(f"truth has shape {truth.shape}; accepted: ({t.TRUTH_SIZE},)")
@@ -96,8 +94,6 @@ class TargetTruthEncoder:
         targets: the world's targets.
         home: origin of their frame.
     """
-
-    __slots__ = ("_calls", "_encoders", "_home", "_moving", "_records", "_targets")
 
     def __init__(self, targets: GroundTargets, home: Home) -> None:
         if len(targets) > MAX_TARGETS:

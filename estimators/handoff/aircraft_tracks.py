@@ -61,7 +61,7 @@ class AircraftTracks:
         self._places = {
             track.number: (float(track.state[0]), float(track.state[1])) for track in self.tracker.tracks
         }
-        self.history.add(time_us, [(number, *place) for number, place in self._places.items()])
+        self.history.add(time_us, reckoning, [(number, *place) for number, place in self._places.items()])
 
     @property
     def places(self) -> Mapping[int, tuple[float, float]]:

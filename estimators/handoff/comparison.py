@@ -21,6 +21,8 @@ class TrackWindows:
         times_us: (n,) times of the places, ascending to the present.
         handoff: (n, 2) forward and right by track number of the handoff aircraft.
         target: (n, 2) the tracker's target; None: it has no window.
+        eyes: (n, 2) places of the handoff aircraft and of the tracker at these times, each in its own frame.
+        heights_m: of both over the ground.
         others: the tracker's other tracks, by number.
         identity: probability that the tracker's target still is the designated one.
     """
@@ -29,6 +31,8 @@ class TrackWindows:
     times_us: NDArray[np.int64]
     handoff: Mapping[int, Array]
     target: Array | None
+    eyes: tuple[Array, Array]
+    heights_m: tuple[float, float]
     others: Mapping[int, Array] = field(default_factory=dict)
     identity: float = 1.0
 

@@ -9,7 +9,8 @@ from its start; the present position and heading in it make a window for any tim
 import math
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ from numpy.typing import NDArray
 from estimators.relative_pose.belief import LevelMotion
 
 Array = NDArray[np.float64]
+
+
+EYE: Final = 0
+"""Number of the aircraft itself beside its tracks, which are numbered from 1."""
 
 
 class DeadReckoning:
@@ -99,7 +104,7 @@ class ReckonedPath:
 
 
 class TrackHistory:
-    """Places of numbered tracks in the frame of a dead reckoning, for some time.
+    """Places of an aircraft and of its numbered tracks in the frame of its dead reckoning, for some time.
 
     Args:
         keep_s: time for which places are kept.
@@ -112,14 +117,14 @@ class TrackHistory:
         self._places: dict[int, deque[tuple[int, float, float]]] = {}
         self._newest_us = 0
 
-    def add(self, time_us: int, places: Iterable[tuple[int, float, float]]) -> None:
-        """Add the tracks of one time as (number, x, y). Places older than the newest are ignored; a track
-        that has had no place for the time of the window is forgotten.
+    def add(self, time_us: int, eye: DeadReckoning, places: Iterable[tuple[int, float, float]]) -> None:
+        """Add the aircraft's place and the tracks of one time as (number, x, y). Places older than the newest
+        are ignored; a track that has had no place for the time of the window is forgotten.
         """
         if time_us < self._newest_us:
             return
         self._newest_us = time_us
-        for number, x_m, y_m in places:
+        for number, x_m, y_m in ((EYE, eye.x_m, eye.y_m), *places):
             kept = self._places.setdefault(number, deque())
             if not kept or kept[-1][0] < time_us:
                 kept.append((time_us, x_m, y_m))
@@ -133,18 +138,12 @@ class TrackHistory:
 
     @property
     def numbers(self) -> Sequence[int]:
-        """Numbers of the tracks with at least one place."""
+        """Numbers of the tracks with at least one place, and `EYE`."""
         return sorted(self._places)
 
-    def current(self, time_us: int) -> Mapping[int, tuple[float, float]]:
-        """Places of the tracks that have one at this time."""
-        return {
-            number: kept[-1][1:] for number, kept in sorted(self._places.items()) if kept[-1][0] == time_us
-        }
-
     def window(self, number: int, times_us: NDArray[np.int64]) -> Array | None:
-        """Places of a track at several times, (n, 2), linear between its own times; None when it does not
-        reach over all of them.
+        """Places of a track, or of the aircraft (`EYE`), at several times, (n, 2), linear between its own
+        times; None when it does not reach over all of them.
         """
         kept = self._places.get(number)
         if kept is None or kept[0][0] > times_us[0] or kept[-1][0] < times_us[-1]:

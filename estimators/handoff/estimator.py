@@ -14,11 +14,13 @@ from typing import ClassVar, Final
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink.handoff_messages import (
     HANDOFF_DECISION_PAYLOAD,
+    TRACK_DESIGNATION_PAYLOAD,
     TRACK_REPORT_PAYLOAD,
     HandoffDecision,
     TrackReport,
     decision_message,
     read_decision,
+    read_designation,
     read_track_report,
     track_report_messages,
 )
@@ -41,6 +43,7 @@ from estimators.vehicle_time import UNIX_TIME_US
 
 _PATH_S: Final = 5.0
 _PENDING_US: Final = 2_000_000
+_RECEIVED: Final = (TRACK_REPORT_PAYLOAD, HANDOFF_DECISION_PAYLOAD, TRACK_DESIGNATION_PAYLOAD)
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
 
 
@@ -125,11 +128,8 @@ class HandoffEstimator(Estimator[HandoffSettings]):
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         system = message.src_system
-        if message.name == "TUNNEL" and message.payload_type in (
-            TRACK_REPORT_PAYLOAD,
-            HANDOFF_DECISION_PAYLOAD,
-        ):
-            return self._from_partner(message)
+        if message.name == "TUNNEL" and message.payload_type in _RECEIVED:
+            return self._from_elsewhere(message)
         if system not in (self.own, self.partner):
             return Outcome.IGNORED
         if message.name in _INERTIAL and message.src_component == 1 and message.time_usec < UNIX_TIME_US:
@@ -169,8 +169,10 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             self._restart()
         return self._compare(time_us) if fused is Outcome.UPDATED else fused
 
-    def _from_partner(self, message: Message) -> Outcome:
-        """A report or a decision, which the onboard computer of the other aircraft sends."""
+    def _from_elsewhere(self, message: Message) -> Outcome:
+        """A report or a decision, which the onboard computer of the other aircraft sends, or a designation by
+        the operator.
+        """
         kind = message.payload_type
         wire = (kind, message.payload_length, message.payload)
         if kind == TRACK_REPORT_PAYLOAD and not self._tracks:
@@ -188,6 +190,13 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             if decision is None:
                 return self._malformed()
             return self._on_decision(decision) if decision.system == self.partner else Outcome.IGNORED
+        if kind == TRACK_DESIGNATION_PAYLOAD and self._tracks:
+            designated = read_designation(*wire)
+            if designated is None:
+                return self._malformed()
+            return (
+                self._on_designation(designated.track) if designated.system == self.own else Outcome.IGNORED
+            )
         return Outcome.IGNORED
 
     def _malformed(self) -> Outcome:
@@ -206,6 +215,16 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             self.released = True
         elif decision.decided:
             self.counts["decisions_of_another_track"] += 1
+        return Outcome.USED
+
+    def _on_designation(self, number: int) -> Outcome:
+        tracks = self.sight.tracks
+        place = tracks.places.get(number)
+        if place is None:
+            self.counts["designations_of_no_track"] += 1
+            return Outcome.LATE
+        self.counts["designations"] += 1
+        self.designation.designate(tracks.time_us, number, place)
         return Outcome.USED
 
     def _receive_pending(self, time_us: int) -> None:
@@ -288,7 +307,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
     def _compare(self, time_us: int) -> Outcome:
         """The handoff aircraft has moved the pose: compare, and send the decision."""
         process, p = self.process, self.parameters
-        process.compare(time_us)
+        process.compare(time_us, self.sight.height_m)
         scores = process.comparison.scores
         number = process.comparison.decided
         if number is None:

@@ -1,25 +1,28 @@
-"""Bayesian comparison of tracks: the probability that each is the target, from all pairs of tracks.
+"""Bayesian comparison of tracks: the probability that each is the target, from the pattern of all tracks.
 
 The alternative to the paper's thresholds. With e the handoff aircraft's window less the tracker's, which the
 relative pose has taken to its level frame, the hypothesis that both are of one target is linear and Gaussian,
 
-    e_n = J_n x + w_n,
+    e_n = J_n x + M_n u_n + w_n.
 
-with x the error that all pairs have in common (place and heading of the pose, drift between both dead
-reckonings) and J_n its derivative at place n. w_n has a white part and one that changes slowly: errors of
-roll and pitch, which move a track for seconds. For two different targets there is also a distance and a
-velocity between them, with wide priors. Both have a closed evidence (Bishop 2006, "Pattern Recognition and
-Machine Learning", section 3.5), so a pair has a Bayes factor.
+x and u are what all pairs of tracks have in common. x has the error of the pose, the drift between both dead
+reckonings and the errors of both heights; u has those of roll and pitch of both aircraft, which change within
+seconds and move a place at the horizontal distance r from an aircraft of height h by M = h + r r'/h. w is
+each pair's own noise, with a white part and a slow one. So an aircraft sees all tracks too far to the same
+side, and their pattern counts.
 
-A hypothesis says which track is the target, or that none is. Under each the tracker's other tracks are
-joined to other tracks of the handoff aircraft, the best pair first, each pair with the x that the pairs
-before it leave, as long as its factor is above 1: the pattern of all targets counts, for "none" too. The
-pose's prior is a mixture: a belief that has converged to a wrong place is improbable, and not impossible.
+A hypothesis joins some of the tracker's tracks to different tracks of the handoff aircraft; the others of the
+tracker are not seen by it, and its own others are of targets that the tracker does not see. All hypotheses
+are summed over (Reid 1979, "An algorithm for tracking multiple targets"), each with the joint density of its
+pairs (Bishop 2006, "Pattern Recognition and Machine Learning", section 2.3). The target may be seen by none.
+The pose may have converged to a wrong place, and the noise may be larger than thought: both are mixtures.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from itertools import combinations, permutations
 from typing import Final
 
 import numpy as np
@@ -32,7 +35,8 @@ from flightsim.foundation.checks import check_fields, require_positive, require_
 Array = NDArray[np.float64]
 
 _POSE: Final = [0, 1, 3]  # forward, right and heading of the pose's covariance
-_PLACE, _DRIFT = slice(0, 2), slice(3, 5)  # parts of x; its third element is the heading
+_TRACKER_TRACKS: Final = 4  # the target and the nearest others
+_HANDOFF_TRACKS: Final = 7  # the nearest to the target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,15 +47,18 @@ class EvidenceParameters:
         every_s: time between comparisons.
         sample_s: time between the places of a window that count.
         sigma_m: standard deviation per axis of the white part of the difference of two windows of one target.
-        slow_sigma_m, slow_s: standard deviation per axis of its slow part, and the correlation time. An
-            error of 0.012 rad of roll or pitch moves a place by 3 m in the study.
+        slow_sigma_m, slow_s: standard deviation per axis of its slow part, and the correlation time.
+        tilt_sigma_rad, tilt_s: errors of roll and of pitch of each aircraft, and their correlation time.
+        height_sigma_m: errors of the heights over the ground.
         pose_sigma_m, pose_sigma_rad: errors of the pose that its covariance does not contain.
         drift_m_s: standard deviation per axis of the velocity between both dead reckonings.
         wrong: prior probability that the pose has converged to a wrong place.
         wrong_sigma_m, wrong_sigma_rad: errors of such a pose.
-        apart_m: standard deviation per axis of the distance of two targets.
-        speed_m_s: the same of their relative velocity.
-        absent: prior probability that no track is the target.
+        rough, rough_scale: prior probability that the noise of the pairs is larger, and how many times.
+        apart_m: standard deviation per axis of the distance of another target from this one.
+        speed_m_s, turn_s: the same of its relative velocity, and the correlation time.
+        seen: prior probability that the handoff aircraft has a track of a target that the tracker tracks.
+        free: mean number of tracks of other targets.
         decision: probability of a track that is decided for.
         hold_s: time for which it must stay above.
     """
@@ -59,49 +66,48 @@ class EvidenceParameters:
     every_s: float = 0.5
     sample_s: float = 1.0
     sigma_m: float = 1.0
-    slow_sigma_m: float = 4.0
+    slow_sigma_m: float = 1.0
     slow_s: float = 5.0
+    tilt_sigma_rad: float = 0.012
+    tilt_s: float = 5.0
+    height_sigma_m: float = 2.0
     pose_sigma_m: float = 3.0
     pose_sigma_rad: float = 0.02
     drift_m_s: float = 0.3
     wrong: float = 0.05
     wrong_sigma_m: float = 40.0
     wrong_sigma_rad: float = 0.1
+    rough: float = 0.1
+    rough_scale: float = 3.0
     apart_m: float = 60.0
-    speed_m_s: float = 2.0
-    absent: float = 0.1
+    speed_m_s: float = 1.5
+    turn_s: float = 20.0
+    seen: float = 0.8
+    free: float = 1.0
     decision: float = 0.99
     hold_s: float = 3.0
 
     def __post_init__(self) -> None:
-        shares = ("absent", "decision", "wrong")
+        shares = ("decision", "rough", "seen", "wrong")
         check_fields(self, require_positive, but=dict.fromkeys(shares, require_probability))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Common:
-    """What is known of x.
-
-    Attributes:
-        mean: (5,) forward, right, heading, and the two components of the drift.
-        covariance: (5, 5).
-    """
-
-    mean: Array
-    covariance: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Pairs:
-    """Differences of all pairs of windows, of which the noise has been made white.
+    """All pairs of windows at n times.
 
     Attributes:
-        off: (tracker's windows, handoff's windows, 2 n); the tracker's first window is the target's.
-        design: (tracker's windows, 2 n, 5).
+        off: (i, 2 n, k) the handoff aircraft's window k less the tracker's window i; i = 0 is the target's.
+        common: (i, 2 n, q) derivatives by what all pairs have in common, of which the standard deviations
+            are 1; the first three are the pose's errors, not scaled.
+        own: (2 n, 2 n) covariance of the noise of one pair.
+        apart: (2 n, 2 n) covariance of the way from one target to another.
     """
 
     off: Array
-    design: Array
+    common: Array
+    own: Array
+    apart: Array
 
 
 class EvidenceComparison(TrackComparison):
@@ -113,11 +119,10 @@ class EvidenceComparison(TrackComparison):
 
     def __init__(self, parameters: EvidenceParameters | None = None) -> None:
         super().__init__()
-        p = self.parameters = parameters or EvidenceParameters()
+        self.parameters = parameters or EvidenceParameters()
         self._scores: dict[int, float] = {}
         self._above: tuple[int, int] | None = None  # track above the decision, and since when
         self._compared_us: int | None = None
-        self._wide = np.diag(np.square([p.apart_m, p.apart_m, 0.0, p.speed_m_s, p.speed_m_s]))
 
     def update(self, windows: TrackWindows, pose: PoseMode) -> None:
         p = self.parameters
@@ -138,85 +143,93 @@ class EvidenceComparison(TrackComparison):
 
     def _probabilities(self, windows: TrackWindows, target: Array, pose: PoseMode) -> dict[int, float]:
         p = self.parameters
-        pairs = self._pairs(windows, target, pose)
-        numbers = list(windows.handoff)
+        numbers, pairs = self._pairs(windows, target, pose)
         narrow: Array = pose.covariance[np.ix_(_POSE, _POSE)] + np.diag(
             np.square([p.pose_sigma_m, p.pose_sigma_m, p.pose_sigma_rad])
         )
         wrong = np.diag(np.square([p.wrong_sigma_m, p.wrong_sigma_m, p.wrong_sigma_rad]))
-        priors = ((1.0 - p.wrong, narrow), (p.wrong, narrow + wrong))
-        logs = np.array([self._hypotheses(pairs, covariance) + _log(weight) for weight, covariance in priors])
-        # the prior of a track: what is left beside `absent`, shared by all
-        logs[:, :-1] += _log((1.0 - p.absent) / len(numbers))
-        logs[:, -1] += _log(p.absent)
-        shares = np.exp(logs - logs.max()).sum(axis=0)
+        logs = [
+            self._hypotheses(pairs, covariance, scale) + _log(weight * share)
+            for weight, covariance in ((1.0 - p.wrong, narrow), (p.wrong, narrow + wrong))
+            for share, scale in ((1.0 - p.rough, 1.0), (p.rough, p.rough_scale))
+        ]
+        shares = np.exp(np.array(logs) - np.max(logs)).sum(axis=0)
         shares *= windows.identity / shares.sum()
         return dict(zip(numbers, shares[:-1].tolist(), strict=True))
 
-    def _pairs(self, windows: TrackWindows, target: Array, pose: PoseMode) -> _Pairs:
+    def _pairs(self, windows: TrackWindows, target: Array, pose: PoseMode) -> tuple[list[int], _Pairs]:
         p = self.parameters
         chosen = _sampled(windows.times_us, round(1e6 * p.sample_s))
         times_s = 1e-6 * (windows.times_us[chosen] - windows.time_us).astype(np.float64)
-        apart_s = np.abs(times_s[:, None] - times_s)
-        noise = p.slow_sigma_m**2 * np.exp(-apart_s / p.slow_s) + p.sigma_m**2 * np.eye(len(chosen))
-        white = np.linalg.inv(np.linalg.cholesky(noise))
-        c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        tracker = np.array([target, *windows.others.values()])[:, chosen]
-        turned = tracker @ np.array([[c, -s], [s, c]])
-        handoff = np.array(list(windows.handoff.values()))[:, chosen]
-        off = handoff - turned[:, None] - (pose.forward_m, pose.right_m)
         n = len(chosen)
-        design = np.zeros((len(tracker), n, 2, 5))
-        design[:, :, 0, 0] = design[:, :, 1, 1] = 1.0
-        design[:, :, 0, 2], design[:, :, 1, 2] = turned[:, :, 1], -turned[:, :, 0]
-        design[:, :, 0, 3] = design[:, :, 1, 4] = times_s
-        return _Pairs(
-            off=np.einsum("mn,jkna->jkma", white, off).reshape(*off.shape[:2], 2 * n),
-            design=np.einsum("mn,jnax->jmax", white, design).reshape(len(tracker), 2 * n, 5),
+        c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        turn, place = np.array([[c, -s], [s, c]]), np.array([pose.forward_m, pose.right_m])
+        near = _nearest(windows.others, target, _TRACKER_TRACKS - 1)
+        turned = np.array([target, *(windows.others[number] for number in near)])[:, chosen] @ turn
+        numbers = _nearest(windows.handoff, target @ turn + place, _HANDOFF_TRACKS)
+        handoff = np.array([windows.handoff[number] for number in numbers])[:, chosen]
+        off = handoff - turned[:, None] - place
+        shifts = np.zeros((len(turned), n, 2, 5))  # by pose and drift
+        shifts[..., 0, 0] = shifts[..., 1, 1] = 1.0
+        shifts[..., 0, 2], shifts[..., 1, 2] = turned[..., 1], -turned[..., 0]
+        shifts[..., 0, 3] = shifts[..., 1, 4] = p.drift_m_s * times_s
+        parts = [shifts]
+        apart_s = np.abs(times_s[:, None] - times_s)
+        root = p.tilt_sigma_rad * np.linalg.cholesky(np.exp(-apart_s / p.tilt_s))
+        eyes = (windows.eyes[0], windows.eyes[1] @ turn + place)
+        for eye, height_m in zip(eyes, windows.heights_m, strict=True):
+            line = turned + place - eye[chosen]
+            tilted = height_m * np.eye(2) + line[..., :, None] * line[..., None, :] / height_m
+            parts.append((p.height_sigma_m / height_m * line)[..., None])
+            parts.append((tilted[..., None, :] * root[:, None, :, None]).reshape(len(turned), n, 2, 2 * n))
+        common = np.concatenate(parts, axis=-1).reshape(len(turned), 2 * n, -1)
+        noise = p.slow_sigma_m**2 * np.exp(-apart_s / p.slow_s) + p.sigma_m**2 * np.eye(n)
+        away = p.apart_m**2 + _walked(-times_s, p.speed_m_s, p.turn_s)
+        return numbers, _Pairs(
+            off=off.reshape(*off.shape[:2], 2 * n).transpose(0, 2, 1),
+            common=common,
+            own=_on_both_axes(noise),
+            apart=_on_both_axes(away),
         )
 
-    def _hypotheses(self, pairs: _Pairs, pose: Array) -> Array:
-        """Logarithm of the evidence that each track of the handoff aircraft is the target, and, last, that
-        none is; over that of all tracks being of different targets.
+    def _hypotheses(self, pairs: _Pairs, pose: Array, scale: float) -> Array:
+        """Logarithm of the density, summed over all hypotheses, with each track of the handoff aircraft as
+        the target, and, last, with none.
+
+        Args:
+            pairs: of tracks.
+            pose: (3, 3) covariance of its error.
+            scale: of the noise of the pairs.
         """
-        prior = np.zeros((5, 5))
-        prior[:3, :3] = pose
-        prior[_DRIFT, _DRIFT] = self.parameters.drift_m_s**2 * np.eye(2)
-        nothing = _Common(mean=np.zeros(5), covariance=prior)
-        others, tracks = list(range(1, pairs.off.shape[0])), list(range(pairs.off.shape[1]))
-        first = self._factors(pairs, [0], tracks, nothing)[0]
-        logs = [
-            float(first[k])
-            + self._pattern(pairs, others, [j for j in tracks if j != k], self._joined(pairs, 0, k, nothing))
-            for k in tracks
-        ]
-        return np.array([*logs, self._pattern(pairs, others, tracks, nothing)])
-
-    def _pattern(self, pairs: _Pairs, others: list[int], tracks: list[int], common: _Common) -> float:
-        """Logarithm of the factors of the other pairs, the best one first."""
-        total, others, tracks = 0.0, list(others), list(tracks)
-        while others and tracks:
-            factors = self._factors(pairs, others, tracks, common)
-            i, k = divmod(int(np.argmax(factors)), len(tracks))
-            if factors[i, k] <= 0.0:
-                break
-            total += float(factors[i, k])
-            common = self._joined(pairs, others.pop(i), tracks.pop(k), common)
-        return total
-
-    def _factors(self, pairs: _Pairs, others: list[int], tracks: list[int], common: _Common) -> Array:
-        """(others, tracks) logarithms of the Bayes factors."""
-        design = pairs.design[others]
-        off = pairs.off[np.ix_(others, tracks)] - (design @ common.mean)[:, None]
-        same = _log_evidence(off, design, common.covariance)
-        return same - _log_evidence(off, design, common.covariance + self._wide)
-
-    def _joined(self, pairs: _Pairs, other: int, track: int, common: _Common) -> _Common:
-        """x if two windows are of one target."""
-        design = pairs.design[other]
-        off = pairs.off[other, track] - design @ common.mean
-        covariance = np.linalg.inv(np.linalg.inv(common.covariance) + design.T @ design)
-        return _Common(mean=common.mean + covariance @ design.T @ off, covariance=covariance)
+        p = self.parameters
+        count, size, tracks = pairs.off.shape
+        root = np.linalg.cholesky(pose)
+        common = np.concatenate((pairs.common[..., :3] @ root, pairs.common[..., 3:]), axis=-1)
+        own = scale**2 * pairs.own
+        # the same for all tracks: as if they were near the target
+        lower = np.linalg.cholesky(common[0] @ common[0].T + own + pairs.apart)
+        free = _log(p.free) - _log_normal(np.linalg.solve(lower, pairs.off[0]), lower)
+        found: list[list[Array]] = [[] for _ in range(tracks + 1)]
+        for some in _subsets(count):
+            prior = len(some) * _log(p.seen) + (count - len(some)) * _log(1.0 - p.seen)
+            if not some:
+                found[-1].append(np.array([prior]))
+            if not 0 < len(some) <= tracks:
+                continue
+            joined = _joined(len(some), tracks)
+            stacked = common[list(some)].reshape(len(some) * size, -1)
+            lower = np.linalg.cholesky(stacked @ stacked.T + np.kron(np.eye(len(some)), own))
+            white = np.linalg.inv(lower).reshape(-1, len(some), size)
+            left = np.zeros((len(some) * size, len(joined)))
+            for row, i in enumerate(some):
+                left += (white[:, row] @ pairs.off[i])[:, joined[:, row]]
+            logs = prior - _log_normal(left, lower) - free[joined].sum(axis=1)
+            if some[0]:
+                found[-1].append(logs)
+                continue
+            for k in range(tracks):
+                found[k].append(logs[joined[:, 0] == k])
+        return np.array([_log_sum(np.concatenate(logs)) if logs else -math.inf for logs in found])
 
     @property
     def scores(self) -> Mapping[int, float]:
@@ -228,20 +241,52 @@ class EvidenceComparison(TrackComparison):
         self.decided = None
 
 
-def _log_evidence(off: Array, design: Array, prior: Array) -> Array:
-    """log N(off; 0, I + A P A') without the terms that any A and P have in common.
+@cache
+def _subsets(count: int) -> tuple[tuple[int, ...], ...]:
+    return tuple(some for size in range(count + 1) for some in combinations(range(count), size))
+
+
+@cache
+def _joined(count: int, tracks: int) -> NDArray[np.int64]:
+    """(p, count) all ways to join tracks to different others."""
+    return np.array(list(permutations(range(tracks), count)))
+
+
+def _nearest(windows: Mapping[int, Array], to: Array, most: int) -> list[int]:
+    """Numbers of the windows that end nearest to another's end."""
+    return sorted(windows, key=lambda number: math.dist(windows[number][-1], to[-1]))[:most]
+
+
+def _on_both_axes(covariance: Array) -> Array:
+    """(2 n, 2 n) of places, from (n, n) of each axis."""
+    return np.kron(covariance, np.eye(2)).astype(np.float64)
+
+
+def _walked(ages_s: Array, speed_m_s: float, turn_s: float) -> Array:
+    """(n, n) covariance per axis of the ways since past times, of a velocity that is an Ornstein-Uhlenbeck
+    process.
+    """
+    ages = ages_s / turn_s
+    both = 2.0 * np.minimum(ages[:, None], ages) - 1.0 - np.exp(-np.abs(ages[:, None] - ages))
+    found: Array = (speed_m_s * turn_s) ** 2 * (both + np.exp(-ages)[:, None] + np.exp(-ages))
+    return found
+
+
+def _log_normal(white: Array, lower: Array) -> Array:
+    """Logarithm of a normal density, with the sign changed.
 
     Args:
-        off: (m, k, 2 n).
-        design: (m, 2 n, 5), A.
-        prior: (5, 5), P.
+        white: (m, ...) deviations, of which the covariance has been made 1.
+        lower: (m, m) Cholesky factor of their covariance.
     """
-    information = np.linalg.inv(prior) + design.transpose(0, 2, 1) @ design
-    vector = off @ design
-    explained = (vector @ np.linalg.inv(information) * vector).sum(axis=-1)
-    spread = np.linalg.slogdet(information)[1] + np.linalg.slogdet(prior)[1]
-    found: Array = -0.5 * ((off * off).sum(axis=-1) - explained + spread[:, None])
+    spread = np.log(np.diag(lower)).sum() + 0.5 * len(lower) * math.log(math.tau)
+    found: Array = 0.5 * (white * white).sum(axis=0) + spread
     return found
+
+
+def _log_sum(logs: Array) -> float:
+    most = float(logs.max())
+    return most + math.log(float(np.exp(logs - most).sum()))
 
 
 def _log(probability: float) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.comparison import TrackComparison, TrackWindows
-from estimators.handoff.dead_reckoning import DeadReckoning, TrackHistory
+from estimators.handoff.dead_reckoning import EYE, DeadReckoning, TrackHistory
 from estimators.handoff.matching import blended
 from estimators.relative_pose.belief import LevelMotion, PoseMeasurement, RelativePoseBelief
 from flightsim.foundation.checks import require_positive
@@ -17,6 +17,7 @@ from flightsim.foundation.checks import require_positive
 Array = NDArray[np.float64]
 
 _OLD_US: Final = 1_000_000  # windows that end earlier are not compared
+_LEAST_HEIGHT_M: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +109,7 @@ class HandoffProcess:
         report: TrackerReport,
         measured: PoseMeasurement,
         frame: tuple[Array, Array] | None,
+        height_m: float,
     ) -> None:
         """Process one time at which everything is known.
 
@@ -119,6 +121,7 @@ class HandoffProcess:
             measured: range, depth and relative heading.
             frame: places (n, 2) and covariances (n, 2, 2) of moving objects, in the present level frame;
                 None: there is no frame of this time.
+            height_m: own height over the ground.
         """
         dt_s = 0.0 if self._time_us is None else (time_us - self._time_us) * 1e-6
         self._time_us = time_us
@@ -129,7 +132,7 @@ class HandoffProcess:
         self.receive(time_us, report, self._tracker)
         if frame is not None:
             self.tracks.scan(time_us, *frame)
-        self.compare(time_us)
+        self.compare(time_us, height_m)
 
     def receive(self, time_us: int, report: TrackerReport, taken: DeadReckoning) -> None:
         """Process a report.
@@ -145,16 +148,17 @@ class HandoffProcess:
         places = taken.placed(np.array(list(report.tracks.values()))) if report.tracks else np.zeros((0, 2))
         placed = dict(zip(report.tracks, places, strict=True))
         self._target = None if report.number is None else placed.get(report.number)
-        self._reported.add(time_us, [(k, float(x), float(y)) for k, (x, y) in placed.items()])
+        self._reported.add(time_us, taken, [(k, float(x), float(y)) for k, (x, y) in placed.items()])
 
-    def compare(self, time_us: int) -> None:
+    def compare(self, time_us: int, height_m: float) -> None:
         """Compare the tracks, if the pose is known and it is time for it.
 
         Args:
             time_us: present time, to which pose and both motions were moved.
+            height_m: own height over the ground; NaN: not known, and nothing is compared.
         """
         best = self.pose.best if self.pose.converged else None
-        if best is None:
+        if best is None or not height_m > _LEAST_HEIGHT_M:
             return
         if self.converged_us is None:
             self.converged_us = time_us
@@ -168,7 +172,8 @@ class HandoffProcess:
             times_us = times_us[:0]
         own = self._windows(self.tracks.history, self.tracks.reckoning, times_us)
         reported = self._windows(self._reported, self._tracker, times_us)
-        report = self.report
+        report, none = self.report, np.zeros((0, 2))
+        eyes = own.pop(EYE, none), reported.pop(EYE, none)
         target = None if report is None or report.number is None else reported.pop(report.number, None)
         self.comparison.update(
             TrackWindows(
@@ -176,6 +181,8 @@ class HandoffProcess:
                 times_us=times_us,
                 handoff=own,
                 target=target,
+                eyes=eyes,
+                heights_m=(height_m, max(_LEAST_HEIGHT_M, height_m - best.down_m)),
                 others=reported,
                 identity=1.0 if report is None else report.identity,
             ),

@@ -24,8 +24,8 @@ class HandoffSettings(RelativePoseSettings):
         ground_altitude_m: pressure altitude of the ground; None: that before the aircraft is armed.
         rate_hz: of the camera.
         tilt_step_rad: errors of roll and pitch that change from frame to frame.
-        slow_sigma_m: standard deviation per axis of the slow errors of a track, of roll and pitch.
-        pose_sigma_m: errors of the pose that its covariance does not contain.
+        tilt_sigma_rad: slow errors of roll and pitch.
+        pose_sigma_m, pose_sigma_rad: errors of the pose that its covariance does not contain.
         speed_max_m_s: largest speed of a target against the air, in which tracks are kept.
         clutter_per_m2: density of false points.
         window_s: time over which tracks are compared (paper: 100 frames).
@@ -42,8 +42,9 @@ class HandoffSettings(RelativePoseSettings):
     ground_altitude_m: float | None = None
     rate_hz: float = 10.0
     tilt_step_rad: float = 0.004
-    slow_sigma_m: float = 6.0
-    pose_sigma_m: float = 15.0
+    tilt_sigma_rad: float = 0.015
+    pose_sigma_m: float = 10.0
+    pose_sigma_rad: float = 0.05
     speed_max_m_s: float = 15.0
     clutter_per_m2: float = 2.5e-5
     window_s: float = 10.0
@@ -63,8 +64,9 @@ class HandoffSettings(RelativePoseSettings):
             **{
                 name: getattr(self, name)
                 for name in (
-                    *("designate_m", "rate_hz", "tilt_step_rad", "slow_sigma_m", "pose_sigma_m"),
-                    *("speed_max_m_s", "clutter_per_m2", "window_s", "hold_s", "report_s", "decision_s"),
+                    *("designate_m", "rate_hz", "tilt_step_rad", "tilt_sigma_rad", "pose_sigma_m"),
+                    *("pose_sigma_rad", "speed_max_m_s", "clutter_per_m2"),
+                    *("window_s", "hold_s", "report_s", "decision_s"),
                 )
             }
         )
@@ -80,8 +82,9 @@ class HandoffSettings(RelativePoseSettings):
     def evidence(self) -> EvidenceParameters:
         """The comparison."""
         return EvidenceParameters(
-            slow_sigma_m=self.slow_sigma_m,
+            tilt_sigma_rad=self.tilt_sigma_rad,
             pose_sigma_m=self.pose_sigma_m,
+            pose_sigma_rad=self.pose_sigma_rad,
             wrong_sigma_m=4.0 * self.pose_sigma_m,
             decision=self.decision,
             hold_s=self.hold_s,

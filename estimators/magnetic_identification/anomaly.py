@@ -252,7 +252,9 @@ class Anomaly:
                 share = float(weights[inside].sum())
                 if share <= 0.0:
                     break
-                centre = weights[inside] @ sources[inside, :2] / share
+                before, centre = centre, weights[inside] @ sources[inside, :2] / share
+                if np.array_equal(before, centre):
+                    break
             found.append((share, *centre.tolist()))
         share, forward_m, right_m = max(found, default=(0.0, 0.0, 0.0))
         north_m, east_m = self._in_map(forward_m, right_m)

@@ -137,6 +137,7 @@ class Identifier:
         self.started = 0
         self._parameters = parameters
         self._classes = parameters.classes
+        self._reach_m = parameters.reach_m
         self._map_error = map_error
         self._field_ned = field_ned
         self._streams = RandomStreams(parameters.seed)
@@ -291,10 +292,9 @@ class Identifier:
 
     def _within_reach(self, sample: Sample) -> Anomaly | None:
         """The nearest anomaly within reach."""
-        reach_m = self._parameters.reach_m
         here = (sample.north_m, sample.east_m)
         found = [(math.dist(here, anomaly.place_ne_m), anomaly.number, anomaly) for anomaly in self.anomalies]
-        near = [entry for entry in found if entry[0] <= reach_m]
+        near = [entry for entry in found if entry[0] <= self._reach_m]
         return min(near)[2] if near else None
 
     def _start(self, sample: Sample, last: Sample) -> Anomaly:

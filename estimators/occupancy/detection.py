@@ -75,13 +75,15 @@ class DetectionModel:
             return exposure
         # pieces no longer than the fall-off, each integrated with the Gauss-Legendre rule
         pieces = max(1, math.ceil(length_m / (2.0 * self.range_m)))
+        nodes, weights = (each.reshape(-1, *[1] * exposure.ndim) for each in _QUADRATURE)
         for piece in range(pieces):
-            for node, weight in zip(*_QUADRATURE, strict=True):
-                share = (piece + 0.5 * (1.0 + node)) / pieces
-                distance2 = (north_m - start_ne_m[0] - share * along_n) ** 2 + (
-                    east_m - start_ne_m[1] - share * along_e
-                ) ** 2
-                exposure += 0.5 * weight / pieces * length_m * np.exp(-0.5 * distance2 / self.range_m**2)
+            shares = (piece + 0.5 * (1.0 + nodes)) / pieces
+            distance2 = (north_m - start_ne_m[0] - shares * along_n) ** 2 + (
+                east_m - start_ne_m[1] - shares * along_e
+            ) ** 2
+            parts = 0.5 * weights / pieces * length_m * np.exp(-0.5 * distance2 / self.range_m**2)
+            for part in parts:
+                exposure += part
         hazard_1_m = -math.log1p(-self.probability_overhead) / (self.range_m * _SQRT_2PI)
         return -np.expm1(-hazard_1_m * exposure)
 

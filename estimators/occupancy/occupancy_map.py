@@ -40,6 +40,7 @@ class OccupancyMap:
         self.layout = layout
         self.belief = GridBelief(layout, prior)
         self.scores: Array = self.belief.mass.copy()
+        self._centres = layout.centres()
 
     @property
     def probability_of_detection(self) -> float:
@@ -50,7 +51,7 @@ class OccupancyMap:
         self, start_ne_m: tuple[float, float], end_ne_m: tuple[float, float], model: DetectionModel
     ) -> None:
         """Lower the scores along a straight stretch of track on which nothing was detected (eq. 10, 11)."""
-        north, east = self.layout.centres()
+        north, east = self._centres
         missed = 1.0 - model.probability(north, east, start_ne_m, end_ne_m)
         self.scores *= missed
         self.belief.update(missed)
@@ -63,7 +64,7 @@ class OccupancyMap:
             radius_m: scores farther away do not change; it is two standard deviations of the Gaussian.
             height: height of the Gaussian's peak, in multiples of the prior's mean score.
         """
-        north, east = self.layout.centres()
+        north, east = self._centres
         distance2 = (north - north_m) ** 2 + (east - east_m) ** 2
         sigma_m = 0.5 * radius_m
         peak = height / (self.layout.rows * self.layout.columns)
@@ -71,7 +72,7 @@ class OccupancyMap:
 
     def dismiss(self, north_m: float, east_m: float, model: DetectionModel) -> None:
         """Lower the scores around a false anomaly, as a pass right over it does (eq. 11)."""
-        north, east = self.layout.centres()
+        north, east = self._centres
         distance2 = (north - north_m) ** 2 + (east - east_m) ** 2
         missed = 1.0 - model.probability_overhead * np.exp(-0.5 * distance2 / model.range_m**2)
         self.scores *= missed

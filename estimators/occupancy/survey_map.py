@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimators.errors import EstimatorError
 from estimators.occupancy.detection import MapError
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.kernels import kernel
 from flightsim.foundation.magnetic_map_file import MagneticMapError, read_map_file
 
 Array = NDArray[np.float64]
@@ -45,17 +46,13 @@ class SurveyMap:
 
     def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:
         """Field at a place and height from the map's home, bilinear; NaN without data."""
-        row = np.interp(north_m, self.north_m, np.arange(self.north_m.size), left=np.nan, right=np.nan)
-        column = np.interp(east_m, self.east_m, np.arange(self.east_m.size), left=np.nan, right=np.nan)
-        if not math.isfinite(row + column):
-            return math.nan
-        i = min(int(row), self.north_m.size - 2)
-        j = min(int(column), self.east_m.size - 2)
-        v, u = float(row) - i, float(column) - j
-        weights = np.array([[(1.0 - v) * (1.0 - u), (1.0 - v) * u], [v * (1.0 - u), v * u]])
-        corners = np.s_[i : i + 2, j : j + 2]
-        gradient = float(np.sum(weights * self.vertical_gradient_nt_m[corners]))
-        return float(np.sum(weights * self.total_field_nt[corners])) + gradient * (height_m - self.height_m)
+        above_m = height_m - self.height_m
+        return float(
+            _total_nt(
+                *(self.north_m, self.east_m, self.total_field_nt, self.vertical_gradient_nt_m),
+                *(north_m, east_m, above_m),
+            )
+        )
 
     def totals_nt(self, north_m: Array, east_m: Array, height_m: Array) -> Array:
         """Field (n,) at places and heights (n,) from the map's home, bilinear; NaN without data."""
@@ -119,6 +116,41 @@ class SurveyMap:
     def west_m(self) -> float:
         """Western edge."""
         return float(self.east_m[0])
+
+
+@kernel
+def _total_nt(
+    rows_m: Array,
+    columns_m: Array,
+    total_field_nt: Array,
+    gradient_nt_m: Array,
+    north_m: float,
+    east_m: float,
+    above_m: float,
+) -> float:
+    """`SurveyMap.total_nt` at a height above that of the map."""
+    row, column = _place_on(rows_m, north_m), _place_on(columns_m, east_m)
+    if not math.isfinite(row + column):
+        return math.nan
+    i = min(int(row), rows_m.size - 2)
+    j = min(int(column), columns_m.size - 2)
+    v, u = row - i, column - j
+    weights = ((1.0 - v) * (1.0 - u), (1.0 - v) * u, v * (1.0 - u), v * u)
+    total = gradient = 0.0
+    for k in range(4):
+        total += weights[k] * total_field_nt[i + k // 2, j + k % 2]
+        gradient += weights[k] * gradient_nt_m[i + k // 2, j + k % 2]
+    return total + gradient * above_m
+
+
+@kernel
+def _place_on(lines_m: Array, place_m: float) -> float:
+    """Broken number of the grid line (n,) at a place; NaN beyond the lines."""
+    last = lines_m.size - 1
+    if not lines_m[0] <= place_m <= lines_m[last]:
+        return math.nan
+    k = np.searchsorted(lines_m, place_m, "right") - 1
+    return float(last) if k == last else k + (place_m - lines_m[k]) * (1.0 / (lines_m[k + 1] - lines_m[k]))
 
 
 def map_error_of(survey_map: SurveyMap, given_nt: float | None = None) -> MapError:

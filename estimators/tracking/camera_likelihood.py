@@ -109,6 +109,19 @@ def _of_turn(a: float, b: float, s: Array) -> tuple[float, float, float]:
 
 
 @kernel
+def _detection_spread(
+    place: tuple[float, float, float], turn: tuple[float, float, float], s: Array
+) -> tuple[float, float, float]:
+    """Covariance of the image coordinates of a detection, with the weights of the frame."""
+    p, t = s[PLACE_WEIGHT], s[TURN_WEIGHT]
+    return (
+        p * place[0] + t * turn[0] + s[NOISE],
+        p * place[1] + t * turn[1],
+        p * place[2] + t * turn[2] + s[NOISE],
+    )
+
+
+@kernel
 def _above(value: float, sigma: float) -> float:
     """Probability that a Gaussian about a value is above 0: one of equation 5's steps, smoothed; to 1e-6 by a
     table, which takes a fifth of the time of the error function.
@@ -170,9 +183,7 @@ def relative_likelihood(north: float, east: float, s: Array, detections: Array) 
     detected = seen * s[PEAK] / (1.0 + math.exp(-min(700.0, max(-700.0, odds))))
     if count == 0:
         return 1.0 - detected
-    aa = s[PLACE_WEIGHT] * paa + s[TURN_WEIGHT] * taa + s[NOISE]
-    ab = s[PLACE_WEIGHT] * pab + s[TURN_WEIGHT] * tab
-    bb = s[PLACE_WEIGHT] * pbb + s[TURN_WEIGHT] * tbb + s[NOISE]
+    aa, ab, bb = _detection_spread((paa, pab, pbb), (taa, tab, tbb), s)
     determinant = aa * bb - ab * ab
     if not determinant > 0.0:  # the rounding of single-precision numbers
         return 1.0 - detected
@@ -193,6 +204,43 @@ def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Arr
     """Relative likelihoods of a frame at places (n,)."""
     for i in range(north.size):
         out[i] = relative_likelihood(north[i], east[i], s, detections)
+
+
+@kernel
+def _on_ground(a: float, b: float, aa: float, ab: float, bb: float, s: Array) -> tuple[float, float, float]:
+    """Covariance (north north, north east, east east) of the place on the ground that a ray (a, b) meets, by
+    that of its image coordinates.
+    """
+    k = ROTATION
+    depth = s[HEIGHT] / (s[k + 2] + a * s[k + 5] + b * s[k + 8])
+    an, ae = (s[k + 3] - a * s[k]) / depth, (s[k + 4] - a * s[k + 1]) / depth
+    bn, be = (s[k + 6] - b * s[k]) / depth, (s[k + 7] - b * s[k + 1]) / depth
+    scale = 1.0 / (an * be - ae * bn) ** 2
+    nn = scale * (be * be * aa - 2.0 * be * ae * ab + ae * ae * bb)
+    ne = scale * (be * an * ab + ae * bn * ab - be * bn * aa - ae * an * bb)
+    return nn, ne, scale * (bn * bn * aa - 2.0 * bn * an * ab + an * an * bb)
+
+
+@kernel
+def _detected_places(s: Array, detections: Array, out: Array) -> int:
+    """Gaussians on the ground of the detections; returns the number of those that lie on it.
+
+    Args:
+        s, detections: of the frame.
+        out: (m, 5), gets north, east, and the covariance nn, ne, ee of each.
+    """
+    k, found = ROTATION, 0
+    for a, b in detections:
+        down = s[k + 2] + a * s[k + 5] + b * s[k + 8]
+        if not down > _LEAST_DEPTH:
+            continue
+        depth = s[HEIGHT] / down
+        aa, ab, bb = _detection_spread(_of_place(a, b, 1.0 / depth, s), _of_turn(a, b, s), s)
+        out[found, 0] = s[NORTH] + depth * (s[k] + a * s[k + 3] + b * s[k + 6])
+        out[found, 1] = s[EAST] + depth * (s[k + 1] + a * s[k + 4] + b * s[k + 7])
+        out[found, 2:] = _on_ground(a, b, aa, ab, bb, s)
+        found += 1
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -232,6 +280,11 @@ class FrameLikelihood:
             likelihoods(north, east, self.numbers, self.detections, out)
         return out
 
+    def places(self) -> Array:
+        """(m, 5) Gaussians of the detections on the ground: north, east, covariance nn, ne, ee."""
+        out = np.empty((len(self.detections), 5))
+        return out[: _detected_places(self.numbers, self.detections, out)]
+
 
 def _numbers(sight: CameraSight, model: SightModel) -> Array:
     s = np.zeros(SIZE)
@@ -268,11 +321,9 @@ def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightMode
     """(2, 2) covariance, north and east, of the place on the ground that a ray (a, b) meets. An error budget
     (Table II) is this for one error at a time.
     """
-    rotation = sight.r_mount_from_ned
-    depth = sight.height_m / float(rotation.T[2] @ (1.0, *ray))
-    image_from_ground = np.array([[-ray[0], 1.0, 0.0], [-ray[1], 0.0, 1.0]]) @ rotation[:, :2] / depth
-    ground_from_image = np.linalg.inv(image_from_ground)
-    return np.asarray(ground_from_image @ image_spread(ray, sight, model) @ ground_from_image.T)
+    (aa, ab), (_, bb) = image_spread(ray, sight, model).tolist()
+    nn, ne, ee = _on_ground(*ray, aa, ab, bb, _numbers(sight, model))
+    return np.array([[nn, ne], [ne, ee]])
 
 
 def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box:

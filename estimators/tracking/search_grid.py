@@ -28,6 +28,7 @@ _LARGEST: Final = 1e25  # of a cell of the linear scale, before all are divided:
 _SMALLEST: Final = 1e-30  # below it a cell is 0: subnormal numbers are slow
 _LARGEST_LOG: Final = 50.0
 _LOST: Final = 1e-4  # share of the sum at which it has lost four digits
+_NARROW: Final = 0.25  # least variance in cells squared down to which sums over cells are exact to 1 %
 _LEAST_STEP: Final = 0.1  # of a walk, in cells squared
 _THREE_CELLS: Final = 0.5  # variance in cells squared up to which three weights have the right one
 
@@ -44,7 +45,8 @@ class Scale(StrEnum):
 class SearchGrid:
     """Probability of a target's place in square cells.
 
-    The place within a cell is one more error of the projection, with variance cell^2 / 12.
+    A frame's likelihood is taken at the middle of each cell. Where the pose is known better than a place
+    within a cell, to a variance of cell^2 / 12, the difference is one more error of the projection.
 
     Args:
         layout: the cells.
@@ -83,6 +85,7 @@ class SearchGrid:
         with np.errstate(divide="ignore"):
             self._cells: Cells = (np.log(start) if scale is Scale.LOG else start).astype(dtype)
         self._within_m2 = layout.cell_m**2 / 12.0
+        self._coarse = False  # a detection was blurred by the cells
         self._walk_cells2_s = (walk_m_sqrt_s / layout.cell_m) ** 2
         self._walked_cells2 = 0.0
         self._offset = 0.0  # of the logarithms
@@ -112,7 +115,11 @@ class SearchGrid:
         reach_m = (layout.rows + layout.columns) * layout.cell_m + math.dist(
             sight.place_ned_m[:2], (layout.south_m, layout.west_m)
         )
-        frame = FrameLikelihood.of(sight.blurred(self._within_m2), self.model, reach_m)
+        known_m2 = min(sight.place_m2[0, 0], sight.place_m2[1, 1])
+        known_m2 += sight.height_m**2 * min(sight.rotation_rad2[1, 1], sight.rotation_rad2[2, 2])
+        blur_m2 = self._within_m2 - float(known_m2)
+        self._coarse = self._coarse or (blur_m2 > 0.0 and len(sight.detections) > 0)
+        frame = FrameLikelihood.of(sight.blurred(blur_m2), self.model, reach_m)
         box = frame.box
         if box is None:
             return 1.0
@@ -197,11 +204,44 @@ class SearchGrid:
         )
         across = cross / total
         between = np.array([[row2 / total, across], [across, column2 / total]])
+        variances, axes = np.linalg.eigh(between)
+        if variances[0] < _NARROW:
+            peak = None if self._coarse else self._peak()
+            if peak is not None:
+                (mean_row, mean_column), between = peak
+                mean = np.array(
+                    [layout.south_m + (mean_row + 0.5) * side, layout.west_m + (mean_column + 0.5) * side]
+                )
+                return mean, side**2 * between
         # the place within a cell counts where a belief is narrower than that, and not once more where the
         # cells themselves show its width
-        variances, axes = np.linalg.eigh(between)
         covariance = side**2 * (axes * np.maximum(variances, 1.0 / 12.0)) @ axes.T
         return mean, np.asarray(covariance)
+
+    def _peak(self) -> tuple[Array, Array] | None:
+        """Mean and covariance, in cells, of the Gaussian through the nine cells about the most probable one;
+        None: they are none of a Gaussian. A sum over cells is not exact when few of them have a weight.
+        """
+        row, column = np.unravel_index(int(np.argmax(self._cells)), self._cells.shape)
+        part = self._cells[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2].astype(np.float64)
+        if part.shape != (3, 3) or (self.scale is Scale.LINEAR and part.min() <= 0.0):
+            return None
+        log = part if self.scale is Scale.LOG else np.log(part)
+        slope = 0.5 * np.array([log[2, 1] - log[0, 1], log[1, 2] - log[1, 0]])
+        across = 0.25 * (log[2, 2] - log[2, 0] - log[0, 2] + log[0, 0])
+        information = -np.array(
+            [
+                [log[2, 1] - 2.0 * log[1, 1] + log[0, 1], across],
+                [across, log[1, 2] - 2.0 * log[1, 1] + log[1, 0]],
+            ]
+        )
+        if not (information[0, 0] > 0.0 and np.linalg.det(information) > 0.0):
+            return None
+        covariance = np.linalg.inv(information)
+        off = covariance @ slope
+        if np.abs(off).max() > 1.0:
+            return None
+        return np.array([row, column]) + off, covariance
 
     @property
     def entropy_nats(self) -> float:

@@ -4,8 +4,9 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import fields
 from enum import Enum
+from functools import cache
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Annotated, Any, Final, get_type_hints
 
 Check = Callable[..., None]
 """Checks numbers by name, and raises a ValueError for the first one that is not accepted."""
@@ -35,10 +36,19 @@ def require_positive(**values: float) -> None:
 
 
 def require_probability(**values: float) -> None:
-    """Probabilities: 0 to 1."""
+    """Probabilities and shares: 0 to 1."""
     for name, value in values.items():
         if not 0.0 <= value <= 1.0:
             raise ValueError(f"{name} = {value!r} is not accepted: 0 to 1 is")
+
+
+Finite = Annotated[float, require_finite]
+Positive = Annotated[float, require_positive]
+NotNegative = Annotated[float, require_not_negative]
+Share = Annotated[float, require_probability]
+PositiveOrInf = Annotated[Positive, math.inf]
+NotNegativeOrInf = Annotated[NotNegative, math.inf]
+"""Types of a field for which `check_fields` requires something else than of the others."""
 
 
 def require_rate(rate_hz: int) -> None:
@@ -71,27 +81,32 @@ def check_amounts(record: Any, *positive: str) -> None:
 
 
 def check_fields(
-    record: Any,
-    usually: Check,
-    *,
-    but: Mapping[str, Check] = _NO_OTHERS,
-    unlimited: Collection[str] = (),
-    unchecked: Collection[str] = (),
+    record: Any, usually: Check, *, but: Mapping[str, Check] = _NO_OTHERS, unchecked: Collection[str] = ()
 ) -> None:
     """Check every number among the fields of a dataclass, and in its tuples.
 
     Args:
         record: an instance; fields other than numbers are skipped.
-        usually: what the numbers must be.
+        usually: what the numbers must be whose fields have none of the types above.
         but: what some must be instead, by name.
-        unlimited: names of those that may be infinite as well.
         unchecked: names of those that are checked elsewhere.
     """
-    for field in fields(record):
-        name = field.name
+    for name, stated, unlimited in _stated(record.__class__):
         value = getattr(record, name, None)
-        if name in unchecked or (value == math.inf and name in unlimited):
+        if name in unchecked or (unlimited and value == math.inf):
             continue
+        check = but.get(name) or stated or usually
         for part in value if isinstance(value, tuple) else (value,):
             if isinstance(part, int | float) and not isinstance(part, bool | Enum):
-                but.get(name, usually)(**{name: part})
+                check(**{name: part})
+
+
+@cache
+def _stated(kind: Any) -> tuple[tuple[str, Any, bool], ...]:
+    """What the type of each field of a dataclass states: its name, a check, whether it may be infinite."""
+    hints = get_type_hints(kind, include_extras=True)
+    stated = {field.name: getattr(hints[field.name], "__metadata__", ()) for field in fields(kind)}
+    return tuple(
+        (name, next((part for part in parts if callable(part)), None), math.inf in parts)
+        for name, parts in stated.items()
+    )

@@ -40,8 +40,6 @@ class MainField:
         gradient_up_nt_m: change with height.
     """
 
-    __slots__ = ("_coefficients", "direction_ned", "gradient_up_nt_m", "total_nt")
-
     def __init__(
         self, home: Place, decimal_year: float = 2026.0, *, model: FieldModel = FieldModel.WMM
     ) -> None:

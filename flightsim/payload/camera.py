@@ -139,39 +139,6 @@ class Camera:
         reader: detects targets in its pictures; None: detections come from the models.
     """
 
-    __slots__ = (
-        "_before_us",
-        "_clutter",
-        "_constants",
-        "_countdown",
-        "_focal_px",
-        "_generators",
-        "_gimbal",
-        "_home_frame",
-        "_interval_steps",
-        "_latency_us",
-        "_no_noise",
-        "_normals",
-        "_number",
-        "_q_before",
-        "_q_frd_from_mount",
-        "_row",
-        "_step_s",
-        "_targets",
-        "_truth",
-        "_uniforms",
-        "_vehicle_before_ned_m",
-        "_vehicle_ned_m",
-        "_view",
-        "_view_before",
-        "_waiting",
-        "_zoom",
-        "focus_distance_m",
-        "frame",
-        "parameters",
-        "reader",
-    )
-
     def __init__(
         self,
         parameters: CameraParameters | None = None,

@@ -52,8 +52,6 @@ class DailyVariation:
         seed: of the pulsations.
     """
 
-    __slots__ = ("_parameters", "_phases", "_rates_rad_s")
-
     def __init__(self, parameters: DailyVariationParameters, seed: np.random.SeedSequence) -> None:
         rng = np.random.Generator(np.random.PCG64(seed))
         self._parameters = parameters

@@ -136,30 +136,6 @@ class Gimbal:
         flags: of the command in force.
     """
 
-    __slots__ = (
-        "_block",
-        "_constants",
-        "_countdown",
-        "_euler",
-        "_interval_steps",
-        "_out",
-        "_rng",
-        "_row",
-        "_state",
-        "_truth",
-        "flags",
-        "joints_rad",
-        "measured_joints_rad",
-        "measured_q_heading_from_gimbal",
-        "measured_q_ned_from_gimbal",
-        "measured_rates_rad_s",
-        "parameters",
-        "q_frd_from_gimbal",
-        "q_ned_from_gimbal",
-        "rates_gimbal_rad_s",
-        "time_us",
-    )
-
     def __init__(
         self,
         parameters: GimbalParameters | None = None,

@@ -21,8 +21,6 @@ class HomeFrame:
     the plane down = 0.
     """
 
-    __slots__ = ("_m_per_rad_lat", "_m_per_rad_lon", "home")
-
     def __init__(self, home: Home) -> None:
         self.home = home
         meridian_m, normal_m = curvature_radii_m(home.lat_deg)

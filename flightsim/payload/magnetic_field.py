@@ -25,8 +25,6 @@ class MagneticField:
         signatures: the targets.
     """
 
-    __slots__ = ("_axes", "_background", "_daily", "_field_ned_nt", "home", "signatures")
-
     def __init__(
         self,
         background: MagneticMap,

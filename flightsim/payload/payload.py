@@ -50,21 +50,6 @@ class Payload:
         points: the scan that the moving-point camera delivered on this step, or None.
     """
 
-    __slots__ = (
-        "_resting",
-        "camera",
-        "frame",
-        "gimbal",
-        "magnetometer",
-        "moving_points",
-        "points",
-        "range_radio",
-        "ranges",
-        "reading",
-        "scan",
-        "target_sensor",
-    )
-
     def __init__(
         self,
         parameters: PayloadParameters,

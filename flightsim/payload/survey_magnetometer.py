@@ -81,26 +81,6 @@ class SurveyMagnetometer:
         next_us: time of the next measurement or delivery; steps before it may be left out.
     """
 
-    __slots__ = (
-        "_body_field",
-        "_decay",
-        "_drift_nt",
-        "_drive_nt",
-        "_due_us",
-        "_field",
-        "_home_frame",
-        "_interval_us",
-        "_latency_us",
-        "_permanent_nt",
-        "_rng",
-        "_truth",
-        "_vehicle_field",
-        "_waiting",
-        "next_us",
-        "parameters",
-        "reading",
-    )
-
     def __init__(
         self,
         parameters: SurveyMagnetometerParameters | None = None,

@@ -46,8 +46,6 @@ class GroundTarget:
         position_ned_m, velocity_ned_m_s: (3,) at the time of the last `step`, local NED of home.
     """
 
-    __slots__ = ("_trajectory", "parameters", "position_ned_m", "velocity_ned_m_s")
-
     def __init__(
         self,
         parameters: GroundTargetParameters,
@@ -82,16 +80,6 @@ class GroundTargets:
         tagged: (n,), what has a tag.
         time_us: of the last `step`.
     """
-
-    __slots__ = (
-        "positions_ned_m",
-        "sizes_m",
-        "tag_ids",
-        "tagged",
-        "targets",
-        "time_us",
-        "velocities_ned_m_s",
-    )
 
     def __init__(
         self,

@@ -47,8 +47,6 @@ class VehicleField:
         rng: random numbers.
     """
 
-    __slots__ = ("_eddy_s", "_induced", "_permanent_nt")
-
     def __init__(self, parameters: VehicleFieldParameters, rng: np.random.Generator) -> None:
         self._permanent_nt: Array = parameters.permanent_nt * rng.standard_normal(3)
         induced = parameters.induced * rng.standard_normal((3, 3))

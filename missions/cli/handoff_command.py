@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 def _values(given: Given) -> Mapping[str, Any]:
-    return {"gps_fault": not given["no_gps_fault"]}
+    values: dict[str, Any] = {"gps_fault": not given["no_gps_fault"]}
+    if given["connect"] and given["confirm_after"] is None:
+        values["confirm_after_s"] = 0.0  # with real aircraft a person confirms, or the user allows it
+    return values
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -60,6 +63,14 @@ COMMAND: Final = MissionCommand(
             help="What estimates the relative pose.",
         ),
         option("--decision", type=float, default=0.99, help="Probability of a track that is decided for."),
+        option(
+            "--confirm-after",
+            type=float,
+            help=(
+                "The tracker's operator confirms a doubtful target after so long, s; 0: never. "
+                "[default: 5; with --connect: 0]"
+            ),
+        ),
         option("--link-loss", type=float, default=0.02, help="Share of the messages that are lost."),
         option("--link-delay", type=float, default=0.05, help="Their mean delay, s."),
         option("--estimator-seed", type=int, default=0, help="Of the random numbers of filters and link."),

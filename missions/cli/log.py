@@ -114,14 +114,17 @@ def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
         raise click.UsageError(in_options(error)) from error
 
 
-def _run(work: Callable[[], None]) -> None:
-    try:
-        work()
-    except BridgeError as error:
-        raise _Failed(in_options(error)) from error
+class _LogCommands(click.Group):
+    """Commands whose errors about the content of a log end them with exit code 1."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BridgeError as error:
+            raise _Failed(in_options(error)) from error
 
 
-@click.group()
+@click.group(cls=_LogCommands)
 def log() -> None:
     """Look into logs, and make others of them: .tlog, ArduPilot .bin, PX4 .ulg."""
 
@@ -132,19 +135,15 @@ def log() -> None:
 @click.option("--json", "as_json", is_flag=True, help="All figures as JSON.")
 def info(path: Path, dialect: str | None, as_json: bool) -> None:
     """Duration, boots, flights, vehicles, modes, rates, gaps, loss; where every byte went."""
+    from estimators.logs import report_of
+    from missions.cli.log_text import report_lines
 
-    def work() -> None:
-        from estimators.logs import report_of
-        from missions.cli.log_text import report_lines
-
-        report = report_of(_open(path, dialect))
-        if as_json:
-            click.echo(json.dumps(report.to_dict(), indent=2))
-            return
-        for line in report_lines(report):
-            click.echo(line)
-
-    _run(work)
+    report = report_of(_open(path, dialect))
+    if as_json:
+        click.echo(json.dumps(report.to_dict(), indent=2))
+        return
+    for line in report_lines(report):
+        click.echo(line)
 
 
 @log.command()
@@ -160,19 +159,15 @@ def info(path: Path, dialect: str | None, as_json: bool) -> None:
 )
 def export(path: Path, dialect: str | None, form: str, si: bool, out: Path | None, **given: Any) -> None:
     """Write messages to other tools' formats: Parquet, CSV, NumPy, MCAP."""
+    from estimators.logs.export import export as write
 
-    def work() -> None:
-        from estimators.logs.export import export as write
-
-        opened = _open(path, dialect)
-        target = out or path.with_name(
-            f"{path.stem}-{form}" if form in ("csv", "parquet") else f"{path.stem}.{form}"
-        )
-        written = write(opened, _select(opened, given), target, form, si=si)
-        what = f"{len(written)} files in {target}" if len(written) > 1 else str(written[0])
-        click.echo(f"written: {what}")
-
-    _run(work)
+    opened = _open(path, dialect)
+    target = out or path.with_name(
+        f"{path.stem}-{form}" if form in ("csv", "parquet") else f"{path.stem}.{form}"
+    )
+    written = write(opened, _select(opened, given), target, form, si=si)
+    what = f"{len(written)} files in {target}" if len(written) > 1 else str(written[0])
+    click.echo(f"written: {what}")
 
 
 @log.command()
@@ -182,15 +177,11 @@ def export(path: Path, dialect: str | None, form: str, si: bool, out: Path | Non
 @_selection_options
 def cut(path: Path, out: Path, dialect: str | None, **given: Any) -> None:
     """Write a part of a telemetry log to OUT, its records as they are."""
+    from estimators.logs.raw_records import positions, read_records, write_records
 
-    def work() -> None:
-        from estimators.logs.raw_records import positions, read_records, write_records
-
-        opened = _open(path, dialect)
-        count = write_records(out, read_records(opened, positions(_select(opened, given))))
-        click.echo(f"written: {out}, {count} of {len(opened)} messages")
-
-    _run(work)
+    opened = _open(path, dialect)
+    count = write_records(out, read_records(opened, positions(_select(opened, given))))
+    click.echo(f"written: {out}, {count} of {len(opened)} messages")
 
 
 @log.command()
@@ -213,21 +204,17 @@ def mutate(
     path: Path, out: Path, dialect: str | None, faults: Sequence[str], seed: int, **given: Any
 ) -> None:
     """Write a telemetry log with faults to OUT: GPS off, spikes, noise, delays, lost messages, ..."""
+    from estimators.logs.faults import parse_fault
+    from estimators.logs.mutate import mutated_records
+    from estimators.logs.raw_records import write_records
 
-    def work() -> None:
-        from estimators.logs.faults import parse_fault
-        from estimators.logs.mutate import mutated_records
-        from estimators.logs.raw_records import write_records
-
-        try:
-            parsed = [parse_fault(text) for text in faults]
-        except BridgeError as error:
-            raise click.UsageError(in_options(error)) from error
-        opened = _open(path, dialect)
-        records = mutated_records(opened, _select(opened, given), parsed, seed=seed)
-        click.echo(f"written: {out}, {write_records(out, records)} of {len(opened)} messages")
-
-    _run(work)
+    try:
+        parsed = [parse_fault(text) for text in faults]
+    except BridgeError as error:
+        raise click.UsageError(in_options(error)) from error
+    opened = _open(path, dialect)
+    records = mutated_records(opened, _select(opened, given), parsed, seed=seed)
+    click.echo(f"written: {out}, {write_records(out, records)} of {len(opened)} messages")
 
 
 @log.command()
@@ -253,51 +240,47 @@ def play(
     path: Path, dialect: str | None, link: str, speed: str, loop: bool, signing_key: Path | None, **given: Any
 ) -> None:
     """Play a telemetry log to a link, as if the vehicle were there; --from seeks."""
+    from autopilot_bridge.links import open_link, parse_address
+    from missions.runs.log_play import MIN_SPEED, Played
+    from missions.runs.log_play import play as send
+    from missions.runs.signing import client_signing
 
-    def work() -> None:
-        from autopilot_bridge.links import open_link, parse_address
-        from missions.runs.log_play import MIN_SPEED, Played
-        from missions.runs.log_play import play as send
-        from missions.runs.signing import client_signing
+    try:
+        factor = math.inf if speed == "max" else float(speed)
+    except ValueError:
+        factor = math.nan
+    if not factor >= MIN_SPEED:
+        raise click.UsageError(f"--speed {speed} is not accepted; give {MIN_SPEED:g} or more, or max")
+    try:
+        address = parse_address(link)
+        key = key_from(signing_key)
+    except BridgeError as error:
+        raise click.UsageError(in_options(error)) from error
+    opened = _open(path, dialect)
+    selections = _select(opened, given)
+    line = StatusLine()
 
-        try:
-            factor = math.inf if speed == "max" else float(speed)
-        except ValueError:
-            factor = math.nan
-        if not factor >= MIN_SPEED:
-            raise click.UsageError(f"--speed {speed} is not accepted; give {MIN_SPEED:g} or more, or max")
-        try:
-            address = parse_address(link)
-            key = key_from(signing_key)
-        except BridgeError as error:
-            raise click.UsageError(in_options(error)) from error
-        opened = _open(path, dialect)
-        selections = _select(opened, given)
-        line = StatusLine()
+    def show(played: Played) -> None:
+        line.show(f"{played.log_s:8.1f} s  {played.frames} frames")
 
-        def show(played: Played) -> None:
-            line.show(f"{played.log_s:8.1f} s  {played.frames} frames")
-
-        signing = client_signing(key)
-        connection = open_link(address)
-        warn_if_open((link,), key)
-        if not connection.peers:
-            click.echo(f"waiting for a client on {connection.description}", err=True)
-        try:
-            played = send(
-                opened,
-                selections,
-                connection,
-                speed=factor,
-                loop=loop,
-                on_progress=show,
-                sign=None if signing is None else signing.sign_again,
-            )
-        finally:
-            connection.close()
-            line.end()
-        lost = connection.counters.dropped
-        but = f" ({lost} dropped: no receiver, or a slow one)" if lost else ""
-        click.echo(f"played: {played.frames} frames{but}, {played.log_s:.1f} s of the log, to {address}")
-
-    _run(work)
+    signing = client_signing(key)
+    connection = open_link(address)
+    warn_if_open((link,), key)
+    if not connection.peers:
+        click.echo(f"waiting for a client on {connection.description}", err=True)
+    try:
+        played = send(
+            opened,
+            selections,
+            connection,
+            speed=factor,
+            loop=loop,
+            on_progress=show,
+            sign=None if signing is None else signing.sign_again,
+        )
+    finally:
+        connection.close()
+        line.end()
+    lost = connection.counters.dropped
+    but = f" ({lost} dropped: no receiver, or a slow one)" if lost else ""
+    click.echo(f"played: {played.frames} frames{but}, {played.log_s:.1f} s of the log, to {address}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.mission_command import MISSION_GROUP, FlightOption, Given, MissionCommand, Scope, option
+from missions.cli.mission_command import FlightOption, Given, MissionCommand, Scope, option
 from missions.cli.options import SIDES, degrees, pair
 
 if TYPE_CHECKING:
@@ -113,23 +113,15 @@ _EVERY: Final = (
     option(
         "--tag-id", type=int, default=0, help="Number of the tag (AprilTag 36h11) that --search looks for."
     ),
-    FlightOption(
-        ("--target-speed",),
-        group=MISSION_GROUP,
+    option(
+        "--target-speed",
         scope=Scope.EMBEDDED,
         type=float,
         default=0.3,
-        show_default=True,
         help="Speed of the target's random walk, m/s; 0: it stays where it is.",
     ),
-    FlightOption(
-        ("--tag-size",),
-        group=MISSION_GROUP,
-        scope=Scope.EMBEDDED,
-        type=float,
-        default=0.3,
-        show_default=True,
-        help="Side of the tag's black square, m.",
+    option(
+        "--tag-size", scope=Scope.EMBEDDED, type=float, default=0.3, help="Side of the tag's black square, m."
     ),
     option(
         "--separation",

@@ -42,7 +42,7 @@ def _magnetic_search(given: Given) -> "Study[Any, Any]":
     from missions.occupancy.suspect import Identify
     from missions.studies.magnetic_search import study
 
-    return study([Identify(way) for way in given["identify"]])
+    return study([Identify(way) for way in given["identify"]], flights=given["flights"])
 
 
 def _multi_target(given: Given) -> "Study[Any, Any]":
@@ -168,7 +168,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "figure 8.\n\n"
                 "By passes that detect an anomaly, by the trace of the paper's confidence, and by the "
                 "evidence of classes, in the worlds of fly occupancy. The searchers are points that turn at "
-                "one rate."
+                "one rate, or aircraft on SITL."
             ),
             options=(
                 click.Option(
@@ -178,6 +178,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     default=("threshold", "trace", "bayes"),
                     help="Ways that are compared; repeat.",
                 ),
+                click.Option(["--flights"], is_flag=True, help="Flights of fly occupancy, not points."),
             ),
             build=_magnetic_search,
         ),

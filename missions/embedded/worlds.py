@@ -12,6 +12,8 @@ from typing import Final
 
 import numpy as np
 
+from flightsim.environment import Environment
+from flightsim.home import Home
 from flightsim.payload import (
     CameraParameters,
     Circle,
@@ -30,7 +32,9 @@ from flightsim.payload import (
 )
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
+from missions.mission import WorldDefaults
 from missions.occupancy.options import OccupancyOptions
+from missions.options import parse_wind
 from missions.orbit.options import LEAST_DEPRESSION_RAD, WANDERING_M, OrbitOptions
 
 CAMERA: Final = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
@@ -60,6 +64,19 @@ class MotionKind(StrEnum):
     STRAIGHT = "straight"
     CIRCLE = "circle"
     RANDOM_WALK = "random-walk"
+
+
+def default_world(defaults: WorldDefaults, *, count: int, seed: int) -> WorldSpec:
+    """The world that `flightstack fly` makes for a mission where only vehicles and seed are chosen."""
+    speed_m_s, from_deg = parse_wind(defaults.wind)
+    return WorldSpec.of_team(
+        count,
+        model=defaults.model,
+        autopilot=defaults.autopilot or "px4",
+        home=None if defaults.home is None else Home.parse(defaults.home),
+        seed=seed,
+        air=Environment.from_wind(speed_m_s=speed_m_s, from_deg=from_deg, turbulence=defaults.turbulence),
+    )
 
 
 def carrying(world: WorldSpec, payload: PayloadParameters) -> WorldSpec:

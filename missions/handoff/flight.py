@@ -12,6 +12,7 @@ from estimators.orbit_target.relative_target import RelativeState
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.handoff.camera import GIMBAL_HZ, GimbalPointing
+from missions.handoff.operator import TrackOperator
 from missions.handoff.options import HandoffOptions, check_vehicle
 from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitGuidance, OrbitParameters
@@ -139,15 +140,19 @@ class HandoffAircraft(ABC):
             await asyncio.gather(task, return_exceptions=True)
 
     async def _keep_looking(self) -> None:
-        assert self._gimbal is not None
         clock, period_us = self.vehicle.clock, round(1e6 / GIMBAL_HZ)
         due_us = clock.time_us
         while True:
-            place, height_m = self.pointing(), self.pilot.height_m
-            if place is not None and math.isfinite(height_m):
-                self._gimbal.point(place, height_m)
+            self.look()
             due_us = max(due_us + period_us, clock.time_us)
             await clock.sleep_until(due_us)
+
+    def look(self) -> None:
+        """Point the camera."""
+        assert self._gimbal is not None
+        place, height_m = self.pointing(), self.pilot.height_m
+        if place is not None and math.isfinite(height_m):
+            self._gimbal.point(place, height_m)
 
     async def circle(self, place_ne_m: Place, *, clockwise: bool) -> None:
         """Circle a place by GPS, without waiting."""
@@ -195,7 +200,29 @@ class HandoffAircraft(ABC):
 
 
 class TrackerFlight(HandoffAircraft):
-    """The aircraft that tracks the target, with GPS, until it has received the decision."""
+    """The aircraft that tracks the target, with GPS, until it has received the decision.
+
+    Args:
+        vehicle, options, estimator, run: as for both.
+        designate: sends the operator's designation of a track.
+    """
+
+    def __init__(
+        self,
+        vehicle: "Vehicle",
+        options: HandoffOptions,
+        estimator: HandoffEstimator,
+        run: HandoffRun,
+        designate: Callable[[int], None],
+    ) -> None:
+        super().__init__(vehicle, options, estimator, run)
+        self._operator = TrackOperator(options.confirm_after_s, options.decision, designate)
+
+    def look(self) -> None:
+        super().look()
+        self._operator.look(
+            self.vehicle.clock.time_us, self.estimator.designation, self.estimator.sight.tracks.places
+        )
 
     async def fly(self) -> None:
         """Fly the tracker's part, including takeoff and landing."""

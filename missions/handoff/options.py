@@ -26,6 +26,8 @@ class HandoffOptions(MissionOptions):
         takeover_s: time for which the first aircraft follows the target alone after the handoff.
         belief: what estimates the relative pose.
         decision: probability of a track that is decided for.
+        confirm_after_s: time after which the tracker's operator confirms a target whose identity has become
+            doubtful; 0: there is no operator.
         link_loss, link_delay_s: share of the messages between the aircraft that are lost, and their mean
             delay.
         estimator_seed: of the random numbers of estimators and link.
@@ -44,6 +46,7 @@ class HandoffOptions(MissionOptions):
     takeover_s: float = 60.0
     belief: Literal["particles", "gaussians"] = "gaussians"
     decision: float = 0.99
+    confirm_after_s: float = 5.0
     link_loss: float = 0.02
     link_delay_s: float = 0.05
     estimator_seed: int = 0
@@ -61,6 +64,8 @@ class HandoffOptions(MissionOptions):
             raise PlanError("`target_ne_m` is not a place; give NORTH,EAST in metres from home")
         if not 0.5 < self.decision < 1.0:
             raise PlanError(f"`decision` {self.decision:g} is not a probability between 0.5 and 1")
+        if not 0.0 <= self.confirm_after_s < math.inf:
+            raise PlanError(f"`confirm_after_s` {self.confirm_after_s:g} is not a time from 0 s")
         if not 0.0 <= self.link_loss < 1.0:
             raise PlanError(f"`link_loss` {self.link_loss:g} is not a share from 0 to below 1")
         if not 0.0 <= self.link_delay_s <= 5.0:

@@ -64,7 +64,7 @@ class HandoffTeam:
         taker, keeper = self.watch.estimators
         self._flights = (
             TakeoverFlight(vehicles[0], options[0], taker, self.run),
-            TrackerFlight(vehicles[1], options[1], keeper, self.run),
+            TrackerFlight(vehicles[1], options[1], keeper, self.run, self.watch.designate),
         )
 
     def _meet(self) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, MAVLinkMessage
+from autopilot_bridge.mavlink.handoff_messages import TrackDesignation, designation_message
 from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
 from estimators.relative_pose import PoseMode
 from estimators.runner import Runner
@@ -137,6 +138,11 @@ class HandoffWatch:
         for stop in self._stops:
             stop()
         self._stops = []
+
+    def designate(self, number: int) -> None:
+        """The tracker's operator designates one of its tracks; the message arrives without loss."""
+        message = designation_message(TrackDesignation(system=self._vehicles[1].system_id, track=number))
+        asyncio.get_running_loop().call_soon(self._arrive, 1, message)
 
     def _take(self, frame: Frame) -> None:
         now_us = self._vehicles[0].clock.time_us

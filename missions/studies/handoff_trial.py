@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
-_SURE: Final = 0.98  # with a smaller probability of the identity the operator designates anew
+_SURE: Final = 0.995  # with a smaller probability of the identity, which limits that of the decision, the
+# operator designates anew
 _OPERATOR_S: Final = 5.0  # time that it takes
 _APART_M: Final = 10.0  # the operator tells targets apart that are farther from each other
 
@@ -144,7 +145,8 @@ class _Tracker:
         close = np.hypot(*(true[1:] - true[0]).T) < _APART_M
         if waited_s < (_OPERATOR_S if designation.count else 0.0) or close.any():
             return
-        for number, target in targets_of(self.tracks.level(), true).items():
+        seen = self._world.apparent(HandoffWorld.TRACKER)
+        for number, target in targets_of(self.tracks.level(), seen).items():
             if target == 0:
                 designation.designate(now_us, number, self.tracks.places[number])
 
@@ -187,7 +189,15 @@ class HandoffTrial:
             pointing = process.target()
             frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
             own = world.motion(HandoffWorld.HANDOFF)
-            process.step(world.time_us, own, motion, report, world.measured(), frame)
+            process.step(
+                world.time_us,
+                own,
+                motion,
+                report,
+                world.measured(),
+                frame,
+                self.setting.heights_m[HandoffWorld.HANDOFF],
+            )
             scores = process.comparison.scores
             if early is None and scores:
                 best = max(scores, key=lambda number: scores[number])
@@ -279,7 +289,7 @@ def _orbit_roll(
 
 def _target_of(world: HandoffWorld, which: int, tracks: AircraftTracks, number: int | None) -> int | None:
     """The true target of a track of an aircraft; None: it is of none."""
-    found = targets_of(tracks.level(), world.seen_from(which, world.targets))
+    found = targets_of(tracks.level(), world.apparent(which))
     return None if number is None else found.get(number)
 
 

@@ -21,7 +21,7 @@ from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 
-_SHIFT_M: Final = 60.0  # largest common error of the tracks of one aircraft
+_SHIFT_M: Final = 25.0  # largest common lag of the tracks of one aircraft
 _RIGHT_M: Final = 10.0  # a track this far from its nearest target is of none
 
 
@@ -223,16 +223,21 @@ class HandoffWorld:
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
         directions = camera.directions(np.vstack((points, false)))
-        roll, pitch = a.tilt.tolist()
-        # directions + tilt x directions, of a small tilt about forward and right
-        tilted = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
-        tilted[:, 2] -= pitch * directions[:, 0]
         height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
         # only the part of the tilt's error that changes from frame to frame is noise to the tracker
         sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
-        places, covariances = on_ground(tilted, height_m, sigma)
+        places, covariances = on_ground(_tilted(directions, a.tilt), height_m, sigma)
         below = np.isfinite(places).all(axis=1) & (np.hypot(*places.T) < 6.0 * a.height_m)
         return places[below], covariances[below]
+
+    def apparent(self, which: int) -> Array:
+        """Forward and right (n, 2) of the targets as an aircraft sees them with its present errors of roll
+        and pitch, and without noise; infinite: above its horizon.
+        """
+        a = self._aircraft[which]
+        level = self.seen_from(which, self.targets)
+        directions = np.column_stack((level, np.full(len(level), a.height_m - self.setting.seen_m)))
+        return np.nan_to_num(on_ground(_tilted(directions, a.tilt), a.height_m, 0.0)[0], nan=np.inf)
 
     def seen_from(self, which: int, places: Array) -> Array:
         """True forward and right (n, 2) of places (n, 2), north and east, in an aircraft's level frame."""
@@ -253,13 +258,21 @@ class HandoffWorld:
         return self._aircraft[which].roll_rad
 
 
+def _tilted(directions: Array, tilt: Array) -> Array:
+    """Directions (n, 3) + tilt x directions, of a small tilt about forward and right."""
+    roll, pitch = tilt.tolist()
+    found: Array = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
+    found[:, 2] -= pitch * directions[:, 0]
+    return found
+
+
 def targets_of(tracks: Mapping[int, tuple[float, float]], targets: Array) -> dict[int, int]:
-    """The true target of each track, by the pattern of all: errors of roll and pitch move all tracks of an
-    aircraft alike, by more than targets are apart. Tracks of no target are left out.
+    """The true target of each track, by the pattern of all: tracks lag behind the errors of roll and pitch,
+    which move all tracks of an aircraft alike. Tracks of no target are left out.
 
     Args:
         tracks: forward and right by number.
-        targets: (n, 2) true places in the same frame.
+        targets: (n, 2) places at which the aircraft sees the targets, in the same frame.
     """
     if not tracks:
         return {}

@@ -2,7 +2,7 @@
 names it by passes that detect an anomaly, by the trace of the confidence, or by the evidence of classes.
 
 The worlds are those of `fly occupancy` with the same seeds. The aircraft are points (`point_searchers`), so a
-search takes seconds.
+search takes seconds, or they fly: a trial is then the flight of that command.
 """
 
 import math
@@ -13,10 +13,14 @@ from typing import Any, Final
 import numpy as np
 
 from missions.embedded.point_searchers import search_with_points
+from missions.embedded.worlds import default_world, occupancy_world
 from missions.occupancy.figures import NAMED_WITHIN_M
+from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.suspect import Identify
+from missions.runs.request import RunRequest
 from missions.studies.design import grid
+from missions.studies.flights import fly_trial
 from missions.studies.results import Results
 from missions.studies.study import Study
 
@@ -47,6 +51,7 @@ class SearchRow:
         time_s: until something was named; the search time if nothing was.
         error_m: of the named place; NaN: none was named.
         passes: that were flown on purpose.
+        reason: why a flight did not complete or failed its checks; "" otherwise.
     """
 
     target_named: bool
@@ -54,11 +59,12 @@ class SearchRow:
     time_s: float
     error_m: float
     passes: int
+    reason: str = ""
 
 
 def trial(cell: Cell, seed: int) -> SearchRow:
-    """One search."""
-    options = OccupancyOptions(vehicles=VEHICLES, identify=Identify(cell.identify))
+    """One search by points."""
+    options = _options(cell)
     done = search_with_points(options, seed, false_count=FALSE_ANOMALIES)
     investigation, error_m = done.search.investigation, done.error_m
     return SearchRow(
@@ -70,29 +76,57 @@ def trial(cell: Cell, seed: int) -> SearchRow:
     )
 
 
+def flight(cell: Cell, seed: int) -> SearchRow:
+    """One search by aircraft."""
+    options = _options(cell)
+    world = default_world(OccupancyMission.world_defaults, count=VEHICLES, seed=seed)
+    world = occupancy_world(world, options, false_count=FALSE_ANOMALIES)
+    result = fly_trial(OccupancyMission(), RunRequest(options=options, world=world))
+    summary = result.summary
+    time_s, error_m = summary["time_to_find_s"], summary["target_error_m"]
+    return SearchRow(
+        target_named=summary["target_named"],
+        false_anomaly_named=summary["false_anomaly_named"],
+        time_s=options.search_time_s if time_s is None else time_s,
+        error_m=math.nan if error_m is None else error_m,
+        passes=summary.get("passes_on_purpose", 0),
+        reason=result.reason,
+    )
+
+
+def _options(cell: Cell) -> OccupancyOptions:
+    return OccupancyOptions(vehicles=VEHICLES, identify=Identify(cell.identify))
+
+
 def summarise(results: Results) -> dict[str, Any]:
-    """`searches`, by way of identification: what was named, time and error; and, if the threshold is one of
-    the ways, the difference of time to it in pairs of equal seeds. The time of a search that does not name
-    the target is infinite.
+    """`searches`, by way of identification: how many, what was named, time and error; and, if the threshold
+    is one of the ways, the difference of time to it in pairs of equal seeds. The time of a search that does
+    not name the target is infinite. A trial without a row named nothing.
     """
     named = results.values("target_named") > 0.0
+    wrong = results.values("false_anomaly_named") > 0.0
     never_s = np.where(named, results.values("time_s"), math.inf)
     blocks: dict[str, Any] = {}
     for k, cell in enumerate(results.cells):
+        ended = results.finished[k]
+        if not ended.any():
+            continue
         blocks[str(cell["identify"])] = block = {
-            "target_named": round(float(named[k].mean()), 4),
-            "false_anomaly_named": round(float(np.nanmean(results.values("false_anomaly_named")[k])), 4),
-            "time_s_median": _finite(float(np.median(never_s[k]))),
+            "searches": int(ended.sum()),
+            "target_named": round(float(named[k, ended].mean()), 4),
+            "false_anomaly_named": round(float(wrong[k, ended].mean()), 4),
+            "time_s_median": _finite(float(np.median(never_s[k, ended]))),
             "error_m_median": _finite(float(np.median(results.values("error_m")[k, named[k]])))
             if named[k].any()
             else None,
         }
-        if results.cells[0]["identify"] == Identify.THRESHOLD:
+        pairs = ended & results.finished[0]
+        if results.cells[0]["identify"] == Identify.THRESHOLD and pairs.any():
             both = named[k] & named[0]
             later_s = results.values("time_s")[k, both] - results.values("time_s")[0, both]
             block |= {
-                "sooner_than_threshold": round(float(np.mean(never_s[k] < never_s[0])), 4),
-                "later_than_threshold": round(float(np.mean(never_s[k] > never_s[0])), 4),
+                "sooner_than_threshold": round(float(np.mean(never_s[k, pairs] < never_s[0, pairs])), 4),
+                "later_than_threshold": round(float(np.mean(never_s[k, pairs] > never_s[0, pairs])), 4),
                 "pairs_that_both_name_it": int(both.sum()),
                 "time_to_threshold_s_median_of_pairs": _finite(float(np.median(later_s)))
                 if both.any()
@@ -105,25 +139,25 @@ def _finite(value: float) -> float | None:
     return round(value, 2) if math.isfinite(value) else None
 
 
+def _shown(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
 def report(results: Results) -> list[str]:
     """The table of the command line."""
-    lines = [
-        f"{'identify':10s} {'target':>8s} {'false':>8s} {'time, s':>8s} {'error, m':>9s} {'pairs':>6s} "
-        f"{'later, s':>9s}"
-    ]
+    titles = ("runs", "target", "false", "time, s", "error, m", "pairs", "later, s")
+    lines = [f"{'identify':10s}" + "".join(f"{title:>9s}" for title in titles)]
     for name, block in summarise(results)["searches"].items():
-        shown = [
-            "-" if value is None else f"{value:.1f}"
-            for value in (
-                block["time_s_median"],
-                block["error_m_median"],
-                block.get("time_to_threshold_s_median_of_pairs"),
-            )
-        ]
-        lines.append(
-            f"{name:10s} {block['target_named']:8.3f} {block['false_anomaly_named']:8.3f} {shown[0]:>8s} "
-            f"{shown[1]:>9s} {block.get('pairs_that_both_name_it', '-'):>6} {shown[2]:>9s}"
+        columns = (
+            f"{block['searches']}",
+            f"{block['target_named']:.3f}",
+            f"{block['false_anomaly_named']:.3f}",
+            _shown(block["time_s_median"]),
+            _shown(block["error_m_median"]),
+            f"{block.get('pairs_that_both_name_it', '-')}",
+            _shown(block.get("time_to_threshold_s_median_of_pairs")),
         )
+        lines.append(f"{name:10s}" + "".join(f"{column:>9s}" for column in columns))
     lines.append(
         "time: median, where a search that does not name the target never does; later: than threshold,"
     )
@@ -131,17 +165,18 @@ def report(results: Results) -> list[str]:
     return lines
 
 
-def study(ways: Collection[Identify] = tuple(Identify)) -> Study[Cell, SearchRow]:
+def study(ways: Collection[Identify] = tuple(Identify), *, flights: bool = False) -> Study[Cell, SearchRow]:
     """The study.
 
     Args:
         ways: of identification that are compared, the threshold first.
+        flights: the searchers are aircraft on SITL, not points.
     """
     compared = [way.value for way in Identify if way in ways]
     return Study(
         name="magnetic-search",
         description="A team names a magnetic target among false anomalies: Lum et al. 2005, figure 8.",
-        trial=trial,
+        trial=flight if flights else trial,
         parameters=Cell,
         row=SearchRow,
         design=grid(identify=compared),
@@ -149,6 +184,7 @@ def study(ways: Collection[Identify] = tuple(Identify)) -> Study[Cell, SearchRow
         success="target_named",
         metrics=("time_s", "error_m", "passes"),
         baseline=0,
+        options={"flights": flights},
         summarise=summarise,
         report=report,
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from estimators.survey.compensation import CYCLES
 from missions.piloting.control import HeadingController
 
 __all__ = ["BOXES", "HEADINGS", "AttitudeCommand", "Manoeuvre", "Programme", "box_side_m", "manoeuvres"]
@@ -19,7 +20,6 @@ HEADINGS: Final = 4
 BOXES: Final = 2
 """The first box is fitted, the second one judges the fit."""
 
-_CYCLES: Final = 3
 _SETTLED_RAD: Final = math.radians(4.0)
 _SETTLE_S: Final = 4.0
 _PAUSE_S: Final = 2.0
@@ -60,7 +60,7 @@ class Manoeuvre:
 
     @property
     def duration_s(self) -> float:
-        return _CYCLES * _PERIOD_S[self.axis]
+        return CYCLES * _PERIOD_S[self.axis]
 
     @property
     def label(self) -> str:
@@ -101,7 +101,7 @@ def manoeuvres(direction_rad: float) -> tuple[Manoeuvre, ...]:
 def box_side_m(speed_m_s: float) -> float:
     """Length of a leg, over ground, at most so long."""
     return speed_m_s * (
-        _SETTLE_S + _TURN_S + sum(_CYCLES * period + _PAUSE_S for period in _PERIOD_S.values())
+        _SETTLE_S + _TURN_S + sum(CYCLES * period + _PAUSE_S for period in _PERIOD_S.values())
     )
 
 

@@ -1,89 +1,25 @@
 """The actions of a vehicle that differ between PX4 (v1.16) and ArduPilot (4.6, copter and plane)."""
 
 import math
-from typing import Final, Protocol
+from abc import ABC, abstractmethod
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.kind import VehicleKind
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
-from missions.vehicle.link import VehicleLink
 from missions.vehicle.parameters import VehicleParameters
+from missions.vehicle.telemetry import Position
 
 PREARM: Final = "pre-arm checks"
 """Name of the autopilot's own checks in the result of `Adapter.readiness`."""
 
 
-class Adapter(Protocol):
+class Adapter(ABC):
     """The actions of one firmware, which have no state of their own.
 
     `missions.vehicle.firmware.Firmware` has the differences that are plain data.
-    """
-
-    def readiness(self) -> list[str]:
-        """Names of what is still missing before the vehicle can be armed; empty when it is ready."""
-        ...
-
-    async def prepare_arming(self) -> None:
-        """Switch to a mode in which arming is allowed."""
-        ...
-
-    async def take_off(self, altitude_m: float) -> None:
-        """Command the armed vehicle to take off."""
-        ...
-
-    async def start_streams(self) -> None:
-        """Request the telemetry that a mission needs, if the firmware doesn't send it by default."""
-        ...
-
-    async def start_mission(self) -> None:
-        """Start the uploaded mission, on the ground or in the air."""
-        ...
-
-    async def acceptance_m(self, requested_m: float) -> float:
-        """The radius within which a waypoint counts as reached."""
-        ...
-
-    async def own_acceptance_m(self) -> float:
-        """The acceptance radius of a waypoint that specifies none."""
-        ...
-
-    async def change_altitude(self, altitude_m: float) -> None:
-        """Command a height above home; the rest of the flight does not change."""
-        ...
-
-    async def loiter(self, place: GeodeticPosition, radius_m: float | None, clockwise: bool) -> None:
-        """Command a fixed wing to circle a place."""
-        ...
-
-    async def change_airspeed(self, airspeed_m_s: float) -> None:
-        """Command an airspeed to a fixed wing; the rest of the flight does not change."""
-        ...
-
-
-def missing_basics(link: VehicleLink) -> list[str]:
-    """The messages that every firmware must have sent before the vehicle can be armed, and that were not
-    received.
-    """
-    missing = []
-    status = link.message("SYS_STATUS")
-    if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:
-        missing.append(PREARM)
-    if link.message("HOME_POSITION") is None:
-        missing.append("home position")
-    if link.message("GLOBAL_POSITION_INT") is None:
-        missing.append("position estimate")
-    return missing
-
-
-_EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
-_EKF_CONST_POS: Final = 0x80
-_PLANE_RADIUS_M: Final = 255.0  # largest value of param2 of a plane's waypoint
-
-
-class ArduPilot:
-    """ArduPilot: it sends nothing until requested. The plane takes off in TAKEOFF and lands only in AUTO.
 
     Args:
         commands: commands to the vehicle.
@@ -95,12 +31,84 @@ class ArduPilot:
         self._commands = commands
         self._parameters = parameters
 
+    def readiness(self) -> list[str]:
+        """Names of what is still missing before the vehicle can be armed; empty when it is ready. Here: the
+        messages that every firmware must have sent, and that were not received.
+        """
+        missing = []
+        status = self._link.message("SYS_STATUS")
+        if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:
+            missing.append(PREARM)
+        if self._link.message("HOME_POSITION") is None:
+            missing.append("home position")
+        if self._link.message("GLOBAL_POSITION_INT") is None:
+            missing.append("position estimate")
+        return missing
+
+    @abstractmethod
+    async def prepare_arming(self) -> None:
+        """Switch to a mode in which arming is allowed."""
+
+    @abstractmethod
+    async def take_off(self, altitude_m: float) -> None:
+        """Command the armed vehicle to take off."""
+
+    @abstractmethod
+    async def start_streams(self) -> None:
+        """Request the telemetry that a mission needs, if the firmware doesn't send it by default."""
+
+    @abstractmethod
+    async def start_mission(self) -> None:
+        """Start the uploaded mission, on the ground or in the air."""
+
+    @abstractmethod
+    async def acceptance_m(self, requested_m: float) -> float:
+        """The radius within which a waypoint counts as reached."""
+
+    @abstractmethod
+    async def own_acceptance_m(self) -> float:
+        """The acceptance radius of a waypoint that specifies none."""
+
+    @abstractmethod
+    async def change_altitude(self, altitude_m: float) -> None:
+        """Command a height above home; the rest of the flight does not change."""
+
+    @abstractmethod
+    async def loiter(self, place: GeodeticPosition, radius_m: float | None, clockwise: bool) -> None:
+        """Command a fixed wing to circle a place."""
+
+    @abstractmethod
+    async def change_airspeed(self, airspeed_m_s: float) -> None:
+        """Command an airspeed to a fixed wing; the rest of the flight does not change."""
+
+    async def _command_at(
+        self,
+        command: int,
+        params: tuple[float, float, float, float],
+        place: GeodeticPosition | Position,
+        alt_m: float,
+        frame: int = dialect.MAV_FRAME_GLOBAL,
+    ) -> None:
+        """Send a COMMAND_INT with a place and a height."""
+        await self._commands.command_int(
+            command, frame, params, round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), alt_m
+        )
+
+
+_EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
+_EKF_CONST_POS: Final = 0x80
+_PLANE_RADIUS_M: Final = 255.0  # largest value of param2 of a plane's waypoint
+
+
+class ArduPilot(Adapter):
+    """ArduPilot: it sends nothing until requested. The plane takes off in TAKEOFF and lands only in AUTO."""
+
     @property
     def _plane(self) -> bool:
         return self._link.kind is VehicleKind.FIXED_WING
 
     def readiness(self) -> list[str]:
-        missing = missing_basics(self._link)
+        missing = super().readiness()
         ekf = self._link.message("EKF_STATUS_REPORT")
         if ekf is None or ekf.flags & _EKF_NEEDED != _EKF_NEEDED or ekf.flags & _EKF_CONST_POS:
             missing.append("navigation filter on GPS")
@@ -162,25 +170,17 @@ class ArduPilot:
                 altitude_m,
             )
             return
-        position = await self._link.position()
-        await self._commands.command_int(
+        await self._command_at(
             dialect.MAV_CMD_DO_REPOSITION,
-            dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
             (-1.0, 1.0, 0.0, 0.0),
-            round(position.lat_deg * 1e7),
-            round(position.lon_deg * 1e7),
+            await self._link.position(),
             altitude_m,
+            dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
         )
 
     async def loiter(self, place: GeodeticPosition, radius_m: float | None, clockwise: bool) -> None:
-        await self._commands.command_int(
-            dialect.MAV_CMD_DO_REPOSITION,
-            dialect.MAV_FRAME_GLOBAL,
-            (-1.0, 1.0, radius_m or 0.0, 0.0 if clockwise else 1.0),
-            round(place.lat_deg * 1e7),
-            round(place.lon_deg * 1e7),
-            place.alt_m,
-        )
+        params = (-1.0, 1.0, radius_m or 0.0, 0.0 if clockwise else 1.0)
+        await self._command_at(dialect.MAV_CMD_DO_REPOSITION, params, place, place.alt_m)
 
     async def change_airspeed(self, airspeed_m_s: float) -> None:
         await self._commands.command_int(
@@ -196,21 +196,8 @@ class ArduPilot:
 _HERE: Final = 0x7FFFFFFF
 
 
-class Px4:
-    """PX4: it streams by default, takes off by NAV_TAKEOFF, and circles by DO_ORBIT.
-
-    Args:
-        commands: commands to the vehicle.
-        parameters: its parameters.
-    """
-
-    def __init__(self, commands: VehicleCommands, parameters: VehicleParameters) -> None:
-        self._link = commands.link
-        self._commands = commands
-        self._parameters = parameters
-
-    def readiness(self) -> list[str]:
-        return missing_basics(self._link)
+class Px4(Adapter):
+    """PX4: it streams by default, takes off by NAV_TAKEOFF, and circles by DO_ORBIT."""
 
     async def prepare_arming(self) -> None:
         modes = self._link.firmware.modes
@@ -260,14 +247,8 @@ class Px4:
             radius_m = abs(await self._parameters.read_or("NAV_LOITER_RAD", 80.0))
         # PX4 1.16.1 ignores the radius of DO_REPOSITION: it circles clockwise with NAV_LOITER_RAD.
         # DO_ORBIT takes a signed radius, and an aircraft stays in Hold with it
-        await self._commands.command_int(
-            dialect.MAV_CMD_DO_ORBIT,
-            dialect.MAV_FRAME_GLOBAL,
-            (radius_m if clockwise else -radius_m, math.nan, 0.0, math.nan),
-            round(place.lat_deg * 1e7),
-            round(place.lon_deg * 1e7),
-            place.alt_m,
-        )
+        params = (radius_m if clockwise else -radius_m, math.nan, 0.0, math.nan)
+        await self._command_at(dialect.MAV_CMD_DO_ORBIT, params, place, place.alt_m)
 
     async def change_airspeed(self, airspeed_m_s: float) -> None:
         await self._commands.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, airspeed_m_s, -1.0)

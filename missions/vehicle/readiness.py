@@ -1,5 +1,6 @@
 """Waiting until a vehicle could be armed, and the reasons when it could not."""
 
+from contextlib import suppress
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
@@ -12,6 +13,8 @@ from missions.vehicle.plans import VehiclePlans
 
 # at the end of a wait for readiness: time in which the autopilot reports what is missing
 _REASONS_S: Final = 5.0
+_STREAMS_S: Final = 3.0  # after a request for streams, until it is repeated
+_STREAM_REQUESTS: Final = 5
 
 
 class Readiness:
@@ -34,11 +37,28 @@ class Readiness:
         await self._adapter.start_streams()
         if self._link.message("HOME_POSITION") is None:
             self._commands.request_once("HOME_POSITION")
+        await self._repeat_requests(timeout_s)
         await self._wait(timeout_s, leave_mission)
         if leave_mission and self._in_mission:
             await self._commands.set_mode(self._link.firmware.resting_mode)
             await self._plans.rewind_mission()
             await self._wait(timeout_s, leave_mission)
+
+    async def _repeat_requests(self, timeout_s: float) -> None:
+        """Request the streams again while no SYS_STATUS is received: ArduPilot does not acknowledge
+        REQUEST_DATA_STREAM, so a request that is lost, as while the autopilot starts, shows in nothing else.
+        """
+        link = self._link
+        for _ in range(min(_STREAM_REQUESTS, int(0.5 * timeout_s / _STREAMS_S))):
+            with suppress(VehicleTimeout):
+                await link.wait_until(
+                    lambda: link.message("SYS_STATUS"),
+                    what="SYS_STATUS",
+                    on=("SYS_STATUS",),
+                    timeout_s=_STREAMS_S,
+                )
+                return
+            await self._adapter.start_streams()
 
     @property
     def _in_mission(self) -> bool:

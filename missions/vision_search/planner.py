@@ -198,9 +198,6 @@ class Localizer:
 
     Args:
         options: of the vehicle.
-
-    Attributes:
-        done: number of passes, or of turns by 60 degrees, that were flown.
     """
 
     def __init__(self, options: VisionSearchOptions) -> None:
@@ -215,21 +212,27 @@ class Localizer:
         self._begun = 0
         self._leaving: float | None = None  # direction in which the present pass leaves the target
         self._angle_rad: float | None = None
-        self.done = 0
+        self._places = 0  # that were asked for: the vehicle has reached all but the last one
+
+    @property
+    def done(self) -> int:
+        """Number of passes, or of turns by 60 degrees, that were flown to their end."""
+        if self._kind is LocalizeKind.ORBIT:
+            return max(0, self._places - 2)
+        return max(0, self._places - 1) // 2
 
     def next_place(self, estimate: AreaEstimate, here: Place) -> Place:
-        """The next place."""
+        """The next place; the vehicle is at the one before."""
+        self._places += 1
         target = estimate.north_m, estimate.east_m
         if self._kind is LocalizeKind.ORBIT:
             if self._angle_rad is None:
                 self._angle_rad = math.atan2(here[1] - target[1], here[0] - target[0])
             else:
                 self._angle_rad += _ORBIT_RAD
-                self.done += 1
             return _at(target, self._angle_rad, self._radius_m)
         if self._leaving is not None:
             direction, self._leaving = self._leaving, None
-            self.done += 1
             return _at(target, direction, self._half_m)
         direction = (self._begun * self._count + self._index) * _GOLDEN_RAD
         self._begun += 1

@@ -16,7 +16,16 @@ def test_bytes_are_taken_apart_into_what_a_parser_finds():
     data = b"".join(frame.raw for frame in made)
     packet = Packet(data, [frame.message_id for frame in made])
     assert packet.frames == FrameParser().feed(data) == made
-    assert packet.frames is packet.frames and packet.sender == (7, 1) and len(packet) == 4
+    assert all(packet.frame(k) is frame for k, frame in enumerate(packet.frames))
+    assert packet.sender == (7, 1) and len(packet) == 4
+
+
+def test_one_frame_of_a_packet_is_the_same_object_before_and_after_the_others():
+    made = frames(7, 3)
+    packet = Packet(b"".join(frame.raw for frame in made), tuple(frame.message_id for frame in made))
+    newest = packet.newest(made[0].message_id)
+    assert newest == made[2] and packet.frames[2] is newest is packet.frame(2)
+    assert packet.part(1, 3).frames == made[1:]
 
 
 def test_the_newest_of_several_frames_of_one_message():

@@ -9,7 +9,7 @@ from scipy.signal import welch
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.turbulence import DrydenTurbulence, low_altitude_scales
+from flightsim.turbulence import BLOCK_STEPS, DrydenTurbulence, advance_turbulence, low_altitude_scales
 from flightsim.world import World, WorldParameters
 
 FT = 0.3048
@@ -27,8 +27,11 @@ def turbulence(
 def record(source: DrydenTurbulence, steps: int, height_m: float, airspeed_m_s: float) -> np.ndarray:
     samples = np.empty((steps, 3))
     for i in range(steps):
-        source.step(height_m, airspeed_m_s)
-        samples[i] = source.velocity_ned_m_s
+        row = i % BLOCK_STEPS
+        if row == 0:
+            source.draw()
+        noise, scales = source.normals[row], source.scales
+        advance_turbulence(source.constants, source.state, noise, height_m, airspeed_m_s, scales, samples[i])
     return samples
 
 

@@ -80,6 +80,19 @@ def test_not_ready_says_what_is_missing(flown, flavour):
     flown(script, flavour, ready=False, setup=never)
 
 
+def test_a_lost_request_for_streams_is_repeated(flown):
+    """It is not acknowledged; an ArduPilot that was starting lost it, and the mission was never ready."""
+
+    async def script(vehicle, autopilot):
+        return autopilot.streams["SYS_STATUS"]
+
+    def starting(autopilot):
+        requests, take = iter(range(3)), autopilot.on_request_data_stream
+        autopilot.on_request_data_stream = lambda m: None if next(requests) < 2 else take(m)
+
+    assert flown(script, "ardupilot", setup=starting) > 0.0
+
+
 def test_no_heartbeat_says_that_nothing_was_received(flown):
     async def script(vehicle, autopilot):
         autopilot.streams.clear()

@@ -9,11 +9,15 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.mavlink.handoff_messages import (
     HANDOFF_DECISION_PAYLOAD,
+    TRACK_DESIGNATION_PAYLOAD,
     TRACK_REPORT_PAYLOAD,
     HandoffDecision,
     ReportedTrack,
+    TrackDesignation,
     decision_message,
+    designation_message,
     read_decision,
+    read_designation,
     read_track_report,
     track_report_messages,
 )
@@ -27,6 +31,7 @@ READERS = {
     MOVING_POINTS_PAYLOAD: read_moving_points,
     TRACK_REPORT_PAYLOAD: read_track_report,
     HANDOFF_DECISION_PAYLOAD: read_decision,
+    TRACK_DESIGNATION_PAYLOAD: read_designation,
 }
 TRACK = ReportedTrack(
     number=5,
@@ -74,6 +79,14 @@ def test_golden_bytes_of_a_report_and_a_decision():
     assert read(message) == HandoffDecision(
         system=1, number=3, time_us=7, decided=True, target=9, probability=0.5, track=TRACK
     )
+
+
+def test_golden_bytes_of_a_designation():
+    message = designation_message(TrackDesignation(system=2, track=0x0304))
+    assert sent(message) == bytes.fromhex("01020403")
+    assert read(message) == TrackDesignation(system=2, track=0x0304)
+    assert read(designation_message(TrackDesignation(system=2, track=0))) is None
+    assert read(designation_message(TrackDesignation(system=0, track=1))) is None
 
 
 @given(
@@ -130,4 +143,4 @@ def test_any_payload_is_read_or_ignored(length, payload):
         assert reader(kind ^ 1, length, payload) is None
         for version in (b"", b"\x01"):
             found = reader(kind, length, version + payload[len(version) :])
-            assert found is None or hasattr(found, "time_us")
+            assert found is None or hasattr(found, "time_us") or found.track

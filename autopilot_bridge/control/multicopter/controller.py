@@ -1,13 +1,11 @@
 """The multicopter controller: navigation state and setpoint in, motor commands out, once per physics step."""
 
 import math
-from collections.abc import Callable
-from dataclasses import astuple, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from autopilot_bridge.control.controller import Array, Controller
 from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import (
@@ -26,10 +24,7 @@ from autopilot_bridge.control.multicopter.position import (
     vertical_control,
 )
 from autopilot_bridge.navigation import layout as n
-from flightsim.foundation.kernels import bound, kernel
-from flightsim.interface import MAX_ACTUATORS
-
-Array = NDArray[np.float64]
+from flightsim.foundation.kernels import kernel
 
 POSITION_RATE_HZ: Final = 62.5  # of the position loop, at least
 _MIN_COS_TILT: Final = 0.5  # collective isn't raised any more beyond 60 deg of tilt
@@ -165,7 +160,7 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
         actuators[i] = 0.0
 
 
-class MulticopterController:
+class MulticopterController(Controller[MulticopterParameters]):
     """Cascaded control of a quad-X: position, velocity, attitude, body rates, mixing.
 
     The setpoint's level chooses where the cascade starts. Fields that are not set (NaN) are filled as
@@ -175,62 +170,39 @@ class MulticopterController:
     flown. Position and velocity loops do not use unknown parts of the navigation state; without attitude or
     rates the motors idle.
 
+    The setpoint has the layout `control.multicopter.setpoint`, the actuators are motor commands 0..1 (front
+    right, rear left, front left, rear right), then zeros. Hover thrust is not learnt with ground contact.
+
     Args:
         parameters: gains and limits.
         physics_rate_hz: rate at which `step` is called.
         nav: navigation state, layout `navigation.layout`, shared with the filter.
-
-    Attributes:
-        step: writes `actuators` for this physics step from `nav` and `setpoint`.
-        setpoint: layout `control.setpoint`; starts at level OFF.
-        actuators: motor commands 0..1 (front right, rear left, front left, rear right), then zeros.
     """
 
     def __init__(
         self, parameters: MulticopterParameters | None = None, *, physics_rate_hz: float, nav: Array
     ) -> None:
-        if not 50.0 <= physics_rate_hz <= 4000.0:
-            raise ValueError(f"physics_rate_hz = {physics_rate_hz} is not in 50..4000")
-        if nav.shape != (n.NAV_SIZE,) or nav.dtype != np.float64:
-            raise ValueError(
-                f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({n.NAV_SIZE},) is accepted"
-            )
-        self._packed: Array = np.zeros(len(c.PARAMETER_NAMES))
-        self._state: Array = np.zeros(c.STATE_SIZE)
-        self.setpoint: Array = np.full(to.SETPOINT_SIZE, np.nan)
-        self.setpoint[to.LEVEL] = to.OFF
-        self.actuators: Array = np.zeros(MAX_ACTUATORS)
+        super().__init__(
+            MulticopterParameters() if parameters is None else parameters,
+            physics_rate_hz=physics_rate_hz,
+            nav=nav,
+            kernel=_step,
+            layout=c,
+            setpoint=to,
+            outer_rate_hz=POSITION_RATE_HZ,
+            scratch=(np.zeros(8),),
+        )
         state = self._state
-        state[c.DT] = 1.0 / physics_rate_hz
-        state[c.DIVISOR] = max(1.0, math.floor(physics_rate_hz / POSITION_RATE_HZ))
         state[c.COUNTER] = state[c.DIVISOR]
         state[c.Q_SETPOINT] = 1.0
         state[c.HOVER_VARIANCE] = 0.01
-        self.step: Callable[[], None] = bound(
-            _step, nav, self.setpoint, self._packed, state, np.zeros(8), self.actuators
-        )
-        self.set_parameters(MulticopterParameters() if parameters is None else parameters)
-        state[c.HOVER] = self._parameters.hover_thrust
-
-    @property
-    def parameters(self) -> MulticopterParameters:
-        """Gains and limits in use."""
-        return self._parameters
+        state[c.HOVER] = self.parameters.hover_thrust
 
     def set_parameters(self, parameters: MulticopterParameters) -> None:
         """Replace gains and limits, in flight too; the hover-thrust estimate is kept while it is in use."""
-        self._parameters = parameters
-        self._packed[:] = astuple(parameters)
+        super().set_parameters(parameters)
         if not parameters.use_hover_thrust_estimate:
             self._state[c.HOVER] = parameters.hover_thrust
-
-    def change(self, **values: float | bool) -> None:
-        """Replace single parameters by their field names."""
-        self.set_parameters(replace(self._parameters, **values))  # type: ignore[arg-type]
-
-    def set_ground_contact(self, contact: bool) -> None:
-        """Set whether the ground may carry part of the weight; hover thrust is not learnt then."""
-        self._state[c.GROUND_CONTACT] = 1.0 if contact else 0.0
 
     @property
     def hover_thrust(self) -> float:
@@ -241,18 +213,3 @@ class MulticopterController:
     def thrust(self) -> float:
         """Collective given by the motors after desaturation, 0..1."""
         return float(self._state[c.THRUST_GIVEN])
-
-    @property
-    def attitude_setpoint(self) -> Array:
-        """q_ned_from_frd wanted by the attitude loop, a view (4,)."""
-        return self._state[c.Q_SETPOINT : c.Q_SETPOINT + 4]
-
-    @property
-    def rate_setpoint_frd_rad_s(self) -> Array:
-        """Body rates wanted by the rate loop, a view (3,)."""
-        return self._state[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
-
-    @property
-    def velocity_setpoint_ned_m_s(self) -> Array:
-        """Velocity wanted by the velocity loop, a view (3,); NaN where it isn't controlled."""
-        return self._state[c.VEL_SETPOINT : c.VEL_SETPOINT + 3]

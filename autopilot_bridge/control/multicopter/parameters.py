@@ -2,38 +2,8 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
-
-_MAY_BE_ZERO: Final = frozenset(
-    {
-        "vel_xy_i_1_s2",
-        "vel_xy_d",
-        "vel_z_i_1_s2",
-        "vel_z_d",
-        "rate_roll_i",
-        "rate_roll_d",
-        "rate_roll_ff",
-        "rate_pitch_i",
-        "rate_pitch_d",
-        "rate_pitch_ff",
-        "rate_yaw_i",
-        "rate_yaw_d",
-        "rate_yaw_ff",
-        "rate_roll_integral_max",
-        "rate_pitch_integral_max",
-        "rate_yaw_integral_max",
-        "yaw_torque_cutoff_hz",
-        "thrust_model_factor",
-        "thrust_min",
-        "thrust_xy_margin",
-        "yaw_weight",
-        "drag_compensation_cutoff_hz",
-        "motor_idle",
-        "rotor_time_constant_s",
-    }
-)
+from flightsim.foundation.checks import NotNegative, Share, check_fields, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,73 +22,63 @@ class MulticopterParameters:
     pos_xy_p_1_s: float = 1.2  # MPC_XY_P
     pos_z_p_1_s: float = 1.0  # MPC_Z_P
     vel_xy_p_1_s: float = 2.6  # MPC_XY_VEL_P_ACC
-    vel_xy_i_1_s2: float = 0.8  # MPC_XY_VEL_I_ACC
-    vel_xy_d: float = 0.2  # MPC_XY_VEL_D_ACC
+    vel_xy_i_1_s2: NotNegative = 0.8  # MPC_XY_VEL_I_ACC
+    vel_xy_d: NotNegative = 0.2  # MPC_XY_VEL_D_ACC
     vel_z_p_1_s: float = 4.0  # MPC_Z_VEL_P_ACC
-    vel_z_i_1_s2: float = 2.0  # MPC_Z_VEL_I_ACC
-    vel_z_d: float = 0.0  # MPC_Z_VEL_D_ACC
+    vel_z_i_1_s2: NotNegative = 2.0  # MPC_Z_VEL_I_ACC
+    vel_z_d: NotNegative = 0.0  # MPC_Z_VEL_D_ACC
     vel_derivative_cutoff_hz: float = 5.0  # MPC_VELD_LP
     speed_xy_max_m_s: float = 12.0  # MPC_XY_VEL_MAX
     speed_up_max_m_s: float = 3.0  # MPC_Z_VEL_MAX_UP
     speed_down_max_m_s: float = 1.5  # MPC_Z_VEL_MAX_DN
     tilt_max_rad: float = math.radians(45.0)  # MPC_TILTMAX_AIR
-    thrust_min: float = 0.08  # MPC_THR_MIN
-    thrust_max: float = 1.0  # MPC_THR_MAX
-    thrust_xy_margin: float = 0.3  # MPC_THR_XY_MARG
+    thrust_min: Share = 0.08  # MPC_THR_MIN
+    thrust_max: Share = 1.0  # MPC_THR_MAX
+    thrust_xy_margin: Share = 0.3  # MPC_THR_XY_MARG
     hover_thrust: float = 0.45  # MPC_THR_HOVER: start of the estimate
     use_hover_thrust_estimate: bool = True  # MPC_USE_HTE
-    drag_compensation_cutoff_hz: float = 0.8  # no PX4 name: measured drag is fed forward below it; 0: off
+    drag_compensation_cutoff_hz: NotNegative = 0.8  # (none): measured drag is fed forward below it; 0: off
 
     # attitude
     roll_p_1_s: float = 6.5  # MC_ROLL_P
     pitch_p_1_s: float = 6.5  # MC_PITCH_P
     yaw_p_1_s: float = 2.8  # MC_YAW_P
-    yaw_weight: float = 0.4  # MC_YAW_WEIGHT
+    yaw_weight: Share = 0.4  # MC_YAW_WEIGHT
     roll_rate_max_rad_s: float = math.radians(220.0)  # MC_ROLLRATE_MAX
     pitch_rate_max_rad_s: float = math.radians(220.0)  # MC_PITCHRATE_MAX
     yaw_rate_max_rad_s: float = math.radians(200.0)  # MC_YAWRATE_MAX
 
     # body rates
     rate_roll_p: float = 0.15  # MC_ROLLRATE_P
-    rate_roll_i: float = 0.2  # MC_ROLLRATE_I
-    rate_roll_d: float = 0.003  # MC_ROLLRATE_D
-    rate_roll_ff: float = 0.0  # MC_ROLLRATE_FF
+    rate_roll_i: NotNegative = 0.2  # MC_ROLLRATE_I
+    rate_roll_d: NotNegative = 0.003  # MC_ROLLRATE_D
+    rate_roll_ff: NotNegative = 0.0  # MC_ROLLRATE_FF
     rate_roll_k: float = 1.0  # MC_ROLLRATE_K
-    rate_roll_integral_max: float = 0.3  # MC_RR_INT_LIM
+    rate_roll_integral_max: NotNegative = 0.3  # MC_RR_INT_LIM
     rate_pitch_p: float = 0.15  # MC_PITCHRATE_P
-    rate_pitch_i: float = 0.2  # MC_PITCHRATE_I
-    rate_pitch_d: float = 0.003  # MC_PITCHRATE_D
-    rate_pitch_ff: float = 0.0  # MC_PITCHRATE_FF
+    rate_pitch_i: NotNegative = 0.2  # MC_PITCHRATE_I
+    rate_pitch_d: NotNegative = 0.003  # MC_PITCHRATE_D
+    rate_pitch_ff: NotNegative = 0.0  # MC_PITCHRATE_FF
     rate_pitch_k: float = 1.0  # MC_PITCHRATE_K
-    rate_pitch_integral_max: float = 0.3  # MC_PR_INT_LIM
+    rate_pitch_integral_max: NotNegative = 0.3  # MC_PR_INT_LIM
     rate_yaw_p: float = 0.45  # MC_YAWRATE_P
-    rate_yaw_i: float = 0.15  # MC_YAWRATE_I
-    rate_yaw_d: float = 0.0  # MC_YAWRATE_D
-    rate_yaw_ff: float = 0.0  # MC_YAWRATE_FF
+    rate_yaw_i: NotNegative = 0.15  # MC_YAWRATE_I
+    rate_yaw_d: NotNegative = 0.0  # MC_YAWRATE_D
+    rate_yaw_ff: NotNegative = 0.0  # MC_YAWRATE_FF
     rate_yaw_k: float = 1.0  # MC_YAWRATE_K
-    rate_yaw_integral_max: float = 0.3  # MC_YR_INT_LIM
+    rate_yaw_integral_max: NotNegative = 0.3  # MC_YR_INT_LIM
     rate_derivative_cutoff_hz: float = 30.0  # IMU_DGYRO_CUTOFF
-    yaw_torque_cutoff_hz: float = 2.0  # MC_YAW_TQ_CUTOFF; 0: off
+    yaw_torque_cutoff_hz: NotNegative = 2.0  # MC_YAW_TQ_CUTOFF; 0: off
 
     # motors
-    thrust_model_factor: float = 0.5  # THR_MDL_FAC, MOT_THST_EXPO: thrust = f c^2 + (1 - f) c
-    motor_idle: float = 0.1  # lowest command of a running motor | MOT_SPIN_ARM
-    rotor_time_constant_s: float = 0.035  # of the thrust, for the hover-thrust estimate
+    thrust_model_factor: Share = 0.5  # THR_MDL_FAC, MOT_THST_EXPO: thrust = f c^2 + (1 - f) c
+    motor_idle: Share = 0.1  # lowest command of a running motor | MOT_SPIN_ARM
+    rotor_time_constant_s: NotNegative = 0.035  # of the thrust, for the hover-thrust estimate
 
     def __post_init__(self) -> None:
-        check_fields(self, require_positive, but=dict.fromkeys(_MAY_BE_ZERO, require_not_negative))
-        for name in (
-            "thrust_min",
-            "thrust_max",
-            "thrust_xy_margin",
-            "hover_thrust",
-            "yaw_weight",
-            "motor_idle",
-        ):
-            if getattr(self, name) > 1.0:
-                raise ValueError(f"{name} = {getattr(self, name)} is not in 0..1")
-        if self.thrust_model_factor > 1.0:
-            raise ValueError(f"thrust_model_factor = {self.thrust_model_factor} is not in 0..1")
+        check_fields(self, require_positive)
+        if self.hover_thrust > 1.0:
+            raise ValueError(f"hover_thrust = {self.hover_thrust} is not in 0..1")
         if self.thrust_min >= self.thrust_max:
             raise ValueError(f"thrust_min = {self.thrust_min} is not below thrust_max = {self.thrust_max}")
         if self.tilt_max_rad >= math.radians(89.0):

@@ -10,9 +10,10 @@ from autopilot_bridge.flight.fixed_wing.mission import MissionTask
 from autopilot_bridge.flight.fixed_wing.offboard import OffboardTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, LaunchKind, TurnInRule
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
-from autopilot_bridge.flight.fixed_wing.return_home import ReturnPhase, ReturnTask
+from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffPhase, TakeoffTask
 from autopilot_bridge.flight.parameters import ReturnDestination
+from autopilot_bridge.flight.return_place import ReturnPhase
 from autopilot_bridge.flight.task import GuidedKind, OffboardKind
 
 __all__ = [

@@ -7,7 +7,7 @@ chosen with `benchmarks/aircraft_landings.py`: many landings of several aircraft
 import math
 from dataclasses import dataclass
 
-from flightsim.foundation.checks import check_fields, require_finite, require_positive
+from flightsim.foundation.checks import Finite, check_fields, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +94,7 @@ class LandingParameters:
     go_arounds: int = 3
     slope_gain: float = 0.4
     dive_free_m: float = 25.0
-    dive_low_rad: float = math.radians(-1.0)
+    dive_low_rad: Finite = math.radians(-1.0)
     latest_flare_share: float = 0.6
     standing_m_s: float = 1.5
     brake_after_s: float = 1.5
@@ -103,7 +103,7 @@ class LandingParameters:
     bounce_s: float = 3.0
 
     def __post_init__(self) -> None:
-        check_fields(self, require_positive, but={"dive_low_rad": require_finite})
+        check_fields(self, require_positive)
         if not (self.low_m < self.free_bank_m and self.low_m < self.dive_free_m):
             raise ValueError(
                 f"low_m = {self.low_m} is not below free_bank_m = {self.free_bank_m} and dive_free_m = "

@@ -16,49 +16,18 @@ from autopilot_bridge.flight.fixed_wing.landing_parameters import (
 )
 from autopilot_bridge.flight.parameters import RallyRule, ReturnDestination
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import (
+    Finite,
+    NotNegative,
+    NotNegativeOrInf,
+    PositiveOrInf,
+    Share,
+    check_fields,
+    require_positive,
+)
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
-
-_SIGNED: Final = frozenset(
-    {
-        "loiter_radius_m",
-        "return_loiter_time_s",
-        "return_loiter_radius_m",
-        "pitch_min_rad",
-        "trim_pitch_rad",
-        "takeoff_roll_pitch_rad",
-        "flare_pitch_min_rad",
-    }
-)
-_MAY_BE_ZERO: Final = frozenset(
-    {
-        "trim_throttle",
-        "throttle_idle",
-        "climb_max_m_s",
-        "takeoff_throttle_ramp_s",
-        "launch_delay_s",
-        "launch_speed_min_m_s",
-        "launch_acceleration_m_s2",
-        "launch_time_s",
-        "landing_abort_climb_m",
-        "standing_height_m",
-        "brake",
-        "flaps_landing",
-        "flaps_takeoff",
-        "return_climb_min_m",
-        "return_cone_half_angle_rad",
-        "return_min_distance_m",
-        "position_lost_wait_s",
-        "manual_deadzone",
-        "manual_expo",
-    }
-)
-_MAY_BE_INFINITE: Final = frozenset(
-    {"acceptance_altitude_m", "glide_slope_min_m", "position_lost_wait_s", "return_descend_altitude_m"}
-)
-
 
 _PERIODS: Final = 2.5  # of the guidance over the time of a turn through a radian and of a bank's reversal
 
@@ -96,14 +65,14 @@ class FixedWingFlightParameters:
     airspeed_max_m_s: float = 35.0  # FW_AIRSPD_MAX | AIRSPEED_MAX
     climb_rate_m_s: float = 3.0  # wanted climbs: FW_T_CLMB_R_SP | FBWB_CLIMB_RATE
     sink_rate_m_s: float = 2.0  # wanted descents: FW_T_SINK_R_SP | FBWB_CLIMB_RATE
-    climb_max_m_s: float = 5.0  # FW_T_CLMB_MAX | TECS_CLMB_MAX
+    climb_max_m_s: NotNegative = 5.0  # FW_T_CLMB_MAX | TECS_CLMB_MAX
     sink_max_m_s: float = 5.0  # FW_T_SINK_MAX | TECS_SINK_MAX
     bank_max_rad: float = math.radians(45.0)  # FW_R_LIM | ROLL_LIMIT_DEG
     pitch_max_rad: float = math.radians(25.0)  # FW_P_LIM_MAX | PTCH_LIM_MAX_DEG
-    pitch_min_rad: float = math.radians(-20.0)  # FW_P_LIM_MIN | PTCH_LIM_MIN_DEG
-    trim_pitch_rad: float = math.radians(3.0)  # FW_PSP_OFF | PTCH_TRIM_DEG: flown when the height is lost
-    trim_throttle: float = 0.5  # FW_THR_TRIM | TRIM_THROTTLE
-    throttle_idle: float = 0.0  # FW_THR_IDLE | THR_MIN
+    pitch_min_rad: Finite = math.radians(-20.0)  # FW_P_LIM_MIN | PTCH_LIM_MIN_DEG
+    trim_pitch_rad: Finite = math.radians(3.0)  # FW_PSP_OFF | PTCH_TRIM_DEG: flown when the height is lost
+    trim_throttle: Share = 0.5  # FW_THR_TRIM | TRIM_THROTTLE
+    throttle_idle: Share = 0.0  # FW_THR_IDLE | THR_MIN
 
     guidance_period_s: float = 10.0  # NPFG_PERIOD | NAVL1_PERIOD
     guidance_damping: float = 0.7  # NPFG_DAMPING | NAVL1_DAMPING
@@ -114,10 +83,10 @@ class FixedWingFlightParameters:
     switch_distance_multiplier: float = 0.32  # NPFG_SW_DST_MLT
 
     acceptance_radius_m: float = 20.0  # NAV_ACC_RAD | WP_RADIUS
-    acceptance_altitude_m: float = 10.0  # NAV_FW_ALT_RAD; ArduPilot: infinite
+    acceptance_altitude_m: PositiveOrInf = 10.0  # NAV_FW_ALT_RAD; ArduPilot: infinite
     turn_in: TurnInRule = TurnInRule.SWITCH_DISTANCE
     loiter_exits_aligned: bool = False  # every loiter item ends towards the next waypoint (ArduPilot)
-    loiter_radius_m: float = 80.0  # NAV_LOITER_RAD | WP_LOITER_RAD; negative: counter-clockwise
+    loiter_radius_m: Finite = 80.0  # NAV_LOITER_RAD | WP_LOITER_RAD; negative: counter-clockwise
 
     launch: LaunchKind = LaunchKind.RUNWAY
     takeoff_altitude_m: float = 30.0  # MIS_TAKEOFF_ALT | TKOFF_ALT
@@ -127,14 +96,14 @@ class FixedWingFlightParameters:
     takeoff_clearance_m: float = 15.0  # straight and nearly level wings below: RWTO_ | TKOFF_LVL_ALT
     takeoff_bank_max_rad: float = math.radians(15.0)  # in the climb-out | LEVEL_ROLL_LIMIT
     takeoff_throttle_max: float = 1.0  # RWTO_MAX_THR | TKOFF_THR_MAX
-    takeoff_throttle_ramp_s: float = 2.0  # RWTO_RAMP_TIME | TKOFF_THR_SLEW
-    takeoff_roll_pitch_rad: float = 0.0  # RWTO_PSP: on the runway | TKOFF_GND_PITCH
+    takeoff_throttle_ramp_s: NotNegative = 2.0  # RWTO_RAMP_TIME | TKOFF_THR_SLEW
+    takeoff_roll_pitch_rad: Finite = 0.0  # RWTO_PSP: on the runway | TKOFF_GND_PITCH
     rotation_airspeed_m_s: float = 20.0  # RWTO_ROT_AIRSPD | TKOFF_ROTATE_SPD
     rotation_time_s: float = 1.0  # RWTO_ROT_TIME
-    launch_acceleration_m_s2: float = 15.0  # FW_LAUN_AC_THLD | TKOFF_THR_MINACC
-    launch_time_s: float = 0.05  # FW_LAUN_AC_T: so long
-    launch_speed_min_m_s: float = 0.0  # TKOFF_THR_MINSPD: over ground, too; 0: off
-    launch_delay_s: float = 0.2  # FW_LAUN_MOT_DEL | TKOFF_THR_DELAY: motor off after the launch
+    launch_acceleration_m_s2: NotNegative = 15.0  # FW_LAUN_AC_THLD | TKOFF_THR_MINACC
+    launch_time_s: NotNegative = 0.05  # FW_LAUN_AC_T: so long
+    launch_speed_min_m_s: NotNegative = 0.0  # TKOFF_THR_MINSPD: over ground, too; 0: off
+    launch_delay_s: NotNegative = 0.2  # FW_LAUN_MOT_DEL | TKOFF_THR_DELAY: motor off after the launch
 
     landing_angle_rad: float = math.radians(5.0)  # FW_LND_ANG: glide slope without an approach leg
     landing_angle_max_rad: float = math.radians(10.0)  # steepest slope flown to meet the place
@@ -143,34 +112,32 @@ class FixedWingFlightParameters:
     flare_height_m: float = 1.5  # above ground, at least: FW_LND_FLALT | LAND_FLARE_ALT
     flare_time_s: float = 2.0  # before the ground at the present sink: FW_LND_FL_TIME | LAND_FLARE_SEC
     flare_sink_m_s: float = 0.6  # FW_LND_FL_SINK | TECS_LAND_SINK
-    flare_pitch_min_rad: float = math.radians(1.0)  # FW_LND_FL_PMIN | LAND_PITCH_DEG
+    flare_pitch_min_rad: Finite = math.radians(1.0)  # FW_LND_FL_PMIN | LAND_PITCH_DEG
     flare_pitch_max_rad: float = math.radians(12.0)  # FW_LND_FL_PMAX | LAND_PITCH_DEG
     ground_bank_max_rad: float = math.radians(
         5.0
     )  # wing tips free near the ground: FW_WING_* | LEVEL_ROLL_LIMIT
     rangefinder_landing: bool = True  # FW_LND_USETER | RNGFND_LANDING
     pitch_time_constant_s: float = 0.25  # FW_P_TC | PTCH2SRV_TCONST: of the flare's haste
-    standing_height_m: float = 0.3  # measured by the rangefinder on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
-    landing_abort_climb_m: float = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
-    flaps_takeoff: float = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
-    flaps_landing: float = 0.0  # FW_FLAPS_LND_SCL | LAND_FLAP_PERCNT
-    brake: float = 0.5  # in the roll-out
+    standing_height_m: NotNegative = 0.3  # of the rangefinder on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
+    landing_abort_climb_m: NotNegative = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
+    flaps_takeoff: Share = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
+    flaps_landing: Share = 0.0  # FW_FLAPS_LND_SCL | LAND_FLAP_PERCNT
+    brake: Share = 0.5  # in the roll-out
     climb_out: ClimbOutParameters = field(default_factory=ClimbOutParameters)
     landing: LandingParameters = field(default_factory=LandingParameters)
     flare: FlareParameters = field(default_factory=FlareParameters)
     surface_wind: SurfaceWindParameters = field(default_factory=SurfaceWindParameters)
 
     return_altitude_m: float = 60.0  # RTL_RETURN_ALT | RTL_ALTITUDE
-    return_descend_altitude_m: float = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE, or infinite
+    return_descend_altitude_m: PositiveOrInf = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE, or infinite
     return_climbs: bool = True  # PX4 climbs and never descends on the way; ArduPilot flies at the altitude
-    glide_slope_min_m: float = math.inf  # GLIDE_SLOPE_MIN: higher above the target, the way there is a slope
-    return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN
-    return_loiter_time_s: float = -1.0  # RTL_LAND_DELAY; negative: for ever
-    return_loiter_radius_m: float = 80.0  # RTL_LOITER_RAD | RTL_RADIUS; negative: counter-clockwise
+    glide_slope_min_m: PositiveOrInf = math.inf  # GLIDE_SLOPE_MIN: from so high above the target a slope
+    return_climb_min_m: NotNegative = 0.0  # RTL_CLIMB_MIN
+    return_loiter_time_s: Finite = -1.0  # RTL_LAND_DELAY; negative: for ever
+    return_loiter_radius_m: Finite = 80.0  # RTL_LOITER_RAD | RTL_RADIUS; negative: counter-clockwise
     return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE | RTL_AUTOLAND
     rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
-    return_cone_half_angle_rad: float = 0.0  # RTL_CONE_ANG within RTL_MIN_DIST; 0: off
-    return_min_distance_m: float = 100.0  # RTL_MIN_DIST
 
     manual_bank_max_rad: float = math.radians(45.0)  # FW_MAN_R_MAX | ROLL_LIMIT_DEG
     manual_pitch_max_rad: float = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MAX_DEG
@@ -178,12 +145,12 @@ class FixedWingFlightParameters:
     acro_roll_rate_rad_s: float = math.radians(90.0)  # FW_ACRO_X_MAX | ACRO_ROLL_RATE
     acro_pitch_rate_rad_s: float = math.radians(90.0)  # FW_ACRO_Y_MAX | ACRO_PITCH_RATE
     acro_yaw_rate_rad_s: float = math.radians(45.0)  # FW_ACRO_Z_MAX | ACRO_YAW_RATE
-    manual_deadzone: float = 0.06
-    manual_expo: float = 0.0
+    manual_deadzone: NotNegative = 0.06
+    manual_expo: Share = 0.0
 
     guided_timeout_s: float = 3.0  # ArduPlane: attitudes in GUIDED
     position_lost_bank_rad: float = math.radians(15.0)  # FW_GPSF_R
-    position_lost_wait_s: float = 30.0  # FW_GPSF_LT: so long before it descends; ArduPilot: infinite
+    position_lost_wait_s: NotNegativeOrInf = 30.0  # FW_GPSF_LT: then it descends; ArduPilot: infinite
     position_lost_sink_m_s: float = 1.5
 
     @classmethod
@@ -236,9 +203,7 @@ class FixedWingFlightParameters:
         return cls(**values)
 
     def __post_init__(self) -> None:
-        signed = dict.fromkeys(_SIGNED, require_finite)
-        zero = dict.fromkeys(_MAY_BE_ZERO, require_not_negative)
-        check_fields(self, require_positive, but=signed | zero, unlimited=_MAY_BE_INFINITE)
+        check_fields(self, require_positive)
         if not self.airspeed_min_m_s <= self.airspeed_trim_m_s <= self.airspeed_max_m_s:
             raise ValueError(
                 f"airspeed_trim_m_s = {self.airspeed_trim_m_s} is not between airspeed_min_m_s = "
@@ -253,13 +218,8 @@ class FixedWingFlightParameters:
                 f"landing_angle_max_rad = {self.landing_angle_max_rad} is below "
                 f"landing_angle_rad = {self.landing_angle_rad}"
             )
-        for name in ("trim_throttle", "throttle_idle", "takeoff_throttle_max", "brake", "manual_expo"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise ValueError(f"{name} = {value} is not in 0..1")
-        for name in ("flaps_takeoff", "flaps_landing"):
-            if getattr(self, name) > 1.0:
-                raise ValueError(f"{name} = {getattr(self, name)} is not in 0..1")
+        if self.takeoff_throttle_max > 1.0:
+            raise ValueError(f"takeoff_throttle_max = {self.takeoff_throttle_max} is not in 0..1")
         if self.manual_deadzone >= 1.0:
             raise ValueError(f"manual_deadzone = {self.manual_deadzone} is not in 0..1 (1 excluded)")
         for name in ("bank_max_rad", "takeoff_bank_max_rad", "ground_bank_max_rad", "manual_bank_max_rad"):

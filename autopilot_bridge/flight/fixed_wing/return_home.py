@@ -4,9 +4,7 @@ The parameters are set by `flight_parameters` of `firmware/px4/plane/mapping.py`
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from enum import IntEnum
 
 import numpy as np
 
@@ -16,74 +14,34 @@ from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.parameters import ALONG_PLAN, ReturnDestination
-from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules, landing_start
-from autopilot_bridge.flight.plan_task import PlanTask
-from autopilot_bridge.flight.return_place import ReturnPlace, ReturnPlan, choose_return, plan_landing
+from autopilot_bridge.flight.plan_reading import landing_start
+from autopilot_bridge.flight.return_place import (
+    HomewardTask,
+    ReturnPhase,
+    ReturnPlace,
+    choose_return,
+    plan_landing,
+)
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
-from autopilot_bridge.mission_plan import MissionStore
 
 
-class ReturnPhase(IntEnum):
-    """Where the return stands."""
-
-    CLIMB = 0
-    FLY = 1
-    DESCEND = 2
-    LOITER = 3
-    LAND = 4
-
-
-def return_height(distance_m: float, height_m: float, parameters: FixedWingFlightParameters) -> float:
-    """Height over home to fly home at.
-
-    PX4: never lower than now; otherwise the return altitude, within RTL_MIN_DIST only as high as the cone
-    around home requires. ArduPilot: the return altitude.
-    """
+def return_height(height_m: float, parameters: FixedWingFlightParameters) -> float:
+    """Height over home to fly home at: the return altitude; PX4: never lower than now."""
     p = parameters
-    wanted = p.return_altitude_m
     if not p.return_climbs:
-        return wanted
-    if p.return_cone_half_angle_rad > 0.0 and distance_m <= p.return_min_distance_m:
-        floor = min(wanted, p.return_descend_altitude_m)
-        wanted = min(wanted, max(distance_m / math.tan(p.return_cone_half_angle_rad), floor))
-    return max(height_m + p.return_climb_min_m, wanted)
+        return p.return_altitude_m
+    return max(height_m + p.return_climb_min_m, p.return_altitude_m)
 
 
-class ReturnTask(AircraftTask):
+class ReturnTask(HomewardTask, AircraftTask):
     """Climb, fly home, circle down, circle there or land; or fly the landing sequence of the plan.
 
     Home is the place that `choose_return` gives: a rally point may take its place. Without a home it circles
     where it is; without a position it does as `LoiterTask`.
-
-    Args:
-        store: the plan, whose landing sequence the parameters may send the return to; None: there is none.
-        first_item: the first item that is flown, as the mission task has it.
-        rules: how the firmware goes through a plan.
-        plan_task: makes the mission task that flies the plan; None: the return flies no plan.
-
-    Attributes:
-        phase: see `ReturnPhase`.
-        place: where the return leads; None: nowhere.
     """
 
-    def __init__(
-        self,
-        store: MissionStore | None = None,
-        *,
-        first_item: int = 0,
-        rules: PlanRules = PX4_PLANS,
-        plan_task: Callable[..., PlanTask] | None = None,
-    ) -> None:
-        super().__init__()
-        self._store = store
-        self._first_item = first_item
-        self._rules = rules
-        self._plan_task = plan_task
-        self.place: ReturnPlace | None = None
-        self._sub: FlightTask | None = None
-        self._home: Array = np.full(3, np.nan)
-        self._wait_s = 0.0
-        self.phase = ReturnPhase.CLIMB
+    _home: Array
+    _sub: FlightTask | None = None
 
     @property
     def sub_task(self) -> FlightTask | None:
@@ -116,11 +74,10 @@ class ReturnTask(AircraftTask):
             return
         if (place.landing is not None or destination in ALONG_PLAN) and self._land_by_plan(ctx, place):
             return
-        self._home[:] = place.ned_m
+        self._home = np.array(place.ned_m)
         ground_down = float(self._home[2])
-        distance = math.hypot(float(self._home[0]) - state.north_m, float(self._home[1]) - state.east_m)
         height = ground_down - state.down_m
-        wanted = return_height(distance, height, p)
+        wanted = return_height(height, p)
         own_down = place.altitude_down_m
         self._home[2] = own_down if math.isfinite(own_down) else ground_down - wanted
         if p.return_climbs and wanted - height > p.acceptance_altitude_m:
@@ -135,13 +92,11 @@ class ReturnTask(AircraftTask):
 
     def _land_by_plan(self, ctx: FlightContext, place: ReturnPlace) -> bool:
         """Go on along the plan, or with its landing sequence, if there is one."""
-        store = self._store
-        if store is None or self._plan_task is None or len(store.items) <= self._first_item:
+        plan = self._plan_home(ctx, ctx.fixed_wing.return_destination, place)
+        if plan is None:
             return False
-        destination = ctx.fixed_wing.return_destination
-        plan = ReturnPlan.of(ctx, store, self._first_item, self._rules, destination, place)
         self.phase = ReturnPhase.LAND
-        self._set_sub(ctx, plan.task(self._plan_task))
+        self._set_sub(ctx, plan)
         return True
 
     def _land_after_home(self, ctx: FlightContext) -> bool:

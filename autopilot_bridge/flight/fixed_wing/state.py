@@ -30,30 +30,13 @@ class AircraftState:
         height_above_ground_m: of the rangefinder; NaN when not known.
     """
 
-    __slots__ = (
-        "airspeed_m_s",
-        "course_rad",
-        "down_m",
-        "east_m",
-        "forward_force_m_s2",
-        "ground_speed_m_s",
-        "height_above_ground_m",
-        "lasting_airspeed_m_s",
-        "north_m",
-        "pitch_rad",
-        "roll_rad",
-        "true_airspeed_m_s",
-        "vel_down_m_s",
-        "vel_east_m_s",
-        "vel_north_m_s",
-        "wind_east_m_s",
-        "wind_north_m_s",
-        "yaw_rad",
-    )
-
     def __init__(self) -> None:
-        for name in self.__slots__:
-            setattr(self, name, 0.0)
+        self.north_m = self.east_m = self.down_m = 0.0
+        self.vel_north_m_s = self.vel_east_m_s = self.vel_down_m_s = 0.0
+        self.wind_north_m_s = self.wind_east_m_s = self.ground_speed_m_s = self.course_rad = 0.0
+        self.airspeed_m_s = self.lasting_airspeed_m_s = self.true_airspeed_m_s = 0.0
+        self.roll_rad = self.pitch_rad = self.yaw_rad = 0.0
+        self.forward_force_m_s2 = self.height_above_ground_m = 0.0
 
     def read(self, ctx: FlightContext) -> None:
         """Take over the newest navigation state."""

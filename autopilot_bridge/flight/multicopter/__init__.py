@@ -9,9 +9,10 @@ from autopilot_bridge.flight.multicopter.manual import ManualMode, ManualTask
 from autopilot_bridge.flight.multicopter.mission import MissionTask
 from autopilot_bridge.flight.multicopter.offboard import OffboardTask
 from autopilot_bridge.flight.multicopter.orbit import OrbitTask, OrbitYaw
-from autopilot_bridge.flight.multicopter.return_home import ReturnPhase, ReturnTask
+from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
+from autopilot_bridge.flight.return_place import ReturnPhase
 from autopilot_bridge.flight.task import (
     FlightTask,
     GuidedKind,

@@ -4,8 +4,6 @@ The parameters are set by `flight_parameters` of `firmware/px4/copter/mapping.py
 """
 
 import math
-from collections.abc import Callable
-from enum import IntEnum
 
 import numpy as np
 
@@ -14,80 +12,44 @@ from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
 from autopilot_bridge.flight.parameters import ALONG_PLAN, FlightParameters
-from autopilot_bridge.flight.plan_reading import PX4_PLANS, PlanRules
-from autopilot_bridge.flight.plan_task import PlanTask
-from autopilot_bridge.flight.return_place import ReturnPlace, ReturnPlan, choose_return, plan_landing
+from autopilot_bridge.flight.return_place import (
+    HomewardTask,
+    ReturnPhase,
+    ReturnPlace,
+    choose_return,
+    plan_landing,
+)
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
-from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
-
-
-class ReturnPhase(IntEnum):
-    """The phase of the return."""
-
-    CLIMB = 0
-    FLY = 1
-    DESCEND = 2
-    LOITER = 3
-    LAND = 4
-    PLAN = 5
-    STAY = 6
 
 
 def return_height(distance_m: float, height_m: float, parameters: FlightParameters) -> float:
     """Height over home of the flight home.
 
-    It is never lower than the present height; otherwise it is the return altitude, and near home only the
-    height that the cone around home requires (PX4 RTL_CONE_ANG within RTL_MIN_DIST; ArduPilot RTL_CONE_SLOPE
-    everywhere).
+    It is never lower than the present height; otherwise it is the return altitude, near home only as high as
+    the cone around home requires (PX4 RTL_CONE_ANG in RTL_MIN_DIST; ArduCopter RTL_CONE_SLOPE everywhere).
     """
     p = parameters
     wanted = min(p.return_altitude_m, p.return_height_max_m)
     if p.return_cone_half_angle_rad > 0.0 and distance_m <= p.return_min_distance_m:
-        tangent = math.tan(p.return_cone_half_angle_rad)
         floor = min(wanted, p.return_descend_altitude_m)
-        wanted = min(wanted, max(distance_m / tangent, floor))
+        wanted = min(wanted, max(distance_m / math.tan(p.return_cone_half_angle_rad), floor))
     return max(height_m, min(max(height_m + p.return_climb_min_m, wanted), p.return_height_max_m))
 
 
-class ReturnTask:
+class ReturnTask(HomewardTask):
     """Climb, fly home, descend, wait, land. Without a home or a position it lands where it is.
 
     The target is the place from `choose_return`: a rally point or the landing of the plan may replace home.
     With a negative loiter time the vehicle stays over home (PX4 RTL_LAND_DELAY = -1); with a final height it
     hovers at that height in the end (ArduPilot RTL_ALT_FINAL).
-
-    Args:
-        store: the plan whose landing the return may use, by the parameters; None: there is none.
-        first_item: the first item that is flown, as in the mission task.
-        rules: how the firmware flies a plan.
-        plan_task: makes the mission task that flies the plan; None: the return flies no plan.
-
-    Attributes:
-        phase: see `ReturnPhase`.
-        place: the target of the return; None: there is none.
     """
 
-    def __init__(
-        self,
-        store: MissionStore | None = None,
-        *,
-        first_item: int = 0,
-        rules: PlanRules = PX4_PLANS,
-        plan_task: Callable[..., PlanTask] | None = None,
-    ) -> None:
-        self.phase = ReturnPhase.CLIMB
-        self.place: ReturnPlace | None = None
-        self._store = store
-        self._first_item = first_item
-        self._rules = rules
-        self._plan_task = plan_task
-        self._motion: SmoothMotion | None = None
-        self._ramp: TakeoffRamp | None = None
-        self._land: FlightTask | None = None
-        self._plan: FlightTask | None = None
-        self._target: Array = np.zeros(3)
-        self._wait_s = 0.0
+    _target: Array
+    _motion: SmoothMotion | None = None
+    _ramp: TakeoffRamp | None = None
+    _land: FlightTask | None = None
+    _plan: FlightTask | None = None
 
     def activate(self, ctx: FlightContext) -> None:
         p = ctx.multicopter
@@ -118,7 +80,7 @@ class ReturnTask:
             height = max(height, own_m)
         # the climb ends where braking ends
         brake_s = float(np.hypot(velocity[0], velocity[1])) / (2.0 * p.acceleration_m_s2)
-        self._target[:] = position + velocity * brake_s
+        self._target = position + velocity * brake_s
         self._target[2] = float(home[2]) - height
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
@@ -134,14 +96,10 @@ class ReturnTask:
 
     def _fly_plan(self, ctx: FlightContext) -> bool:
         """Continue along the plan, or with its landing; False if there is none."""
-        store = self._store
-        if store is None or self._plan_task is None or len(store.items) <= self._first_item:
+        self._plan = self._plan_home(ctx, ctx.multicopter.return_destination, self.place)
+        if self._plan is None:
             return False
-        plan = ReturnPlan.of(
-            ctx, store, self._first_item, self._rules, ctx.multicopter.return_destination, self.place
-        )
         self.phase = ReturnPhase.PLAN
-        self._plan = plan.task(self._plan_task)
         self._plan.activate(ctx)
         return True
 

@@ -21,6 +21,7 @@ from estimators.handoff import (
     align,
     blended,
 )
+from estimators.handoff.dead_reckoning import EYE
 from estimators.relative_pose import LevelMotion, PoseMode
 from estimators.vision.ground_points import CameraAxes, on_ground
 
@@ -50,7 +51,13 @@ def windows(handoff, target, others=None, k=0):
     count = len(target)
     times = STEP_US * (k + np.arange(1 - count, 1))
     return TrackWindows(
-        time_us=int(times[-1]), times_us=times, handoff=handoff, target=target, others=others or {}
+        time_us=int(times[-1]),
+        times_us=times,
+        handoff=handoff,
+        target=target,
+        eyes=(1.8 * np.arange(1.0 - count, 1.0)[:, None] * (1.0, 0.0),) * 2,
+        heights_m=(120.0, 130.0),
+        others=others or {},
     )
 
 
@@ -83,14 +90,17 @@ def test_past_places_are_seen_from_now_as_the_ground_is():
 def test_a_history_gives_windows_of_complete_tracks_only():
     history = TrackHistory(keep_s=1.0)
     for k in range(21):
-        history.add(k * STEP_US, [(1, float(k), 0.0)] + ([(2, 0.0, float(k))] if k > 15 else []))
+        eye = DeadReckoning()
+        eye.x_m = float(-k)
+        history.add(k * STEP_US, eye, [(1, float(k), 0.0)] + ([(2, 0.0, float(k))] if k > 15 else []))
     times = STEP_US * np.arange(12, 21)
     assert history.window(1, times)[:, 0].tolist() == list(range(12, 21))
     assert history.window(1, times - STEP_US // 2)[:, 0] == pytest.approx(np.arange(12, 21) - 0.5)
     assert history.window(2, times) is None and history.window(3, times) is None
     assert history.window(1, STEP_US * np.arange(5, 21)) is None  # older than it keeps
-    assert history.numbers == [1, 2]
-    history.add(3 * STEP_US, [(9, 0.0, 0.0)])  # late
+    assert history.numbers == [EYE, 1, 2]
+    assert history.window(EYE, times)[:, 0].tolist() == list(range(-12, -21, -1))
+    history.add(3 * STEP_US, DeadReckoning(), [(9, 0.0, 0.0)])  # late
     assert 9 not in history.numbers
 
 
@@ -166,7 +176,7 @@ def test_scores_of_lost_tracks_fade_and_no_target_decides_nothing():
     comparison = MatchComparison(MatchingParameters(forgetting=0.5))
     target = walk(rng, 100)
     comparison.update(windows({1: seen_by_handoff(target)}, target), POSE)
-    empty = TrackWindows(time_us=0, times_us=np.zeros(0, dtype=np.int64), handoff={}, target=None)
+    empty = replace(windows({}, target), target=None)
     for _ in range(25):
         comparison.update(empty, POSE)
     assert comparison.scores == {} and comparison.decided is None
@@ -181,33 +191,90 @@ def test_blending_goes_from_the_pose_to_the_track():
     assert blended((10.0, 2.0), (20.0, -2.0), 0.25) == (17.5, -1.0)
 
 
-def test_the_factor_of_a_pair_is_the_ratio_of_two_gaussians():
-    """Against the densities of scipy, with the covariance of every pair of places written out."""
+def shifted(place, eye, height, tilt, up):
+    """A place on the ground as an aircraft sees it with errors of roll, pitch and height."""
+    x, y = np.asarray(place) - eye
+    roll, pitch = tilt
+    line = np.array([x, y, height]) + np.cross((roll, pitch, 0.0), (x, y, height))
+    return eye + (height + up) * line[:2] / line[2]
+
+
+def slopes(function, count):
+    """Derivatives at 0 by differences, (2, count)."""
+    steps = 1e-4 * np.eye(count)
+    return np.column_stack([(function(step) - function(-step)) / 2e-4 for step in steps])
+
+
+def test_the_probabilities_are_those_of_all_hypotheses_written_out():
+    """Against the densities of scipy, with each error as a number and derivatives by differences."""
     rng = np.random.default_rng(4)
-    p = EvidenceParameters(absent=0.5, wrong=0.0)
-    target = walk(rng, 41)
-    handoff = seen_by_handoff(target) + rng.normal(0.0, 3.0, (41, 2)) + (4.0, -2.0)
+    p = EvidenceParameters(wrong=0.0, rough=0.0, decision=0.5)
+    target, other = walk(rng, 41), walk(rng, 41, start=(55.0, 45.0))
+    own = {
+        k: seen_by_handoff(places) + rng.normal(0.0, 2.0, (41, 2)) + (4.0, -2.0)
+        for k, places in ((3, target), (4, other), (5, walk(rng, 41)))
+    }
+    given = windows(own, target, {9: other})
     comparison = EvidenceComparison(p)
-    comparison.update(windows({3: handoff}, target), POSE)
-    c, s = math.cos(POSE.heading_rad), math.sin(POSE.heading_rad)
-    target, handoff = target[::10], handoff[::10]
-    times = 0.1 * np.arange(-40.0, 1.0, 10.0)
-    place, heading = 25.0 + p.pose_sigma_m**2, 0.01**2 + p.pose_sigma_rad**2
-    same, different = np.zeros((10, 10)), np.zeros((10, 10))
-    for i in range(5):
-        for j in range(5):
-            x, y = (np.array([-s * t[0] + c * t[1], -c * t[0] - s * t[1]]) for t in (target[i], target[j]))
-            noise = p.slow_sigma_m**2 * math.exp(-abs(times[i] - times[j]) / p.slow_s)
-            noise += p.sigma_m**2 * (i == j) + place + times[i] * times[j] * p.drift_m_s**2
-            block = noise * np.eye(2) + heading * np.outer(x, y)
-            same[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = block
-            wide = (p.apart_m**2 + times[i] * times[j] * p.speed_m_s**2) * np.eye(2)
-            different[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = block + wide
-    off = (handoff - seen_by_handoff(target)).ravel()
-    factor = math.exp(
-        multivariate_normal.logpdf(off, cov=same) - multivariate_normal.logpdf(off, cov=different)
+    comparison.update(given, POSE)
+    sampled = slice(0, 41, 10)
+    times, count = 0.1 * np.arange(-40.0, 1.0, 10.0), 5
+    place = np.array([POSE.forward_m, POSE.right_m])
+
+    def by(errors, k, track):
+        """Where the tracker's place k of a track is expected among the handoff aircraft's."""
+        x, y, heading, north, east, up, over, *tilts = errors
+        tilts = np.reshape(tilts, (2, count, 2))
+        at = shifted(track[sampled][k], given.eyes[1][sampled][k], given.heights_m[1], tilts[1, k], over)
+        c, s = math.cos(POSE.heading_rad + heading), math.sin(POSE.heading_rad + heading)
+        at = np.array([[c, s], [-s, c]]) @ at + place + (x, y) + times[k] * np.array([north, east])
+        return shifted(at, given.eyes[0][sampled][k], given.heights_m[0], tilts[0, k], up)
+
+    slow = np.exp(-np.abs(times[:, None] - times) / p.tilt_s)
+    spread = np.zeros((7 + 4 * count, 7 + 4 * count))
+    spread[:3, :3] = np.diag([25.0 + p.pose_sigma_m**2] * 2 + [1e-4 + p.pose_sigma_rad**2])
+    spread[3:7, 3:7] = np.diag([p.drift_m_s**2] * 2 + [p.height_sigma_m**2] * 2)
+    spread[7:, 7:] = np.kron(np.eye(2), np.kron(p.tilt_sigma_rad**2 * slow, np.eye(2)))
+    noise = p.slow_sigma_m**2 * np.exp(-np.abs(times[:, None] - times) / p.slow_s) + p.sigma_m**2 * np.eye(
+        count
     )
-    assert comparison.scores[3] == pytest.approx(factor / (factor + 1.0))
+    noise = np.kron(noise, np.eye(2))
+    ages = np.linspace(0.0, 4.0, 4001)  # of a velocity, from now back
+    covariance = p.speed_m_s**2 * np.exp(-np.abs(ages[:, None] - ages) / p.turn_s)
+    inside = (ages <= -times[:, None]) * np.where((ages == 0.0) | (ages == -times[:, None]), 5e-4, 1e-3)
+    away = np.kron(p.apart_m**2 + inside @ covariance @ inside.T, np.eye(2))
+
+    def slope(track):
+        return np.vstack([slopes(lambda e, k=k: by(e, k, track), len(spread)) for k in range(count)])
+
+    tracker = (target, other)
+    jacobians = [slope(track) for track in tracker]
+    expected = [np.array([by(np.zeros(len(spread)), k, track) for k in range(count)]) for track in tracker]
+    off = {(i, k): (own[k][sampled] - expected[i]).ravel() for i in (0, 1) for k in own}
+    free = {
+        k: multivariate_normal.pdf(off[0, k], cov=jacobians[0] @ spread @ jacobians[0].T + noise + away)
+        for k in own
+    }
+    totals = dict.fromkeys([None, *own], 0.0)
+    for first in totals:
+        for second in totals:
+            if first is not None and first == second:
+                continue
+            pairs = [(i, k) for i, k in enumerate((first, second)) if k is not None]
+            density = p.seen ** len(pairs) * (1.0 - p.seen) ** (2 - len(pairs))
+            for k in own:
+                if k not in (first, second):
+                    density *= p.free * free[k]
+            if pairs:
+                stacked = np.vstack([jacobians[i] for i, _ in pairs])
+                covariance = stacked @ spread @ stacked.T + np.kron(np.eye(len(pairs)), noise)
+                density *= multivariate_normal.pdf(
+                    np.concatenate([off[pair] for pair in pairs]), cov=covariance
+                )
+            totals[first] += density
+    for k in own:
+        assert comparison.scores[k] == pytest.approx(totals[k] / sum(totals.values()), rel=1e-3, abs=1e-12)
+    assert 0.5 < comparison.scores[3] < 1.0 - 1e-6
 
 
 def scene(seed, *, bias=8.0, noise=1.0, absent=False):

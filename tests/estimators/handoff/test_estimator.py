@@ -12,7 +12,9 @@ from autopilot_bridge.mavlink.handoff_messages import (
     TRACK_REPORT_PAYLOAD,
     HandoffDecision,
     ReportedTrack,
+    TrackDesignation,
     decision_message,
+    designation_message,
     track_report_messages,
 )
 from autopilot_bridge.mavlink.moving_points import MovingPoints, moving_points_messages
@@ -112,6 +114,21 @@ def test_the_tracker_is_released_by_the_decision_about_its_track_and_by_nothing_
     assert runner.estimator.released
 
 
+def test_an_operator_designates_a_track_of_this_aircraft_and_no_other(decided):
+    runner = decided.runners[TRACKER]
+    tracker, designation = runner.estimator, runner.estimator.designation
+    other = next(number for number in tracker.sight.tracks.places if number != designation.number)
+    before, count = designation.number, designation.count
+    for system, track in ((HANDOFF, other), (TRACKER, 60_000)):
+        runner.feed(encoded(designation_message(TrackDesignation(system=system, track=track)), 255, 190))
+        assert (designation.number, designation.count) == (before, count)
+    assert tracker.counts["designations_of_no_track"] == 1
+    for number in (other, before):
+        runner.feed(encoded(designation_message(TrackDesignation(system=TRACKER, track=number)), 255, 190))
+        assert designation.number == number and designation.probability == 1.0
+    assert designation.count == count + 2 and tracker.counts["designations"] == 2
+
+
 def part(time_us, first, points, total, scan=0):
     return MovingPoints(
         scan=scan, time_us=time_us, first=first, total=total, sigma=0.002, points=tuple(points)
@@ -155,7 +172,7 @@ def test_a_second_track_of_the_same_target_leaves_no_doubt():
     designation.update(100, {1: (0.0, 0.0), 2: (1.0, 0.0)})
     assert designation.probability == 1.0
     designation.update(200, {2: (1.0, 0.0)})
-    assert designation.number == 2 and designation.probability == pytest.approx(0.99)
+    assert designation.number == 2 and designation.probability == pytest.approx(0.995)
     designation.update(300, {2: (1.0, 0.0), 3: (20.0, 0.0)})
     designation.update(400, {2: (1.0, 0.0), 3: (2.0, 0.0)})
     assert designation.probability < 0.6

@@ -7,6 +7,7 @@ import pytest
 
 from estimators.errors import EstimatorError
 from estimators.survey.compensation import (
+    CYCLES,
     direction_cosines,
     figure_of_merit_nt,
     fit_compensation,
@@ -33,11 +34,11 @@ DIRECTION = MainField(HOME).direction_ned
 
 
 def manoeuvres():
-    """Rolls, pitches and yaws of three cycles each on four headings, with turns between: (n, 3) attitudes,
+    """Rolls, pitches and yaws of `CYCLES` cycles each on four headings, with turns between: (n, 3) attitudes,
     and the slice of each manoeuvre. The end is the begin of the next flight.
     """
     attitudes, slices = [], []
-    cycles = round(3 * PERIOD_S * RATE_HZ)
+    cycles = round(CYCLES * PERIOD_S * RATE_HZ)
     turning = round(TURN_S * RATE_HZ)
     for number in range(4):
         heading = 0.3 + 0.5 * math.pi * number
@@ -122,7 +123,7 @@ def test_the_figure_of_merit_falls_by_ten_times_and_more(seed):
 
 def test_noise_alone_has_the_figure_of_merit_that_is_stated_for_it():
     rng = np.random.default_rng(5)
-    flown = [np.zeros(round(length_s * RATE_HZ)) for length_s in (12.0, 15.0, 24.0)] * 4
+    flown = [np.zeros(round(length_s * RATE_HZ)) for length_s in (24.0, 30.0, 48.0)] * 4
     stated = noise_figure_nt(flown, 0.2, rate_hz=RATE_HZ)
     trend = [0.1 * np.arange(len(values)) for values in flown]
     drawn = [

@@ -168,14 +168,7 @@ def test_after_its_loiter_time_it_lands() -> None:
 
 
 def test_height_to_fly_home_at() -> None:
-    p = FixedWingFlightParameters(
-        return_altitude_m=100.0,
-        return_descend_altitude_m=40.0,
-        return_cone_half_angle_rad=math.radians(45.0),
-        return_min_distance_m=200.0,
-    )
-    assert return_height(1000.0, 50.0, p) == 100.0
-    assert return_height(1000.0, 130.0, p) == 130.0
-    assert return_height(70.0, 10.0, p) == pytest.approx(70.0)
-    assert return_height(10.0, 10.0, p) == 40.0
-    assert return_height(1000.0, 130.0, ARDUPILOT) == 100.0
+    p = FixedWingFlightParameters(return_altitude_m=100.0, return_descend_altitude_m=40.0)
+    assert return_height(50.0, p) == 100.0
+    assert return_height(130.0, p) == 130.0
+    assert return_height(130.0, ARDUPILOT) == 100.0

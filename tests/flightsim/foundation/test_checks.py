@@ -7,9 +7,10 @@ from enum import IntEnum
 import pytest
 
 from flightsim.foundation.checks import (
+    Finite,
+    PositiveOrInf,
     check_amounts,
     check_fields,
-    require_finite,
     require_not_negative,
     require_positive,
 )
@@ -23,8 +24,8 @@ class Kind(IntEnum):
 class Parameters:
     time_s: float = 1.0
     noise_m: float = 0.0
-    angle_rad: float = -1.0
-    reach_m: float = math.inf
+    angle_rad: Finite = -1.0
+    reach_m: PositiveOrInf = math.inf
     count: int = 3
     limits_m: tuple[float, float] = (1.0, 2.0)
     place_m: tuple[float, float] | None = None
@@ -33,13 +34,7 @@ class Parameters:
     name: str = ""
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            require_positive,
-            but={"noise_m": require_not_negative, "angle_rad": require_finite},
-            unlimited=("reach_m",),
-            unchecked=("place_m",),
-        )
+        check_fields(self, require_positive, but={"noise_m": require_not_negative}, unchecked=("place_m",))
 
 
 def test_everything_else_than_numbers_is_passed_over() -> None:

@@ -23,6 +23,7 @@ from missions.planning.limits import FixedWingLimits, MulticopterLimits
         ({"link_loss": 1.0}, "`link_loss` 1 is not a share"),
         ({"link_delay_s": 9.0}, "`link_delay_s` 9 s is not in 0..5 s"),
         ({"target_ne_m": (math.nan, 0.0)}, "`target_ne_m` is not a place"),
+        ({"confirm_after_s": -1.0}, "`confirm_after_s` -1"),
         ({"timeout_s": -1.0}, "`timeout_s` -1"),
         ({"estimator_seed": -1}, "`estimator_seed` -1"),
     ],

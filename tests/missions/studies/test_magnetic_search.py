@@ -1,16 +1,18 @@
 """The study `magnetic-search`, and the searches with points that it consists of."""
 
+import json
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from missions.cli.main import run_command_line
 from missions.embedded.point_searchers import search_with_points
 from missions.embedded.worlds import drawn_target
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.suspect import Identify
-from missions.studies import run_trial
+from missions.studies import run_study, run_trial
 from missions.studies.magnetic_search import report, study, summarise
 
 SMALL = OccupancyOptions(
@@ -44,6 +46,7 @@ def test_the_time_of_a_search_that_does_not_name_the_target_is_infinite():
     }
     results = SimpleNamespace(
         cells=[{"identify": "threshold"}, {"identify": "bayes"}],
+        finished=np.ones((2, 3), dtype=bool),
         values=lambda name: np.array(columns[name], dtype=np.float64),
     )
     threshold, bayes = summarise(results)["searches"].values()
@@ -51,8 +54,28 @@ def test_the_time_of_a_search_that_does_not_name_the_target_is_infinite():
     assert (threshold["time_s_median"], bayes["time_s_median"]) == (None, 200.0)
     assert (bayes["sooner_than_threshold"], bayes["later_than_threshold"]) == (1.0, 0.0)
     assert (bayes["pairs_that_both_name_it"], bayes["time_to_threshold_s_median_of_pairs"]) == (1, -10.0)
+    assert threshold["searches"] == bayes["searches"] == 3
     assert bayes["error_m_median"] == 6.0
     assert "bayes" in report(results)[2]
+
+
+def test_searches_that_have_not_ended_are_not_counted():
+    columns = {
+        "target_named": [[1, np.nan, 1], [1, 1, np.nan]],
+        "false_anomaly_named": [[0, np.nan, 0], [0, 0, np.nan]],
+        "time_s": [[100.0, np.nan, 30.0], [90.0, 200.0, np.nan]],
+        "error_m": [[8.0, np.nan, 7.0], [4.0, 6.0, np.nan]],
+    }
+    results = SimpleNamespace(
+        cells=[{"identify": "threshold"}, {"identify": "bayes"}],
+        finished=~np.isnan(columns["time_s"]),
+        values=lambda name: np.array(columns[name]),
+    )
+    bayes = summarise(results)["searches"]["bayes"]
+    assert (bayes["searches"], bayes["target_named"], bayes["time_s_median"]) == (2, 1.0, 145.0)
+    assert (bayes["sooner_than_threshold"], bayes["time_to_threshold_s_median_of_pairs"]) == (1.0, -10.0)
+    results.finished = np.zeros((2, 3), dtype=bool)
+    assert summarise(results) == {"searches": {}}
 
 
 def test_without_the_threshold_nothing_is_compared_with_it():
@@ -65,7 +88,9 @@ def test_without_the_threshold_nothing_is_compared_with_it():
         "error_m": [[8.0, 900.0], [4.0, 6.0]],
     }
     results = SimpleNamespace(
-        cells=chosen.design.cells, values=lambda name: np.array(columns[name], dtype=np.float64)
+        cells=chosen.design.cells,
+        finished=np.ones((2, 2), dtype=bool),
+        values=lambda name: np.array(columns[name], dtype=np.float64),
     )
     assert "sooner_than_threshold" not in summarise(results)["searches"]["trace"]
     assert [line.split()[-2:] for line in report(results)[1:3]] == [["-", "-"]] * 2
@@ -78,6 +103,20 @@ def test_the_evidence_names_the_target_among_five_false_anomalies(run):
     row = run_trial(study(), index, runs=4)
     assert (row["identify"], row["target_named"], row["false_anomaly_named"]) == ("bayes", True, False)
     assert row["error_m"] < 40.0
+
+
+@pytest.mark.slow
+def test_a_flight_of_the_study_is_that_of_its_command(tmp_path):
+    chosen = study([Identify.BAYES], flights=True)
+    result = run_study(chosen, runs=1, out=tmp_path / "study", keep_logs="all", picture=False)
+    row = result.results.table.to_pylist()[0]
+    words = ["fly", "occupancy", "--vehicles", "3", "--identify", "bayes", "--false-anomalies", "5"]
+    assert run_command_line([*words, "--seed", "0", "--no-picture", "--out", str(tmp_path / "fly")]) == 0
+    (log,) = (tmp_path / "study").rglob("flight.tlog")
+    assert log.read_bytes() == (tmp_path / "fly" / "flight.tlog").read_bytes()
+    summary = json.loads((tmp_path / "fly" / "summary.json").read_text(encoding="utf-8"))
+    assert (row["target_named"], row["time_s"]) == (True, summary["time_to_find_s"])
+    assert (row["error_m"], row["reason"]) == (summary["target_error_m"], "")
 
 
 def test_its_cells_can_be_stored():

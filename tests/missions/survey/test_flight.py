@@ -170,8 +170,7 @@ def test_a_survey_over_terrain_keeps_its_height(autopilot, tmp_path):
 def test_compensation_takes_out_the_aircraft_at_least_ten_times(seed, autopilot, tmp_path):
     """Improvement ratio and figure of merit of the second box, and the aircraft's true field on all headings.
 
-    The magnetometer's own noise makes 1.5 nT of figure of merit, so that of a clean aircraft can't fall by
-    ten times: then noise is most of what is left.
+    The magnetometer's own noise makes 1.1 nT of the figure of merit, whatever the compensation.
     """
     options = SurveyOptions(calibrate=True, altitude_m=CALIBRATION_ALTITUDE_M)
     result = fly(
@@ -184,10 +183,9 @@ def test_compensation_takes_out_the_aircraft_at_least_ten_times(seed, autopilot,
     before_nt, after_nt, noise_nt = (
         summary[f"figure_of_merit{name}_nt"] for name in ("_before", "", "_noise")
     )
-    assert before_nt > 8.0 * after_nt
-    assert before_nt > 10.0 * after_nt or after_nt < 1.5 * noise_nt
+    assert before_nt > 10.0 * after_nt
     assert after_nt < 3.0
-    assert 1.2 < noise_nt < 1.8
+    assert 0.8 < noise_nt < 1.3
     compensation = load_compensation(result.folder / COMPENSATION)
     home = load_survey_map(result.folder / MAP_NAME).home
     main = MainField(home)

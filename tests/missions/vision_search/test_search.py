@@ -131,7 +131,7 @@ def test_passes_cross_the_estimate_in_spread_directions():
         assert middle == pytest.approx((10.0, 20.0))
         directions.append(math.atan2(exit_[1] - entry[1], exit_[0] - entry[0]) % math.pi)
         here = exit_
-    assert localizer.done == 6
+    assert localizer.done == 5  # the sixth pass has begun
     gaps = np.diff(np.sort([*directions, min(directions) + math.pi]))
     assert gaps.max() < math.radians(60.0)
 
@@ -143,7 +143,7 @@ def test_an_orbit_keeps_its_distance():
     assert radii == pytest.approx([radii[0]] * 7)
     assert 5.0 < radii[0] < 23.0  # the target stays in the picture
     assert places[6] == pytest.approx(places[0])
-    assert localizer.done == 6
+    assert localizer.done == 5  # the sixth turn has begun
 
 
 def search_of(count=1, **changes):
@@ -170,10 +170,11 @@ def test_a_search_localizes_when_the_belief_is_narrow_and_searches_on_when_it_is
     search.observed(0, estimate(sigma_m=50.0), nowhere)
     again = search.step(0, 0, exit_)
     assert math.dist(again, (10.0, 20.0)) != pytest.approx(math.dist(entry, (10.0, 20.0)))
-    assert search.passes == 1 and not search.over
     search.observed(0, estimate(), nowhere)
-    for _ in range(4):
-        search.step(0, 0, (0.0, 0.0))
+    places = [search.step(0, 0, again) for _ in range(2)]
+    assert search.passes == 1 and not search.over
+    assert 0.5 * np.add(*places) == pytest.approx((10.0, 20.0))  # the second pass is flown to its end
+    assert search.step(0, 0, places[1]) == places[1]
     assert search.reason == "all passes are flown"
     assert search.progress == 1.0
 

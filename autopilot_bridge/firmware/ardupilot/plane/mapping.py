@@ -170,7 +170,6 @@ def flight_parameters(
     least_drop_m = store.get("GLIDE_SLOPE_MIN")
     values["glide_slope_min_m"] = least_drop_m if least_drop_m > 0.0 else math.inf
     values["return_loiter_time_s"] = -1.0
-    values["return_cone_half_angle_rad"] = 0.0
     radius_m = store.limited("RTL_RADIUS")
     values["return_loiter_radius_m"] = radius_m or values["loiter_radius_m"]
     values["return_destination"] = _DESTINATIONS.get(integer(store, "RTL_AUTOLAND"), ReturnDestination.HOME)

@@ -19,32 +19,15 @@ from autopilot_bridge.firmware.px4.texts import plane_notices
 from autopilot_bridge.flight.fixed_wing import LandDetector
 from flightsim.airframe import AirframeKind, LaunchKind
 
-_SELECTABLE: Final = frozenset(
-    {
-        FlightMode.MANUAL,
-        FlightMode.STABILIZED,
-        FlightMode.ACRO,
-        FlightMode.ALTITUDE,
-        FlightMode.POSITION,
-        FlightMode.HOLD,
-        FlightMode.TAKEOFF,
-        FlightMode.MISSION,
-        FlightMode.RETURN,
-        FlightMode.LAND,
-        FlightMode.FOLLOW,
-        FlightMode.OFFBOARD,
-    }
-)
-_PREVENT_ARMING: Final = frozenset(
-    {FlightMode.RETURN, FlightMode.LAND, FlightMode.FOLLOW, FlightMode.DESCEND}
-)
+_SELECTABLE: Final = MULTICOPTER_POLICY.ground_modes - px4_plane_modes.MULTICOPTER_ONLY
+_ARMABLE: Final = MULTICOPTER_POLICY.armable_modes - px4_plane_modes.MULTICOPTER_ONLY
 
 POLICY: Final = replace(
     MULTICOPTER_POLICY,
-    armable_modes=_SELECTABLE - _PREVENT_ARMING,
+    armable_modes=_ARMABLE,
     ground_modes=_SELECTABLE,
     flown_modes=_SELECTABLE - {FlightMode.FOLLOW},  # an aircraft follows no target
-    kept_after_disarm=_SELECTABLE - _PREVENT_ARMING,
+    kept_after_disarm=_ARMABLE,
     preflight_disarm_extra_s=0.0,
     orbit_mode=FlightMode.HOLD,  # Orbit is a multicopter's mode; an aircraft circles in Hold
 )

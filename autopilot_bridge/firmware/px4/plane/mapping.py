@@ -119,7 +119,6 @@ def flight_parameters(
     values["rangefinder_landing"] = integer(store, "FW_LND_USETER") > 0
     values["return_destination"], values["rally"] = px4_mapping.return_rules(store)
     values["return_climbs"] = True
-    values["return_cone_half_angle_rad"] = 0.0  # RTL_CONE_ANG is the multicopter's
     return replace(tuned, **flight_values(values, tuned, controller))
 
 

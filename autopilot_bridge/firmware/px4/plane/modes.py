@@ -11,13 +11,13 @@ from autopilot_bridge.firmware.flavour import ModeDisplay
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 
 _STABILIZE: Final = 0x10
-_MULTICOPTER_ONLY: Final = frozenset({FlightMode.ORBIT, FlightMode.POSITION_SLOW, FlightMode.PRECISION_LAND})
+MULTICOPTER_ONLY: Final = frozenset({FlightMode.ORBIT, FlightMode.POSITION_SLOW, FlightMode.PRECISION_LAND})
 
 CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
-    {mode: number for mode, number in px4_modes.CUSTOM_MODES.items() if mode not in _MULTICOPTER_ONLY}
+    {mode: number for mode, number in px4_modes.CUSTOM_MODES.items() if mode not in MULTICOPTER_ONLY}
 )
 MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
-    {mode: name for mode, name in px4_modes.MODE_NAMES.items() if mode not in _MULTICOPTER_ONLY}
+    {mode: name for mode, name in px4_modes.MODE_NAMES.items() if mode not in MULTICOPTER_ONLY}
 )
 
 LISTED_MODES: Final = tuple(
