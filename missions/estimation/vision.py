@@ -36,12 +36,7 @@ def watch(request: VisionRequest, on_progress: OnProgress | None = None) -> Visi
         PlanError: the run folder can't be made.
         BridgeError: the link can't be opened, or the log can't be read.
     """
-    camera = load_camera(request.camera)
-    pictures: PictureProcess[Any]
-    if isinstance(request.detector, TagDetectorParameters):
-        pictures = PictureWatch(camera, request.detector)
-    else:
-        pictures = MotionWatch(camera, request.detector)
+    pictures = _process(request)
     begun_s = wall_time_s()
     if request.log is not None:
         folder, outcome, reason, more = over_log(request, request.log, pictures, on_progress)
@@ -59,3 +54,13 @@ def watch(request: VisionRequest, on_progress: OnProgress | None = None) -> Visi
     }
     write_summary(folder, summary)
     return VisionResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
+
+
+def _process(request: VisionRequest) -> PictureProcess[Any]:
+    """What searches the pictures."""
+    camera, detector = load_camera(request.camera), request.detector
+    return (
+        PictureWatch(camera, detector)
+        if isinstance(detector, TagDetectorParameters)
+        else MotionWatch(camera, detector)
+    )
