@@ -1,9 +1,17 @@
-"""The operator of the tracking aircraft: when the target is confirmed."""
+"""The operator of the tracking aircraft: when the target is confirmed, and how the message arrives."""
 
+import asyncio
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
+from autopilot_bridge.mavlink.handoff_messages import TrackDesignation, read_designation
 from estimators.handoff import Designation
 from missions.handoff.operator import TrackOperator
+from missions.handoff.options import HandoffOptions
+from missions.handoff.team import settings_of
+from missions.handoff.watch import HandoffWatch, RadioLink
 
 STEP_US = 100_000
 
@@ -37,3 +45,29 @@ def test_targets_side_by_side_are_not_confirmed():
     sent = []
     times, probability = met(TrackOperator(5.0, 0.99, sent.append), sent, seconds=30.0, apart_m=6.0)
     assert times == [] and probability < 0.75
+
+
+def test_a_designation_reaches_the_estimator_of_the_tracker_and_its_log():
+    sent = {1: [], 2: []}
+    vehicles = [
+        SimpleNamespace(
+            system_id=system,
+            clock=SimpleNamespace(time_us=0),
+            link=SimpleNamespace(connection=SimpleNamespace(send=sent[system].append)),
+        )
+        for system in (1, 2)
+    ]
+    options = HandoffOptions(vehicles=2)
+    settings = [settings_of(options, role, 1, 2) for role in ("handoff", "tracker")]
+    watch = HandoffWatch(vehicles, settings, RadioLink(1.0, 0.0, np.random.default_rng(1)))
+
+    async def designate():
+        watch.designate(7)
+        await asyncio.sleep(0)
+
+    asyncio.run(designate())
+    handoff, tracker = watch.estimators
+    assert tracker.counts == {"designations_of_no_track": 1} and not handoff.counts
+    (message,) = sent[2]
+    wire = (message.payload_type, message.payload_length, message.payload)
+    assert read_designation(*wire) == TrackDesignation(system=2, track=7) and not sent[1]
