@@ -63,7 +63,7 @@ def frame(target, rng):
     )
 
 
-@pytest.mark.parametrize("frames", [2, 9])
+@pytest.mark.parametrize("frames", [pytest.param(2, marks=pytest.mark.slow), 9])
 @pytest.mark.parametrize("make", [grid, particles])
 def test_the_claimed_errors_are_those_of_drawn_searches(make, frames):
     """Nine frames leave 0.13 m, a fifth of a cell, and the first one is sharper than the particles are dense.
