@@ -23,16 +23,7 @@ from estimators.vision.video import frames_of
 from flightsim import truth as t
 from flightsim.foundation.vectors import from_euler
 from flightsim.home import Home
-from flightsim.payload import (
-    ConstantVelocity,
-    GroundTargetParameters,
-    GroundTargets,
-    MovingPointCamera,
-    MovingPointParameters,
-    PinholeModel,
-    Static,
-    TargetShape,
-)
+from flightsim.payload import GroundTargets, MovingPointCamera, MovingPointParameters
 from missions.camera_picture import CameraPicture
 from missions.cli.main import run_command_line
 from missions.embedded.films import FlightFilm
@@ -40,19 +31,11 @@ from missions.embedded.rendered_points import POINT_CAMERA, RenderedPoints, watc
 from missions.estimation.vision import VisionRequest, watch
 from tests.clients.sitl_process import free_port
 from tests.estimators.vision.test_video import serving
+from tests.missions.test_rendered_motion import CAR, HEIGHT_M, MODEL, PARKED, PITCH_RAD
 
 EPOCH_US = 1_735_689_600_000_000
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=0.0)
-MODEL = PinholeModel(width_px=320, height_px=240, horizontal_fov_rad=math.radians(60.0))
-CAR = GroundTargetParameters(
-    motion=ConstantVelocity(north_m=-8.0, east_m=-10.0, speed_m_s=6.0, course_rad=1.2),
-    size_m=4.5,
-    shape=TargetShape.VEHICLE,
-)
-PARKED = GroundTargetParameters(
-    motion=Static(north_m=-12.0, east_m=12.0), size_m=4.5, shape=TargetShape.VEHICLE
-)
-HEIGHT_M, PITCH_RAD, STEP_US, LATENCY_S = 50.0, math.radians(-60.0), 20_000, 0.1
+STEP_US, LATENCY_S = 20_000, 0.1
 
 
 def pressure(time_us, height_m):
