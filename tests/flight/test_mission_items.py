@@ -268,6 +268,7 @@ def roi(command: int, **fields: float) -> MissionItem:
     ],
 )
 @pytest.mark.parametrize("rules", [PX4_PLANS, ARDUCOPTER_PLANS])
+@pytest.mark.sampled(3)
 def test_the_nose_follows_a_place(item: MissionItem, rules: PlanRules) -> None:
     flight = Flight(
         place(1.0, 0.0),

@@ -158,6 +158,7 @@ def test_turn_speed_is_the_inverse_of_the_turn_distance(angle_deg: float, distan
 
 
 @pytest.mark.parametrize("turn_deg", [45.0, 90.0, -90.0, 120.0])
+@pytest.mark.sampled(2)
 def test_corners_are_rounded_inside_without_swinging_out(turn_deg: float) -> None:
     rig = Rig(height_m=HEIGHT_M)
     turn = math.radians(turn_deg)

@@ -195,6 +195,7 @@ def test_reposition_keeps_what_is_nan_and_takes_off_when_commanded_up() -> None:
 
 
 @pytest.mark.parametrize("loiters_high", [False, True])
+@pytest.mark.sampled(1)
 def test_return_climbs_flies_home_and_lands(loiters_high: bool) -> None:
     limits = FlightParameters(
         return_altitude_m=12.0,
@@ -295,6 +296,7 @@ def _yaws_deg(log: np.ndarray) -> np.ndarray:
     ("direction", "relative", "turned_deg"),
     [(0, False, 90.0), (1, False, 90.0), (-1, False, -270.0), (1, True, 90.0), (-1, True, -90.0)],
 )
+@pytest.mark.sampled(2)
 def test_a_commanded_turn_has_its_rate_and_direction(
     direction: int, relative: bool, turned_deg: float
 ) -> None:

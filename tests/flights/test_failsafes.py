@@ -230,6 +230,7 @@ def test_gps_recovered_px4_goes_back_to_what_it_did_ardupilot_does_not() -> None
         *(slow(MAG, STUCK), slow(MAG, INTERMITTENT), slow(BARO, OFF), slow(BARO, GARBAGE)),
     ],
 )
+@pytest.mark.sampled(2)
 def test_the_vehicle_holds_its_place_with_a_poor_sensor(unit: int, failure: int) -> None:
     flight = hovering("px4", height_m=6.0)
     place = np.array(flight.position_ned_m)

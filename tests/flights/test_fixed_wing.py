@@ -51,6 +51,7 @@ def fly_to_the_ground(flight: AircraftFlight, limit_s: float = 300.0) -> float:
 
 
 @pytest.mark.parametrize("seed", [4, 6, 7])
+@pytest.mark.sampled(1)
 def test_gusts_that_swing_a_parked_aircraft_are_not_taken_for_the_gyros_bias(seed: int) -> None:
     """A rate of a few degrees per second at rest is no bias that a gyro has after its calibration."""
     air = Environment(wind_ned_m_s=(-3.0, -5.2, 0.0), turbulence=Turbulence.MODERATE)

@@ -220,6 +220,7 @@ def test_position_step(flight: Flight) -> None:
     assert farthest < distance_m + 0.6
 
 
+@pytest.mark.sampled(1)
 def test_attitude_targets(flight: Flight) -> None:
     hover = flight.newest["VFR_HUD"].throttle * 0.01 if flight.flavour == "px4" else 0.5
 

@@ -169,6 +169,7 @@ def test_what_a_sender_does_not_know(ignored: int) -> None:
         {"horiz_accuracy": 80.0},
     ],
 )
+@pytest.mark.sampled(3)
 def test_fixes_that_are_none(changed: dict[str, Any]) -> None:
     """Refused, or shown and not used; the vehicle has no position."""
     flight = Flight("ardupilot", parameters=MAV)

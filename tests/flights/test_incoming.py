@@ -74,6 +74,7 @@ def test_a_quadrotor_without_gps_flies_by_odometry(flavour: str, message: str) -
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_an_origin_gives_positions_on_earth(flavour: str) -> None:
     flight = Flight(flavour, parameters=VISION[flavour])
     flight.inject(GPS, OFF)

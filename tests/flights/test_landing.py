@@ -17,7 +17,7 @@ from tests.flights.flight import Flight
         ("ardupilot", 2, 0.0, "land"),
     ],
 )
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_lands_on_its_feet_and_disarms(flavour: str, seed: int, wind_m_s: float, mode: str) -> None:
     air = Environment.from_wind(
         speed_m_s=wind_m_s, from_deg=53.0 * seed % 360.0, turbulence="moderate" if wind_m_s else "none"

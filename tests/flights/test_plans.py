@@ -171,6 +171,7 @@ def test_items_that_are_commands_are_carried_out() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_the_nose_follows_a_region_of_interest(flavour: str) -> None:
     flight = Flight(flavour)
     flight.take_off(10.0)

@@ -85,6 +85,7 @@ def test_trimmed_flight_stays_trimmed(model: str, airspeed_m_s: float, turn: dic
     ("command", "rate"), [(AILERON, 10), (ELEVATOR, 11), (RUDDER, 12)], ids=["aileron", "elevator", "rudder"]
 )
 @pytest.mark.parametrize("model", ["aerosonde", "c172x", "j3cub", "t37", "sgs126"])
+@pytest.mark.sampled(4)
 def test_positive_commands_roll_right_pitch_up_turn_right(model: str, command: int, rate: int) -> None:
     speed = {"aerosonde": 25.0, "c172x": 45.0, "j3cub": 28.0, "t37": 90.0, "sgs126": 23.0}[model]
     trim = trim_flight(model, airspeed_m_s=speed, home=HOME)

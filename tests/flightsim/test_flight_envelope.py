@@ -138,6 +138,7 @@ def described(tmp_path: Path, more: str) -> Path:
         ("[limits]\nairspeed_trim_m_s = 4\n", r"cannot hold steady flight.*power off \(4\.0 m/s"),
     ],
 )
+@pytest.mark.sampled(3)
 def test_what_cannot_fly_is_reported_in_plain_words(tmp_path: Path, more: str, message: str) -> None:
     with pytest.raises(AirframeError, match=message):
         flight_envelope(described(tmp_path, more))

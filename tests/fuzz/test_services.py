@@ -10,6 +10,7 @@ from tests.slow import slow
     ("flavour", "model"),
     [("px4", "aerosonde"), ("ardupilot", "iris"), slow("px4", "iris"), slow("ardupilot", "aerosonde")],
 )
+@pytest.mark.sampled(1)
 def test_what_is_no_order_moves_nothing(flavour: str, model: str) -> None:
     figures = Campaign(flavour, model, 1).one_round(800, orders=False)
     assert figures.complaints == []
@@ -22,6 +23,7 @@ def test_what_is_no_order_moves_nothing(flavour: str, model: str) -> None:
     ("flavour", "model"),
     [("px4", "iris"), ("ardupilot", "aerosonde"), slow("px4", "aerosonde"), slow("ardupilot", "iris")],
 )
+@pytest.mark.sampled(1)
 def test_absurd_orders_are_borne(flavour: str, model: str) -> None:
     figures = Campaign(flavour, model, 2).one_round(500, orders=True)
     assert figures.complaints == []

@@ -105,7 +105,7 @@ ERASE_QUESTION = "delete all logs (3) of vehicle 1? Type yes (or y): "
         (END_OF_FILE, 1, "not flown: not confirmed"),
     ],
 )
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 def test_what_is_typed_is_the_answer_and_the_link_is_kept_up_meanwhile(
     answer: str, code: int, reported: str
 ) -> None:

@@ -359,6 +359,7 @@ def lissajous_off_by(monkeypatch, offset_m):
 
 
 @pytest.mark.parametrize(("offset_m", "word"), [(1.9, "within the acceptance radius"), (2.1, "poor")])
+@pytest.mark.sampled(1)
 def test_poor_tracking_is_reported(scripted, tmp_path, capsys, monkeypatch, offset_m, word):
     lissajous_off_by(monkeypatch, offset_m)
     code, out, _err = command_line(

@@ -71,6 +71,7 @@ def planned(name: str) -> tuple[FlightOptions, FixedWingLimits, FlyablePath]:
 
 @pytest.mark.parametrize("name", ["sector", "parallel-sweep", "expanding-square", "lissajous"])
 @pytest.mark.parametrize("turn_effect", [0.7, 1.0])
+@pytest.mark.sampled(2)
 def test_l1_guidance_follows_a_pattern_by_its_waypoints(name: str, turn_effect: float) -> None:
     options, limits, path = planned(name)
     route = with_leads(path, 27.0)

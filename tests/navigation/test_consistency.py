@@ -62,6 +62,7 @@ def test_accuracy(runs: tuple[NDArray[np.float64], NDArray[np.float64]]) -> None
 @pytest.mark.parametrize("seeds", slow_after(1, (6, 20)))
 @pytest.mark.parametrize("receiver", RECEIVERS)
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
+@pytest.mark.sampled(2)
 def test_the_firmwares_defaults_cover_the_errors(flavour: str, receiver: str, seeds: int) -> None:
     """Their figures are wider than good sensors', so NEES lies below the band; above it, it never may."""
     store = ParameterStore(get_flavour(flavour).parameter_definitions(), get_flavour(flavour).airframe)

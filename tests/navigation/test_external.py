@@ -127,6 +127,7 @@ def yaw_error_rad(odometry: Odometry) -> float:
 
 @pytest.mark.parametrize("late_ms", [0, 120])
 @pytest.mark.parametrize("use_yaw", [True, False])
+@pytest.mark.sampled(2)
 def test_flies_by_odometry_alone(flight: Array, use_yaw: bool, late_ms: int) -> None:
     bench = Bench(flight, parameters=replace(NO_GPS, external=replace(ALL, use_yaw=use_yaw)))
     odometry = Odometry(bench)

@@ -59,6 +59,7 @@ def when(bench: WingBench, condition: Callable[[], bool], until_s: float) -> flo
     ],
     ids=["blocked", "off", "stuck", "garbage", "wrong"],
 )
+@pytest.mark.sampled(2)
 def test_a_failed_pitot_tube_is_found_and_replaced(failure: FaultType, options: dict[str, object]) -> None:
     bench = WingBench(ORBIT, 110.0).run(60.0)
     health, state = bench.filter.health, bench.filter.state

@@ -21,6 +21,7 @@ DIVE = InitialState(
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_a_crash_ends_nothing_but_the_aircraft(flavour: str) -> None:
     def fly(*, crash: bool) -> tuple[Sitl, list[bytes]]:
         vehicles = team(2, model=["aerosonde", "iris"], autopilot=flavour, parameters={})

@@ -23,6 +23,7 @@ def flies(log: Path) -> bool:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.sampled(1)
 def test_a_signal_leaves_the_vehicle_safe_and_the_run_whole(
     number: signal.Signals, code: int, tmp_path: Path
 ) -> None:

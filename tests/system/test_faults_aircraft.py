@@ -109,6 +109,7 @@ def test_gps_lost_is_reported(flavour: str) -> None:
 
 @pytest.mark.parametrize("unit", [GPS, AIRSPEED])
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(2)
 def test_no_take_off_without(flavour: str, unit: int) -> None:
     flight = AircraftFlight(flavour, seed=3)
     flight.get_ready()

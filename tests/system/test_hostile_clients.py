@@ -180,6 +180,7 @@ def test_a_thousand_ports() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_who_speaks_in_the_vehicles_name_is_not_listened_to(flavour: str) -> None:
     with scene(flavour) as there:
         impostor = there.client(1)
@@ -193,6 +194,7 @@ def test_who_speaks_in_the_vehicles_name_is_not_listened_to(flavour: str) -> Non
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_a_stranger_does_not_disarm_in_the_air_unless_by_force(flavour: str) -> None:
     """As the firmware does: without the magic number it is denied; that client gets the denial."""
     with scene(flavour) as there:

@@ -41,6 +41,7 @@ def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
     ("flavour", "on_failure", "via"),
     [slow("px4", "return", "waypoints"), ("px4", "hold", "setpoints"), ("ardupilot", "land", "waypoints")],
 )
+@pytest.mark.sampled(1)
 def test_ctrl_c_in_an_embedded_flight(flavour: str, on_failure: str, via: str, tmp_path: Path) -> None:
     """The vehicle is commanded, and answers, before the run ends."""
     flight = ("--autopilot", flavour, "--via", via, "--on-failure", on_failure, "--speedup", "40")

@@ -197,6 +197,7 @@ class Stalled:
 
 
 @pytest.mark.parametrize(("flavour", "seconds"), [("px4", 7.0), ("ardupilot", 7.0), ("ardupilot", 10.0)])
+@pytest.mark.sampled(1)
 def test_an_upload_that_the_vehicle_gave_up_is_done_anew(flavour: str, seconds: float) -> None:
     """PX4 gives a transfer up after 5 s, and answers the item that comes then with ERROR; ArduPilot cancels
     it after 8 s.

@@ -99,6 +99,7 @@ def test_what_a_boot_takes_stays_in_flight_and_other_parameters_leave_the_filter
 
 
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
+@pytest.mark.sampled(1)
 def test_gps_fusion_can_be_switched_off_and_on_again(flavour: str) -> None:
     name, on = GPS_SWITCH[flavour]
     flying = Flying(flavour)

@@ -10,6 +10,7 @@ WAYPOINT, COUNT = 16, 300
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_uploads_a_plan(flavour: str) -> None:
     """ArduPilot answers a repeated item with INVALID_SEQUENCE and goes on with the transfer."""
     flying = Flying(flavour)
@@ -33,6 +34,7 @@ def test_uploads_a_plan(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_takes_off_and_lands(flavour: str) -> None:
     flying = Flying(flavour)
 

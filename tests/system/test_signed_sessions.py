@@ -135,7 +135,7 @@ def left_alone() -> Attacked:
 
 @pytest.mark.parametrize("same_link", [True, False], ids=["same link", "other link"])
 @pytest.mark.parametrize("attack", REASONS)
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 def test_an_attacker_changes_nothing_at_all(
     attack: str, same_link: bool, recorded: tuple[list[bytes], int], left_alone: Attacked
 ) -> None:

@@ -150,6 +150,7 @@ def test_a_flight_is_logged_listed_and_downloaded(
 
 
 @pytest.mark.parametrize(("flavour", "sent"), [("px4", True), ("ardupilot", False)])
+@pytest.mark.sampled(1)
 def test_logs_of_an_armed_vehicle(flavour: str, sent: bool) -> None:
     """ArduPilot sends none, says so once, and goes on with what was under way when it is disarmed again."""
     first = 0 if flavour == "px4" else 1
@@ -315,6 +316,7 @@ def test_reboot_starts_again_from_zero(flavour: str) -> None:
 
 
 @pytest.mark.parametrize(("flavour", "refused"), [("px4", 2), ("ardupilot", 4)])
+@pytest.mark.sampled(1)
 def test_no_reboot_while_armed(flavour: str, refused: int) -> None:
     client = Client(flavour, MemoryCard())
     client.run(45.0 if flavour == "ardupilot" else 6.0)

@@ -145,6 +145,7 @@ def test_a_line_of_1200_baud_still_has_heartbeats() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.sampled(1)
 def test_a_radio_with_a_full_buffer_slows_the_streams_down(flavour: str) -> None:
     """RADIO_STATUS, on a link that has no limit of its own; and fast again when the buffer is empty."""
     client = Client(flavour, None)

@@ -101,6 +101,7 @@ def test_moderate_turbulence_and_wind(seed: int) -> None:
 
 @pytest.mark.parametrize("course_deg", [0.0, 90.0, -135.0])
 @pytest.mark.parametrize("wind_known", [True, False])
+@pytest.mark.sampled(2)
 def test_course_is_held_in_wind(course_deg: float, wind_known: bool) -> None:
     flown = rig(environment=Environment(wind_ned_m_s=(6.0, 8.0, 0.0)))
     flown.wind_known = wind_known

@@ -42,6 +42,7 @@ def test_height_airspeed_and_heading_are_held(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ("sgs126", *slow_after(2, POWERED)))
+@pytest.mark.sampled(1)
 def test_bank_steps_are_coordinated(name: str) -> None:
     flown = rig(name)
     bank = 0.7 * flown.envelope.bank_max_rad
@@ -56,6 +57,7 @@ def test_bank_steps_are_coordinated(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", slow_after(2, POWERED))
+@pytest.mark.sampled(1)
 def test_height_step(name: str) -> None:
     flown = rig(name)
     flown.set(heading_rad=0.0, down_m=-HEIGHT_M - 30.0)
@@ -78,7 +80,7 @@ def test_airspeeds_between_the_limits(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", (*POWERED, "sgs126"))
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_turn_onto_a_course_in_moderate_turbulence(name: str) -> None:
     windy = Environment(wind_ned_m_s=(4.0, 4.0, 0.0), turbulence=Turbulence.MODERATE)
     flown = rig(name, windy)

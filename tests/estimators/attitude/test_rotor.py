@@ -47,6 +47,7 @@ def test_accelerated_flight(drag_1_s):
 
 
 @pytest.mark.parametrize("drag_1_s", [0.3, 0.5, 1.0])
+@pytest.mark.sampled(1)
 def test_drag_is_learned(drag_1_s):
     found = Filter(at.ROTOR)
     errors(found, drag_1_s)

@@ -108,6 +108,7 @@ RAW = SurveyMagnetometerParameters(
 
 
 @pytest.mark.parametrize("seed", range(5))
+@pytest.mark.sampled(2)
 def test_the_figure_of_merit_falls_by_ten_times_and_more(seed):
     """One flight calibrates, the next one is judged; attitudes are 0.3 degrees off."""
     attitudes, slices = manoeuvres()

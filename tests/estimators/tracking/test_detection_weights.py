@@ -1,5 +1,6 @@
 """Weights of correlated detections: the variance that their product claims is that of its error."""
 
+import functools
 import math
 
 import numpy as np
@@ -55,7 +56,7 @@ def final(headings, rng, errors=ERRORS):
             round(1e6 * time_s), height_m=HEIGHT_M, q_ned_from_frd=reported, q_frd_from_mount=DOWN, ray=ray
         )
         assert factor >= 1.0
-        information = 1.0 / (factor * _variance(errors, reported, ray))
+        information = 1.0 / (factor * _variance(errors, heading, ahead(north, east)))
         mean = (total * mean + information * found) / (total + information)
         total += information
     return mean, 1.0 / total
@@ -66,19 +67,29 @@ def _small(vector):
     return (1.0, *half.tolist())
 
 
-def _variance(errors, reported, ray):
-    """Variance of one detection per axis: all its causes, one after the other, by differences."""
+def ahead(north, east):
+    """Distance of the camera from the target along its way, m, to a centimetre."""
+    return round(math.hypot(north, east), 2)
+
+
+@functools.cache
+def _variance(errors, heading, ahead_m):
+    """Variance of one detection per axis, taken right above the line: all its causes."""
     total = 0.0
+    ray = (0.0, ahead_m / HEIGHT_M)
     for name in ("forward_m", "right_m", "height_m", "yaw_rad", "pitch_rad", "roll_rad", "mount_rad"):
         alone = PoseErrors(
             **(dict.fromkeys(PoseErrors.__dataclass_fields__, 0.0) | {name: getattr(errors, name)})
         )
         one = DetectionWeights(alone, 0.0)
-        one.take(0, height_m=HEIGHT_M, q_ned_from_frd=reported, q_frd_from_mount=DOWN, ray=ray)
+        one.take(
+            0, height_m=HEIGHT_M, q_ned_from_frd=from_euler(0.0, 0.0, heading), q_frd_from_mount=DOWN, ray=ray
+        )
         total += 1.0 / one.information_m2 if one.information_m2 else 0.0
     return total
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     ("headings", "least"),
     [

@@ -38,6 +38,7 @@ def checked(apart_s, rate_rad_s=0.5, tilt_rad=0.0):
 
 
 @pytest.mark.parametrize("apart_s", [0.0, 0.3, -0.3])
+@pytest.mark.sampled(1)
 def test_the_difference_of_the_clocks_is_found(apart_s):
     difference = checked(apart_s).difference()
     assert difference.apart_s == pytest.approx(apart_s, abs=0.04)

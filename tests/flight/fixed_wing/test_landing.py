@@ -63,6 +63,7 @@ def finish(rig: Aircraft, task: LandTask) -> tuple[float, float]:
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (-6.0, 0.0), (0.0, 5.0), (-4.0, -4.0), (3.0, 0.0)])
 @pytest.mark.parametrize("rangefinder", [False, True])
+@pytest.mark.sampled(3)
 def test_lands_on_the_place_along_a_leg(wind: tuple[float, float], rangefinder: bool) -> None:
     rig = flying(wind)
     rig.rangefinder = rangefinder
@@ -170,6 +171,7 @@ def test_the_flare_gives_up_less_airspeed_against_the_wind() -> None:
 
 
 @pytest.mark.parametrize("wind_m_s", [-6.0, 6.0])
+@pytest.mark.sampled(1)
 def test_airspeed_is_held_in_a_wind_that_fades(wind_m_s: float) -> None:
     """The navigation state here has the wind of 10 m at all heights, as a filter that takes its time has."""
     rig = Aircraft(
@@ -249,6 +251,7 @@ def test_a_glider_comes_down_wherever_the_flare_carries_it() -> None:
 
 
 @pytest.mark.parametrize("requested", [False, True])
+@pytest.mark.sampled(1)
 def test_a_go_around_without_power_comes_down_straight_ahead(requested: bool) -> None:
     rig, task = flaring((-3.0, 0.0), rangefinder=True)
     rig.vehicle.set_motor_effectiveness(0, 0.0)

@@ -89,6 +89,7 @@ def test_a_slow_roll_stretches_the_period() -> None:
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (0.0, 8.0), (-9.0, 3.0)])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize("radius", [140.0, 250.0])
+@pytest.mark.sampled(4)
 def test_circle_is_held_in_wind(wind: tuple[float, float], direction: float, radius: float) -> None:
     mass = PointMass((-600.0, 50.0, -100.0), 0.7, wind)
     task = LoiterTask(np.array([0.0, 0.0, -100.0]), direction * radius)

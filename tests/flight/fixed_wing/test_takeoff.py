@@ -32,6 +32,7 @@ def aircraft(launch: str, wind: tuple[float, float, float] = (0.0, 0.0, 0.0), **
 
 @pytest.mark.parametrize("launch", list(LAUNCHES))
 @pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (-3.0, 4.0, 0.0)])
+@pytest.mark.sampled(2)
 def test_takes_off_and_reaches_its_height(launch: str, wind: tuple[float, float, float]) -> None:
     rig = aircraft(launch, wind)
     task = TakeoffTask(60.0)

@@ -41,6 +41,7 @@ def same_estimates(folder, again):
 
 @pytest.mark.parametrize("vehicles", [1, 2])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(2)
 def test_flight_and_replay_of_its_log_agree_to_the_last_bit(scripted, tmp_path, flavour, vehicles):
     result = flight(tmp_path, autopilot=flavour, vehicles=vehicles, estimator=LEVEL)
     assert result.outcome == "completed", result.reason

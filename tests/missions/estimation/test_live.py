@@ -285,6 +285,7 @@ def test_what_the_link_lacks_is_reported_and_nothing_is_published(tmp_path, port
 
 
 @pytest.mark.parametrize(("says", "seconds", "period_ms"), [(imu, LONG, 500), (untimed, "1.5", 10)])
+@pytest.mark.sampled(1)
 def test_its_duration_ends_on_a_vehicle_that_says_little(tmp_path, port, vehicle, says, seconds, period_ms):
     """Nothing but what was requested, as ArduPilot does; or nothing that tells a time: wall time counts.
 

@@ -63,6 +63,7 @@ def fly_losing(flown, flavour, names, *, lands=True, then=None):
 
 @both
 @pytest.mark.parametrize("lost", LOST)
+@pytest.mark.sampled(3)
 def test_a_mission_with_do_items_is_followed_to_its_end(flown, flavour, lost) -> None:
     notes = fly_losing(flown, flavour, LOST[lost])
     assert [p.name for p in notes.phases][-3:] == ["takeoff", "pattern", "return"]
@@ -71,6 +72,7 @@ def test_a_mission_with_do_items_is_followed_to_its_end(flown, flavour, lost) ->
 
 @both
 @pytest.mark.parametrize("lost", LOST)
+@pytest.mark.sampled(3)
 def test_a_mission_that_ends_in_the_air_is_followed_to_its_end(flown, flavour, lost) -> None:
     notes = fly_losing(flown, flavour, LOST[lost], lands=False)
     assert [index for index, _ in notes.reached] == [0, 1, 2, 3, 4, 5]
