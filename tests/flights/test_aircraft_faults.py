@@ -97,6 +97,7 @@ def test_sensors_failed_in_turbulence(flavour: str, failures: tuple[tuple[int, i
     holds(flavour, seed, *failures)
 
 
+@pytest.mark.slow
 def test_a_speed_below_the_lowest_is_not_flown() -> None:
     flight = circling("px4", 1)
     assert flight.result(dialect.MAV_CMD_DO_CHANGE_SPEED, 0, 8.0, -1) == 0
@@ -107,6 +108,7 @@ def test_a_speed_below_the_lowest_is_not_flown() -> None:
     assert np.ptp(watch.heights_m) < 10.0
 
 
+@pytest.mark.slow
 def test_a_climb_beyond_its_power_is_flown_at_its_speed() -> None:
     flight = circling("ardupilot", 1, 60.0)
     assert flight.circle(150.0, 150.0, 600.0, 100.0) == 0

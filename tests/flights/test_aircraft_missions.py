@@ -144,7 +144,7 @@ def test_legs_count_early() -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_lands_on_the_point(flavour: str) -> None:
     """In wind that fades towards the ground."""
     corners = (*RECTANGLE[:2], (-600.0, -600.0))
@@ -179,6 +179,7 @@ def test_landings_in_moderate_turbulence(flavour: str, wind_from_deg: float) -> 
     assert np.median(sinks_m_s) < 1.6 and sorted(sinks_m_s)[-2] < 2.0 and max(sinks_m_s) < 2.6, flown
 
 
+@pytest.mark.slow
 def test_cold_day() -> None:
     """Twenty degrees below the standard day: a pressure altitude is seven per cent off; GPS mends that."""
     flight = AircraftFlight("px4", seed=1, environment=Environment(temperature_offset_k=-20.0))

@@ -39,7 +39,7 @@ def test_circle(flavour: str, radius_m: float) -> None:
 
 
 @pytest.mark.parametrize("course", [False, True])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_arduplane_heading_in_wind(course: bool) -> None:
     """MAV_CMD_GUIDED_CHANGE_HEADING: course over ground (0) or heading (1)."""
     flight = AircraftFlight("ardupilot", seed=2, environment=LIGHT)

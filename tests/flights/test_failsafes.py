@@ -95,7 +95,7 @@ def test_ground_station_lost_ardupilot() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_silent_ground_station_changes_nothing_by_default(flavour: str) -> None:
     flight = hovering(flavour)
     before = flight.mode
@@ -205,6 +205,7 @@ def test_without_gps_at_cruise_the_vehicle_sinks_level_and_disarms(flavour: str)
     assert flight.tilt_deg < 3.0 and flight.speed_m_s < 0.05
 
 
+@pytest.mark.slow
 def test_gps_recovered_px4_goes_back_to_what_it_did_ardupilot_does_not() -> None:
     for flavour, then in (("px4", "hold"), ("ardupilot", "land")):
         flight = hovering(flavour, height_m=25.0)

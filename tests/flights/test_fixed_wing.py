@@ -61,7 +61,8 @@ def test_gusts_that_swing_a_parked_aircraft_are_not_taken_for_the_gyros_bias(see
     assert abs(math.degrees(error_rad)) < 5.0
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.slow
 def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)
     flight.start()
@@ -93,7 +94,8 @@ def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
     assert np.mean(altitudes) == pytest.approx(70.0, abs=2.0) and np.std(altitudes) < 1.5
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.slow
 def test_circles_to_the_left(flavour: str) -> None:
     flight = AircraftFlight(flavour)
     flight.take_off(60.0)
@@ -231,6 +233,7 @@ def test_px4_offboard_attitude() -> None:
     assert abs(flight.roll_deg) < 15.0 and flight.height_m > 40.0
 
 
+@pytest.mark.slow
 def test_arduplane_guided_attitude() -> None:
     flight = AircraftFlight("ardupilot", environment=WIND)
     flight.take_off(80.0)
@@ -279,7 +282,8 @@ def test_arduplane_boots_initialising() -> None:
     assert flight.result(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == 0
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.slow
 def test_same_seed_same_bytes(flavour: str) -> None:
     def recorded() -> bytes:
         received = bytearray()

@@ -50,6 +50,7 @@ def test_ground_station_lost_arduplane() -> None:
     assert flight.mode == "return"
 
 
+@pytest.mark.slow
 def test_arduplane_goes_on_in_guided_without_a_ground_station() -> None:
     flight = circling("ardupilot", FS_GCS_ENABL=1)  # FS_LONG_ACTN 0: continue in AUTO and GUIDED
     flight.heartbeat = False
@@ -73,6 +74,7 @@ def test_gps_lost_while_circling(flavour: str) -> None:
     assert flight.distance_m(150.0, 150.0) == pytest.approx(100.0, abs=12.0)
 
 
+@pytest.mark.slow
 def test_px4_without_gps_and_airspeed_descends() -> None:
     flight = circling("px4", 60.0)
     flight.inject(GPS, OFF)
@@ -85,6 +87,7 @@ def test_px4_without_gps_and_airspeed_descends() -> None:
     assert flight.actuators_finite
 
 
+@pytest.mark.slow
 def test_px4_offboard_attitudes_go_on_without_gps() -> None:
     flight = circling("px4", 120.0)
     flight.repeat(20.0, lambda _: flight.attitude_setpoint(22.0, 6.0, 0.7))
@@ -97,6 +100,7 @@ def test_px4_offboard_attitudes_go_on_without_gps() -> None:
     assert np.mean(rolls) == pytest.approx(22.0, abs=2.0) and np.std(rolls) < 3.0
 
 
+@pytest.mark.slow
 def test_arduplane_guided_attitudes_go_on_without_gps() -> None:
     flight = circling("ardupilot", 100.0)
     flight.repeat(20.0, lambda _: flight.attitude_setpoint(22.0, 0.0, 0.0, 0xC6))
@@ -197,6 +201,7 @@ def test_battery_runs_low(flavour: str) -> None:
     assert status(flight) == CRITICAL
 
 
+@pytest.mark.slow
 def test_arduplane_radio_lost_for_a_moment() -> None:
     """FBWA: CIRCLE after FS_SHORT_TIMEOUT, back when the radio is; RTL after FS_LONG_TIMEOUT."""
     flight = AircraftFlight("ardupilot", seed=3)

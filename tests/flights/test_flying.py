@@ -11,7 +11,6 @@ import pytest
 
 from autopilot_bridge.mavlink import dialect
 from tests.flights.flight import FLAVOURS, Flight
-from tests.slow import slow
 
 GUIDED = {"px4": "offboard", "ardupilot": "guided"}
 HEIGHT_M = 12.0
@@ -79,7 +78,7 @@ def test_altitude_mode_tilts_with_the_stick_and_keeps_the_height(flight: Flight)
     assert 0.4 < figures["climb_m_s"] < 2.5
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_stabilized_mode_gives_thrust_to_the_throttle(flight: Flight) -> None:
     figures = fly_with_sticks(flight, "stabilized" if flight.flavour == "px4" else "stabilize")
     assert 4.0 < figures["tilt_deg"] < 16.0
@@ -256,9 +255,9 @@ def test_attitude_targets(flight: Flight) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flavour", "height_m"), [("px4", 5.0), ("ardupilot", 45.0), slow("px4", 45.0), slow("ardupilot", 5.0)]
+    ("flavour", "height_m"), [("px4", 5.0), ("ardupilot", 45.0), ("px4", 45.0), ("ardupilot", 5.0)]
 )
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_return_from_afar(flavour: str, height_m: float) -> None:
     flight = Flight(flavour, seed=2)
     flight.take_off(height_m)

@@ -11,7 +11,6 @@ from flightsim.world_spec import WorldSpec
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
-from tests.slow import slow
 
 FLAVOURS = ("px4", "ardupilot")
 STILL_RMS_M = 0.6
@@ -66,7 +65,8 @@ def well_flown(flight: dict[str, Any], rms_max_m: float) -> None:
     assert seconds(flight, "return") < RETURN_MAX_S
 
 
-@pytest.mark.parametrize(("pattern", "flavour"), [("L1", "px4"), slow("L2", "px4"), slow("L2", "ardupilot")])
+@pytest.mark.parametrize(("pattern", "flavour"), [("L1", "px4"), ("L2", "px4"), ("L2", "ardupilot")])
+@pytest.mark.slow
 def test_setpoints_follow_the_curve_in_still_air(flown: Any, pattern: str, flavour: str) -> None:
     flight = flown("lissajous", flavour, None, windy=False, pattern=pattern)
     well_flown(flight, STILL_RMS_M)

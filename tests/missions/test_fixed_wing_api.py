@@ -20,7 +20,6 @@ from missions.vehicle.adapters import ArduPilot, Px4
 from missions.vehicle.connection import Connection
 from missions.vehicle.telemetry import AirData, Attitude, Position
 from missions.vehicle.wing import Approach
-from tests.slow import slow_after
 
 HEIGHT = 80.0
 
@@ -59,7 +58,8 @@ async def watch(vehicle, seconds, look):
     return np.array(seen)
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.slow
 def test_an_aircraft_is_flown_by_circles_headings_and_an_approach(flavour):
     async def script(vehicle):
         assert vehicle.kind is VehicleKind.FIXED_WING

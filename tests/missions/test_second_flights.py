@@ -123,7 +123,7 @@ def test_a_full_queue_gives_other_tasks_a_turn(flown) -> None:
         over = asyncio.Event()
         with vehicle.link.messages("COMMAND_ACK") as stream:
             autopilot.ack(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
-            asyncio.get_running_loop().call_later(0.1, over.set)
+            asyncio.get_running_loop().call_later(0.01, over.set)
             while not over.is_set():
                 await anext(stream)
                 autopilot.ack(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)  # an answer that comes at once

@@ -16,7 +16,8 @@ LAYOUTS = (
 )
 
 
-@pytest.mark.parametrize("model", ["iris", pytest.param("aerosonde", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", ["iris", "aerosonde"])
+@pytest.mark.slow
 def test_a_flight_with_added_places_is_the_same(tmp_path: Path, model: str) -> None:
     flights = [
         subprocess.Popen(

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.sitl import Sitl
@@ -69,6 +71,7 @@ def test_looking_changes_nothing(tmp_path):
     assert flight(None, look=False) == flight(None, look=True)
 
 
+@pytest.mark.slow
 def test_the_same_seed_says_the_same_with_pictures_kept(tmp_path):
     first, second = (flight(tmp_path / name, look=False) for name in ("first", "second"))
     assert first == second

@@ -56,8 +56,8 @@ def test_bank_steps_are_coordinated(name: str) -> None:
         assert np.abs(log[:, n.AIRSPEED_M_S] - flown.envelope.airspeed_trim_m_s).max() < 1.0
 
 
-@pytest.mark.parametrize("name", slow_after(2, POWERED))
-@pytest.mark.sampled(1)
+@pytest.mark.parametrize("name", POWERED)
+@pytest.mark.slow
 def test_height_step(name: str) -> None:
     flown = rig(name)
     flown.set(heading_rad=0.0, down_m=-HEIGHT_M - 30.0)
@@ -67,8 +67,8 @@ def test_height_step(name: str) -> None:
     assert np.abs(log[-100:, 12] + HEIGHT_M + 30.0).max() < 1.5
 
 
-@pytest.mark.parametrize("name", ("sgs126", *slow_after(2, POWERED)))
-@pytest.mark.sampled(1)
+@pytest.mark.parametrize("name", ("sgs126", *POWERED))
+@pytest.mark.slow
 def test_airspeeds_between_the_limits(name: str) -> None:
     flown = rig(name)
     envelope = flown.envelope
@@ -80,7 +80,7 @@ def test_airspeeds_between_the_limits(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", (*POWERED, "sgs126"))
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_turn_onto_a_course_in_moderate_turbulence(name: str) -> None:
     windy = Environment(wind_ned_m_s=(4.0, 4.0, 0.0), turbulence=Turbulence.MODERATE)
     flown = rig(name, windy)

@@ -129,6 +129,7 @@ def test_go_around_is_refused_on_the_ground_and_on_the_way() -> None:
     assert not task.go_around(rig.ctx)
 
 
+@pytest.mark.slow
 def test_far_from_the_leg_it_circles_to_its_entry_first() -> None:
     rig = flying((0.0, 3.0), yaw_rad=1.0)
     task = LandTask(np.array([1500.0, 800.0, -REST_M]), np.array([900.0, 800.0, -50.3]))
@@ -138,6 +139,7 @@ def test_far_from_the_leg_it_circles_to_its_entry_first() -> None:
     assert abs(along) < 15.0 and abs(right) < 3.0
 
 
+@pytest.mark.slow
 def test_beside_the_runway_on_short_final_it_goes_around() -> None:
     rig = flying((0.0, 0.0))
     task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
@@ -221,6 +223,7 @@ def _carried_on(rig: Aircraft, along_m: float) -> None:
     rig.frame = LocalFrame(replace(origin, lat_deg=origin.lat_deg - along_m / 111_195.0))
 
 
+@pytest.mark.slow
 def test_carried_too_far_in_the_flare_it_goes_around_three_times_and_then_comes_down() -> None:
     rig = flying((-3.0, 0.0))
     task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))

@@ -299,6 +299,7 @@ def test_without_a_position_it_banks_and_goes_on_when_there_is_one() -> None:
     assert reached(mass.ctx.events) == [0]
 
 
+@pytest.mark.slow
 def test_go_around_in_a_plan_comes_back_to_the_landing() -> None:
     rig = Aircraft(height_m=60.0, environment=Environment(wind_ned_m_s=(-4.0, 0.0, 0.0)))
     rig.ctx.home_ned_m[2] = -0.3

@@ -194,6 +194,7 @@ def test_a_process_that_stops_while_it_compiles_does_not_stop_the_others(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_without_a_writable_package_folder_the_users_cache_serves(package: Package, tmp_path: Path) -> None:
     (package.parts / "__pycache__").write_text("in the way", encoding="utf-8")
     home = tmp_path / "home"
@@ -273,6 +274,7 @@ def test_a_function_that_is_no_kernel_is_bound_too() -> None:
     assert bound(max, 3, then=(0,))(5) == 5
 
 
+@pytest.mark.slow
 def test_bound_kernels_of_several_types_are_kept_from_run_to_run(package: Package) -> None:
     """What one process has compiled, the next one finds, and no type displaces another."""
     assert package.say(BINDING_PROGRAM).split() == ["16.0", "0"]

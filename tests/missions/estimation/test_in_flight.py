@@ -129,7 +129,8 @@ def test_a_wrong_estimator_is_refused_before_the_flight(scripted, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("autopilot", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.slow
 def test_attitude_in_an_embedded_flight_equals_its_replay(tmp_path, capfd, autopilot):
     """The whole stack: our SITL, the attitude filter beside the flight, and over its log."""
     command = ["fly", "lissajous", "--size", "40x30", "--pattern", "L2", "--seed", "5"]

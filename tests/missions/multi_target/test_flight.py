@@ -98,6 +98,7 @@ def test_a_sensor_that_is_off_stops_the_search_and_the_vehicle_waits(tmp_path):
     assert result.summary["steps"] == 6
 
 
+@pytest.mark.slow
 def test_a_sensor_that_stays_off_ends_the_search(tmp_path):
     pause = ScanDisturbance(start_s=30.0, duration_s=1000.0)
     options = replace(SMALL, sensor_limit_s=10.0)

@@ -64,6 +64,7 @@ STUDY = Study(name="own", trial=trial, row=Row, design=grid(share=(0.5, 1.0)), r
 """
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_with_a_worker_process_and_a_node_killed(
     cluster: Cluster, expected: bytes, tmp_path: Path
 ) -> None:
@@ -96,6 +97,7 @@ def test_rows_are_the_same_with_a_worker_process_and_a_node_killed(
     assert (tmp_path / "study" / "rows.parquet").read_bytes() == expected
 
 
+@pytest.mark.slow
 def test_a_users_files_travel_with_the_job(cluster: Cluster, tmp_path: Path) -> None:
     """A study file that imports its neighbour, from the head's client server; both files are gone then."""
     folder = tmp_path / "own"
