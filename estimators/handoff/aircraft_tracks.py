@@ -68,6 +68,12 @@ class AircraftTracks:
         """Tracks after the newest frame, in the frame of the reckoning, by number."""
         return self._places
 
+    @property
+    def doubtful(self) -> frozenset[int]:
+        """Tracks with a smaller share of measurements than a hypothesis needs to become a track."""
+        least = self.tracker.parameters.good_ratio
+        return frozenset(track.number for track in self.tracker.tracks if track.inlier_ratio < least)
+
     def level(self, taken: DeadReckoning | None = None) -> Mapping[int, tuple[float, float]]:
         """The same in the level frame of a motion, None: the present one; forward and right."""
         if not self._places:

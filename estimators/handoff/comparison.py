@@ -25,6 +25,8 @@ class TrackWindows:
         heights_m: of both over the ground.
         others: the tracker's other tracks, by number.
         identity: probability that the tracker's target still is the designated one.
+        doubtful: tracks of the handoff aircraft that are measured more seldom than a new track must be: they
+            are about to leave their targets, or these have stopped.
     """
 
     time_us: int
@@ -35,6 +37,7 @@ class TrackWindows:
     heights_m: tuple[float, float]
     others: Mapping[int, Array] = field(default_factory=dict)
     identity: float = 1.0
+    doubtful: frozenset[int] = frozenset()
 
 
 class TrackComparison(ABC):

@@ -62,7 +62,7 @@ class EvidenceParameters:
         unforeseen: probability that the comparison is wrong for a reason that the model does not have,
             whatever the tracks show (docs/handoff.md).
         decision: probability of a track that is decided for.
-        hold_s: time for which it must stay above.
+        hold_s: time for which it must stay above, and must not be doubtful.
     """
 
     every_s: float = 0.5
@@ -136,7 +136,7 @@ class EvidenceComparison(TrackComparison):
         if windows.target is not None and windows.handoff:
             self._scores = self._probabilities(windows, windows.target, pose)
         best = max(self._scores, key=lambda number: self._scores[number], default=None)
-        if best is None or self._scores[best] < p.decision:
+        if best is None or self._scores[best] < p.decision or best in windows.doubtful:
             self._above = None
             return
         if self._above is None or self._above[0] != best:

@@ -185,6 +185,7 @@ class HandoffProcess:
                 heights_m=(height_m, max(_LEAST_HEIGHT_M, height_m - best.down_m)),
                 others=reported,
                 identity=1.0 if report is None else report.identity,
+                doubtful=self.tracks.doubtful,
             ),
             best,
         )

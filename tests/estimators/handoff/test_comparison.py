@@ -364,6 +364,20 @@ def test_the_decision_needs_time_above_the_threshold():
     assert comparison.decided is None and comparison.scores == {}
 
 
+def test_a_track_that_is_seldom_measured_is_not_decided_for():
+    """A track that leaves its target still has a window of the target's way; a decision waits for it."""
+    rng = np.random.default_rng(6)
+    target = walk(rng, 100)
+    own = {1: seen_by_handoff(target)}
+    comparison = EvidenceComparison(EvidenceParameters(hold_s=1.0, every_s=0.1))
+    for k in range(0, 60, 2):
+        comparison.update(replace(windows(own, target, k=k), doubtful=frozenset({1})), POSE)
+        assert comparison.decided is None and comparison.scores[1] > 0.99
+    for k in range(60, 71, 2):
+        comparison.update(windows(own, target, k=k), POSE)
+        assert comparison.decided == (1 if k >= 70 else None)
+
+
 def test_image_points_come_back_as_places_on_the_ground():
     """Equations 36 to 40, there and back; the covariance against samples."""
     camera = CameraAxes.towards(90.0, -50.0, 120.0)
