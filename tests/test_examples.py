@@ -86,6 +86,7 @@ def test_docs_show_the_windy_world() -> None:
     assert WORLD.read_text(encoding="utf-8") in (ROOT / "docs/world.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_own_aircraft_flies(tmp_path: Path) -> None:
     arguments = ("--pattern", "L1", "--model", str(AIRCRAFT))  # a circle, which is the shortest pattern
     flown = flightstack_done("fly", "lissajous", *arguments, "--out", str(tmp_path / "run"))
@@ -93,6 +94,7 @@ def test_own_aircraft_flies(tmp_path: Path) -> None:
     assert "completed: lissajous" in flown.stdout
 
 
+@pytest.mark.slow
 def test_a_sweep_in_a_small_form(tmp_path: Path) -> None:
     sweep = runpy.run_path(str(EXAMPLES / "sweep.py"), run_name="sweep")
     rows = list(sweep["sweep"]((0.0, 9.0), (1,), tmp_path))

@@ -76,7 +76,8 @@ def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("autopilot", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.slow
 def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
     fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
 

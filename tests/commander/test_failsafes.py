@@ -403,6 +403,7 @@ def test_an_ardupilot_failsafe_on_the_ground_disarms() -> None:
     assert rig.happened(Disarmed)
 
 
+@pytest.mark.slow
 def test_failsafe_parameters_may_hold_anything() -> None:
     for flavour in ("px4", "ardupilot"):
         rig = Rig(flavour)

@@ -129,7 +129,7 @@ def test_yaw_step_settles() -> None:
     [(Environment(), 0.3), (Environment(wind_ned_m_s=(5.0, 0.0, 0.0), turbulence=Turbulence.MODERATE), 0.6)],
     ids=["still", "windy"],
 )
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_lissajous_path_error(
     control: MulticopterParameters, environment: Environment, limit_m: float
 ) -> None:

@@ -37,6 +37,7 @@ def reached(rig: Rig) -> list[int]:
     return [e.seq for e in rig.ctx.events if isinstance(e, WaypointReached)]
 
 
+@pytest.mark.slow
 def test_lissajous_waypoints_are_passed_without_stopping() -> None:
     rig = Rig(height_m=HEIGHT_M)
     phase = np.linspace(0.0, 2.0 * np.pi, 121)[:-1]

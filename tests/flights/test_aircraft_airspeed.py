@@ -7,7 +7,7 @@ from tests.flights.aircraft import AircraftFlight
 
 
 @pytest.mark.parametrize("launch", ["catapult", "runway"])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_gust_on_the_ground_does_not_cost_the_airspeed(launch: str) -> None:
     wind = Environment.from_wind(speed_m_s=8.0, from_deg=0.0, turbulence=Turbulence.MODERATE)
     flight = AircraftFlight("px4", seed=3, launch=launch, environment=wind)

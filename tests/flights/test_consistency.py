@@ -9,8 +9,8 @@ from tests.flights.flight import FLAVOURS
 from tests.slow import slow
 
 DEFAULTS = [
-    ("px4", Case(), 3),
-    ("ardupilot", Case(gps="standalone"), 3),
+    ("px4", Case(), 2),
+    ("ardupilot", Case(gps="standalone"), 2),
     *(
         slow(flavour, Case(gps=gps, spoiled=spoiled), 20)
         for flavour in FLAVOURS

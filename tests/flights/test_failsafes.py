@@ -265,7 +265,7 @@ def test_a_broken_inertial_sensor_breaks_no_software(flavour: str, unit: int) ->
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_weak_motor_is_carried_and_a_dead_one_breaks_no_software(flavour: str) -> None:
     flight = hovering(flavour, height_m=8.0)
     flight.vehicle.vehicle.set_motor_effectiveness(1, 0.75)
@@ -279,6 +279,7 @@ def test_a_weak_motor_is_carried_and_a_dead_one_breaks_no_software(flavour: str)
     assert flight.time_s - flight.heartbeats[-1][0] < 1.2
 
 
+@pytest.mark.slow
 def test_a_crashed_arducopter_is_disarmed() -> None:
     flight = hovering("ardupilot", height_m=8.0)
     flight.vehicle.vehicle.set_motor_effectiveness(3, 0.0)  # it tumbles, and comes to rest on its back

@@ -254,6 +254,7 @@ def test_arduplane_guided_attitude() -> None:
     assert flight.distance_m(150.0, 150.0) < 150.0
 
 
+@pytest.mark.slow
 def test_arduplane_guided_changes() -> None:
     flight = AircraftFlight("ardupilot")
     flight.take_off(60.0)

@@ -145,7 +145,7 @@ def test_airspeed_fails(flavour: str, failure: int) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_motor_fails(flavour: str) -> None:
     """It glides, at a speed that carries it, down to the ground."""
     flight = circling(flavour, 80.0)

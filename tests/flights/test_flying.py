@@ -68,7 +68,7 @@ def test_position_mode_moves_and_stops_with_the_stick(flight: Flight) -> None:
     assert 0.4 < figures["climb_m_s"] < 2.5
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_altitude_mode_tilts_with_the_stick_and_keeps_the_height(flight: Flight) -> None:
     figures = fly_with_sticks(flight, "altitude" if flight.flavour == "px4" else "alt_hold")
     assert 4.0 < figures["tilt_deg"] < 16.0
@@ -86,6 +86,7 @@ def test_stabilized_mode_gives_thrust_to_the_throttle(flight: Flight) -> None:
     assert abs(figures["height_m"] - HEIGHT_M) < 8.0  # the middle of the stick is about hover
 
 
+@pytest.mark.slow
 def test_loiter_without_a_pilot_holds() -> None:
     """ArduPilot's simulated radio has its throttle down, which is not taken for a wish to sink."""
     flight = Flight("ardupilot", seed=2)

@@ -193,6 +193,7 @@ def test_no_service_listens_by_default(flavour: str) -> None:
         assert service(flight).taken == 0
 
 
+@pytest.mark.slow
 def test_the_parameter_counts_from_the_next_boot_on() -> None:
     flight = copter()
     flight.get_ready()

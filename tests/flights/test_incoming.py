@@ -362,6 +362,7 @@ def test_radio_and_mavlink_signals_fail() -> None:
     flight.set_mode("hold")
 
 
+@pytest.mark.slow
 def test_sim_parameters_break_the_world() -> None:
     flight = Flight("ardupilot", parameters={"BATT_FS_LOW_ACT": 0})
     flight.take_off(10.0)

@@ -90,7 +90,7 @@ def test_computed_once_it_is_remembered(aerosonde: FlightEnvelope) -> None:
 
 
 @pytest.mark.parametrize("model", ["c172x", "j3cub", "t37", "sgs126"])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_package_aircraft_trim(model: str) -> None:
     envelope = flight_envelope(model)
     assert envelope.stall_speed_m_s < envelope.airspeed_min_m_s

@@ -45,6 +45,7 @@ def small(**changes):
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("via", list(Via))
 @pytest.mark.parametrize("name", [n for n, m in MISSIONS.items() if isinstance(m, PatternMission)])
+@pytest.mark.sampled(8)
 def test_every_mission_on_both_firmwares_by_both_ways(scripted, tmp_path, name, via, flavour):
     request = RunRequest(
         options=small(via=via),
@@ -121,6 +122,7 @@ def test_a_team_shares_the_pattern_in_layers(scripted, tmp_path, via):
     assert abs(centre[0] - centre[1]) * 0.0111 < 1.5
 
 
+@pytest.mark.slow
 def test_search_time_ends_the_pattern(scripted, tmp_path):
     for via in Via:
         options = small(via=via, search_time_s=90.0)
@@ -359,7 +361,7 @@ def lissajous_off_by(monkeypatch, offset_m):
 
 
 @pytest.mark.parametrize(("offset_m", "word"), [(1.9, "within the acceptance radius"), (2.1, "poor")])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_poor_tracking_is_reported(scripted, tmp_path, capsys, monkeypatch, offset_m, word):
     lissajous_off_by(monkeypatch, offset_m)
     code, out, _err = command_line(

@@ -108,6 +108,7 @@ def test_turn_of_45_degrees_bank_with_gps() -> None:
         assert np.sqrt(np.mean(np.square(tilt))) < 0.3
 
 
+@pytest.mark.slow
 def test_ten_minutes_of_orbit_without_gps() -> None:
     """150 m radius in 4 m/s of wind and light turbulence: what the GPS-denied missions rely on."""
     wing = Wing(turns=((40.0, 1000.0, math.degrees(25.0 / 150.0)),))

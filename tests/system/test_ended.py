@@ -37,6 +37,7 @@ def test_a_signal_leaves_the_vehicle_safe_and_the_run_whole(
         assert run.summary["vehicles"][0]["left"] == "was commanded to return"
 
 
+@pytest.mark.slow
 def test_a_terminal_that_is_closed_does_so_too(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     log = folder / "flight.tlog"

@@ -68,6 +68,7 @@ def test_airspeed_lost_is_reported(flavour: str, failure: int) -> None:
     assert sum(lost_text in text for _, text in flight.texts) == 1
 
 
+@pytest.mark.slow
 def test_px4_uses_an_airspeed_sensor_again_where_it_may() -> None:
     flight = circling("px4", ASPD_FS_T_START=5.0)
     flight.inject(AIRSPEED, OFF)
@@ -133,7 +134,7 @@ def test_failures_that_an_aircraft_can_not_have() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_an_aileron_that_sticks(flavour: str) -> None:
     """Where it was in the circle: held against by the other controls, the aircraft flies on."""
     flight = circling(flavour)

@@ -88,7 +88,8 @@ def damage() -> list[bytes]:
     return damaged(5, frames)
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, ["ardupilot", "px4"]))
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.slow
 def test_random_bytes_and_damaged_frames(flavour: str, damage: list[bytes]) -> None:
     flying = circling(flavour)
     watch = Watch(flying)
@@ -106,6 +107,7 @@ def test_random_bytes_and_damaged_frames(flavour: str, damage: list[bytes]) -> N
     assert flying.autopilot.parameters.as_dict() == before
 
 
+@pytest.mark.slow
 def test_garbage_on_the_payloads_own_line(damage: list[bytes]) -> None:
     """The components count it, and answer afterwards."""
     flying = circling("px4")
@@ -146,6 +148,7 @@ def answering(flying: Flying) -> set[int]:
 
 
 @pytest.mark.parametrize("seed", slow_after(1, range(2)))
+@pytest.mark.slow
 def test_any_message_with_any_content_to_the_payload(seed: int) -> None:
     """Absurd messages and commands that are whole: the aircraft flies on, and the devices stay finite."""
     flying = circling("px4" if seed else "ardupilot")

@@ -106,7 +106,7 @@ def test_every_message_at_a_kilohertz(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_storms_of_requests(flavour: str) -> None:
     with scene(flavour) as there:
         client, other = there.client(), there.client(254)

@@ -100,7 +100,8 @@ def test_everything_is_done_over_a_poor_radio(flavour: str, seed: int) -> None:
     assert (parameters.get(speed), parameters.get(acceleration)) == (9.0, 7.0)
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.slow
 def test_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
     radio = Radio(flavour, POOR, 7)
 

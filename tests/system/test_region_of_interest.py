@@ -88,6 +88,7 @@ def test_a_place_that_is_none_on_earth_is_refused(guided: Looking) -> None:
     assert guided.yaw_deg == pytest.approx(before, abs=4.0)
 
 
+@pytest.mark.slow
 def test_arducopters_loiter_has_its_pilots_heading(guided: Looking) -> None:
     assert guided.look() == 0
     guided.flying.step(8.0)

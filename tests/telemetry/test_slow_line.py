@@ -106,6 +106,7 @@ def test_a_wide_line_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.slow
 def test_the_same_bytes_again(flavour: str) -> None:
     first, second = Client(flavour, BAUD_57600), Client(flavour, BAUD_57600)
     assert first.run(12.0) == second.run(12.0)

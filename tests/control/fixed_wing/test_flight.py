@@ -86,7 +86,7 @@ def test_airspeed_step_costs_no_height(airspeed: float) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_moderate_turbulence_and_wind(seed: int) -> None:
     wind = Environment(wind_ned_m_s=(4.2, -4.2, 0.0), turbulence=Turbulence.MODERATE)
     flown = rig(environment=wind, seed=seed)
@@ -234,6 +234,7 @@ def test_a_glide_slope_is_followed() -> None:
     assert np.abs(errors[-100:]).max() < 0.4
 
 
+@pytest.mark.slow
 def test_px4_defaults_fly_it_too() -> None:
     """Limits and speeds of the aircraft, PX4's default gains: slower, but stable."""
     p, d = FixedWingParameters.for_envelope(AEROSONDE), FixedWingParameters()

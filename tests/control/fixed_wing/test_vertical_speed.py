@@ -167,7 +167,7 @@ def test_climb_rates_are_flown_within_a_second() -> None:
 
 
 @pytest.mark.parametrize("gust_m_s", [4.0, -4.0])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_gust_along_the_path_moves_the_sink_little(gust_m_s: float) -> None:
     """Held by pitch alone; flying on with the pitch as it was would change the sink by 2 m/s and more."""
     gust = CosineGust(start_s=6.0, velocity_ned_m_s=(gust_m_s, 0.0, 0.0), rise_s=0.7, hold_s=1.0, fall_s=0.7)

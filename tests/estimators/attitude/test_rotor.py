@@ -37,7 +37,7 @@ def errors(found, drag_1_s, seconds=180.0, noise=1.0):
 
 
 @pytest.mark.parametrize("drag_1_s", [0.3, 0.5, 1.0])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_accelerated_flight(drag_1_s):
     """Below one degree whatever the drag is, and much better than trust in the bare accelerometer."""
     found, bare = Filter(at.ROTOR), Filter(at.STILL)

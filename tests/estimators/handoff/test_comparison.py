@@ -205,6 +205,7 @@ def slopes(function, count):
     return np.column_stack([(function(step) - function(-step)) / 2e-4 for step in steps])
 
 
+@pytest.mark.slow
 def test_the_probabilities_are_those_of_all_hypotheses_written_out():
     """Against the densities of scipy, with each error as a number and derivatives by differences."""
     rng = np.random.default_rng(4)

@@ -108,6 +108,7 @@ def test_without_a_leg_it_circles_down_and_lands_against_the_wind(
     assert rig.touch_sink_m_s < 1.2
 
 
+@pytest.mark.slow
 def test_go_around_climbs_comes_back_and_lands() -> None:
     rig, task = flaring((-3.0, 2.0))
     lowest = -rig.nav[n.POS + 2]

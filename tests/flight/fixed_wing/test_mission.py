@@ -167,7 +167,7 @@ def test_a_missed_waypoint_is_flown_to_again() -> None:
 
 
 @pytest.mark.parametrize("radius", [120.0, -120.0])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_circles_of_a_plan(radius: float) -> None:
     mass = PointMass(wind_ne_m_s=(0.0, 4.0))
     store = store_of(

@@ -140,11 +140,13 @@ def test_a_leaning_gimbal_costs_some_radius_but_not_the_orbit():
     assert 4.0 < abs(radius.mean() - 150.0) < 10.0
 
 
+@pytest.mark.slow
 def test_false_detections_do_not_lead_it_astray():
     flown, _ = fly(1, ENTRIES[0], clutter=0.5)
     assert abs(flown[flown[:, 0] > 60.0, 1].mean() / 150.0 - 1.0) < 0.02
 
 
+@pytest.mark.slow
 def test_half_the_detections_are_enough():
     flown, _ = fly(-1, ENTRIES[1], detection=0.4)
     assert abs(flown[flown[:, 0] > 60.0, 1].mean() / 150.0 - 1.0) < 0.02

@@ -51,6 +51,7 @@ def test_a_killed_worker_loses_no_row_and_doubles_none(expected: Path, tmp_path:
     assert results.table["trial"].to_pylist() == list(range(48))
 
 
+@pytest.mark.slow
 def test_a_trial_that_kills_its_process_each_time_becomes_a_row(expected: Path, tmp_path: Path) -> None:
     results = results_of(troubled(tmp_path, always=(5,)), tmp_path / "study", engine=Pool(2))
     (lost,) = [row for row in results.without_row() if row["outcome"] == "lost"]
