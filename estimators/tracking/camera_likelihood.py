@@ -18,47 +18,48 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from estimators.tracking.camera_sight import CameraSight, SightModel
+from estimators.tracking.frame_kernels import (
+    BORDER,
+    BROWN,
+    CONSTANT,
+    DENSITY,
+    EAST,
+    FAR_SIGMAS,
+    FAR_U,
+    FAR_V,
+    FOCAL,
+    FOLD,
+    HALF_HEIGHT,
+    HALF_WIDTH,
+    HEIGHT,
+    LEAST_DEPTH,
+    LINEAR,
+    NOISE,
+    NORTH,
+    PEAK,
+    PLACE,
+    PLACE_WEIGHT,
+    QUADRATIC,
+    ROTATION,
+    SIZE,
+    TARGET_PX,
+    TURN,
+    TURN_WEIGHT,
+    detection_spread,
+    likelihoods,
+    of_place,
+    of_turn,
+)
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["FrameLikelihood", "ground_spread", "image_spread", "relative_likelihood"]
+__all__ = ["FrameLikelihood", "ground_spread", "image_spread"]
 
 Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
-NORTH: Final = 0
-EAST: Final = 1
-HEIGHT: Final = 2
-ROTATION: Final = 3  # 9 numbers, rows of r_mount_from_ned
-PLACE: Final = 12  # 6 numbers, covariance of the place in camera axes: xx, xy, xz, yy, yz, zz
-TURN: Final = 18  # 6 numbers, covariance of the rotation
-PLACE_WEIGHT: Final = 24
-TURN_WEIGHT: Final = 25
-FOCAL: Final = 26
-HALF_WIDTH: Final = 27
-HALF_HEIGHT: Final = 28
-BROWN: Final = 29  # 5 numbers
-FOLD: Final = 34  # squared radius up to which the distortion is monotonic
-TARGET_PX: Final = 35  # resolution times sqrt(depth^3)
-BORDER: Final = 36
-PEAK: Final = 37
-CONSTANT: Final = 38
-LINEAR: Final = 39
-QUADRATIC: Final = 40
-NOISE: Final = 41  # variance of a detection's place in image coordinates
-DENSITY: Final = 42  # A / P_false
-FAR_U: Final = 43  # pixels; a border farther away does not matter
-FAR_V: Final = 44
-SIZE: Final = 45
-
 _UPPER: Final = np.triu_indices(3)
-_LEAST_DEPTH: Final = 1e-3  # of the height
-_FAR: Final = 4.5  # standard deviations; a border so far away does not matter (3e-6)
-_STEPS_PER_SIGMA: Final = 256
-_NORMAL: Final = ndtr(np.arange(-_FAR * _STEPS_PER_SIGMA, _FAR * _STEPS_PER_SIGMA + 2) / _STEPS_PER_SIGMA)
-_GATE: Final = 60.0  # squared distance; beyond it a likelihood is below 1e-13 of its peak
 _FOLD_STEP: Final = 1.02
 _FARTHEST: Final = 3.0  # image radius up to which the distortion is examined
 _LEAST_RATE: Final = 1e-4
@@ -75,136 +76,6 @@ def _fold(distortion: tuple[float, ...]) -> float:
             break
         radius *= _FOLD_STEP
     return radius * radius
-
-
-@kernel
-def _of_place(a: float, b: float, inverse_depth: float, s: Array) -> tuple[float, float, float]:
-    """Covariance of the image coordinates (aa, ab, bb) by the errors of the place, which enter by H / depth
-    with H = [[-a, 1, 0], [-b, 0, 1]]: one half of S of equation 4, first order.
-    """
-    k = PLACE
-    w = inverse_depth * inverse_depth
-    aa = w * (a * (a * s[k] - 2.0 * s[k + 1]) + s[k + 3])
-    ab = w * (a * (b * s[k] - s[k + 2]) - b * s[k + 1] + s[k + 4])
-    bb = w * (b * (b * s[k] - 2.0 * s[k + 2]) + s[k + 5])
-    return aa, ab, bb
-
-
-@kernel
-def _of_turn(a: float, b: float, s: Array) -> tuple[float, float, float]:
-    """The same by the errors of the attitude: rotations enter by H [q]x with q = (1, a, b), whose rows are
-    (b, ab, -1 - a^2) and (-a, 1 + b^2, -ab).
-    """
-    k = TURN
-    cross = a * b
-    p, r = -1.0 - a * a, 1.0 + b * b
-    x = b * s[k] + cross * s[k + 1] + p * s[k + 2]
-    y = b * s[k + 1] + cross * s[k + 3] + p * s[k + 4]
-    z = b * s[k + 2] + cross * s[k + 4] + p * s[k + 5]
-    aa = b * x + cross * y + p * z
-    ab = -a * x + r * y - cross * z
-    x = r * s[k + 1] - a * s[k] - cross * s[k + 2]
-    y = r * s[k + 3] - a * s[k + 1] - cross * s[k + 4]
-    z = r * s[k + 4] - a * s[k + 2] - cross * s[k + 5]
-    return aa, ab, -a * x + r * y - cross * z
-
-
-@kernel
-def _detection_spread(
-    place: tuple[float, float, float], turn: tuple[float, float, float], s: Array
-) -> tuple[float, float, float]:
-    """Covariance of the image coordinates of a detection, with the weights of the frame."""
-    p, t = s[PLACE_WEIGHT], s[TURN_WEIGHT]
-    return (
-        p * place[0] + t * turn[0] + s[NOISE],
-        p * place[1] + t * turn[1],
-        p * place[2] + t * turn[2] + s[NOISE],
-    )
-
-
-@kernel
-def _above(value: float, sigma: float) -> float:
-    """Probability that a Gaussian about a value is above 0: one of equation 5's steps, smoothed; to 1e-6 by a
-    table, which takes a fifth of the time of the error function.
-    """
-    if value >= _FAR * sigma:
-        return 1.0
-    if value <= -_FAR * sigma:
-        return 0.0
-    at = (value / sigma + _FAR) * _STEPS_PER_SIGMA
-    k = int(at)
-    return _NORMAL[k] + (at - k) * (_NORMAL[k + 1] - _NORMAL[k])
-
-
-@kernel
-def _within(value: float, half: float, sigma: float) -> float:
-    """Probability that a Gaussian about a value lies within -half..half."""
-    return max(0.0, _above(half - value, sigma) + _above(half + value, sigma) - 1.0)
-
-
-@kernel
-def relative_likelihood(north: float, east: float, s: Array, detections: Array) -> float:
-    """The likelihood of a frame for a target at a place, relative to one far away."""
-    dn, de, h = north - s[NORTH], east - s[EAST], s[HEIGHT]
-    k = ROTATION
-    depth = s[k] * dn + s[k + 1] * de + s[k + 2] * h
-    if not depth > _LEAST_DEPTH * h:
-        return 1.0
-    inverse = 1.0 / depth
-    a = (s[k + 3] * dn + s[k + 4] * de + s[k + 5] * h) * inverse
-    b = (s[k + 6] * dn + s[k + 7] * de + s[k + 8] * h) * inverse
-    # Brown's distortion, in pixels from the middle
-    q = a * a + b * b
-    near = min(q, s[FOLD])
-    k = BROWN
-    radial = 1.0 + near * (s[k] + near * (s[k + 1] + near * s[k + 4]))
-    u = s[FOCAL] * (a * radial + 2.0 * s[k + 2] * a * b + s[k + 3] * (q + 2.0 * a * a))
-    v = s[FOCAL] * (b * radial + s[k + 2] * (q + 2.0 * b * b) + 2.0 * s[k + 3] * a * b)
-    resolution = s[TARGET_PX] * inverse * math.sqrt(inverse)
-    half_u = s[HALF_WIDTH] - s[BORDER] * resolution
-    half_v = s[HALF_HEIGHT] - s[BORDER] * resolution
-    inside = min(half_u - abs(u) - s[FAR_U], half_v - abs(v) - s[FAR_V]) > 0.0
-    count = detections.shape[0]
-    seen = 1.0
-    paa, pab, pbb, taa, tab, tbb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if count > 0 or not inside:
-        if half_u <= 0.0 or half_v <= 0.0:
-            return 1.0
-        if abs(u) - half_u > s[FAR_U] or abs(v) - half_v > s[FAR_V]:
-            return 1.0
-        paa, pab, pbb = _of_place(a, b, inverse, s)
-        taa, tab, tbb = _of_turn(a, b, s)
-        if not inside:
-            seen = _within(u, half_u, s[FOCAL] * math.sqrt(max(0.0, paa + taa) + s[NOISE]))
-            if seen > 0.0:
-                seen *= _within(v, half_v, s[FOCAL] * math.sqrt(max(0.0, pbb + tbb) + s[NOISE]))
-            if seen == 0.0:
-                return 1.0
-    odds = s[CONSTANT] + resolution * (s[LINEAR] + resolution * s[QUADRATIC])
-    detected = seen * s[PEAK] / (1.0 + math.exp(-min(700.0, max(-700.0, odds))))
-    if count == 0:
-        return 1.0 - detected
-    aa, ab, bb = _detection_spread((paa, pab, pbb), (taa, tab, tbb), s)
-    determinant = aa * bb - ab * ab
-    if not determinant > 0.0:  # the rounding of single-precision numbers
-        return 1.0 - detected
-    gate = _GATE * determinant
-    density = 0.0
-    for i in range(count):
-        da, db = detections[i, 0] - a, detections[i, 1] - b
-        distance = da * da * bb - 2.0 * da * db * ab + db * db * aa
-        if distance < gate:
-            density += math.exp(-0.5 * distance / determinant)
-    if density > 0.0:
-        density /= count * math.tau * math.sqrt(determinant)
-    return 1.0 - detected + detected * density * s[DENSITY]
-
-
-@kernel
-def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Array) -> None:
-    """Relative likelihoods of a frame at places (n,)."""
-    for i in range(north.size):
-        out[i] = relative_likelihood(north[i], east[i], s, detections)
 
 
 @kernel
@@ -233,10 +104,10 @@ def _detected_places(s: Array, detections: Array, out: Array) -> int:
     k, found = ROTATION, 0
     for a, b in detections:
         down = s[k + 2] + a * s[k + 5] + b * s[k + 8]
-        if not down > _LEAST_DEPTH:
+        if not down > LEAST_DEPTH:
             continue
         depth = s[HEIGHT] / down
-        aa, ab, bb = _detection_spread(_of_place(a, b, 1.0 / depth, s), _of_turn(a, b, s), s)
+        aa, ab, bb = detection_spread(of_place(a, b, 1.0 / depth, s), of_turn(a, b, s), s)
         out[found, 0] = s[NORTH] + depth * (s[k] + a * s[k + 3] + b * s[k + 6])
         out[found, 1] = s[EAST] + depth * (s[k + 1] + a * s[k + 4] + b * s[k + 7])
         out[found, 2:] = _on_ground(a, b, aa, ab, bb, s)
@@ -313,7 +184,7 @@ def image_spread(ray: tuple[float, float], sight: CameraSight, model: SightModel
     """(2, 2) covariance of the image coordinates of a place that is seen at (a, b), by the pose alone."""
     s = _numbers(sight, model)
     down = float(sight.r_mount_from_ned.T[2] @ (1.0, *ray))
-    aa, ab, bb = np.add(_of_place(*ray, down / sight.height_m, s), _of_turn(*ray, s))
+    aa, ab, bb = np.add(of_place(*ray, down / sight.height_m, s), of_turn(*ray, s))
     return np.array([[aa, ab], [ab, bb]])
 
 
@@ -328,25 +199,26 @@ def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightMode
 
 def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box:
     """The box; sets the distances in `s` at which a border does not matter."""
-    rotation = s[ROTATION : ROTATION + 9].reshape(3, 3)
-    edges, slope = _border_of(sight.width_px, sight.height_px, sight.focal_px, sight.distortion)
-    border = np.array(edges)
-    bounds: Array | None = border
-    wide = tall = math.inf
+    border, slope = _border_of(sight.width_px, sight.height_px, sight.focal_px, sight.distortion)
+    bounds, wide, tall = border, math.inf, math.inf
     for _ in range(3):  # the errors are larger outside of the picture than in it
-        if bounds is None:
+        wide, tall = _largest_sigmas(*bounds, s)
+        if math.isinf(wide):
             break
-        wide, tall = _largest_sigmas(bounds[0], bounds[1], bounds[2], bounds[3], s)
-        more = _FAR / slope * np.array([-wide, -tall, wide, tall])
-        bounds = border + more if math.isfinite(wide) else None
-    north, east = sight.place_ned_m[:2]
-    if bounds is not None:
-        corners = np.array([[1.0, a, b] for a in bounds[::2] for b in bounds[1::2]]) @ rotation
-        if np.all(corners[:, 2] * reach_m > sight.height_m):
-            s[FAR_U], s[FAR_V] = _FAR * sight.focal_px * wide, _FAR * sight.focal_px * tall
-            places = corners[:, :2] * (sight.height_m / corners[:, 2:])
-            (south, west), (far_n, far_e) = places.min(axis=0).tolist(), places.max(axis=0).tolist()
-            return north + south, east + west, north + far_n, east + far_e
+        more_a, more_b = FAR_SIGMAS / slope * wide, FAR_SIGMAS / slope * tall
+        bounds = border[0] - more_a, border[1] - more_b, border[2] + more_a, border[3] + more_b
+    north, east, height_m = *sight.place_ned_m[:2], sight.height_m
+    xn, xe, xd, yn, ye, yd, zn, ze, zd = s[ROTATION : ROTATION + 9].tolist()
+    corners = [
+        (xn + a * yn + b * zn, xe + a * ye + b * ze, xd + a * yd + b * zd)
+        for a in bounds[::2]
+        for b in bounds[1::2]
+    ]
+    if math.isfinite(wide) and min(down for _, _, down in corners) * reach_m > height_m:
+        s[FAR_U], s[FAR_V] = FAR_SIGMAS * sight.focal_px * wide, FAR_SIGMAS * sight.focal_px * tall
+        norths = [north + n * height_m / down for n, _, down in corners]
+        easts = [east + e * height_m / down for _, e, down in corners]
+        return min(norths), min(easts), max(norths), max(easts)
     reach_m = min(reach_m, _reach(sight, model))
     return north - reach_m, east - reach_m, north + reach_m, east + reach_m
 
@@ -363,10 +235,10 @@ def _largest_sigmas(a0: float, b0: float, a1: float, b1: float, s: Array) -> tup
         for j in range(3):
             b = b0 + 0.5 * j * (b1 - b0)
             down = s[k + 2] + a * s[k + 5] + b * s[k + 8]
-            if not down > _LEAST_DEPTH:
+            if not down > LEAST_DEPTH:
                 return math.inf, math.inf
-            paa, _, pbb = _of_place(a, b, down / s[HEIGHT], s)
-            taa, _, tbb = _of_turn(a, b, s)
+            paa, _, pbb = of_place(a, b, down / s[HEIGHT], s)
+            taa, _, tbb = of_turn(a, b, s)
             wide = max(wide, math.sqrt(max(0.0, paa + taa) + s[NOISE]))
             tall = max(tall, math.sqrt(max(0.0, pbb + tbb) + s[NOISE]))
     return wide, tall

@@ -1,6 +1,7 @@
 """Kernels of the particles of a target's place: their density, new ones, and the next generation."""
 
 import math
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 from estimators.tracking.resampling import systematic
 from flightsim.foundation.kernels import kernel
 
-__all__ = ["DRAWS", "add_particles", "count_near", "densities", "reflect", "regenerate"]
+__all__ = ["DRAWS", "add_particles", "count_near", "densities", "reflect", "regenerate", "spiral"]
 
 Array = NDArray[np.float64]
 Draws = NDArray[np.uint16]
+Bins = NDArray[np.int32]
 Box = tuple[float, float, float, float]  # south, west, and bins per metre along each axis
 
 DRAWS: Final = 4
@@ -44,43 +46,63 @@ def reflect(places: Array, rates: Array, low: Array, high: Array) -> None:
 
 @kernel
 def _box_of(places: Array, weights: Array) -> Box:
-    """The bins over the particles."""
-    box = (0.0, 0.0, 0.0, 0.0)
-    for axis in range(2):
-        total, mean, square = 0.0, 0.0, 0.0
-        low = high = places[axis, 0]
-        for i in range(weights.size):
-            x = places[axis, i]
-            low, high = min(low, x), max(high, x)
-            total += weights[i]
-            mean += weights[i] * x
-        mean /= total
-        for i in range(weights.size):
-            square += weights[i] * (places[axis, i] - mean) ** 2
-        reach = _BOX_SIGMAS * math.sqrt(square / total)
-        low, high = max(low, mean - reach), min(high, mean + reach)
-        per_m = _BINS / max(high - low, 1e-6 * _BINS)
-        box = (low, box[1], per_m, box[3]) if axis == 0 else (box[0], low, box[2], per_m)
-    return box
-
-
-@kernel
-def _bin_of(north: float, east: float, box: Box) -> int:
-    """The bin of a place; beyond the box the nearest."""
-    row = min(_BINS - 1.0, max(0.0, (north - box[0]) * box[2]))
-    column = min(_BINS - 1.0, max(0.0, (east - box[1]) * box[3]))
-    return int(row) * _BINS + int(column)
-
-
-@kernel
-def _binned(places: Array, weights: Array, box: Box) -> tuple[Array, Array]:
-    """Number of the particles in each bin, and the sum of their weights."""
-    number, probability = np.zeros(_BINS * _BINS), np.zeros(_BINS * _BINS)
+    """The bins over the particles. Both axes in one loop: each sum waits for its last addition."""
+    north, east = places[0], places[1]
+    total, mean_n, mean_e, square_n, square_e = 0.0, 0.0, 0.0, 0.0, 0.0
+    low_n, high_n, low_e, high_e = north[0], north[0], east[0], east[0]
     for i in range(weights.size):
-        k = _bin_of(places[0, i], places[1, i], box)
+        low_n, high_n = min(low_n, north[i]), max(high_n, north[i])
+        low_e, high_e = min(low_e, east[i]), max(high_e, east[i])
+        total += weights[i]
+        mean_n += weights[i] * north[i]
+        mean_e += weights[i] * east[i]
+    mean_n, mean_e = mean_n / total, mean_e / total
+    for i in range(weights.size):
+        square_n += weights[i] * (north[i] - mean_n) ** 2
+        square_e += weights[i] * (east[i] - mean_e) ** 2
+    reach_n, reach_e = _BOX_SIGMAS * math.sqrt(square_n / total), _BOX_SIGMAS * math.sqrt(square_e / total)
+    low_n, high_n = max(low_n, mean_n - reach_n), min(high_n, mean_n + reach_n)
+    low_e, high_e = max(low_e, mean_e - reach_e), min(high_e, mean_e + reach_e)
+    least_m = 1e-6 * _BINS
+    return low_n, low_e, _BINS / max(high_n - low_n, least_m), _BINS / max(high_e - low_e, least_m)
+
+
+@kernel
+def _bins_of(places: Array, box: Box) -> Bins:
+    """The bins of places (n,); beyond the box the nearest."""
+    north, east = places[0], places[1]
+    south, west, per_n, per_e = box
+    rows, columns = np.empty(north.size), np.empty(north.size)
+    out = np.empty(north.size, np.int32)
+    for i in range(north.size):
+        row = (north[i] - south) * per_n
+        row = row if row > 0.0 else 0.0
+        rows[i] = row if row < _BINS - 1.0 else _BINS - 1.0
+    for i in range(north.size):
+        column = (east[i] - west) * per_e
+        column = column if column > 0.0 else 0.0
+        columns[i] = column if column < _BINS - 1.0 else _BINS - 1.0
+    for i in range(north.size):
+        out[i] = np.int32(rows[i]) * np.int32(_BINS) + np.int32(columns[i])
+    return out
+
+
+@kernel
+def _numbers(bins: Bins) -> Array:
+    """Number of the particles in each bin."""
+    number = np.zeros(_BINS * _BINS)
+    for k in bins:
         number[k] += 1.0
-        probability[k] += weights[i]
-    return number, probability
+    return number
+
+
+@kernel
+def _probabilities(bins: Bins, weights: Array) -> Array:
+    """Sum of the weights in each bin."""
+    probability = np.zeros(_BINS * _BINS)
+    for i in range(weights.size):
+        probability[bins[i]] += weights[i]
+    return probability
 
 
 @kernel
@@ -100,9 +122,10 @@ def _between(north: float, east: float, bins: Array, box: Box) -> float:
 def densities(places: Array, weights: Array, out: Array) -> None:
     """Probability per square metre about each particle, (n,): of its bin."""
     box = _box_of(places, weights)
-    _, bins = _binned(places, weights, box)
+    bins = _bins_of(places, box)
+    probability = _probabilities(bins, weights)
     for i in range(weights.size):
-        out[i] = max(1e-300, bins[_bin_of(places[0, i], places[1, i], box)]) * box[2] * box[3]
+        out[i] = max(1e-300, probability[bins[i]]) * box[2] * box[3]
 
 
 @kernel
@@ -156,13 +179,28 @@ def _density_of(places: Array, inverted: Array, drawn: int) -> Array:
     return density
 
 
+def spiral(count: int, turn_rad: float) -> Array:
+    """(2, n) places that stand for a Gaussian of unit variance: along a spiral of the golden angle, that is
+    turned by an angle.
+    """
+    places, cosine, sine = _unturned(count), math.cos(turn_rad), math.sin(turn_rad)
+    return np.array([[cosine, -sine], [sine, cosine]]) @ places
+
+
+@lru_cache(maxsize=4)
+def _unturned(count: int) -> Array:
+    k = np.arange(count)
+    radius, angle = np.sqrt(-2.0 * np.log((k + 0.5) / count)), _GOLDEN_RAD * k
+    return np.stack((radius * np.cos(angle), radius * np.sin(angle)))
+
+
 @kernel
 def add_particles(
     places: Array,
     rates: Array,
     weights: Array,
     gaussians: Array,
-    turn_rad: float,
+    places_of_unit: Array,
     new_places: Array,
     new_rates: Array,
     new_weights: Array,
@@ -176,22 +214,25 @@ def add_particles(
         places, rates: (2, n).
         weights: (n,), sum one; become those beside the new particles.
         gaussians: (m, 5) north, east, covariance nn, ne, ee.
-        turn_rad: by which the spiral is turned.
+        places_of_unit: (2, k) places that stand for a Gaussian of unit variance (`spiral`).
         new_places, new_rates, new_weights: (2, k) and (k,), get the new particles.
     """
     count, drawn = weights.size, new_weights.size
     box = _box_of(places, weights)
     per_area = box[2] * box[3]
-    number, probability = _binned(places, weights, box)
+    bins = _bins_of(places, box)
+    number, probability = _numbers(bins), _probabilities(bins, weights)
     inverted = _inverted(gaussians)
-    for k in range(drawn):
-        g = gaussians[k % gaussians.shape[0]]
-        radius, angle = math.sqrt(-2.0 * math.log((k + 0.5) / drawn)), turn_rad + _GOLDEN_RAD * k
-        one, other = radius * math.cos(angle), radius * math.sin(angle)
+    for j in range(gaussians.shape[0]):
+        g = gaussians[j]
         root = math.sqrt(g[2])
         across = g[3] / root
-        new_places[0, k] = g[0] + root * one
-        new_places[1, k] = g[1] + across * one + math.sqrt(max(0.0, g[4] - across * across)) * other
+        rest = math.sqrt(max(0.0, g[4] - across * across))
+        for k in range(j, drawn, gaussians.shape[0]):
+            one, other = places_of_unit[0, k], places_of_unit[1, k]
+            new_places[0, k] = g[0] + root * one
+            new_places[1, k] = g[1] + across * one + rest * other
+    for k in range(drawn):
         like = k * count // drawn
         new_rates[0, k], new_rates[1, k] = rates[0, like], rates[1, like]
     more = _density_of(places, inverted, drawn)
@@ -230,15 +271,16 @@ def regenerate(
     """
     count = new_places.shape[1]
     box = _box_of(places, weights)
-    bins, _ = _binned(places, weights, box)
-    for k in range(bins.size):
-        if bins[k] > 0.0:
-            bins[k] = _SPREAD * _DRAW_UNIT * math.sqrt(1.0 / (box[2] * box[3] * bins[k]))
+    bins = _bins_of(places, box)
+    spreads = _numbers(bins)
+    for k in range(spreads.size):
+        if spreads[k] > 0.0:
+            spreads[k] = _SPREAD * _DRAW_UNIT * math.sqrt(1.0 / (box[2] * box[3] * spreads[k]))
     chosen = np.empty(count, np.int64)
     systematic(weights, start, chosen)
     for i in range(count):
         one = chosen[i]
-        spread = bins[_bin_of(places[0, one], places[1, one], box)]
+        spread = spreads[bins[one]]
         for axis in range(2):
             off = float(draws[i, 2 * axis]) + float(draws[i, 2 * axis + 1]) - 65535.0
             new_places[axis, i] = places[axis, one] + spread * off

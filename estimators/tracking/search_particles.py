@@ -25,6 +25,7 @@ from estimators.tracking.particle_kernels import (
     densities,
     reflect,
     regenerate,
+    spiral,
 )
 from estimators.tracking.resampling import effective_count
 
@@ -128,8 +129,8 @@ class SearchParticles:
         """Add particles where detections are, (m, 5); what all represent stays the same."""
         drawn = math.ceil(_NEW * self.count)
         places, rates, weights = np.empty((2, drawn)), np.empty((2, drawn)), np.empty(drawn)
-        turn = math.tau * float(self._rng.random())
-        add_particles(self._places, self._rates, self._weights, detected, turn, places, rates, weights)
+        unit = spiral(drawn, math.tau * float(self._rng.random()))
+        add_particles(self._places, self._rates, self._weights, detected, unit, places, rates, weights)
         self._places = np.hstack((self._places, places))
         self._rates = np.hstack((self._rates, rates))
         self._weights = np.hstack((self._weights, weights))

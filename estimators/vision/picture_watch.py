@@ -2,12 +2,14 @@
 
 It makes of each picture the messages that a camera of the SITL with a reader sends: LANDING_TARGET for each
 tag, and the end of the frame (docs/mavlink/camera_scan.md). It also watches whether pictures and attitude fit
-together in time.
+together in time, and whether the tags' sizes fit the height.
 """
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from typing import Any, ClassVar, Final
+
+import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink.camera_scan import (
@@ -20,13 +22,18 @@ from estimators.messages import Message
 from estimators.vision.camera_file import CameraDescription
 from estimators.vision.clock_check import ClockCheck
 from estimators.vision.tag_detector import Picture, TagDetection, TagDetector, TagDetectorParameters
-from estimators.vision.vehicle_track import VehicleTrack
+from estimators.vision.vehicle_track import VehicleTrack, ground_place
+from flightsim.foundation.vectors import rotate
 
 __all__ = ["PictureWatch"]
 
 _CLOCKS_APART_S: Final = 0.15
 """From here on a vehicle that turns by a radian in a second is off by the width of a small tag's view."""
 _WITHOUT_SHARE: Final = 0.1
+_SCALE_OFF: Final = 0.2
+"""Share by which a distance is wrong; a tag on a vehicle's roof 2 m above ground is off by it from 10 m."""
+_LEAST_SCALES: Final = 10
+_SCALES: Final = 1000
 
 
 class PictureWatch:
@@ -45,7 +52,10 @@ class PictureWatch:
     """
 
     MESSAGES: ClassVar[tuple[str, ...]] = VehicleTrack.MESSAGES
-    REQUESTS: ClassVar[tuple[tuple[str, int, float], ...]] = (("ATTITUDE", 1, 25.0),)
+    REQUESTS: ClassVar[tuple[tuple[str, int, float], ...]] = (
+        ("ATTITUDE", 1, 25.0),
+        ("LOCAL_POSITION_NED", 1, 10.0),
+    )
     NEEDED: ClassVar[str] = "attitude"
 
     def __init__(self, camera: CameraDescription, parameters: TagDetectorParameters | None = None) -> None:
@@ -56,6 +66,7 @@ class PictureWatch:
         self.frames = 0
         self.without_attitude = 0
         self.tags: Counter[int] = Counter()
+        self._scales: deque[float] = deque(maxlen=_SCALES)
 
     def handle(self, message: Message) -> None:
         """Take a message of the vehicle."""
@@ -117,7 +128,26 @@ class PictureWatch:
         )
         self.frames += 1
         messages.append(camera_scan_message(scan))
+        self._compare_with_height(scan, detections)
         return messages
+
+    def _compare_with_height(self, scan: CameraScan, detections: tuple[TagDetection, ...]) -> None:
+        """Compare the distances of tags by their size with those of their places on level ground."""
+        pose = self._track.at(scan.time_us)
+        if pose is None:
+            return
+        eye = np.add(pose.pos_ned_m, rotate(pose.q_ned_from_frd, scan.position_frd_m))
+        for found in detections:
+            place = ground_place(pose, scan, found.angle_x_rad, found.angle_y_rad)
+            if place is not None:
+                self._scales.append(found.distance_m / math.dist((*place, 0.0), eye))
+
+    @property
+    def scale(self) -> float | None:
+        """Median of the tags' distances by their size, as shares of those by the vehicle's height; None: too
+        few are known. A wrong focal length or size of the tags makes it another than 1.
+        """
+        return float(np.median(self._scales)) if len(self._scales) >= _LEAST_SCALES else None
 
     def makes(self, message: Message) -> bool:
         """Whether a message is of a kind that it sends."""
@@ -134,6 +164,7 @@ class PictureWatch:
             "detections": self.found,
             "tags": {str(tag): count for tag, count in sorted(self.tags.items())},
             "clocks_apart_s": None if difference is None else round(difference.apart_s, 3),
+            "distance_by_size": None if self.scale is None else round(self.scale, 3),
         }
 
     def warnings(self) -> list[str]:
@@ -150,5 +181,11 @@ class PictureWatch:
                 f"the clocks of pictures and attitude are {abs(difference.apart_s):.2f} s apart: the "
                 f"pictures count as exposed {'before' if difference.apart_s > 0.0 else 'after'} they were; "
                 "correct latency_s of a stream, or start_us of a recording, in the camera's file"
+            )
+        scale = self.scale
+        if scale is not None and not 1.0 - _SCALE_OFF < scale < 1.0 + _SCALE_OFF:
+            found.append(
+                f"the tags' distances by their size are {scale:.2f} times those by the vehicle's height; "
+                "check focal_px in the camera's file, the size of the tags, and that they lie at home's level"
             )
         return found

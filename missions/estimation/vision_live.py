@@ -88,7 +88,7 @@ class _Live(Generic[Found]):
         self._stop = asyncio.Event()
         self._vehicle: int | None = None
         self._received = 0
-        self._needed = frozenset(name for name, _, _ in pictures.REQUESTS)
+        self._needed = pictures.REQUESTS[0][0]
         self.stopped = False
         self.reason = ""
         self.figures: dict[str, Any] = {}
@@ -179,7 +179,7 @@ class _Live(Generic[Found]):
     def _take(self, frame: Frame) -> None:
         if self._vehicle in (None, frame.system_id):
             message = read_message(frame)
-            self._received += message.name in self._needed
+            self._received += message.name == self._needed
             self._watch.handle(message)
 
     async def _search(self, live: LivePictures) -> None:

@@ -19,6 +19,8 @@ def serve(port: int, file: str, first: int, last: int, rounds: int = 1) -> None:
     """Send some pictures, again and again, at 10 Hz."""
     pictures = [frame.pixels for frame in frames_of(file)][first:last]
     height, width = pictures[0].shape[:2]
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
     with av.open(f"tcp://127.0.0.1:{port}?listen=1", "w", format="nut") as container:
         stream = container.add_stream("ffv1", rate=10)
         stream.width, stream.height, stream.pix_fmt = width, height, "bgr0"

@@ -40,6 +40,8 @@ class Scene:
         corners = place + half * np.array([(1, -1, 0), (1, 1, 0), (-1, 1, 0), (-1, -1, 0)])
         self.corners_px = CAMERA.pixels((corners @ r)[:, [1, 2, 0]])
         self.place_camera_m = (r.T @ place)[[1, 2, 0]]
+        right_top_out = np.array([(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)]).T
+        self.r_camera_from_tag = (r.T @ right_top_out)[[1, 2, 0]]
         self.side_px = float(np.linalg.norm(np.diff(self.corners_px, axis=0), axis=1).mean())
         low, high = self.corners_px.min(axis=0), self.corners_px.max(axis=0)
         margin = 0.3 * self.side_px + 6.0  # the yellow margin, and room for the corners' windows
@@ -57,7 +59,9 @@ class Scene:
 
 
 def examine(count, seed):
-    """Rows: side px, detected, corner error px, reprojection px, relative place error; and false tags."""
+    """Rows: side px, detected, corner error px, reprojection px, relative place error, attitude error rad;
+    and false tags.
+    """
     rng = np.random.default_rng(seed)
     renderer = Renderer(MODEL, imager=IMAGER, seed=seed)
     rows, false = [], 0
@@ -75,9 +79,12 @@ def examine(count, seed):
             off = np.linalg.norm(right[0].corners_px - scene.corners_px, axis=1)
             place = np.linalg.norm(right[0].position_camera_m - scene.place_camera_m)
             error = place / np.linalg.norm(scene.place_camera_m)
-            rows.append((scene.side_px, 1.0, math.sqrt(np.mean(off**2)), right[0].reprojection_px, error))
+            turn = 0.5 * (np.trace(scene.r_camera_from_tag.T @ right[0].r_camera_from_tag) - 1.0)
+            angle = math.acos(np.clip(turn, -1.0, 1.0))
+            pixels = math.sqrt(np.mean(off**2)), right[0].reprojection_px
+            rows.append((scene.side_px, 1.0, *pixels, error, angle))
         else:
-            rows.append((scene.side_px, 0.0, math.nan, math.nan, math.nan))
+            rows.append((scene.side_px, 0.0, *[math.nan] * 4))
     return np.array(rows), false
 
 
@@ -88,6 +95,7 @@ def check(rows, false):
     assert np.nanmedian(rows[:, 2]) < 0.5
     assert np.nanmedian(rows[:, 3]) < 0.5
     assert np.nanmedian(large[:, 4]) < 0.02
+    assert np.nanmedian(large[:, 5]) < math.radians(3.0)
     assert rows[rows[:, 0] < 8.0, 1].mean() == 0.0
 
 

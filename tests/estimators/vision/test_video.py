@@ -4,14 +4,16 @@ import asyncio
 import subprocess
 import sys
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
 from autopilot_bridge.mavlink.camera_scan import read_camera_scan
 from estimators.errors import EstimatorError
+from estimators.messages import read_message
 from estimators.vision import CameraDescription, PictureWatch, TagDetectorParameters, load_camera
 from estimators.vision.video import Film, VideoError, frames_of, is_stream
 from missions.estimation.picture_source import LivePictures, StreamClock
@@ -43,8 +45,9 @@ def serving(port, film, first, last, rounds=1):
     """A stream of pictures of a film, in a process of its own."""
     words = [str(word) for word in (port, film, first, last, rounds)]
     command = [sys.executable, "-m", "tests.estimators.vision.stream_server", *words]
-    with subprocess.Popen(command, cwd=Path(__file__).parents[3]) as process:
+    with subprocess.Popen(command, cwd=Path(__file__).parents[3], stdout=subprocess.PIPE) as process:
         try:
+            assert process.stdout is not None and process.stdout.readline() == b"ready\n"
             yield
         finally:
             process.kill()
@@ -76,6 +79,24 @@ def test_an_empty_picture_is_reported_as_such(taken):
     scan = read_camera_scan(message.payload_type, message.payload_length, message.payload)
     assert (scan.number, scan.time_us, scan.detections) == (0, 7, 0)
     assert (scan.width_px, scan.height_px) == (320, 240)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.4])
+def test_a_wrong_focal_length_does_not_fit_the_height(taken, factor):
+    """Each picture has two tags; the vehicle reports 6 m above ground."""
+    geometry = replace(CAMERA.geometry, focal_px=tuple(factor * f for f in CAMERA.geometry.focal_px))
+    watch = PictureWatch(replace(CAMERA, geometry=geometry), DETECTOR)
+    for k, (time_us, pixels) in enumerate(taken):
+        for message in (
+            dialect.MAVLink_attitude_message(time_us // 1000, 0.0, 0.0, 0.1 * k, 0.0, 0.0, 0.0),
+            dialect.MAVLink_local_position_ned_message(time_us // 1000, 0.2 * k, 0.0, -6.0, 2.0, 0.0, 0.0),
+        ):
+            (frame,) = FrameParser().feed(FrameEncoder(1, 1).encode(message))
+            watch.handle(read_message(frame))
+        watch.messages(time_us, watch.detect(time_us, pixels))
+    assert watch.figures()["distance_by_size"] == pytest.approx(factor, rel=0.1)
+    assert [warning for warning in watch.warnings() if "check focal_px" not in warning] == []
+    assert len(watch.warnings()) == (factor != 1.0)
 
 
 def test_what_is_no_video_is_named(tmp_path):

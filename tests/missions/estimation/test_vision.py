@@ -5,6 +5,7 @@ import math
 import socket
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -17,6 +18,7 @@ from missions.cli.main import run_command_line
 from missions.estimation.vision import VisionRequest, watch
 from tests.clients.sitl_process import free_port
 from tests.estimators.vision.pictures import CAMERA, pictures
+from tests.estimators.vision.test_clock_check import seen
 from tests.estimators.vision.test_video import DETECTOR, messages_of, serving, write_film
 
 EPOCH_US = 1_735_689_600_000_000
@@ -94,6 +96,39 @@ def test_pictures_without_attitude_near_them_are_counted_and_reported(recording)
     summary = watch(request(recording)).summary
     assert summary["frames_without_attitude"] == 3
     assert "3 of 6 pictures have no attitude near their exposure" in summary["warnings"][0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("apart_s", [0.0, 0.3, -0.3])
+def test_clocks_that_are_apart_are_reported(recording, capsys, apart_s):
+    """A video of a turning vehicle, whose begin is given wrong; it and its log through the command line."""
+    start_s, steps = 3.0, 80
+
+    def yaw(time_s):
+        return 0.5 * math.sin(time_s) * math.cos(0.37 * time_s)
+
+    taken = [
+        (CAMERA.start_us + 150_000 * k, seen(yaw(start_s + 0.15 * k), 0.1 * (start_s + 0.15 * k)))
+        for k in range(steps)
+    ]
+    video, camera = write_film(recording / "turning.mp4", taken), recording / "late.toml"
+    given = replace(CAMERA, start_us=round((start_s - apart_s) * 1e6))
+    camera.write_text(given.toml(), encoding="utf-8")
+    write_log(
+        recording / "flight.tlog",
+        (
+            (ms * 1000, dialect.MAVLink_attitude_message(ms, 0.0, 0.0, yaw(1e-3 * ms), 0.0, 0.0, 0.0))
+            for ms in range(1000, 17_000, 40)
+        ),
+    )
+    out = recording / "run"
+    words = [str(video), "--camera", str(camera), "--log", str(recording / "flight.tlog"), "--out", str(out)]
+    assert run_command_line(["vision", *words]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["frames"] == steps
+    assert summary["clocks_apart_s"] == pytest.approx(apart_s, abs=0.04)
+    reported = "the clocks of pictures and attitude are 0.3" in capsys.readouterr().err
+    assert reported == (apart_s != 0.0)
 
 
 def test_a_video_of_another_time_is_refused(recording):
@@ -182,6 +217,29 @@ def test_a_live_stream_becomes_messages_on_the_link(recording, taken, live):
 def _frame(raw):
     (frame,) = FrameParser().feed(raw)
     return frame
+
+
+@pytest.mark.slow
+def test_a_stream_of_another_size_than_the_cameras_ends_the_run(recording, live):
+    """The message names both sizes; nothing is sent of such pictures."""
+    video, link = free_port(), free_port()
+    live(send_attitudes, link)
+    text = (recording / "camera.toml").read_text(encoding="utf-8")
+    (recording / "camera.toml").write_text(text.replace("width_px = 320", "width_px = 640"), encoding="utf-8")
+    with serving(video, recording / "film.mp4", 0, 6, 200):
+        result = watch(
+            request(
+                recording,
+                log=None,
+                connect=f"udpin:127.0.0.1:{link}",
+                video=f"tcp://127.0.0.1:{video}",
+                silence_s=30.0,
+            )
+        )
+    assert result.outcome == "failed"
+    assert "320 x 240 pixels is not of the camera of 640 x 240" in result.reason
+    sent = {frame.definition.name for _, frame in of_camera(result.folder / "flight.tlog")}
+    assert not sent & {"LANDING_TARGET", "TUNNEL"}
 
 
 @pytest.mark.slow
