@@ -218,6 +218,7 @@ def test_level_switches_do_not_jerk() -> None:
     acceleration=st.tuples(*[st.floats(-30.0, 30.0)] * 3),
     yaw=st.floats(-10.0, 10.0),
 )
+@pytest.mark.slow
 def test_tilt_and_speed_limits_hold(
     position: tuple[float, float, float],
     velocity: tuple[float, float, float],

@@ -25,6 +25,7 @@ DT_S = 0.02
     acc=st.floats(1.0, 5.0),
     jerk=st.floats(2.0, 15.0),
 )
+@pytest.mark.slow
 def test_limits_hold_and_the_target_is_reached(
     target: tuple[float, float, float],
     velocity: tuple[float, float, float],

@@ -61,7 +61,7 @@ def test_arduplane_heading_in_wind(course: bool) -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_attitude_steps(flavour: str) -> None:
     """Offboard and guided attitudes: each bank is reached within 3 s, without much overshoot."""
     flight = AircraftFlight(flavour, seed=2, environment=LIGHT)

@@ -52,6 +52,7 @@ def test_px4_offboard_setpoints_lost_and_resumed() -> None:
     assert flight.velocity_ned_m_s[1] == pytest.approx(3.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_ardupilot_brakes_when_velocity_setpoints_stop() -> None:
     flight = hovering("ardupilot")
     guided_north(flight, 3.0)
@@ -186,7 +187,7 @@ def test_without_gps_the_vehicle_lands(flavour: str, failure: int) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_without_gps_at_cruise_the_vehicle_sinks_level_and_disarms(flavour: str) -> None:
     flight = hovering(flavour, height_m=20.0)
     guided_north(flight, 8.0)

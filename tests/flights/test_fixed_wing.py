@@ -213,6 +213,7 @@ def test_px4_lands_where_commanded() -> None:
     flight.wait_disarmed(10.0)
 
 
+@pytest.mark.slow
 def test_px4_offboard_attitude() -> None:
     flight = AircraftFlight("px4", environment=WIND)
     flight.take_off(80.0)

@@ -28,6 +28,7 @@ def status(flight: AircraftFlight) -> int:
     return flight.heartbeats[-1][3]
 
 
+@pytest.mark.slow
 def test_ground_station_lost_px4() -> None:
     flight = circling("px4", NAV_DLL_ACT=2)
     flight.heartbeat = False
@@ -164,7 +165,8 @@ def test_motor_fails(flavour: str) -> None:
     assert abs(flight.roll_deg) < 60.0 and flight.actuators_finite
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS[::-1]))
+@pytest.mark.parametrize("flavour", FLAVOURS[::-1])
+@pytest.mark.slow
 def test_geofence(flavour: str) -> None:
     fence = (
         {"GF_ACTION": 3}

@@ -164,7 +164,7 @@ def test_stops_at_once(flight: Flight) -> None:
     assert 4.0 < flight.position_ned_m[0] - start_m < 13.0
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_reposition(flight: Flight) -> None:
     home = flight.newest["HOME_POSITION"]
     yaw = math.nan if flight.flavour == "px4" else 0.0
@@ -198,7 +198,7 @@ def test_reposition(flight: Flight) -> None:
     assert (4.5 < fastest < 5.7) if flight.flavour == "px4" else (6.0 < fastest < 8.5)
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_position_step(flight: Flight) -> None:
     here = local(flight)
     distance_m = 15.0 if flight.flavour == "px4" else 30.0

@@ -206,7 +206,7 @@ def land(flight: Flight) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_lands_at_the_target_its_camera_sees(flavour: str) -> None:
     flight = to_land(flavour)
     land(flight)
@@ -257,9 +257,9 @@ def test_a_target_lost_in_the_descent_is_searched_and_then_done_without(flavour:
 # obstacles
 
 
-@pytest.mark.parametrize("slide", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("slide", [True, False])
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_stops_before_a_wall(flavour: str, slide: bool) -> None:
     parameters = (
         {"CP_DIST": 3.0, "CP_GO_NO_DATA": float(slide)}

@@ -109,7 +109,7 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_the_fence_sends_the_vehicle_to_a_rally_point(flavour: str) -> None:
     parameters = (
         {"GF_ACTION": 3, "RTL_RETURN_ALT": 12.0, "RTL_DESCEND_ALT": 6.0}

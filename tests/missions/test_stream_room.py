@@ -66,7 +66,7 @@ def received(flavour: str, *, reported: bool, room: bool) -> tuple[list[str], Co
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_what_is_needed_gets_its_rate(flavour: str) -> None:
     _, before = received(flavour, reported=True, room=False)
     slowed, after = received(flavour, reported=True, room=True)

@@ -79,6 +79,7 @@ def fly(seed: int, environment: Environment) -> tuple[np.ndarray, np.ndarray]:
     [slow(Environment()), Environment(wind_ned_m_s=(5.0, 0.0, 0.0), turbulence=Turbulence.MODERATE)],
     ids=["still", "turbulent"],
 )
+@pytest.mark.slow
 def test_consistent_and_accurate_in_flight(environment: Environment) -> None:
     runs = [fly(seed, environment) for seed in range(SEEDS)]
     nees, errors = np.array([run[0] for run in runs]), np.array([run[1] for run in runs])

@@ -143,6 +143,7 @@ def test_payload_and_targets_change_no_other_stream(alone: tuple[bytes, bytes]) 
     assert len(said) > 10_000 and alone[1] == b""
 
 
+@pytest.mark.slow
 def test_other_vehicles_change_no_stream_of_an_aircraft_and_its_payload() -> None:
     single = taken_off(payload=CARRIED, targets=TARGETS)
     assert taken_off(models=("aerosonde", "iris", "aerosonde"), payload=CARRIED, targets=TARGETS) == single

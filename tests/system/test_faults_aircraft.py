@@ -49,7 +49,7 @@ def healthy(flight: AircraftFlight, bit: int) -> bool:
 
 @pytest.mark.parametrize("failure", [OFF, STUCK])
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_airspeed_lost_is_reported(flavour: str, failure: int) -> None:
     flight = circling(flavour)
     lost_text, found_text = TEXTS[flavour]

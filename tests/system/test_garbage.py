@@ -205,7 +205,8 @@ def test_damaged_frames_change_nothing_at_all(damage: list[bytes]) -> None:
     assert np.array_equal(*truths)
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.slow
 def test_frames_for_other_systems(flavour: str) -> None:
     """Every message there is, and every command, for another vehicle: forwarded perhaps, never obeyed."""
     flying = hovering(flavour)

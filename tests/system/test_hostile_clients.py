@@ -92,7 +92,7 @@ def scene(flavour: str) -> Iterator[Scene]:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_every_message_at_a_kilohertz(flavour: str) -> None:
     with scene(flavour) as there:
         client = there.client()

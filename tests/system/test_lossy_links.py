@@ -75,9 +75,9 @@ def heights(items: tuple[MissionItem, ...] | list[MissionItem]) -> list[float]:
     return [item.z for item in items]
 
 
-@pytest.mark.parametrize("seed", slow_after(1, range(3)))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_everything_is_done_over_a_poor_radio(flavour: str, seed: int) -> None:
     radio = Radio(flavour, POOR, seed)
     speed, acceleration = SPEEDS[flavour]

@@ -6,6 +6,7 @@ import pytest
 from tests.estimators.attitude.wing_flight import PAPER_DEG2, fly_turns
 
 
+@pytest.mark.slow
 def test_one_flight():
     """A calm one, by the truth: better than Table I of Tolman et al. 2021."""
     found = fly_turns(1)

@@ -154,6 +154,7 @@ def test_targets_at_the_border_are_found_and_measurements_beyond_are_counted():
     assert flight.runner.remarks["measurements_outside"] > 0
 
 
+@pytest.mark.slow
 def test_two_hundred_targets():
     rng = np.random.default_rng(0)
     grid = np.array([(7.0 * a, 7.0 * b) for a in range(-7, 8) for b in range(-7, 7)])[:200]

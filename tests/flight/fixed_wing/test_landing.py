@@ -80,6 +80,7 @@ def test_lands_on_the_place_along_a_leg(wind: tuple[float, float], rangefinder: 
     assert task.update(rig.ctx) is TaskStatus.DONE
 
 
+@pytest.mark.slow
 def test_turbulence_leaves_it_on_the_runway() -> None:
     touches = []
     for seed in (1, 2, 3):
@@ -92,7 +93,7 @@ def test_turbulence_leaves_it_on_the_runway() -> None:
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (5.0, 3.0)])
 @pytest.mark.parametrize("radius", [120.0, -120.0])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_without_a_leg_it_circles_down_and_lands_against_the_wind(
     wind: tuple[float, float], radius: float
 ) -> None:
@@ -174,7 +175,7 @@ def test_the_flare_gives_up_less_airspeed_against_the_wind() -> None:
 
 
 @pytest.mark.parametrize("wind_m_s", [-6.0, 6.0])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_airspeed_is_held_in_a_wind_that_fades(wind_m_s: float) -> None:
     """The navigation state here has the wind of 10 m at all heights, as a filter that takes its time has."""
     rig = Aircraft(

@@ -115,7 +115,7 @@ def test_an_aircraft_flies_its_plan_and_lands(flavour: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(("flavour", "suffix"), [("px4", ".plan"), ("ardupilot", ".waypoints")])
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_pattern_is_written_and_flown_from_its_file(flavour: str, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"l2{suffix}"
     requested = RunRequest(

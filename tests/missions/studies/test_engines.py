@@ -115,6 +115,7 @@ def test_an_interruption_keeps_the_rows_and_resumes(expected: Path, tmp_path: Pa
     assert all(timing[row["trial"]] == row for row in before)  # nothing was done twice
 
 
+@pytest.mark.slow
 def test_a_study_that_was_killed_resumes(expected: Path, tmp_path: Path) -> None:
     command = tied([sys.executable, "-m", "tests.missions.studies.small", str(tmp_path / "study")])
     killed = subprocess.run(command, cwd=ROOT, check=False, timeout=120.0)
