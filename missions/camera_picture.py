@@ -1,8 +1,9 @@
-"""A picture of a camera with what was found in it, for the run folder."""
+"""Pictures of a camera with what was found in them, for the run folder."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     import numpy as np
@@ -10,9 +11,11 @@ if TYPE_CHECKING:
 
     from estimators.vision import CameraGeometry
 
-__all__ = ["CameraPicture", "PictureAt"]
+__all__ = ["CameraPicture", "PicturesOf", "clip", "png"]
 
 Point = tuple[float, float]
+
+_JPEG_QUALITY: Final = 80  # noise does not compress: a picture of 640 x 480 pixels has some 100 kB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,11 +41,12 @@ class CameraPicture:
         """Of pixels (height, width, 3), BGR."""
         import cv2
 
-        _, data = cv2.imencode(".jpg", pixels)
+        _, data = cv2.imencode(".jpg", pixels, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))
         return cls(time_us=time_us, jpeg=bytes(data), camera=camera, points=points)
 
-    def drawn(self, tracks: Sequence[tuple[Point, str, bool]]) -> bytes:
-        """The picture as PNG, with a circle around each point and a cross with a text at each track.
+    def drawn(self, tracks: Sequence[tuple[Point, str, bool]]) -> "NDArray[np.uint8]":
+        """The picture (height, width, 3), BGR, with a circle around each point, and a cross with a text at
+        each track.
 
         Args:
             tracks: tangents, text, and whether it is marked.
@@ -66,9 +70,33 @@ class CameraPicture:
                 cv2.putText(
                     picture, text, (x + 9, y - 7), cv2.FONT_HERSHEY_SIMPLEX, 0.45, shade, width, cv2.LINE_AA
                 )
-        _, data = cv2.imencode(".png", picture)
-        return bytes(data)
+        return np.asarray(picture, dtype=np.uint8)
 
 
-PictureAt = Callable[[int, int], CameraPicture | None]
-"""The picture that the camera of a vehicle has kept nearest to a vehicle time, in microseconds."""
+PicturesOf = Callable[[int], Sequence[CameraPicture]]
+"""The pictures that the camera of a vehicle has kept, by system id, in the order of their times."""
+
+
+def png(pixels: "NDArray[np.uint8]") -> bytes:
+    """A picture (height, width, 3), BGR, as PNG."""
+    import cv2
+
+    _, data = cv2.imencode(".png", pixels)
+    return bytes(data)
+
+
+def clip(pictures: "Iterable[NDArray[np.uint8]]", rate_hz: int) -> bytes:
+    """Pictures (height, width, 3), BGR, of one size as a video (MP4, H.264); b"" without pictures."""
+    import av
+
+    file, stream = BytesIO(), None
+    with av.open(file, "w", format="mp4") as container:
+        for pixels in pictures:
+            if stream is None:
+                stream = container.add_stream("libx264", rate=rate_hz)
+                stream.height, stream.width = pixels.shape[:2]
+                stream.pix_fmt = "yuv420p"
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="bgr24")))
+        if stream is not None:
+            container.mux(stream.encode(None))
+    return b"" if stream is None else file.getvalue()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from autopilot_bridge.mission_plan import MissionItem
     from flightsim.foundation.geodesy import GeodeticPosition
-    from missions.camera_picture import PictureAt
+    from missions.camera_picture import PicturesOf
     from missions.notes import FlightNotes
     from missions.outline import Outline
     from missions.runs.records import FlightRecords
@@ -171,8 +171,8 @@ class Mission(Generic[AnyOptions]):
         """First words of the picture's title."""
         return self.name
 
-    def pictures(self, debriefing: Debriefing, picture_at: "PictureAt") -> Mapping[str, bytes]:
-        """Pictures of the cameras as PNG, by file name, with what the mission draws in."""
+    def pictures(self, debriefing: Debriefing, pictures_of: "PicturesOf") -> Mapping[str, bytes]:
+        """Pictures and videos of the cameras, by file name, with what the mission draws in."""
         return {}
 
     def draw(self, path: "Path", title: str, debriefing: Debriefing) -> None:

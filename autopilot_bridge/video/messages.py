@@ -4,7 +4,14 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from flightsim.payload import BrownDistortion, CameraView, ImagerParameters, PinholeModel, TargetView
+from flightsim.payload import (
+    BrownDistortion,
+    CameraView,
+    ImagerParameters,
+    PinholeModel,
+    TargetShape,
+    TargetView,
+)
 from flightsim.picture import Scenery
 
 MAX_LINE = 1 << 20
@@ -100,7 +107,7 @@ def view_from_json(data: dict[str, Any]) -> CameraView:
     """From plain data."""
     targets = tuple(
         TargetView(
-            position_ned_m=_triple(item["position_ned_m"]), size_m=item["size_m"], tag_id=item["tag_id"]
+            **{**item, "position_ned_m": _triple(item["position_ned_m"]), "shape": TargetShape(item["shape"])}
         )
         for item in data["targets"]
     )

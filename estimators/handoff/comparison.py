@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.handoff.alignment import Alignment, align
 from estimators.relative_pose.belief import PoseMode
 
 Array = NDArray[np.float64]
@@ -38,6 +39,15 @@ class TrackWindows:
     others: Mapping[int, Array] = field(default_factory=dict)
     identity: float = 1.0
     doubtful: frozenset[int] = frozenset()
+    _alignments: dict[int, Alignment] = field(default_factory=dict, init=False, repr=False)
+
+    def alignment(self, number: int, target: Array) -> Alignment:
+        """Alignment of a track of the handoff aircraft with the tracker's target, made once for all
+        comparisons of these windows.
+        """
+        if number not in self._alignments:
+            self._alignments[number] = align(self.handoff[number], target)
+        return self._alignments[number]
 
 
 class TrackComparison(ABC):

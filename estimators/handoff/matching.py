@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from estimators.handoff.alignment import Alignment, align
+from estimators.handoff.alignment import Alignment
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.relative_pose.belief import PoseMode
 from flightsim.foundation.checks import check_fields, require_positive, require_probability
@@ -87,7 +87,7 @@ class MatchComparison(TrackComparison):
         self.newest = {}
         if windows.target is not None:
             self.newest = {
-                number: self._match(window, windows.target, pose)
+                number: self._match(windows.alignment(number, windows.target), window, windows.target, pose)
                 for number, window in windows.handoff.items()
             }
         for number in sorted({*self._scores, *self.newest}):
@@ -101,9 +101,8 @@ class MatchComparison(TrackComparison):
             if self._scores[best] > p.decision:
                 self.decided = best
 
-    def _match(self, handoff: np.ndarray, target: np.ndarray, pose: PoseMode) -> Match:
+    def _match(self, alignment: Alignment, handoff: np.ndarray, target: np.ndarray, pose: PoseMode) -> Match:
         p = self.parameters
-        alignment = align(handoff, target)
         rotation = wrap_pi(alignment.heading_rad - pose.heading_rad)
         expected = pose.from_tracker(*target.mean(axis=0).tolist())
         off = handoff.mean(axis=0) - expected

@@ -11,7 +11,7 @@ from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.handoff.dead_reckoning import EYE, DeadReckoning, TrackHistory
 from estimators.handoff.matching import blended
-from estimators.relative_pose.belief import LevelMotion, PoseMeasurement, RelativePoseBelief
+from estimators.relative_pose.belief import LevelMotion, PoseMeasurement, PoseMode, RelativePoseBelief
 from flightsim.foundation.checks import require_positive
 
 Array = NDArray[np.float64]
@@ -166,8 +166,23 @@ class HandoffProcess:
         if self._compared_us is not None and time_us - self._compared_us < every_us:
             return
         self._compared_us = time_us
+        self.comparison.update(self.track_windows(time_us, height_m, best, self.windows), best)
+        if self.comparison.decided is not None and self.decided_us is None:
+            self.decided_us = time_us
+
+    def track_windows(
+        self, time_us: int, height_m: float, best: PoseMode, parameters: WindowParameters
+    ) -> TrackWindows:
+        """The windows of all tracks at a time.
+
+        Args:
+            time_us: present time, to which pose and both motions were moved.
+            height_m: own height over the ground.
+            best: the relative pose.
+            parameters: of the windows; the tracks must be kept for their span.
+        """
         end_us = min(self.tracks.time_us, self._reported_us)
-        times_us = end_us + every_us * np.arange(1 - self.windows.samples, 1)
+        times_us = end_us + round(1e6 * parameters.every_s) * np.arange(1 - parameters.samples, 1)
         if time_us - end_us > _OLD_US:
             times_us = times_us[:0]
         own = self._windows(self.tracks.history, self.tracks.reckoning, times_us)
@@ -175,22 +190,17 @@ class HandoffProcess:
         report, none = self.report, np.zeros((0, 2))
         eyes = own.pop(EYE, none), reported.pop(EYE, none)
         target = None if report is None or report.number is None else reported.pop(report.number, None)
-        self.comparison.update(
-            TrackWindows(
-                time_us=time_us,
-                times_us=times_us,
-                handoff=own,
-                target=target,
-                eyes=eyes,
-                heights_m=(height_m, max(_LEAST_HEIGHT_M, height_m - best.down_m)),
-                others=reported,
-                identity=1.0 if report is None else report.identity,
-                doubtful=self.tracks.doubtful,
-            ),
-            best,
+        return TrackWindows(
+            time_us=time_us,
+            times_us=times_us,
+            handoff=own,
+            target=target,
+            eyes=eyes,
+            heights_m=(height_m, max(_LEAST_HEIGHT_M, height_m - best.down_m)),
+            others=reported,
+            identity=1.0 if report is None else report.identity,
+            doubtful=self.tracks.doubtful,
         )
-        if self.comparison.decided is not None and self.decided_us is None:
-            self.decided_us = time_us
 
     @staticmethod
     def _windows(

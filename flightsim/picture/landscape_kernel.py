@@ -27,8 +27,10 @@ SCENERY: Final = 8
 FIELD_M: Final = 100.0
 _TRACK_M: Final = 3.0
 _OCTAVES: Final = 4
-_PER_TEXEL: Final = (1.0 / 0.03, 1.0 / 0.27, 1.0 / 2.4, 1.0 / 22.0)
-_LOG_TEXEL: Final = (math.log2(0.03), math.log2(0.27), math.log2(2.4), math.log2(22.0))
+_TEXEL_M: Final = (0.03, 0.27, 2.4, 22.0)
+# by octave and level: texels in a metre, and the least footprint to which the level belongs
+_PER_M: Final = np.array([[1.0 / texel_m / (1 << n) for n in range(LEVELS)] for texel_m in _TEXEL_M])
+_FROM_M: Final = np.array([[texel_m * 2.0 ** (n - 0.5) for n in range(LEVELS)] for texel_m in _TEXEL_M])
 _GRAIN: Final = (0.07, 0.08, 0.08, 0.06)
 _AWAY: Final = float(1 << 40)  # whole patches that make every place positive, so that int() is the floor
 _FIELDS_BGR: Final = np.array(
@@ -53,30 +55,78 @@ _SUN_COSINE: Final = math.cos(math.radians(0.6))
 _GLOW_COSINE: Final = math.cos(math.radians(15.0))
 _PAD_M: Final = 3.0
 _TERRAIN_STEPS: Final = 8
+_LEAST_SINE: Final = 1e-4  # of the depression of a ray that meets the ground
+
+# rays of a row, and where they meet the ground
+_NORTH: Final = 0
+_EAST: Final = 1
+_DOWN: Final = 2  # of a ray; its direction has a length of _STRETCH
+_STRETCH: Final = 3
+_SINE: Final = 4  # of its depression
+_DEPTH: Final = 5  # along the optical axis
+_RANGE: Final = 2  # of a place
+_FOOTPRINT: Final = 3
 
 
 @kernel
-def _grain(texture: NDArray[np.float32], north: float, east: float, footprint_m: float) -> float:
-    """The sum of the octaves that are coarser than what a pixel covers."""
-    value = 0.0
-    detail = math.log2(footprint_m) + 0.5
+def _octave(
+    texture: NDArray[np.float32],
+    ground: Array,
+    first: int,
+    last: int,
+    per_m: float,
+    size: int,
+    weight: float,
+    grain: Array,
+) -> None:
+    """Add an octave to the grain of some pixels of a row: the texture (TEXELS * TEXELS) of one level, whose
+    patch has `size` texels each way, between its texels.
+    """
+    mask = np.uint32(size - 1)
+    for column in range(first, last):
+        x = ground[_NORTH, column] * per_m + _AWAY
+        y = ground[_EAST, column] * per_m + _AWAY
+        whole_x, whole_y = np.floor(x), np.floor(y)
+        fx, fy = x - whole_x, y - whole_y
+        i, j = np.uint32(np.int32(whole_x - _AWAY)) & mask, np.uint32(np.int32(whole_y - _AWAY)) & mask
+        k, m = (i + np.uint32(1)) & mask, (j + np.uint32(1)) & mask
+        i, k = i * np.uint32(TEXELS), k * np.uint32(TEXELS)
+        a, b = texture[i + j], texture[k + j]
+        c = a + (texture[i + m] - a) * fy
+        d = b + (texture[k + m] - b) * fy
+        grain[column] += weight * (c + (d - c) * fx)
+
+
+@kernel
+def _grain(texture: NDArray[np.float32], ground: Array, grain: Array) -> None:
+    """For a row of pixels (n,), the sum of the octaves that are coarser than what a pixel covers."""
+    grain[:] = 0.0
+    footprint = ground[_FOOTPRINT]
     for octave in range(_OCTAVES):
-        level = max(0, int(detail - _LOG_TEXEL[octave])) if detail > _LOG_TEXEL[octave] else 0
-        if level >= LEVELS - 1:
-            continue
-        mask = (TEXELS >> level) - 1
-        per_m = _PER_TEXEL[octave] / (1 << level)
-        x = north * per_m + _AWAY
-        y = east * per_m + _AWAY
-        i, j = int(x), int(y)
-        fx, fy = x - i, y - j
-        i, j = i & mask, j & mask
-        k, m = (i + 1) & mask, (j + 1) & mask
-        a, b = texture[level, i, j], texture[level, k, j]
-        a += (texture[level, i, m] - a) * fy
-        b += (texture[level, k, m] - b) * fy
-        value += _GRAIN[octave] * (a + (b - a) * fx)
-    return value
+        last = level = 0
+        while last < grain.shape[0]:
+            first = last
+            while level < LEVELS - 1 and footprint[first] >= _FROM_M[octave, level + 1]:
+                level += 1
+            while level > 0 and footprint[first] < _FROM_M[octave, level]:
+                level -= 1
+            last += 1
+            while last < grain.shape[0] and not (
+                (level < LEVELS - 1 and footprint[last] >= _FROM_M[octave, level + 1])
+                or (level > 0 and footprint[last] < _FROM_M[octave, level])
+            ):
+                last += 1
+            if level < LEVELS - 1:
+                _octave(
+                    texture[level].ravel(),
+                    ground,
+                    first,
+                    last,
+                    _PER_M[octave, level],
+                    TEXELS >> level,
+                    _GRAIN[octave],
+                    grain,
+                )
 
 
 @kernel
@@ -122,6 +172,56 @@ def _height_at(heights: Array, grid: Array, north: float, east: float) -> float:
 
 
 @kernel
+def _cast_rays(r_ned_from_mount: Array, u: Array, v: float, height_m: float, rays: Array) -> None:
+    """The rays (6, n) of a row of pixels over level ground; `u` (n,) and `v` are their image coordinates.
+
+    This loop and the next one have no branch, so that the compiler works on several pixels at once:
+    `np.divide` does not check for zeros, and a ray that does not meet the ground has a depth without meaning.
+    """
+    r = r_ned_from_mount
+    for column in range(u.shape[0]):
+        x = u[column]
+        stretch = math.sqrt(1.0 + x * x + v * v)
+        down = r[2, 0] + x * r[2, 1] + v * r[2, 2]
+        rays[_NORTH, column] = r[0, 0] + x * r[0, 1] + v * r[0, 2]
+        rays[_EAST, column] = r[1, 0] + x * r[1, 1] + v * r[1, 2]
+        rays[_DOWN, column] = down
+        rays[_STRETCH, column] = stretch
+        rays[_SINE, column] = np.divide(down, stretch)
+        rays[_DEPTH, column] = np.divide(height_m, down)
+
+
+@kernel
+def _meet_ground(eye_ned_m: Array, focal_px: float, rays: Array, ground: Array) -> None:
+    """Where rays meet the ground (4, n), by their depth."""
+    eye_north, eye_east = eye_ned_m[0], eye_ned_m[1]
+    for column in range(rays.shape[1]):
+        depth = rays[_DEPTH, column]
+        ground[_NORTH, column] = eye_north + depth * rays[_NORTH, column]
+        ground[_EAST, column] = eye_east + depth * rays[_EAST, column]
+        ground[_RANGE, column] = depth * rays[_STRETCH, column]
+        footprint = np.divide(np.divide(depth, focal_px), math.sqrt(rays[_SINE, column]))
+        ground[_FOOTPRINT, column] = max(1e-4, footprint)
+
+
+@kernel
+def _meet_terrain(eye_ned_m: Array, height_m: float, heights: Array, grid: Array, rays: Array) -> None:
+    """Depths of rays over terrain in place of those over level ground.
+
+    It is a fixed point, which converges where the ground is less steep than the ray.
+    """
+    for column in range(rays.shape[1]):
+        if rays[_SINE, column] < _LEAST_SINE:
+            continue
+        depth = rays[_DEPTH, column]
+        for _ in range(_TERRAIN_STEPS):
+            at_n = eye_ned_m[0] + depth * rays[_NORTH, column]
+            at_e = eye_ned_m[1] + depth * rays[_EAST, column]
+            depth = max(0.05, height_m - _height_at(heights, grid, at_n, at_e)) / rays[_DOWN, column]
+        rays[_DEPTH, column] = depth
+
+
+@kernel
 def paint_landscape(
     r_ned_from_mount: Array,
     eye_ned_m: Array,
@@ -145,19 +245,26 @@ def paint_landscape(
     height_m = max(0.05, -eye_ned_m[2])
     sun = scenery[SUN_NED]
     length_m, width_m = scenery[RUNWAY_LENGTH_M], scenery[RUNWAY_WIDTH_M]
+    visibility_m = scenery[VISIBILITY_M]
     colour = np.empty(3)
+    rays, ground_at, grain = np.empty((6, width)), np.empty((4, width)), np.empty(width)
+    u = np.empty(width)
+    for column in range(width):
+        u[column] = (column + 0.5 - centre_u_px) / focal_px
+    known_n = known_e = math.nan
+    which = 0
     for row in range(height):
-        v = (row + 0.5 - centre_v_px) / focal_px
+        _cast_rays(r_ned_from_mount, u, (row + 0.5 - centre_v_px) / focal_px, height_m, rays)
+        if heights.shape[0] > 1:
+            _meet_terrain(eye_ned_m, height_m, heights, grid, rays)
+        _meet_ground(eye_ned_m, focal_px, rays, ground_at)
+        _grain(texture, ground_at, grain)
         for column in range(width):
-            u = (column + 0.5 - centre_u_px) / focal_px
-            stretch = math.sqrt(1.0 + u * u + v * v)
-            dn = r_ned_from_mount[0, 0] + u * r_ned_from_mount[0, 1] + v * r_ned_from_mount[0, 2]
-            de = r_ned_from_mount[1, 0] + u * r_ned_from_mount[1, 1] + v * r_ned_from_mount[1, 2]
-            dd = r_ned_from_mount[2, 0] + u * r_ned_from_mount[2, 1] + v * r_ned_from_mount[2, 2]
-            sine = dd / stretch  # of the depression
-            if sine < 1e-4:
+            sine = rays[_SINE, column]
+            if sine < _LEAST_SINE:
+                dn, de, dd = rays[_NORTH, column], rays[_EAST, column], rays[_DOWN, column]
                 up = math.sqrt(min(1.0, max(0.0, -sine)))
-                toward = (dn * sun[0] + de * sun[1] + dd * sun[2]) / stretch
+                toward = (dn * sun[0] + de * sun[1] + dd * sun[2]) / rays[_STRETCH, column]
                 glow = 0.0
                 if toward > _SUN_COSINE:
                     glow = 1.0
@@ -167,25 +274,20 @@ def paint_landscape(
                     sky = _HAZE_BGR[c] + (_ZENITH_BGR[c] - _HAZE_BGR[c]) * up
                     out[row, column, c] = np.uint8(sky + (_SUN_BGR[c] - sky) * glow)
                 continue
-            depth = height_m / dd
-            if heights.shape[0] > 1:
-                # fixed point: it converges where the ground is less steep than the ray
-                for _ in range(_TERRAIN_STEPS):
-                    at_n, at_e = eye_ned_m[0] + depth * dn, eye_ned_m[1] + depth * de
-                    depth = max(0.05, height_m - _height_at(heights, grid, at_n, at_e)) / dd
-            range_m = depth * stretch
-            north, east = eye_ned_m[0] + depth * dn, eye_ned_m[1] + depth * de
-            haze = 1.0 - math.exp(-range_m / scenery[VISIBILITY_M])
-            footprint = max(1e-4, depth / focal_px / math.sqrt(sine))
+            north, east = ground_at[_NORTH, column], ground_at[_EAST, column]
+            haze = 1.0 - math.exp(-ground_at[_RANGE, column] / visibility_m)
+            footprint = ground_at[_FOOTPRINT, column]
             if haze > 0.98:
                 for c in range(3):
                     ground = _MEAN_BGR[c]
                     out[row, column, c] = np.uint8(ground + (_HAZE_BGR[c] - ground) * haze)
                 continue
             field_n, field_e = math.floor(north / FIELD_M), math.floor(east / FIELD_M)
-            which = (int(field_n) * 73 + int(field_e) * 151 + (int(field_n) * int(field_e)) % 11 * 37) % 7
+            if field_n != known_n or field_e != known_e:
+                known_n, known_e = field_n, field_e
+                which = (int(field_n) * 73 + int(field_e) * 151 + (int(field_n) * int(field_e)) % 11 * 37) % 7
             far = min(1.0, footprint / (0.25 * FIELD_M))
-            light = 1.0 + _grain(texture, north, east, footprint)
+            light = 1.0 + grain[column]
             near_n = 0.5 * FIELD_M - abs(north - (field_n + 0.5) * FIELD_M)
             near_e = 0.5 * FIELD_M - abs(east - (field_e + 0.5) * FIELD_M)
             track = 0.0

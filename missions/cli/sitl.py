@@ -216,6 +216,7 @@ def sitl(
     map_file: str | None,
     map_target: str | None,
     video: str | None,
+    video_rate: float,
     pictures: Path | None,
     signing_key: Path | None,
     unsigned: str,
@@ -266,7 +267,7 @@ def sitl(
             simulated = Sitl(spec, signing=signing, cards=memory.cards)
             compile_flight_code(spec.vehicles)
             server = SitlServer(simulated, speedup=speedup or None, monotonic=wall_time_s)
-            pictured = start_video(simulated, video, pictures, losses.picture_lost)
+            pictured = start_video(simulated, video, video_rate, pictures, losses.picture_lost)
             if pictured is not None:
                 at_end.callback(pictured.close)
             if count > 1 and ports:

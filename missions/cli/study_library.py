@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 def _handoff(given: Given) -> "Study[Any, Any]":
     from missions.studies.handoff import study
 
-    return study(given["comparison"], given["belief"], given["window"], given["trade_off"], given["camera"])
+    return study(
+        given["comparison"],
+        given["belief"],
+        given["window"],
+        given["trade_off"],
+        given["camera"],
+        given["timeout"],
+    )
 
 
 def _lissajous_localization(given: Given) -> "Study[Any, Any]":
@@ -99,6 +106,12 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     type=click.Choice(["points", "pixels"]),
                     default="points",
                     help="Moving points by a model, or found in rendered pictures; slow.",
+                ),
+                click.Option(
+                    ["--timeout"],
+                    type=click.FloatRange(1.0, 3600.0),
+                    default=900.0,
+                    help="A trial without a decision ends then, s.",
                 ),
             ),
             build=_handoff,

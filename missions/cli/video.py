@@ -12,12 +12,20 @@ if TYPE_CHECKING:
 
 
 def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds --video and --pictures."""
+    """Adds --video, --video-rate and --pictures."""
     command = click.option(
         "--pictures",
         type=click.Path(path_type=Path, file_okay=False),
         metavar="DIR",
         help="Keep photos and videos that the cameras take, in a new folder.",
+    )(command)
+    command = click.option(
+        "--video-rate",
+        type=float,
+        default=20.0,
+        show_default=True,
+        metavar="HZ",
+        help="Pictures per second: of wall time in streams, of vehicle time in recordings.",
     )(command)
     return click.option(
         "--video",
@@ -27,13 +35,13 @@ def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def start_video(
-    world: "Sitl", video: str | None, pictures: Path | None, on_loss: Callable[[str], None]
+    world: "Sitl", video: str | None, rate_hz: float, pictures: Path | None, on_loss: Callable[[str], None]
 ) -> "VideoService | None":
     """Serve video and keep pictures as the options specify; None: neither was requested.
 
     Args:
         world: the world that has the cameras.
-        video, pictures: values of the command-line options.
+        video, rate_hz, pictures: values of the command-line options.
         on_loss: called with what could not be written, and the reason.
 
     Raises:
@@ -51,12 +59,12 @@ def start_video(
     from autopilot_bridge.video.for_sitl import show_cameras
 
     if video == "off":
-        parameters = VideoParameters(port=None, folder=pictures)
+        parameters = VideoParameters(port=None, folder=pictures, rate_hz=rate_hz)
     elif video is None:
-        parameters = VideoParameters(folder=pictures)
+        parameters = VideoParameters(folder=pictures, rate_hz=rate_hz)
     else:
         host, port = _place(video)
-        parameters = VideoParameters(host=host, port=port, any_port=False, folder=pictures)
+        parameters = VideoParameters(host=host, port=port, any_port=False, folder=pictures, rate_hz=rate_hz)
     if parameters.port is not None and not parameters.host.startswith(("127.", "localhost")):
         click.echo(f"warning: video on {parameters.host} is open to whoever reaches it", err=True)
     service = show_cameras(world, parameters, on_loss)

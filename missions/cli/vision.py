@@ -92,6 +92,7 @@ class _ProgressLine:
     "--silence", type=_SECONDS, default=10.0, show_default=True, metavar="S",
     help="Wall seconds without the vehicle or a first picture, after which it fails.",
 )  # fmt: skip
+@click.option("--film", is_flag=True, help="Keep the searched pictures of a stream as lossless video; large.")
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/vision-N]")
 @key_option()
 def vision(**given: Any) -> int:
@@ -126,6 +127,7 @@ def vision(**given: Any) -> int:
                 component_id=given["component_id"],
                 duration_s=given["duration"],
                 silence_s=given["silence"],
+                film=given["film"],
                 out=given["out"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),
                 signing_key=key,

@@ -25,8 +25,8 @@ POINT_CAMERA: Final = CameraParameters(
     max_zoom=1.0,
 )
 """The camera of the study's video: 640 x 480 pixels over 60 degrees."""
-_KEEP_US: Final = 1_000_000
-_KEPT: Final = 600
+_KEEP_US: Final = 400_000
+_KEPT: Final = 600  # four minutes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,9 +108,10 @@ class RenderedPointsReader:
             self._kept.append(CameraPicture.of(view.time_us, picture, self.geometry, points))
         return points
 
-    def picture_at(self, time_us: int) -> CameraPicture | None:
-        """The kept picture nearest to a time; None: there is none."""
-        return min(self._kept, key=lambda kept: abs(kept.time_us - time_us), default=None)
+    @property
+    def kept(self) -> tuple[CameraPicture, ...]:
+        """The newest pictures with points in them, some of each second."""
+        return tuple(self._kept)
 
 
 def watched(vehicle: MemoryLink, system_id: int, watch: MotionWatch) -> MemoryLink:

@@ -110,12 +110,10 @@ class EmbeddedSitl:
                 found[f"tag{system_id}.png"] = reader.kept.drawn()
         return found
 
-    def picture_at(self, system_id: int, time_us: int) -> CameraPicture | None:
-        """The picture that the moving-point camera of a vehicle has kept nearest to a time; None: it takes
-        none.
-        """
+    def pictures_of(self, system_id: int) -> tuple[CameraPicture, ...]:
+        """The pictures that the moving-point camera of a vehicle has kept."""
         finder = self._finders.get(system_id)
-        return None if finder is None else finder.picture_at(time_us)
+        return () if finder is None else finder.kept
 
     def on_truth(self, listener: TruthListener) -> None:
         """Subscribe to frames of truth at 50 Hz, for the log and the score."""

@@ -12,6 +12,8 @@ from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
 from estimators.messages import read_message
+from estimators.vision.video import Picture, VideoError
+from missions.camera_film import CameraFilm
 from missions.errors import LinkClosed
 from missions.estimation.picture_source import LivePictures
 from missions.estimation.rates import interval_request
@@ -35,6 +37,7 @@ from missions.vehicle.connection import Connection
 __all__ = ["next_to_link"]
 
 _LOOK_S: Final = 0.25
+_FILM_NAME: Final = "camera.mp4"
 
 
 def next_to_link(
@@ -50,12 +53,15 @@ def next_to_link(
         folder = create_run_folder(request.out, "vision")
         log = TlogWriter(folder / LOG_NAME)
         recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
+        film = CameraFilm(folder / _FILM_NAME, pictures.camera) if request.film else None
         try:
             loop = asyncio.new_event_loop()
-            process = _Live(request, link, pictures, recorder)
+            process = _Live(request, link, pictures, recorder, film)
             for number in end_signals(signal.SIGINT, signal.SIGTERM):
                 loop.add_signal_handler(number, process.stop)
             run(process.run(on_progress), loop)
+            if film is not None:
+                process.close(film)
         finally:
             recorder.close()
     finally:
@@ -73,9 +79,15 @@ class _Live(Generic[Found]):
     """One run on an open link."""
 
     def __init__(
-        self, request: VisionRequest, link: Link, pictures: PictureProcess[Found], recorder: FlightRecorder
+        self,
+        request: VisionRequest,
+        link: Link,
+        pictures: PictureProcess[Found],
+        recorder: FlightRecorder,
+        film: CameraFilm | None,
     ) -> None:
-        self._request, self._watch = request, pictures
+        self._request, self._watch, self._film = request, pictures, film
+        self._filmed_us = -1
         self._clock = TelemetryClock()
         self._connection = Connection(
             link,
@@ -146,6 +158,12 @@ class _Live(Generic[Found]):
                     "is the vehicle on, and sending there?"
                 )
                 return
+            if first_us is None and wall_time_s() - begun_s > 2.0 * request.silence_s:
+                self.reason = (
+                    f"no time of the vehicle was received on {request.connect}, by which pictures are "
+                    "placed; let it send ATTITUDE or SYSTEM_TIME"
+                )
+                return
             if (
                 not live.received
                 and first_us is not None
@@ -188,7 +206,22 @@ class _Live(Generic[Found]):
             exposed_us, picture = await live.next()
             if self._vehicle is None:
                 continue
-            found = await loop.run_in_executor(None, self._watch.detect, exposed_us, picture)
+            found = await loop.run_in_executor(None, self._detect, exposed_us, picture)
             for message in self._watch.messages(exposed_us, found):
                 with suppress(LinkClosed):
                     self._connection.send(message)
+
+    def _detect(self, exposed_us: int, picture: Picture) -> Found:
+        """Search a picture, and keep it."""
+        found = self._watch.detect(exposed_us, picture)
+        if self._film is not None and exposed_us > self._filmed_us:
+            self._filmed_us = exposed_us
+            self._film.write(exposed_us, picture)
+        return found
+
+    def close(self, film: CameraFilm) -> None:
+        """Finish the film."""
+        try:
+            film.close()
+        except VideoError as error:
+            self.reason = self.reason or str(error)

@@ -89,6 +89,7 @@ class VisionRequest:
         duration_s: vehicle time since the vehicle was first received; None: until it is stopped.
         silence_s: wall time without a message of the vehicle, or without a first picture, after which the run
             fails.
+        film: keep the searched pictures of a stream as lossless video in the run folder.
         out: run folder; None: the next `runs/vision-<n>`.
         command: the command line, for the summary.
         signing_key: shared with the vehicle; None: unsigned.
@@ -107,6 +108,7 @@ class VisionRequest:
     component_id: int | None = None
     duration_s: float | None = None
     silence_s: float = SILENCE_S
+    film: bool = False
     out: Path | None = None
     command: str = ""
     signing_key: SigningKey | None = None
@@ -118,6 +120,8 @@ class VisionRequest:
         if is_stream(self.video) != (self.connect is not None):
             needed = "`connect`, the vehicle's link" if is_stream(self.video) else "`log`, the vehicle's log"
             raise EstimatorError(f"the video {self.video} needs {needed}")
+        if self.film and self.log is not None:
+            raise EstimatorError("`film` keeps the pictures of a stream; a recording is there already")
         if self.component_id is not None and self.component_id not in self._components:
             accepted = " to ".join(
                 str(number) for number in sorted({self._components[0], self._components[-1]})

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from missions.camera_picture import PictureAt
+from missions.camera_picture import PicturesOf
 from missions.handoff.options import HandoffOptions, check_vehicle
 from missions.handoff.team import HandoffTeam
 from missions.kind import VehicleKind
@@ -68,13 +68,13 @@ class HandoffMission(TeamMission[HandoffOptions, HandoffTeam]):
     def title(self, options: HandoffOptions) -> str:
         return f"GPS-denied handoff, orbits of {options.radius_m:g} m"
 
-    def pictures(self, debriefing: Debriefing, picture_at: PictureAt) -> Mapping[str, bytes]:
+    def pictures(self, debriefing: Debriefing, pictures_of: PicturesOf) -> Mapping[str, bytes]:
         team = self.team_of(debriefing)
         if team is None:
             return {}
         from missions.handoff.picture import camera_pictures
 
-        return camera_pictures(team, [flight[0].system_id for flight in debriefing.flights], picture_at)
+        return camera_pictures(team, [flight[0].system_id for flight in debriefing.flights], pictures_of)
 
     def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
         team = self.team_of(debriefing)

@@ -1,6 +1,7 @@
 """The picture of a handoff: both tracks in a common frame, modes of the pose, and scores over time."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -8,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from estimators.reports.picture import tidy
-from missions.camera_picture import PictureAt
+from missions.camera_picture import CameraPicture, PicturesOf, clip, png
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
 
 if TYPE_CHECKING:
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
     from missions.handoff.watch import Moment
     from missions.mission import Debriefing
 
+Point = tuple[float, float]
+
+_CLIP_HZ: Final = 10  # four times as fast as the flight
+_AFTER_US: Final = 20_000_000
 _INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"
 _BLUE: Final = "#1769aa"
@@ -63,24 +69,38 @@ def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debri
 
 
 def camera_pictures(
-    team: "HandoffTeam", system_ids: Sequence[int], picture_at: PictureAt
+    team: "HandoffTeam", system_ids: Sequence[int], pictures_of: PicturesOf
 ) -> dict[str, bytes]:
-    """What each camera saw at the decision, or at the end without one, with the found points and the tracks;
-    the decided track and that of the tracker's target are marked.
+    """What each camera saw at the decision, or at the end without one, as a picture; and from the contact on,
+    until some time after that, as a video. The found points and the tracks are drawn in; the decided track
+    and that of the tracker's target are marked.
     """
-    watch = team.watch
-    if not watch.moments:
+    moments = team.watch.moments
+    if not moments:
         return {}
-    moment = next((moment for moment in watch.moments if moment.estimate.decided), watch.moments[-1])
-    marked = (moment.estimate.track, 0 if moment.tracker is None else moment.tracker.track)
+    shown_us = next((m for m in moments if m.estimate.decided), moments[-1]).time_us
+    times_us = [moment.time_us for moment in moments]
     found = {}
-    for system_id, seen, track in zip(system_ids, watch.seen, marked, strict=True):
-        picture = picture_at(system_id, moment.time_us)
-        if picture is not None:
+    for index, (system_id, seen) in enumerate(zip(system_ids, team.watch.seen, strict=True)):
+
+        def drawn(
+            picture: CameraPicture, index: int = index, seen: "dict[int, dict[int, Point]]" = seen
+        ) -> "NDArray[np.uint8]":
+            moment = moments[max(0, bisect_right(times_us, picture.time_us) - 1)]
+            estimate = moment.tracker if index else moment.estimate
+            marked = 0 if estimate is None else estimate.track
             tracks = seen.get(picture.time_us, {})
-            found[f"camera{system_id}.png"] = picture.drawn(
-                [(point, str(number), number == track) for number, point in tracks.items()]
-            )
+            return picture.drawn([(point, str(k), k == marked) for k, point in tracks.items()])
+
+        kept = pictures_of(system_id)
+        if kept:
+            name = f"camera{system_id}.png"
+            found[name] = png(drawn(min(kept, key=lambda one: abs(one.time_us - shown_us))))
+        video = clip(
+            (drawn(one) for one in kept if times_us[0] <= one.time_us <= shown_us + _AFTER_US), _CLIP_HZ
+        )
+        if video:
+            found[f"tracks{system_id}.mp4"] = video
     return found
 
 

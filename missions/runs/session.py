@@ -222,7 +222,7 @@ def _fly_interruptible(
         if request.picture and debriefing.flights:
             with whole(folder / PICTURE_NAME):
                 mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
-            drawn = {**stage.pictures(), **mission.pictures(debriefing, stage.picture_at)}
+            drawn = {**stage.pictures(), **mission.pictures(debriefing, stage.pictures_of)}
             for name, data in drawn.items():
                 with whole(folder / name):
                     with (folder / name).open("xb") as file:

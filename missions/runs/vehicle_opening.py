@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.camera_picture import PictureAt
+from missions.camera_picture import PicturesOf
 from missions.runs.claimed_folder import ClaimedFolder
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -40,7 +40,7 @@ class Stage:
         close: releases everything; called at the end.
         published_map: file of the published magnetic map of an embedded world; None: there is none.
         pictures: pictures of the embedded cameras with what they have detected, by file name.
-        picture_at: a picture of an embedded moving-point camera.
+        pictures_of: those that an embedded moving-point camera has kept.
     """
 
     loop: asyncio.AbstractEventLoop
@@ -54,7 +54,7 @@ class Stage:
     close: Callable[[], None]
     published_map: Path | None = None
     pictures: Callable[[], Mapping[str, bytes]] = dict
-    picture_at: PictureAt = lambda _system_id, _time_us: None
+    pictures_of: PicturesOf = lambda _system_id: ()
 
 
 def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
@@ -71,7 +71,7 @@ def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
         close=sitl.close,
         published_map=sitl.published_map,
         pictures=sitl.pictures,
-        picture_at=sitl.picture_at,
+        pictures_of=sitl.pictures_of,
     )
 
 

@@ -2,6 +2,8 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from missions.studies.design import listed
-from missions.studies.handoff_trial import Cell, Comparison, Handoff, HandoffTrial, PoseBelief
+from missions.studies.handoff_paired import PairedTrial
+from missions.studies.handoff_surface import draw_surface
+from missions.studies.handoff_trial import TIMEOUT_S, Cell, Comparison, Handoff, HandoffTrial, PoseBelief
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, rate_of
 from missions.studies.study import Study
@@ -40,6 +44,7 @@ def study(
     window: int = 100,
     trade_off: bool = False,
     camera: str = "points",
+    timeout_s: float = TIMEOUT_S,
 ) -> Study[Cell, Handoff]:
     """The study.
 
@@ -49,24 +54,26 @@ def study(
         window: samples of the windows.
         trade_off: windows and residual thresholds of figure 9 instead of one of each.
         camera: "points" of a model, or "pixels": found in rendered pictures.
+        timeout_s: time without a decision that is a failure.
     """
     kinds = tuple(Comparison) if comparison == "all" else (Comparison(comparison),)
     cells = [
-        {"comparison": kind.value, "window": samples, "residual_m": residual_m, "belief": belief}
+        Cell(comparison=kind.value, window=samples, residual_m=residual_m, belief=belief)
         for kind in kinds
         for samples in (WINDOWS if trade_off else (window,))
         for residual_m in (RESIDUALS_M[kind] if trade_off else (_residual_m(kind),))
     ]
+    trial = HandoffTrial(pixels=camera == "pixels", timeout_s=timeout_s)
     return Study(
         name="handoff",
         description=(
             "Moving-target handoff without GPS: five walking targets, of which one is the tracker's "
             "(Tolman et al. 2021)."
         ),
-        trial=HandoffTrial(pixels=camera == "pixels"),
+        trial=PairedTrial(trial=trial, cells=tuple(cells)) if trade_off else trial,
         parameters=Cell,
         row=Handoff,
-        design=listed(cells),
+        design=listed([asdict(cell) for cell in cells]),
         runs=500,
         success="correct",
         metrics=("time_s", "converged_s", "track_error_m"),
@@ -76,10 +83,11 @@ def study(
             "window": window,
             "trade_off": trade_off,
             "camera": camera,
+            "timeout_s": timeout_s,
         },
         summarise=summarise,
         report=lines_of,
-        draw=draw,
+        draw=partial(draw_trade_off, timeout_s=timeout_s) if trade_off else draw,
     )
 
 
@@ -180,6 +188,13 @@ def lines_of(results: Results) -> Sequence[str]:
         lines += [f"    {count} x {cause}" for cause, count in cell["causes"].items()]
     lines.append("paper      window 100, T_r 15 m: 500 runs, 97.2 % correct, mean 314 s")
     return lines
+
+
+def draw_trade_off(results: Results, folder: Path, *, timeout_s: float) -> None:
+    """Draw `handoff.png` and `trade_off.png`."""
+    draw(results, folder)
+    cells = [_cell(results, number) for number in range(len(results.cells))]
+    draw_surface(cells, PAPER, timeout_s, folder)
 
 
 def draw(results: Results, folder: Path) -> None:

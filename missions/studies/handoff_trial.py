@@ -27,6 +27,8 @@ from missions.orbit.guidance import OrbitGuidance, OrbitParameters
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
 
 Array = NDArray[np.float64]
+Early = tuple[float, bool]
+"""Score of a track, and whether it is of the tracked target."""
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
@@ -103,7 +105,7 @@ class Handoff:
     cause: str
 
 
-class _Tracker:
+class Tracker:
     """The tracking aircraft: its tracks, and an operator who designates the target.
 
     The operator designates it anew when its track is lost or its identity is doubtful, some seconds later
@@ -151,6 +153,80 @@ class _Tracker:
                 designation.designate(now_us, number, self.tracks.places[number])
 
 
+class TrialFlight:
+    """Both aircraft of a trial, in opposite orbits: the relative pose is easiest to observe in them.
+
+    Args:
+        world: the truth, and the measurements of it.
+        tracks: of the tracker.
+        process: of the handoff aircraft.
+
+    Attributes:
+        world, process: as given.
+        tracker: the tracking aircraft.
+        report: its newest report.
+    """
+
+    def __init__(self, world: HandoffWorld, tracks: AircraftTracks, process: HandoffProcess) -> None:
+        self.world, self.process = world, process
+        self.tracker = Tracker(world, tracks)
+        self.report = TrackerReport()
+        self._pilots = [
+            OrbitGuidance(OrbitParameters(radius_m=world.setting.radius_m, direction=d)) for d in (1, -1)
+        ]
+        self._rolls = (0.0, 0.0)
+
+    def step(self) -> None:
+        """Advance by one period of the rate."""
+        world, process = self.world, self.process
+        world.advance(self._rolls)
+        motion, self.report = self.tracker.step()
+        pointing = process.target()
+        frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
+        own = world.motion(HandoffWorld.HANDOFF)
+        process.step(
+            world.time_us,
+            own,
+            motion,
+            self.report,
+            world.measured(),
+            frame,
+            world.setting.heights_m[HandoffWorld.HANDOFF],
+        )
+        self._rolls = (
+            _orbit_roll(
+                self._pilots[0],
+                world.time_us,
+                tuple(world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0].tolist()),
+                world.ground_velocity(HandoffWorld.TRACKER),
+                world.roll_rad(HandoffWorld.TRACKER),
+            ),
+            _SEARCH_ROLL_RAD
+            if (target := process.target()) is None
+            else _orbit_roll(
+                self._pilots[1],
+                world.time_us,
+                target,
+                (own.forward_m_s, own.right_m_s),  # equation 34
+                world.roll_rad(HandoffWorld.HANDOFF),
+            ),
+        )
+
+    def best(self, comparison: TrackComparison) -> Early | None:
+        """Score of the best track, and whether it is of the tracked target; None: no track has one."""
+        scores = comparison.scores
+        if not scores:
+            return None
+        number = max(scores, key=lambda key: scores[key])
+        return scores[number], self.target_of(HandoffWorld.HANDOFF, number) == 0
+
+    def target_of(self, which: int, number: int | None) -> int | None:
+        """The true target of a track of an aircraft; None: it is of none."""
+        tracks = self.process.tracks if which == HandoffWorld.HANDOFF else self.tracker.tracks
+        found = targets_of(tracks.level(), self.world.apparent(which))
+        return None if number is None else found.get(number)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandoffTrial:
     """The trial: a function of its cell and its seed.
@@ -166,61 +242,21 @@ class HandoffTrial:
     pixels: bool = False
 
     def __call__(self, cell: Cell, seed: int) -> Handoff:
-        world = self._world(seed)
+        comparison = comparison_of(cell)
+        flight = self.flight(cell, seed, comparison)
+        early: Early | None = None
+        while flight.world.time_us < 1e6 * self.timeout_s and comparison.decided is None:
+            flight.step()
+            early = early or flight.best(comparison)
+        return outcome_of(flight, comparison, early)
+
+    def flight(self, cell: Cell, seed: int, comparison: TrackComparison) -> TrialFlight:
+        """The flight at its start, with the windows of a cell."""
         windows = WindowParameters(samples=cell.window, every_s=1.0 / self.setting.rate_hz)
         keep_s = 1.5 * windows.span_s + 1.0
-        tracker = _Tracker(world, AircraftTracks(self._ransac(seed, 0), keep_s))
-        process = HandoffProcess(
-            self._belief(cell, seed),
-            AircraftTracks(self._ransac(seed, 1), keep_s),
-            _comparison(cell),
-            windows,
-        )
-        # opposite orbits: the relative pose is easiest to observe in them
-        pilots = [
-            OrbitGuidance(OrbitParameters(radius_m=self.setting.radius_m, direction=d)) for d in (1, -1)
-        ]
-        rolls = (0.0, 0.0)
-        report = TrackerReport()
-        early: tuple[float, bool] | None = None
-        while world.time_us < 1e6 * self.timeout_s and process.decided_us is None:
-            world.advance(rolls)
-            motion, report = tracker.step()
-            pointing = process.target()
-            frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
-            own = world.motion(HandoffWorld.HANDOFF)
-            process.step(
-                world.time_us,
-                own,
-                motion,
-                report,
-                world.measured(),
-                frame,
-                self.setting.heights_m[HandoffWorld.HANDOFF],
-            )
-            scores = process.comparison.scores
-            if early is None and scores:
-                best = max(scores, key=lambda number: scores[number])
-                early = scores[best], _target_of(world, HandoffWorld.HANDOFF, process.tracks, best) == 0
-            rolls = (
-                _orbit_roll(
-                    pilots[0],
-                    world.time_us,
-                    tuple(world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0].tolist()),
-                    world.ground_velocity(HandoffWorld.TRACKER),
-                    world.roll_rad(HandoffWorld.TRACKER),
-                ),
-                _SEARCH_ROLL_RAD
-                if (target := process.target()) is None
-                else _orbit_roll(
-                    pilots[1],
-                    world.time_us,
-                    target,
-                    (own.forward_m_s, own.right_m_s),  # equation 34
-                    world.roll_rad(HandoffWorld.HANDOFF),
-                ),
-            )
-        return _outcome(world, process, tracker, report, early)
+        tracks = [AircraftTracks(self._ransac(seed, which), keep_s) for which in range(2)]
+        process = HandoffProcess(self._belief(cell, seed), tracks[1], comparison, windows)
+        return TrialFlight(self._world(seed), tracks[0], process)
 
     def _world(self, seed: int) -> HandoffWorld:
         if not self.pixels:
@@ -262,7 +298,8 @@ class HandoffTrial:
         )
 
 
-def _comparison(cell: Cell) -> TrackComparison:
+def comparison_of(cell: Cell) -> TrackComparison:
+    """What decides."""
     kind = Comparison(cell.comparison)
     if kind is Comparison.EVIDENCE:
         return EvidenceComparison()
@@ -287,30 +324,26 @@ def _orbit_roll(
     return pilot.command(state, 0.0, roll_rad).roll_rad
 
 
-def _target_of(world: HandoffWorld, which: int, tracks: AircraftTracks, number: int | None) -> int | None:
-    """The true target of a track of an aircraft; None: it is of none."""
-    found = targets_of(tracks.level(), world.apparent(which))
-    return None if number is None else found.get(number)
+def outcome_of(flight: TrialFlight, comparison: TrackComparison, early: Early | None) -> Handoff:
+    """The outcome, when a comparison has just decided, or time is over.
 
-
-def _outcome(
-    world: HandoffWorld,
-    process: HandoffProcess,
-    tracker: _Tracker,
-    report: TrackerReport,
-    early: tuple[float, bool] | None,
-) -> Handoff:
-    number = process.comparison.decided
+    Args:
+        flight: the flight at this time.
+        comparison: what decides.
+        early: score of the best track at the first comparison, and whether it was right.
+    """
+    world, process, report = flight.world, flight.process, flight.report
+    number = comparison.decided
     track_error_m = tracker_error_m = score = None
     correct, cause = False, "" if process.converged_us is not None else "pose never converged"
     if report.target is not None:
         true = world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0]
         tracker_error_m = math.dist(true, report.target)
-        if _target_of(world, HandoffWorld.TRACKER, tracker.tracks, report.number) != 0:
+        if flight.target_of(HandoffWorld.TRACKER, report.number) != 0:
             cause = "tracker on another target"
     if number is not None:
-        score = process.comparison.scores.get(number)
-        target = _target_of(world, HandoffWorld.HANDOFF, process.tracks, number)
+        score = comparison.scores.get(number)
+        target = flight.target_of(HandoffWorld.HANDOFF, number)
         place = process.tracks.level().get(number)
         if place is not None:
             true = world.seen_from(HandoffWorld.HANDOFF, world.targets[:1])[0]
@@ -327,7 +360,7 @@ def _outcome(
         correct=correct,
         wrong=number is not None and not correct,
         timeout=number is None,
-        time_s=None if process.decided_us is None else process.decided_us * 1e-6,
+        time_s=None if number is None else world.time_us * 1e-6,
         converged_s=None if process.converged_us is None else process.converged_us * 1e-6,
         score=score,
         early_score=None if early is None else early[0],
@@ -335,6 +368,6 @@ def _outcome(
         track_error_m=track_error_m,
         tracker_error_m=tracker_error_m,
         resets=process.pose.resets,
-        designations=tracker.designation.count,
+        designations=flight.tracker.designation.count,
         cause=cause,
     )

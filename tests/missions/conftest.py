@@ -432,8 +432,8 @@ class FakeSitl:
     def pictures(self):
         return {}
 
-    def picture_at(self, system_id, time_us):
-        return None
+    def pictures_of(self, system_id):
+        return ()
 
     def advance(self):
         self.time_us += STEP_US

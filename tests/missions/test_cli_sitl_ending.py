@@ -179,11 +179,14 @@ def test_keys_that_can_not_be_stored_any_more_do_not_end_the_flight(
 
 
 def test_pictures_that_are_lost_are_reported_and_the_command_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    def lose(world: Sitl, video: str | None, pictures: Path | None, on_loss: Callable[[str], None]) -> None:
+    def lose(
+        world: Sitl, video: str | None, rate_hz: float, pictures: Path | None, on_loss: Callable[[str], None]
+    ) -> None:
+        assert rate_hz == 5.0
         on_loss("can't write photo IMG_0000.jpg: No space left on device")
 
     monkeypatch.setattr("missions.cli.sitl.start_video", lose)
-    done = sitl("--duration", "1")
+    done = sitl("--duration", "1", "--video-rate", "5")
     assert done.return_value == 1 and "stopped at 1.0 s" in done.output
     assert "flightstack: can't write photo IMG_0000.jpg: No space left on device\n" in done.output
 

@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from autopilot_bridge.mavlink import FrameEncoder, Packet, dialect
 from autopilot_bridge.mavlink.moving_points import read_moving_points
 from autopilot_bridge.payload import MovingPointComponent
 from autopilot_bridge.tlog import TlogReader, TlogWriter
+from estimators.errors import EstimatorError
 from estimators.handoff.motion_watch import MotionWatch, MotionWatchParameters
 from estimators.messages import read_message
 from estimators.vision import CameraDescription, load_camera
@@ -24,9 +26,9 @@ from flightsim import truth as t
 from flightsim.foundation.vectors import from_euler
 from flightsim.home import Home
 from flightsim.payload import GroundTargets, MovingPointCamera, MovingPointParameters
-from missions.camera_picture import CameraPicture
+from missions.camera_film import CameraFilm
+from missions.camera_picture import CameraPicture, clip, png
 from missions.cli.main import run_command_line
-from missions.embedded.films import FlightFilm
 from missions.embedded.rendered_points import POINT_CAMERA, RenderedPoints, watched
 from missions.estimation.vision import VisionRequest, watch
 from tests.clients.sitl_process import free_port
@@ -75,7 +77,7 @@ class Flight:
             seeds=lambda name: np.random.SeedSequence([5, *name.encode()]),
         )
         self.reader = camera.reader
-        film = FlightFilm(self.film, CameraDescription(geometry=self.reader.geometry, latency_s=LATENCY_S))
+        film = CameraFilm(self.film, CameraDescription(geometry=self.reader.geometry, latency_s=LATENCY_S))
         self.reader.film = film
         vehicle, gimbal = FrameEncoder(1, 1), FrameEncoder(1, 154)
         with TlogWriter(self.log) as log:
@@ -155,7 +157,8 @@ def send_in_flight(port, stopped):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         while not stopped.wait(0.04):
             now_us = 10_000_000 + round((time.monotonic() - begun_s) * 1e6)
-            sent = [vehicle.encode(heartbeat(armed=True)), vehicle.encode(pressure(now_us, HEIGHT_M))]
+            level = dialect.MAVLink_attitude_message(now_us // 1000, *[0.0] * 6)  # it sets the clock
+            sent = [vehicle.encode(m) for m in (heartbeat(armed=True), pressure(now_us, HEIGHT_M), level)]
             for data in (*sent, gimbal.encode(gimbal_status(now_us))):
                 link.sendto(data, ("127.0.0.1", port))
 
@@ -175,6 +178,7 @@ def test_a_live_stream_becomes_moving_points_on_the_link(flight, tmp_path):
                     detector=MotionWatchParameters(ground_altitude_m=0.0),
                     duration_s=12.0,
                     silence_s=30.0,
+                    film=True,
                     out=tmp_path / "live",
                 )
             )
@@ -188,6 +192,24 @@ def test_a_live_stream_becomes_moving_points_on_the_link(flight, tmp_path):
     assert len(of_camera(log)) == summary["front_end"]["measured"] > 0
     names = {frame.definition.name for _, frame in TlogReader(log) if frame.component_id == 28}
     assert names >= {"HEARTBEAT", "TUNNEL"}  # a mission requires the camera's heartbeat
+    again = watch(
+        VisionRequest(
+            video=str(result.folder / "camera.mp4"),
+            camera=result.folder / "camera.toml",
+            log=log,
+            detector=MotionWatchParameters(ground_altitude_m=0.0),
+            out=tmp_path / "again",
+        )
+    )
+    found, live = (
+        [payload for _, payload in of_camera(path)] for path in (again.folder / "flight.tlog", log)
+    )
+    assert found == live[: len(found)] and len(found) >= len(live) - 2  # the log ends before the last ones
+
+
+def test_only_the_pictures_of_a_stream_are_kept(flight):
+    with pytest.raises(EstimatorError, match="`film` keeps the pictures of a stream"):
+        VisionRequest(video="a.mp4", camera=flight.film, log=flight.film, film=True)
 
 
 def test_pictures_without_gimbal_or_height_are_counted_and_not_searched(flight):
@@ -224,12 +246,20 @@ def test_the_front_end_receives_what_the_client_of_a_link_receives(flight):
     assert [message.name for message in taken] == ["SCALED_PRESSURE"]
 
 
-def test_a_kept_picture_has_points_and_tracks_drawn_in(flight):
+def test_kept_pictures_have_points_and_tracks_drawn_in_and_make_a_video(flight, tmp_path):
     scan = next(scan for scan in flight.scans if scan.points)
-    kept = flight.reader.picture_at(scan.time_us)
-    assert isinstance(kept, CameraPicture) and abs(kept.time_us - scan.time_us) <= 1_000_000
-    plain, drawn = kept.drawn([]), kept.drawn([(scan.points[0], "7", True)])
-    assert plain.startswith(b"\x89PNG") and plain != drawn
+    kept = flight.reader.kept
+    assert all(later.time_us - one.time_us >= 400_000 for one, later in pairwise(kept))
+    first = min(kept, key=lambda one: abs(one.time_us - scan.time_us))
+    assert isinstance(first, CameraPicture) and abs(first.time_us - scan.time_us) <= 400_000
+    plain, drawn = first.drawn([]), first.drawn([(scan.points[0], "7", True)])
+    assert png(plain).startswith(b"\x89PNG") and not np.array_equal(plain, drawn)
+    path = tmp_path / "clip.mp4"
+    path.write_bytes(clip([plain, drawn, plain], 10))
+    frames = list(frames_of(str(path)))
+    assert [frame.time_us for frame in frames] == [0, 100_000, 200_000]
+    assert np.abs(frames[0].pixels.astype(float) - plain).mean() < 10.0
+    assert clip([], 10) == b""
 
 
 @pytest.mark.parametrize(

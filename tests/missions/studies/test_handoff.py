@@ -10,6 +10,7 @@ import pytest
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.handoff import study
 from missions.studies.handoff_pixels import PixelWorld
+from missions.studies.handoff_surface import draw_surface
 from missions.studies.handoff_trial import Cell, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld
 
@@ -90,6 +91,36 @@ def test_the_trade_off_has_windows_and_thresholds():
     assert ("paper", 100, 15.0) in cells and ("rms", 25, 1.0) in cells and ("evidence", 50, 15.0) in cells
     assert len(set(cells)) == len(cells) == 21
     assert run_trial(study("evidence", "gaussians", window=50), 0, runs=1)["window"] == 50
+
+
+def test_the_surface_of_the_trade_off_is_drawn_without_decisions_too(tmp_path):
+    cells = [
+        {"comparison": kind, "window": 100, "residual_m": residual_m, "runs": 4, "correct": correct,
+         "correct_ci95": [0.1, 0.9], "mean_time_s": 80.0 if correct else None}
+        for kind, residual_m, correct in (("paper", 10.0, 0), ("paper", 15.0, 2), ("evidence", 15.0, 4))
+    ]  # fmt: skip
+    draw_surface(cells, {"runs": 500, "correct": 486, "mean_time_s": 314.0}, 900.0, tmp_path)
+    assert (tmp_path / "trade_off.png").stat().st_size > 10_000
+
+
+def test_all_cells_of_the_trade_off_judge_one_flight():
+    trial = study("all", "gaussians", trade_off=True, timeout_s=1.0).trial
+    rows = [trial(cell, 1) for cell in trial.cells]
+    assert len(rows) == 21 and all(row == rows[0] for row in rows)
+    assert rows[0].timeout and rows[0].cause == "pose never converged"
+
+
+@pytest.mark.slow
+def test_a_flight_is_decided_by_some_cells_and_not_by_others():
+    trial = study("all", "gaussians", trade_off=True, timeout_s=120.0).trial
+    rows = {(cell.comparison, cell.window, cell.residual_m): trial(cell, 3) for cell in trial.cells}
+    assert all(rows["evidence", window, 15.0].correct for window in (25, 50, 100))
+    assert rows["paper", 100, 10.0].timeout
+    for kind, window in (("paper", 50), ("rms", 25)):  # a wider threshold matches earlier
+        times = [row.time_s or 120.0 for (k, w, _), row in sorted(rows.items()) if (k, w) == (kind, window)]
+        assert times == sorted(times, reverse=True)
+    # the flight ends with the last decision, and all cells are of the same one
+    assert len({row.converged_s for row in rows.values()}) == 1
 
 
 @pytest.mark.slow
