@@ -245,6 +245,20 @@ class VehicleLink:
                 if value is not None:
                     yield value
 
+    def listen(self, kind: type[T], listener: Callable[[T], None]) -> Callable[[], None]:
+        """Call `listener` with each usable telemetry of a kind, in the order of all messages, also of those
+        that arrive together; returns a function that ends this. The listener must send nothing.
+        """
+        source, system_id = SOURCES[kind], self.system_id
+
+        def on_frame(frame: Frame) -> None:
+            if frame.system_id == system_id and frame.component_id == AUTOPILOT_COMPONENT:
+                value = source.read(frame)
+                if value is not None:
+                    listener(value)
+
+        return self.connection.listen(source.message, on_frame, in_order=False)
+
     def messages(self, *names: str) -> MessageStream:
         """Stream of the autopilot's messages by name."""
         return self.connection.messages(*names, system_id=self.system_id, component_id=AUTOPILOT_COMPONENT)
