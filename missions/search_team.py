@@ -320,7 +320,8 @@ class SearchTeam(Generic[Options]):
             commanded: float | None = None
             with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
                 async with vehicle.link.guard("the end of the search"):
-                    async for _ in stream:
+                    while True:
+                        await stream.frame()
                         settled = vehicle.clock.time_us - searcher.began_us > _MODE_AGE_US
                         if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
                             raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")

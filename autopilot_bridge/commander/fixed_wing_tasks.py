@@ -252,7 +252,7 @@ class FixedWingTasks(VehicleTasks):
 
 def _flown_by(task: FlightTask | None) -> FlightTask | None:
     """The task that a plan or a return runs, else the task itself."""
-    while task is not None and isinstance(task, (MissionTask, ReturnTask)):
+    while type(task) is MissionTask or type(task) is ReturnTask:  # 50 Hz: `isinstance` of an ABC is slower
         task = task.sub_task
     return task
 

@@ -158,7 +158,7 @@ def definition(id_or_name: int | str) -> MessageDefinition:
         MessageError: the dialect has no such message.
     """
     found = (
-        _BY_NAME.get(id_or_name.strip().upper())
+        _BY_NAME.get(id_or_name) or _BY_NAME.get(id_or_name.strip().upper())
         if isinstance(id_or_name, str)
         else DEFINITIONS.get(id_or_name)
     )

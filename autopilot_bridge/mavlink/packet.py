@@ -82,7 +82,7 @@ class Packet:
     def newest(self, message_id: int) -> Frame:
         """The last frame with an id that is in `message_ids`; always the same object."""
         ids = self.message_ids
-        return self.frame(next(k for k in range(len(ids) - 1, -1, -1) if ids[k] == message_id))
+        return self.frame(len(ids) - 1 - ids[::-1].index(message_id))
 
     def part(self, begin: int, end: int) -> "Packet":
         """The packet of some of the frames: at least one."""

@@ -86,6 +86,10 @@ class Component:
         """Frame a message and send it."""
         self._send(self._encoder.encode(message))
 
+    def send_payload(self, message_id: int, payload: bytes) -> None:
+        """Frame an already packed payload and send it."""
+        self._send(self._encoder.encode_payload(message_id, payload))
+
     @property
     def time_ms(self) -> int:
         """Vehicle time in the unit of most messages."""

@@ -5,6 +5,7 @@ In single precision a field of 50,000 nT is reported to 0.004 nT.
 """
 
 from collections.abc import Callable
+from struct import Struct
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
@@ -14,6 +15,8 @@ from flightsim.payload import MagneticReading
 MAGNETOMETER_COMPONENT: Final = int(mavlink.MAV_COMP_ID_PERIPHERAL)
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 _NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
+_MESSAGE_ID: Final = int(mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT)
+_pack: Final = Struct("<If10s").pack
 
 
 class MagnetometerComponent(Component):
@@ -32,8 +35,5 @@ class MagnetometerComponent(Component):
 
     def update(self, reading: MagneticReading) -> None:
         """Send a reading that was delivered on this step."""
-        self.send(
-            mavlink.MAVLink_named_value_float_message(
-                (reading.time_us // 1000) & 0xFFFFFFFF, _NAME, reading.total_field_nt
-            )
-        )
+        time_ms = (reading.time_us // 1000) & 0xFFFFFFFF
+        self.send_payload(_MESSAGE_ID, _pack(time_ms, reading.total_field_nt, _NAME))

@@ -89,9 +89,10 @@ class FlightPath(NamedTuple):
 
 def flight_path(task: object, context: FlightContext, missions: MissionStore | None) -> FlightPath | None:
     """The path of a flight task; None for one without positions (sticks, attitudes, headings)."""
-    while isinstance(task, (MissionTask, ReturnTask)) and task.sub_task is not None:
+    # many times a second: `isinstance` of an abstract class takes longer
+    while (type(task) is MissionTask or type(task) is ReturnTask) and task.sub_task is not None:
         task = task.sub_task
-    if isinstance(task, MissionTask):
+    if type(task) is MissionTask:
         return None if missions is None else _leg(context, missions)
     if isinstance(task, GuidedTask):
         task = task.circle

@@ -160,7 +160,8 @@ class SearchTeam:
         try:
             with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
                 async with vehicle.link.guard("the end of the search"):
-                    async for _ in stream:
+                    while True:
+                        await stream.frame()
                         if self.over:
                             self.search.finish(self._vehicles[0].clock.time_us)
                             break

@@ -50,7 +50,8 @@ class AttitudePilot:
         self._altitude_m = math.nan
         self._airspeed_m_s = math.nan
         self._last_us = -1
-        self._stop = link.connection.listen("SCALED_PRESSURE", lambda _frame: self._on_pressure())
+        self._air = link.latest(AirData)
+        self._stops = [link.listen(AirData, self._on_air), link.listen(Pressure, self._on_pressure)]
 
     @classmethod
     async def on_ground(
@@ -83,13 +84,15 @@ class AttitudePilot:
 
     def close(self) -> None:
         """Stop receiving messages."""
-        self._stop()
+        for stop in self._stops:
+            stop()
 
-    def _on_pressure(self) -> None:
-        pressure = self._link.latest(Pressure)
-        air = self._link.latest(AirData)
-        if pressure is not None and air is not None:
-            self._pressure.add(pressure.time_us, pressure.static_pa, air.climb_m_s)
+    def _on_air(self, air: AirData) -> None:
+        self._air = air
+
+    def _on_pressure(self, pressure: Pressure) -> None:
+        if self._air is not None:
+            self._pressure.add(pressure.time_us, pressure.static_pa, self._air.climb_m_s)
 
     @property
     def height_m(self) -> float:

@@ -400,6 +400,10 @@ class MessageStream:
         return self
 
     async def __anext__(self) -> Any:
+        return decode(await self.frame())
+
+    async def frame(self) -> Frame:
+        """The next frame, when it has arrived; it is not decoded."""
         self._at_once += 1
         if self._queue and self._at_once >= _AT_ONCE:  # a full queue must not keep other tasks from running
             self._at_once = 0
@@ -413,7 +417,7 @@ class MessageStream:
                 await self._waiting
             finally:
                 self._waiting = None
-        return decode(self._queue.popleft())
+        return self._queue.popleft()
 
     def take(self) -> MAVLinkMessage | None:
         """The next message if one has arrived, else None; does not wait."""

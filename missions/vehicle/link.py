@@ -63,8 +63,8 @@ class VehicleLink:
         self._last_ack: Any = None
         self.heartbeat_us: int | None = None
         self.on_regained: Callable[[], None] = lambda: None
-        # newest usable telemetry: its message, the value, and the time at which it was examined
-        self._usable: dict[type, tuple[MAVLinkMessage, Any, int]] = {}
+        # newest usable telemetry: its frame, the value, and the time at which it was examined
+        self._usable: dict[type, tuple[Frame, Any, int]] = {}
         self.first_heartbeat_us = 0
         self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
@@ -204,16 +204,16 @@ class VehicleLink:
         `MissionProgress`. A message with NaN or infinite values is ignored: for one second the message before
         it is returned, then None.
         """
-        name, convert = SOURCES[kind]
-        message = self.message(name)
-        if message is None:
+        source = SOURCES[kind]
+        frame = self.connection.newest_frame(source.message_id, self.system_id)
+        if frame is None:
             return None
         before = self._usable.get(kind)
-        known = before is not None and before[0] is message  # converted once
-        value: T | None = before[1] if before is not None and known else convert(message)
+        known = before is not None and before[0] is frame  # converted once
+        value: T | None = before[1] if before is not None and known else source.read(frame)
         now_us = self.clock.time_us
         if value is not None:
-            self._usable[kind] = (message, value, now_us)
+            self._usable[kind] = (frame, value, now_us)
             return value
         return before[1] if before is not None and now_us - before[2] <= _USABLE_FOR_US else None
 
@@ -238,12 +238,26 @@ class VehicleLink:
 
     async def telemetry(self, kind: type[T]) -> AsyncIterator[T]:
         """Stream of telemetry: `async for position in vehicle.telemetry(Position)`."""
-        name, convert = SOURCES[kind]
-        with self.messages(name) as stream:
-            async for message in stream:
-                value = convert(message)
+        source = SOURCES[kind]
+        with self.messages(source.message) as stream:
+            while True:
+                value = source.read(await stream.frame())
                 if value is not None:
                     yield value
+
+    def listen(self, kind: type[T], listener: Callable[[T], None]) -> Callable[[], None]:
+        """Call `listener` with each usable telemetry of a kind, in the order of all messages, also of those
+        that arrive together; returns a function that ends this. The listener must send nothing.
+        """
+        source, system_id = SOURCES[kind], self.system_id
+
+        def on_frame(frame: Frame) -> None:
+            if frame.system_id == system_id and frame.component_id == AUTOPILOT_COMPONENT:
+                value = source.read(frame)
+                if value is not None:
+                    listener(value)
+
+        return self.connection.listen(source.message, on_frame, in_order=False)
 
     def messages(self, *names: str) -> MessageStream:
         """Stream of the autopilot's messages by name."""

@@ -23,7 +23,7 @@ class NewestFrames:
 
     def __init__(self) -> None:
         self._packets: dict[ComponentId, dict[int, Packet]] = {}
-        self._decoded: dict[ComponentId, dict[int, tuple[Frame, MAVLinkMessage]]] = {}
+        self._decoded: dict[ComponentId, dict[int, tuple[Packet, MAVLinkMessage]]] = {}
         self._kept: set[ComponentId] = set()
 
     def __len__(self) -> int:
@@ -67,11 +67,11 @@ class NewestFrames:
 
     def latest(self, component: ComponentId, message_id: int) -> MAVLinkMessage | None:
         """The newest message with an id from a component, or None; decoded once."""
-        frame = self.frame(component, message_id)
-        if frame is None:
+        packet = self._packets.get(component, {}).get(message_id)
+        if packet is None:
             return None
         messages = self._decoded.setdefault(component, {})
         known = messages.get(message_id)
-        if known is None or known[0] is not frame:
-            known = messages[message_id] = (frame, decode(frame))
+        if known is None or known[0] is not packet:
+            known = messages[message_id] = (packet, decode(packet.newest(message_id)))
         return known[1]

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from inspect import signature
 from types import MappingProxyType
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
+from autopilot_bridge.mavlink import Frame, definition, field_reader
 from flightsim.foundation.geodesy import GeodeticPosition
 
 T = TypeVar("T")
@@ -117,68 +119,78 @@ class MissionProgress:
     sequence: int
 
 
-def position(m: Any) -> Position:
+def position(
+    time_boot_ms: int, lat: int, lon: int, alt: int, relative_alt: int, vx: int, vy: int, vz: int
+) -> Position:
     """From GLOBAL_POSITION_INT."""
     return Position(
-        time_us=m.time_boot_ms * 1000,
-        lat_deg=m.lat * 1e-7,
-        lon_deg=m.lon * 1e-7,
-        alt_m=m.alt * 1e-3,
-        height_m=m.relative_alt * 1e-3,
-        vel_ned_m_s=(m.vx * 0.01, m.vy * 0.01, m.vz * 0.01),
+        time_us=time_boot_ms * 1000,
+        lat_deg=lat * 1e-7,
+        lon_deg=lon * 1e-7,
+        alt_m=alt * 1e-3,
+        height_m=relative_alt * 1e-3,
+        vel_ned_m_s=(vx * 0.01, vy * 0.01, vz * 0.01),
     )
 
 
-def local_position(m: Any) -> LocalPosition | None:
+def local_position(
+    time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float
+) -> LocalPosition | None:
     """From LOCAL_POSITION_NED; None when the position is invalid."""
-    if not math.isfinite(m.x + m.y + m.z + m.vx + m.vy + m.vz):
+    if not math.isfinite(x + y + z + vx + vy + vz):
         return None
-    return LocalPosition(
-        time_us=m.time_boot_ms * 1000, pos_ned_m=(m.x, m.y, m.z), vel_ned_m_s=(m.vx, m.vy, m.vz)
-    )
+    return LocalPosition(time_us=time_boot_ms * 1000, pos_ned_m=(x, y, z), vel_ned_m_s=(vx, vy, vz))
 
 
-def attitude(m: Any) -> Attitude | None:
+def attitude(
+    time_boot_ms: int,
+    roll: float,
+    pitch: float,
+    yaw: float,
+    rollspeed: float,
+    pitchspeed: float,
+    yawspeed: float,
+) -> Attitude | None:
     """From ATTITUDE; None when its angles are invalid."""
-    if not math.isfinite(m.roll + m.pitch + m.yaw):
+    if not math.isfinite(roll + pitch + yaw):
         return None
     return Attitude(
-        time_us=m.time_boot_ms * 1000,
-        roll_rad=m.roll,
-        pitch_rad=m.pitch,
-        yaw_rad=m.yaw,
-        rates_frd_rad_s=(m.rollspeed, m.pitchspeed, m.yawspeed),
+        time_us=time_boot_ms * 1000,
+        roll_rad=roll,
+        pitch_rad=pitch,
+        yaw_rad=yaw,
+        rates_frd_rad_s=(rollspeed, pitchspeed, yawspeed),
     )
 
 
-def air_data(m: Any) -> AirData | None:
+def air_data(airspeed: float, climb: float, throttle: int) -> AirData | None:
     """From VFR_HUD; None when airspeed or climb rate is not a number."""
-    if not math.isfinite(m.airspeed + m.climb):
+    if not math.isfinite(airspeed + climb):
         return None
-    return AirData(airspeed_m_s=m.airspeed, climb_m_s=m.climb, throttle=0.01 * m.throttle)
+    return AirData(airspeed_m_s=airspeed, climb_m_s=climb, throttle=0.01 * throttle)
 
 
-def pressure(m: Any) -> Pressure:
+def pressure(time_boot_ms: int, press_abs: float) -> Pressure:
     """From SCALED_PRESSURE."""
-    return Pressure(time_us=m.time_boot_ms * 1000, static_pa=100.0 * m.press_abs)
+    return Pressure(time_us=time_boot_ms * 1000, static_pa=100.0 * press_abs)
 
 
-def battery(m: Any) -> Battery:
+def battery(voltage_battery: int, current_battery: int, battery_remaining: int) -> Battery:
     """From SYS_STATUS."""
     return Battery(
-        voltage_v=m.voltage_battery * 1e-3 if m.voltage_battery != 0xFFFF else math.nan,
-        current_a=m.current_battery * 0.01 if m.current_battery >= 0 else math.nan,
-        remaining=m.battery_remaining * 0.01 if m.battery_remaining >= 0 else math.nan,
+        voltage_v=voltage_battery * 1e-3 if voltage_battery != 0xFFFF else math.nan,
+        current_a=current_battery * 0.01 if current_battery >= 0 else math.nan,
+        remaining=battery_remaining * 0.01 if battery_remaining >= 0 else math.nan,
     )
 
 
-def gps(m: Any) -> Gps:
+def gps(time_usec: int, eph: int, fix_type: int, satellites_visible: int) -> Gps:
     """From GPS_RAW_INT."""
     return Gps(
-        time_us=m.time_usec,
-        fix_type=m.fix_type,
-        satellites=m.satellites_visible if m.satellites_visible != 255 else 0,
-        hdop=m.eph * 0.01 if m.eph != 0xFFFF else math.nan,
+        time_us=time_usec,
+        fix_type=fix_type,
+        satellites=satellites_visible if satellites_visible != 255 else 0,
+        hdop=eph * 0.01 if eph != 0xFFFF else math.nan,
     )
 
 
@@ -187,24 +199,44 @@ def home(m: Any) -> GeodeticPosition:
     return GeodeticPosition(lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3)
 
 
-def progress(m: Any) -> MissionProgress:
+def progress(seq: int) -> MissionProgress:
     """From MISSION_CURRENT."""
-    return MissionProgress(sequence=m.seq)
+    return MissionProgress(sequence=seq)
 
 
-SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyType(
+class Source(NamedTuple):
+    """Where a kind of telemetry comes from.
+
+    Attributes:
+        message: name of the message.
+        message_id: its number.
+        read: the value in a frame of that message; None: not usable.
+    """
+
+    message: str
+    message_id: int
+    read: Callable[[Frame], Any]
+
+    @classmethod
+    def of(cls, message: str, convert: Callable[..., Any]) -> "Source":
+        """By a function of some fields, whose arguments are those fields in the order on the wire."""
+        fields = field_reader(message, *signature(convert).parameters)
+        return cls(message, definition(message).message_id, lambda frame: convert(*fields(frame)))
+
+
+SOURCES: Final[Mapping[type, Source]] = MappingProxyType(
     {
-        Position: ("GLOBAL_POSITION_INT", position),
-        LocalPosition: ("LOCAL_POSITION_NED", local_position),
-        Attitude: ("ATTITUDE", attitude),
-        AirData: ("VFR_HUD", air_data),
-        Pressure: ("SCALED_PRESSURE", pressure),
-        Battery: ("SYS_STATUS", battery),
-        Gps: ("GPS_RAW_INT", gps),
-        MissionProgress: ("MISSION_CURRENT", progress),
+        Position: Source.of("GLOBAL_POSITION_INT", position),
+        LocalPosition: Source.of("LOCAL_POSITION_NED", local_position),
+        Attitude: Source.of("ATTITUDE", attitude),
+        AirData: Source.of("VFR_HUD", air_data),
+        Pressure: Source.of("SCALED_PRESSURE", pressure),
+        Battery: Source.of("SYS_STATUS", battery),
+        Gps: Source.of("GPS_RAW_INT", gps),
+        MissionProgress: Source.of("MISSION_CURRENT", progress),
     }
 )
-"""The source message of each kind of telemetry, and the conversion; an unusable message gives None."""
+"""The source of each kind of telemetry."""
 
 
 class StatusTextAssembler:

@@ -403,15 +403,18 @@ def test_few_unfinished_texts_are_kept():
 @pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
 def test_numbers_that_are_none_make_no_telemetry(nothing):
     for angles in ((nothing, 0.0, 0.0), (0.0, nothing, 0.0), (0.0, 0.0, nothing)):
-        assert attitude(dialect.MAVLink_attitude_message(0, *angles, 0.0, 0.0, 0.0)) is None
-    assert air_data(dialect.MAVLink_vfr_hud_message(nothing, 0.0, 0, 0, 0.0, 0.0)) is None
-    assert air_data(dialect.MAVLink_vfr_hud_message(20.0, 0.0, 0, 0, 0.0, nothing)) is None
-    assert local_position(dialect.MAVLink_local_position_ned_message(0, nothing, 0, 0, 0, 0, 0)) is None
+        assert attitude(0, *angles, 0.0, 0.0, 0.0) is None
+    assert air_data(nothing, 0.0, 0) is None
+    assert air_data(20.0, nothing, 0) is None
+    assert local_position(0, nothing, 0, 0, 0, 0, 0) is None
 
 
 def test_an_attitude_that_is_none_is_passed_over_and_then_not_known(flown):
+    passed = []
+
     async def script(vehicle, autopilot):
         await vehicle.commands.set_message_rate("ATTITUDE", 25.0)
+        stop = vehicle.link.listen(Attitude, passed.append)
         await vehicle.clock.sleep(1.0)
         before = vehicle.latest(Attitude)
         autopilot.yaw = math.nan
@@ -421,13 +424,20 @@ def test_an_attitude_that_is_none_is_passed_over_and_then_not_known(flown):
         gone = vehicle.latest(Attitude)
         autopilot.yaw = 0.25
         await vehicle.clock.sleep(0.5)
-        return before, stands, gone, vehicle.latest(Attitude)
+        again = vehicle.latest(Attitude)
+        stop()
+        await vehicle.clock.sleep(0.5)
+        return before, stands, gone, again
 
     before, stands, gone, again = flown(script)
     assert math.isfinite(before.yaw_rad)
     assert stands == before
     assert gone is None
     assert again.yaw_rad == pytest.approx(0.25)
+    assert before in passed and passed[-1] == again
+    assert all(math.isfinite(attitude.yaw_rad) for attitude in passed)
+    times_us = [attitude.time_us for attitude in passed]
+    assert len(times_us) == pytest.approx(37, abs=2) and times_us == sorted(set(times_us))
 
 
 class TwoOnALink:

@@ -150,7 +150,7 @@ def local_from_global(
 def unit_quaternion(values: list[float], tolerance: float) -> np.ndarray | None:
     """q_ned_from_frd, normalised; None when it is not of unit length within `tolerance`."""
     q = np.array(values, dtype=np.float64)
-    length = float(np.sqrt(q @ q)) if np.isfinite(q).all() else math.nan
+    length = float(np.sqrt(q @ q)) if all(map(math.isfinite, values)) else math.nan
     return q / length if abs(length - 1.0) <= tolerance else None
 
 
