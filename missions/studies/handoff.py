@@ -237,14 +237,15 @@ def draw(results: Results, folder: Path) -> None:
             right.step(
                 decided, shares, where="post", color=colour, linewidth=1.2, alpha=1.0 if number == 0 else 0.5
             )
-    left.plot(PAPER["mean_time_s"], PAPER["correct"] / PAPER["runs"], "*", color="#1f2937", markersize=10)
-    left.annotate("paper", (PAPER["mean_time_s"], PAPER["correct"] / PAPER["runs"]), fontsize=8)
+    paper = PAPER["mean_time_s"], PAPER["correct"] / PAPER["runs"]
+    left.plot(*paper, "*", color="#1f2937", markersize=10)
+    left.annotate("paper", paper, xytext=(-8, -3), textcoords="offset points", ha="right", fontsize=8)
     for name, colour in colours.items():
         if any(cell["comparison"] == name for cell in results.cells):
             left.plot([], [], "o", color=colour, markersize=4, label=name)
     left.set_xlabel("mean time of a decision, s", fontsize=9)
     left.set_ylabel("share of correct decisions, 95 % interval", fontsize=9)
-    left.legend(fontsize=8, frameon=False, loc="lower right")
+    left.legend(fontsize=8, frameon=False, loc="center right")
     right.set_xlabel("time, s", fontsize=9)
     right.set_ylabel("share of runs with a decision", fontsize=9)
     right.set_ylim(0.0, 1.02)
