@@ -189,21 +189,26 @@ def live():
         thread.join(10.0)
 
 
-@pytest.mark.slow
-def test_a_live_stream_becomes_messages_on_the_link(recording, taken, live):
+def watch_live(recording, live, **changes):
+    """Run on a stream of the film beside a link with attitudes."""
     video, link = free_port(), free_port()
     live(send_attitudes, link)
     with serving(video, recording / "film.mp4", 0, 6, 200):
-        result = watch(
+        return watch(
             request(
                 recording,
                 log=None,
                 connect=f"udpin:127.0.0.1:{link}",
                 video=f"tcp://127.0.0.1:{video}",
-                duration_s=10.0,
                 silence_s=30.0,
+                **changes,
             )
         )
+
+
+@pytest.mark.slow
+def test_a_live_stream_becomes_messages_on_the_link(recording, taken, live):
+    result = watch_live(recording, live, duration_s=10.0)
     summary = result.summary
     assert (result.outcome, result.reason) == ("completed", "")
     assert summary["frames"] > 20 and summary["frames_without_attitude"] == 0
@@ -222,20 +227,9 @@ def _frame(raw):
 @pytest.mark.slow
 def test_a_stream_of_another_size_than_the_cameras_ends_the_run(recording, live):
     """The message names both sizes; nothing is sent of such pictures."""
-    video, link = free_port(), free_port()
-    live(send_attitudes, link)
     text = (recording / "camera.toml").read_text(encoding="utf-8")
     (recording / "camera.toml").write_text(text.replace("width_px = 320", "width_px = 640"), encoding="utf-8")
-    with serving(video, recording / "film.mp4", 0, 6, 200):
-        result = watch(
-            request(
-                recording,
-                log=None,
-                connect=f"udpin:127.0.0.1:{link}",
-                video=f"tcp://127.0.0.1:{video}",
-                silence_s=30.0,
-            )
-        )
+    result = watch_live(recording, live)
     assert result.outcome == "failed"
     assert "320 x 240 pixels is not of the camera of 640 x 240" in result.reason
     sent = {frame.definition.name for _, frame in of_camera(result.folder / "flight.tlog")}
