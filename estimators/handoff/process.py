@@ -16,6 +16,7 @@ from flightsim.foundation.checks import require_positive
 
 Array = NDArray[np.float64]
 
+_EARLY_US: Final = 1_000  # a period that is rounded to microseconds may be shorter
 _OLD_US: Final = 1_000_000  # windows that end earlier are not compared
 _LEAST_HEIGHT_M: Final = 1.0
 
@@ -163,7 +164,7 @@ class HandoffProcess:
         if self.converged_us is None:
             self.converged_us = time_us
         every_us = round(1e6 * self.windows.every_s)
-        if self._compared_us is not None and time_us - self._compared_us < every_us:
+        if self._compared_us is not None and time_us - self._compared_us < every_us - _EARLY_US:
             return
         self._compared_us = time_us
         self.comparison.update(self.track_windows(time_us, height_m, best, self.windows), best)

@@ -24,6 +24,7 @@ def _handoff(given: Given) -> "Study[Any, Any]":
         given["trade_off"],
         given["camera"],
         given["timeout"],
+        given["rate"],
     )
 
 
@@ -94,7 +95,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     ["--window"],
                     type=click.IntRange(10, 600),
                     default=100,
-                    help="Samples of the windows that are compared, at 10 Hz.",
+                    help="Samples of the windows that are compared, at 10 Hz or the rate of a slower camera.",
                 ),
                 click.Option(
                     ["--trade-off"],
@@ -112,6 +113,11 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                     type=click.FloatRange(1.0, 3600.0),
                     default=900.0,
                     help="A trial without a decision ends then, s.",
+                ),
+                click.Option(
+                    ["--rate"],
+                    type=FiniteRange(2.0, 60.0),
+                    help="Frames, Hz. [default: 10; with --camera pixels: 30]",
                 ),
             ),
             build=_handoff,

@@ -15,6 +15,7 @@ from missions.studies.design import listed
 from missions.studies.handoff_paired import PairedTrial
 from missions.studies.handoff_surface import draw_surface
 from missions.studies.handoff_trial import TIMEOUT_S, Cell, Comparison, Handoff, HandoffTrial, PoseBelief
+from missions.studies.handoff_world import HandoffSetting
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, rate_of
 from missions.studies.study import Study
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 
 PAPER: Final[Mapping[str, float]] = {"runs": 500, "correct": 486, "mean_time_s": 314.0}
 """The paper's result, with windows of 100 samples, T_r = 15 m and T_gamma = 0.95."""
+
+PIXELS_HZ: Final = 30.0
+"""Frames of the paper's camera."""
 
 WINDOWS: Final = (25, 50, 100)
 RESIDUALS_M: Final[Mapping[Comparison, tuple[float, ...]]] = {
@@ -45,6 +49,7 @@ def study(
     trade_off: bool = False,
     camera: str = "points",
     timeout_s: float = TIMEOUT_S,
+    rate_hz: float | None = None,
 ) -> Study[Cell, Handoff]:
     """The study.
 
@@ -55,7 +60,10 @@ def study(
         trade_off: windows and residual thresholds of figure 9 instead of one of each.
         camera: "points" of a model, or "pixels": found in rendered pictures.
         timeout_s: time without a decision that is a failure.
+        rate_hz: of the frames; None: 10 Hz for points, 30 Hz for pixels.
     """
+    pixels = camera == "pixels"
+    rate_hz = rate_hz or (PIXELS_HZ if pixels else HandoffSetting().rate_hz)
     kinds = tuple(Comparison) if comparison == "all" else (Comparison(comparison),)
     cells = [
         Cell(comparison=kind.value, window=samples, residual_m=residual_m, belief=belief)
@@ -63,7 +71,7 @@ def study(
         for samples in (WINDOWS if trade_off else (window,))
         for residual_m in (RESIDUALS_M[kind] if trade_off else (_residual_m(kind),))
     ]
-    trial = HandoffTrial(pixels=camera == "pixels", timeout_s=timeout_s)
+    trial = HandoffTrial(setting=HandoffSetting(rate_hz=rate_hz), pixels=pixels, timeout_s=timeout_s)
     return Study(
         name="handoff",
         description=(
@@ -84,6 +92,7 @@ def study(
             "trade_off": trade_off,
             "camera": camera,
             "timeout_s": timeout_s,
+            "rate_hz": rate_hz,
         },
         summarise=summarise,
         report=lines_of,

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Early = tuple[float, bool]
 """Score of a track, and whether it is of the tracked target."""
 
+_EVERY_S: Final = 0.1  # between two samples of a window
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
 _SURE: Final = 0.995  # with a smaller probability of the identity, which limits that of the decision, the
@@ -252,7 +253,7 @@ class HandoffTrial:
 
     def flight(self, cell: Cell, seed: int, comparison: TrackComparison) -> TrialFlight:
         """The flight at its start, with the windows of a cell."""
-        windows = WindowParameters(samples=cell.window, every_s=1.0 / self.setting.rate_hz)
+        windows = WindowParameters(samples=cell.window, every_s=max(_EVERY_S, 1.0 / self.setting.rate_hz))
         keep_s = 1.5 * windows.span_s + 1.0
         tracks = [AircraftTracks(self._ransac(seed, which), keep_s) for which in range(2)]
         process = HandoffProcess(self._belief(cell, seed), tracks[1], comparison, windows)

@@ -21,6 +21,7 @@ from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 
+_MEASURED_HZ: Final = 10.0
 _SHIFT_M: Final = 25.0  # largest common lag of the tracks of one aircraft
 _RIGHT_M: Final = 10.0  # a track this far from its nearest target is of none
 
@@ -39,11 +40,12 @@ class HandoffSetting:
         radius_m: of both orbits.
         start_m: least and greatest distance from which the handoff aircraft starts.
         wind_m_s: greatest wind per axis.
-        rate_hz: of the camera, the range and all other measurements.
+        rate_hz: of the camera and both motions. Ranges, heights and headings come at 10 Hz at most.
         range_sigma_m, heading_sigma_rad: noise of range and headings (paper: 3 m, 0.01 rad).
         range_missing: share of ranges that are not received.
         height_sigma_m: noise of each pressure altitude.
-        airspeed_sigma_m_s, airspeed_bias_m_s: noise, and standard deviation of a constant error, of airspeed.
+        airspeed_sigma_m_s, airspeed_bias_m_s: noise at 10 Hz, and standard deviation of a constant error, of
+            airspeed. At other rates the noise has the same density.
         yaw_rate_sigma_rad_s, yaw_rate_bias_rad_s: the same of the yaw rate.
         tilt_sigma_rad, tilt_time_s: errors of roll and of pitch, and their correlation time. In
             docs/attitude.md the attitude filter's mean squared errors are 0.1 to 1.6 deg^2.
@@ -134,7 +136,7 @@ class HandoffWorld:
         self._headings = self._walk.uniform(-math.pi, math.pi, n)
         self._speeds = self._walk.uniform(*s.walk_m_s, n)
         self.wind = start.uniform(-s.wind_m_s, s.wind_m_s, 2)
-        self.time_us = 0
+        self.time_us = self._step = 0
         angle, around = start.uniform(-math.pi, math.pi, 2)
         away = s.radius_m * np.array([math.cos(around), math.sin(around)])
         far = start.uniform(*s.start_m) * np.array([math.cos(angle), math.sin(angle)])
@@ -182,19 +184,24 @@ class HandoffWorld:
         self.targets += (step * self._speeds)[:, None] * np.column_stack(
             (np.cos(self._headings), np.sin(self._headings))
         )
-        self.time_us += round(1e6 * step)
+        self._step += 1
+        self.time_us = round(1e6 * self._step * step)
 
     def motion(self, which: int) -> LevelMotion:
         """Airspeed and yaw rate as an aircraft measures them."""
         s, a = self.setting, self._aircraft[which]
+        more = math.sqrt(s.rate_hz / _MEASURED_HZ)
+        speed, rate = a.rng.normal(0.0, (more * s.airspeed_sigma_m_s, more * s.yaw_rate_sigma_rad_s)).tolist()
         return LevelMotion(
-            forward_m_s=s.airspeed_m_s + a.speed_bias_m_s + a.rng.normal(0.0, s.airspeed_sigma_m_s),
-            yaw_rate_rad_s=a.yaw_rate_rad_s + a.rate_bias_rad_s + a.rng.normal(0.0, s.yaw_rate_sigma_rad_s),
+            forward_m_s=s.airspeed_m_s + a.speed_bias_m_s + speed,
+            yaw_rate_rad_s=a.yaw_rate_rad_s + a.rate_bias_rad_s + rate,
         )
 
     def measured(self) -> PoseMeasurement:
-        """Range, depth and relative heading between the aircraft."""
+        """Range, depth and relative heading between the aircraft; all NaN between two times of 10 Hz."""
         s, rng = self.setting, self._link
+        if self._step % max(1, round(s.rate_hz / _MEASURED_HZ)):
+            return PoseMeasurement()
         tracker, handoff = self._aircraft
         down = handoff.height_m - tracker.height_m
         slant = math.hypot(*(tracker.place - handoff.place).tolist(), down)

@@ -93,6 +93,16 @@ def test_the_trade_off_has_windows_and_thresholds():
     assert run_trial(study("evidence", "gaussians", window=50), 0, runs=1)["window"] == 50
 
 
+def test_pixels_have_the_papers_frames_and_ranges_keep_their_10_hz():
+    rates = [study("evidence", camera=camera).options["rate_hz"] for camera in ("points", "pixels")]
+    assert rates == [10.0, 30.0] and study("evidence", rate_hz=5.0).options["rate_hz"] == 5.0
+    world, known = HandoffWorld(HandoffSetting(rate_hz=30.0, range_missing=0.0), 1), []
+    for _ in range(30):
+        world.advance((0.2, 0.2))
+        known.append(math.isfinite(world.measured().range_m))
+    assert world.time_us == 1_000_000 and sum(known) == 10
+
+
 def test_the_surface_of_the_trade_off_is_drawn_without_decisions_too(tmp_path):
     cells = [
         {"comparison": kind, "window": 100, "residual_m": residual_m, "runs": 4, "correct": correct,
