@@ -91,7 +91,8 @@ def _move_air(
             work,
             rates_frd_rad_s,
         )
-        values[_ROTARY:_END] = rates_frd_rad_s
+        for axis in range(3):
+            values[_ROTARY + axis] = rates_frd_rad_s[axis]
 
 
 class VehicleAir:

@@ -20,7 +20,7 @@ from hypothesis import settings
 from missions.cli.main import YOUNG_OBJECTS
 from tests.clients.compatibility import CompatibilityPlugin
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -63,6 +63,7 @@ def test_the_analysis_refuses_what_is_no_log(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_the_windy_world_is_flown_and_its_options_are_overridden(tmp_path: Path) -> None:
     arguments = ("--world", str(WORLD), "--pattern", "L1", "--seed", "8", "--no-picture")
     flown = flightstack_done("fly", "lissajous", *arguments, "--out", str(tmp_path / "run"))
@@ -72,14 +73,23 @@ def test_the_windy_world_is_flown_and_its_options_are_overridden(tmp_path: Path)
     assert summary["gps"] == "standalone,differential"
     assert summary["seed"] == 8
     assert summary["wind"] == {"speed_m_s": 5.0, "from_deg": 240.0, "profile": "log", "turbulence": "light"}
-    log = open_log(tmp_path / "run" / "flight.tlog")
-    receiver = log.table("GPS_RAW_INT", system_id=1, component_id=1)
+    check_gps_fault(tmp_path / "run" / "flight.tlog")
+
+
+def check_gps_fault(path: Path) -> None:
+    """The quadrotor's GPS is off from 45 s to 48 s, and is reported lost after a second."""
+    receiver = open_log(path).table("GPS_RAW_INT", system_id=1, component_id=1)
     time_s = receiver.time_us * 1e-6
     lost_s = time_s[(receiver.columns["fix_type"] < 3) & (time_s > 40.0)]
-    assert (
-        len(lost_s) > 5
-    )  # the quadrotor's GPS is off from 45 s to 48 s, and is reported lost after a second
+    assert len(lost_s) > 5
     assert 45.0 < lost_s.min() < lost_s.max() < 48.1
+
+
+def test_the_windy_world_is_served(tmp_path: Path) -> None:
+    arguments = ("--world", str(WORLD), "--speedup", "0", "--duration", "50", "--link", "tcpin:127.0.0.1:0")
+    served = flightstack_done("sitl", *arguments, "--log", str(tmp_path / "sitl.tlog"))
+    assert served.returncode == 0, served.stderr
+    check_gps_fault(tmp_path / "sitl.tlog")
 
 
 def test_docs_show_the_windy_world() -> None:

@@ -82,6 +82,7 @@ def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
     fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
 
 
+@pytest.mark.slow
 def test_the_code_of_the_python_page_runs(tmp_path: Path) -> None:
     """The blocks stand alone; the second one reads the log of the first."""
     printed = []

@@ -14,6 +14,8 @@ import pytest
 from tests.clients.forked_process import flightstack, flightstack_done
 from tests.documented_commands import commands_in
 
+pytestmark = pytest.mark.slow
+
 TUTORIAL: Final = (Path(__file__).parents[1] / "docs" / "tutorial.md").read_text(encoding="utf-8")
 PORT: Final = "5790"
 

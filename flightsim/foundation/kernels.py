@@ -54,7 +54,7 @@ def kernel(function: Function) -> Function:
     one compiles it and the others wait for it.
     """
     try:
-        dispatcher = numba.njit(cache=True)(function)
+        dispatcher = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
     except RuntimeError:  # Numba found no folder to write to
         return numba.njit(function)
     cache = getattr(dispatcher, "_cache", None)
@@ -166,7 +166,7 @@ def _entry(function: Any, typed: tuple[Any, ...], more: int) -> Any:
         lambda address, a, b, c: function(*take(address, (a, b, c))),
         lambda address, a, b, c, d: function(*take(address, (a, b, c, d))),
     )[more]
-    dispatcher = numba.njit(cache=True)(entry)
+    dispatcher = numba.njit(cache=True, no_cfunc_wrapper=True)(entry)
     variant = "".join(_code_parts(_taker.__code__, set())) + repr(typed)
     _keep(dispatcher, own.beside(f"bound{more}", entry, variant))
     return dispatcher

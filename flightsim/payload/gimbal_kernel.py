@@ -178,7 +178,8 @@ def advance(truth: Array, constants: Array, state: Array, normals: Array, row: i
     held, at_limit = state[HELD], out[AT_LIMIT]
     _tilted(truth[t.Q_NED_FROM_FRD], state[ERROR], body)
     if state[STARTED] <= 0.0:
-        state[BODY] = body
+        for i in range(4):
+            state[BODY.start + i] = body[i]
         state[STARTED] = 1.0
 
     # The joint angles for the old command and the old attitude, then the change since.
@@ -203,7 +204,8 @@ def advance(truth: Array, constants: Array, state: Array, normals: Array, row: i
         held[axis] += step
     if constants[ENDLESS] > 0.0:
         held[_YAW] = wrap_pi(held[_YAW])
-    state[BODY] = body
+    for i in range(4):
+        state[BODY.start + i] = body[i]
 
     joints = out[JOINTS]
     for axis in range(3):

@@ -65,6 +65,7 @@ def test_auto_from_take_off_to_auto_disarm() -> None:
 @pytest.mark.compatibility(
     client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
 )
+@pytest.mark.slow
 def test_reposition_with_radius_and_direction(flying: AircraftClient) -> None:
     for place, clockwise in (
         (flying.runway.along(300.0, 200.0), 1.0),

@@ -67,6 +67,7 @@ def test_mission_from_take_off_to_auto_disarm() -> None:
 
 
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
+@pytest.mark.slow
 def test_reposition_does_not_read_a_radius(flying: AircraftClient) -> None:
     place = flying.runway.along(300.0, -200.0)
     lat, lon, height_m = flying.geodetic(place, flying.runway.alt_m + 80.0)

@@ -198,6 +198,7 @@ def test_mavsdk_uses_gimbal_and_camera(parked: int) -> None:
 
 
 @pytest.mark.compatibility(client="MAVSDK asyncio", feature="camera tracking", parameter="hovering")
+@pytest.mark.slow
 def test_mavsdk_tracks_a_target(hovering: tuple[Client, int]) -> None:
     _, port = hovering
     with_mavsdk(port, track_target)

@@ -33,6 +33,7 @@ def test_hover_in_severe_turbulence_is_flight() -> None:
     assert in_air(rig)
 
 
+@pytest.mark.slow
 def test_landing_descent_in_turbulence_is_flight_until_the_ground() -> None:
     rig = Rig(
         height_m=25.0, environment=Environment(wind_ned_m_s=(6.0, 0.0, 0.0), turbulence=Turbulence.MODERATE)

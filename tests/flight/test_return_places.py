@@ -222,7 +222,7 @@ def long_plan(landing: bool) -> MissionStore:
         (ReturnDestination.ALONG_PLAN_SHORTER, True, 3, (50.0, 0.0), (40.0, 10.0)),
     ],
 )
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_a_return_along_the_plan(
     destination: ReturnDestination, landing: bool, current: int, ends: tuple, passes: tuple
 ) -> None:

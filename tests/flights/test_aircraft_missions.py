@@ -99,6 +99,7 @@ def mission(
     ),
     ids=lambda case: f"{case.flavour}-{case.launch or 'runway'}",
 )
+@pytest.mark.slow
 def test_mission_in_moderate_turbulence(case: Case) -> None:
     figures = mission(case)
     assert abs(figures.touch_along_m) < 20.0, figures

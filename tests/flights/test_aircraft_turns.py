@@ -21,6 +21,7 @@ PLACE = (150.0, 150.0)
 
 @pytest.mark.parametrize(("flavour", "radius_m"), [("px4", 100.0), ("ardupilot", -150.0)])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_circle(flavour: str, radius_m: float) -> None:
     flight = AircraftFlight(flavour, seed=2, environment=LIGHT)
     flight.take_off(80.0)

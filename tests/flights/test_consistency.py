@@ -22,6 +22,7 @@ DEFAULTS = [
 
 @pytest.mark.parametrize(("flavour", "case", "seeds"), DEFAULTS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_the_firmwares_defaults_cover_the_errors(flavour: str, case: Case, seeds: int) -> None:
     """NEES may lie below its 95 % band, because the defaults are wide, but not above it; with a receiver that
     is as exact as in the firmwares' simulators, the errors are decimetres."""

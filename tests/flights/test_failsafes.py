@@ -82,6 +82,7 @@ def test_ground_station_lost_px4() -> None:
     assert flight.mode == "return"
 
 
+@pytest.mark.slow
 def test_ground_station_lost_ardupilot() -> None:
     flight = hovering("ardupilot", FS_GCS_ENABLE=1)
     flight.heartbeat = False
@@ -111,6 +112,7 @@ def set_real(flight: Flight, name: str, value: float) -> None:
     flight.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
 
 
+@pytest.mark.slow
 def test_battery_px4_returns_when_critical_and_lands_when_empty() -> None:
     flight = hovering("px4", height_m=6.0, COM_LOW_BAT_ACT=3)
     set_real(flight, "BAT_LOW_THR", 0.995)
@@ -233,6 +235,7 @@ def test_gps_recovered_px4_goes_back_to_what_it_did_ardupilot_does_not() -> None
     ],
 )
 @pytest.mark.sampled(2)
+@pytest.mark.slow
 def test_the_vehicle_holds_its_place_with_a_poor_sensor(unit: int, failure: int) -> None:
     flight = hovering("px4", height_m=6.0)
     place = np.array(flight.position_ned_m)

@@ -138,6 +138,7 @@ def test_launched(flavour: str, launch: str) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_no_crew_launches_an_aircraft_that_does_not_ask(flavour: str) -> None:
     flight = AircraftFlight(flavour, launch="catapult")
     flight.get_ready()
@@ -193,6 +194,7 @@ def test_mission_from_the_ground_to_the_ground(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
+@pytest.mark.slow
 def test_returns_home(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)
     flight.take_off(60.0, (400.0, 300.0))
@@ -204,6 +206,7 @@ def test_returns_home(flavour: str) -> None:
     assert flight.distance_m(0.0, 0.0) < 130.0
 
 
+@pytest.mark.slow
 def test_px4_lands_where_commanded() -> None:
     flight = AircraftFlight("px4")
     flight.take_off(50.0, (0.0, 0.0))

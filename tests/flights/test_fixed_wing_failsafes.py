@@ -39,6 +39,7 @@ def test_ground_station_lost_px4() -> None:
     assert flight.mode == "return" and status(flight) == CRITICAL
 
 
+@pytest.mark.slow
 def test_ground_station_lost_arduplane() -> None:
     flight = circling("ardupilot", FS_GCS_ENABL=1, FS_LONG_ACTN=1)
     flight.heartbeat = False
@@ -60,6 +61,7 @@ def test_arduplane_goes_on_in_guided_without_a_ground_station() -> None:
 
 
 @pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
+@pytest.mark.slow
 def test_gps_lost_while_circling(flavour: str) -> None:
     """Dead reckoning on airspeed and wind: the mode stays, the reported accuracy grows as the true error."""
     flight = circling(flavour)
@@ -126,6 +128,7 @@ def test_arduplane_guided_attitudes_go_on_without_gps() -> None:
 @pytest.mark.parametrize("failure", slow_after(1, [STUCK, OFF]))
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_airspeed_fails(flavour: str, failure: int) -> None:
     flight = circling(flavour, 80.0)
     mode = flight.mode

@@ -57,6 +57,7 @@ def fly_with_sticks(flight: Flight, mode: str) -> dict[str, float]:
 
 
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_position_mode_moves_and_stops_with_the_stick(flight: Flight) -> None:
     figures = fly_with_sticks(flight, "position" if flight.flavour == "px4" else "loiter")
     # half a stick after dead zone and expo is 0.23 (PX4) of 10 m/s; ArduPilot has less expo
@@ -98,6 +99,7 @@ def test_loiter_without_a_pilot_holds() -> None:
 
 
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_circle(flight: Flight) -> None:
     nan = math.nan
     if flight.flavour == "px4":
@@ -221,6 +223,7 @@ def test_position_step(flight: Flight) -> None:
 
 
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_attitude_targets(flight: Flight) -> None:
     hover = flight.newest["VFR_HUD"].throttle * 0.01 if flight.flavour == "px4" else 0.5
 

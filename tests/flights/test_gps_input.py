@@ -132,6 +132,7 @@ def test_a_script_may_say_the_same_place_again_and_again() -> None:
 
 @pytest.mark.parametrize("ignored", [VERTICAL, HORIZONTAL | VERTICAL, ALT, EPH | EPV | SPEED])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_what_a_sender_does_not_know(ignored: int) -> None:
     flight = copter(**MAV)
     wild = {name: math.nan for name in ("horiz_accuracy", "vert_accuracy", "speed_accuracy")}
@@ -169,7 +170,7 @@ def test_what_a_sender_does_not_know(ignored: int) -> None:
         {"horiz_accuracy": 80.0},
     ],
 )
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 def test_fixes_that_are_none(changed: dict[str, Any]) -> None:
     """Refused, or shown and not used; the vehicle has no position."""
     flight = Flight("ardupilot", parameters=MAV)

@@ -342,6 +342,7 @@ def test_failures_can_be_disabled() -> None:
     assert flight.result(dialect.MAV_CMD_INJECT_FAILURE, GPS, OFF, 0) == 2
 
 
+@pytest.mark.slow
 def test_radio_and_mavlink_signals_fail() -> None:
     flight = Flight("px4", parameters={"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5})
     flight.sticks()

@@ -83,6 +83,7 @@ def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
     ],
 )
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_waypoints_are_passed_within_the_acceptance_radius_in_wind(
     flown: Any, name: str, flavour: str
 ) -> None:

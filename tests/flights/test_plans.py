@@ -57,6 +57,7 @@ def test_all_three_plans_as_a_ground_station_sends_and_reads_them(flavour: str, 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
     payload = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
     flight = Flight(flavour, payload=payload)

@@ -146,6 +146,7 @@ def test_two_axes_point_the_optical_axis_and_let_the_picture_lean() -> None:
 
 
 @pytest.mark.parametrize("parameters", [three(), two()], ids=["three axes", "two axes"])
+@pytest.mark.sampled(1)
 def test_locked_it_looks_at_the_same_place_while_the_vehicle_moves(parameters: GimbalParameters) -> None:
     """A turning, rolling vehicle: after the start the line of sight stands still, as in an orbit."""
     bench = Bench(parameters)

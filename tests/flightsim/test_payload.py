@@ -109,6 +109,7 @@ def test_rates() -> None:
 
 
 @pytest.mark.parametrize("removed", ["gimbal", "magnetometer", "camera"])
+@pytest.mark.sampled(1)
 def test_removing_a_device_changes_no_other(removed: str) -> None:
     # A camera looks elsewhere without its gimbal: then only the others can be compared.
     whole = fly(*make())

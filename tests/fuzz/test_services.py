@@ -11,6 +11,7 @@ from tests.slow import slow
     [("px4", "aerosonde"), ("ardupilot", "iris"), slow("px4", "iris"), slow("ardupilot", "aerosonde")],
 )
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_what_is_no_order_moves_nothing(flavour: str, model: str) -> None:
     figures = Campaign(flavour, model, 1).one_round(800, orders=False)
     assert figures.complaints == []
@@ -25,9 +26,9 @@ def test_what_is_no_order_moves_nothing(flavour: str, model: str) -> None:
 )
 @pytest.mark.sampled(1)
 def test_absurd_orders_are_borne(flavour: str, model: str) -> None:
-    figures = Campaign(flavour, model, 2).one_round(500, orders=True)
+    figures = Campaign(flavour, model, 2).one_round(250, orders=True)
     assert figures.complaints == []
-    assert figures.messages >= 500
+    assert figures.messages >= 250
 
 
 @pytest.mark.slow

@@ -53,6 +53,7 @@ def test_a_reader_that_has_gone_is_no_news(log: str) -> None:
     assert process.returncode == 1
 
 
+@pytest.mark.slow
 def test_without_any_output_a_sitl_runs() -> None:
     done = run(">&-", "sitl", "--link", "udpin:127.0.0.1:0", "--speedup", "0", "--duration", "1")
     assert done.returncode == 0, done.stderr
@@ -61,6 +62,7 @@ def test_without_any_output_a_sitl_runs() -> None:
 
 @pytest.mark.parametrize("closed", ["2>&-", "2>&- <&-", ">&- 2>&- <&-"])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_without_an_error_output_a_command_runs(closed: str, log: str) -> None:
     done = run(closed, "log", "play", log, "--link", "udpout:127.0.0.1:9")
     assert done.returncode == 0

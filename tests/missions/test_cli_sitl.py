@@ -91,6 +91,7 @@ def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_the_log_has_what_every_vehicle_says(tmp_path, autopilot):
     log = tmp_path / "said.tlog"
     result = sitl("--autopilot", autopilot, "--no-wait", "--count", "2", "--duration", "6", "--log", str(log))

@@ -207,6 +207,7 @@ class Elsewhere(threading.Thread):
     ("kind", "flavour"), [("udp", "px4"), ("tcp", "ardupilot"), slow("udp", "ardupilot"), slow("tcp", "px4")]
 )
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_the_same_mission_flies_a_vehicle_elsewhere(make_sitl, tmp_path, kind, flavour):
     port = free_port(socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM)
     theirs, ours = {

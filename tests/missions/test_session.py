@@ -45,7 +45,7 @@ def small(**changes):
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("via", list(Via))
 @pytest.mark.parametrize("name", [n for n, m in MISSIONS.items() if isinstance(m, PatternMission)])
-@pytest.mark.sampled(8)
+@pytest.mark.sampled(4)
 def test_every_mission_on_both_firmwares_by_both_ways(scripted, tmp_path, name, via, flavour):
     request = RunRequest(
         options=small(via=via),
@@ -103,6 +103,7 @@ def test_same_flight_same_log(scripted, tmp_path):
 
 
 @pytest.mark.parametrize("via", list(Via))
+@pytest.mark.sampled(1)
 def test_a_team_shares_the_pattern_in_layers(scripted, tmp_path, via):
     options = small(via=via, vehicles=2, pattern="L1")
     result = session.fly("lissajous", RunRequest(options=options, out=tmp_path / "run", picture=False))

@@ -98,7 +98,7 @@ def test_with_a_time_limit_the_rest_need_not_be_flown() -> None:
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("via", Via)
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_a_mission_that_is_reported_and_not_flown_has_failed(
     scripted, make_sitl, tmp_path: Path, flavour, via
 ):

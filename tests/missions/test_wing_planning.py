@@ -213,7 +213,7 @@ def follow(wind: tuple[float, float], offset_m: float, effect: float = 1.0) -> n
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (6.0, 0.0), (-3.0, 7.0)])
 @pytest.mark.parametrize("offset_m", [0.0, -60.0])
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_banks_follow_a_path_in_wind(wind: tuple[float, float], offset_m: float) -> None:
     across = follow(wind, offset_m)
     assert np.sqrt((across**2).mean()) < 1.0

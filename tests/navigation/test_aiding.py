@@ -328,6 +328,7 @@ def test_a_constant_gps_offset_is_refused_and_then_accepted(flight: Array) -> No
     assert bench.error()[6] == pytest.approx(-30.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_standalone_receiver_wanders_as_much_as_it_says(flight: Array) -> None:
     """The origin takes over the error of the first fix, and the covariance has it: over seeds, each way."""
     sensors = SensorSuiteParameters(gps=GpsParameters.standalone())

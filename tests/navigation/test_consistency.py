@@ -37,6 +37,7 @@ def runs() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @pytest.mark.parametrize(("index", "name"), [(0, "attitude"), (1, "velocity"), (2, "position")])
+@pytest.mark.sampled(1)
 def test_nees_is_in_its_95_percent_band(
     runs: tuple[NDArray[np.float64], NDArray[np.float64]], index: int, name: str
 ) -> None:

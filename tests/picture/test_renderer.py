@@ -115,6 +115,7 @@ def test_a_tag_is_read_by_opencv_where_the_detection_says(place, attitude, targe
 
 
 @pytest.mark.parametrize(("attitude", "axis"), [slow((0.0, -20.0, 0.0), 0), ((25.0, -30.0, 60.0), 1)])
+@pytest.mark.slow
 def test_a_tag_is_read_until_the_edge_of_the_picture_cuts_it_off(attitude, axis):
     """A large, flat tag moves out of the picture: the model loses it where OpenCV does, within a cell."""
     size_m = 3.0

@@ -223,6 +223,7 @@ def no_vehicle_there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
 
 
 @pytest.mark.parametrize("arguments", ["fly lissajous --altitude nan", "sitl --link foo"])
+@pytest.mark.sampled(1)
 def test_as_a_process(arguments: str) -> None:
     """The same from a real process: one line, exit code 2, nothing on stdout."""
     command = [sys.executable, "-m", "missions", *arguments.split()]

@@ -81,6 +81,7 @@ def test_in_a_mission(flavour: str, leg_m: float) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_on_the_way_to_a_place_and_to_the_next_one(flavour: str) -> None:
     flying = Flying(flavour)
 

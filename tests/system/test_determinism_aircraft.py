@@ -149,6 +149,7 @@ def test_other_vehicles_change_no_stream_of_an_aircraft_and_its_payload() -> Non
     assert taken_off(models=("aerosonde", "iris", "aerosonde"), payload=CARRIED, targets=TARGETS) == single
 
 
+@pytest.mark.slow
 def test_another_seed_is_another_flight(alone: tuple[bytes, bytes]) -> None:
     assert taken_off()[0] == alone[0]
     assert taken_off(seed=8)[0] != alone[0]

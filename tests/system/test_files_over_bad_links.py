@@ -144,6 +144,7 @@ def test_a_log_is_downloaded_and_gaps_are_requested() -> None:
     assert b"".join(got[start] for start in sorted(got)) == data
 
 
+@pytest.mark.slow
 def test_a_client_that_goes_away_leaves_nothing_open() -> None:
     station = Station(Impairment())
     station.files.open(("file",), Mode.NEW).write(0, bytes(100_000))

@@ -179,6 +179,7 @@ def test_random_bytes(kind: str, garbage: list[bytes]) -> None:
 
 @pytest.mark.parametrize("kind", LINKS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_damaged_frames(kind: str, damage: list[bytes]) -> None:
     flying = hovering("px4")
     watch = Watch(flying)
@@ -233,7 +234,7 @@ TERMINATING = (
 )
 
 
-@pytest.mark.parametrize("seed", slow_after(1, range(3)))
+@pytest.mark.parametrize("seed", slow_after(1, range(8)))
 @pytest.mark.parametrize("flavour", slow_after(1, ["ardupilot", "px4"]))
 def test_any_message_with_any_content(flavour: str, seed: int) -> None:
     """Valid frames of every message, every command and every parameter, with absurd fields, for the vehicle
@@ -241,9 +242,9 @@ def test_any_message_with_any_content(flavour: str, seed: int) -> None:
     """
     flying = hovering(flavour)
     names = [item.name for item in flying.autopilot.parameters.definitions]
-    frames = valid_frames(10 + seed, 6000, target=1, without=(COMMAND_LONG, COMMAND_INT))
-    frames += commands(20 + seed, 3000, target=1, without=TERMINATING)
-    frames += parameter_sets(30 + seed, 2000, names, target=1)
+    frames = valid_frames(10 + seed, 2000, target=1, without=(COMMAND_LONG, COMMAND_INT))
+    frames += commands(20 + seed, 1000, target=1, without=TERMINATING)
+    frames += parameter_sets(30 + seed, 700, names, target=1)
     random.Random(seed).shuffle(frames)
     with memory(flying) as (channel, write):
         for start in range(0, len(frames), 4):

@@ -164,15 +164,18 @@ def test_any_message_with_any_content_to_the_payload(seed: int) -> None:
     assert answering(flying) == set(ALL_PAYLOAD)
 
 
+@pytest.mark.parametrize("seed", slow_after(1, range(4)))
 @pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
-def test_any_message_with_any_content_to_the_aircraft(flavour: str) -> None:
+def test_any_message_with_any_content_to_the_aircraft(flavour: str, seed: int) -> None:
     """It may go anywhere and refuse anything, but nothing raises, and all actuator commands are numbers."""
     flying = circling(flavour)
     names = [item.name for item in flying.autopilot.parameters.definitions]
-    frames = valid_frames(30, 6000, target=1, components=COMPONENTS, without=(COMMAND_LONG, COMMAND_INT))
-    frames += commands(31, 3000, target=1, without=TERMINATING, components=COMPONENTS)
-    frames += parameter_sets(32, 2000, names, target=1)
-    random.Random(33).shuffle(frames)
+    frames = valid_frames(
+        30 + seed, 1500, target=1, components=COMPONENTS, without=(COMMAND_LONG, COMMAND_INT)
+    )
+    frames += commands(40 + seed, 800, target=1, without=TERMINATING, components=COMPONENTS)
+    frames += parameter_sets(50 + seed, 500, names, target=1)
+    random.Random(seed).shuffle(frames)
     with memory(flying) as (channel, write):
         for start in range(0, len(frames), 4):
             for frame in frames[start : start + 4]:

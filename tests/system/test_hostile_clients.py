@@ -161,6 +161,7 @@ def test_an_upload_left_open_is_given_up(flavour: str) -> None:
         assert true.count("MISSION_REQUEST") + true.count("MISSION_REQUEST_INT") >= 1
 
 
+@pytest.mark.slow
 def test_a_thousand_ports() -> None:
     with scene("px4") as there:
         true = there.client()
@@ -205,6 +206,7 @@ def test_a_stranger_does_not_disarm_in_the_air_unless_by_force(flavour: str) -> 
         assert ack.payload[2] != dialect.MAV_RESULT_ACCEPTED
 
 
+@pytest.mark.slow
 def test_setpoints_of_two_senders_are_followed_as_they_come() -> None:
     """As PX4 does: the newest setpoint counts, whoever sent it; OFFBOARD goes on while either sends."""
     with ExitStack() as stack:

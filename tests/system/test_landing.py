@@ -9,6 +9,7 @@ from tests.system.flying import Flying
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_disarms_soon_after_touchdown(flavour: str) -> None:
     """Thrust that winds down on the ground is not taken for hover thrust: that would hide the landing."""
     flying = Flying(flavour)

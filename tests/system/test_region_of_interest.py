@@ -98,6 +98,7 @@ def test_arducopters_loiter_has_its_pilots_heading(guided: Looking) -> None:
     assert guided.to_the_east() < 10.0
 
 
+@pytest.mark.slow
 def test_px4_turns_its_nose_in_a_mission_only() -> None:
     looking = Looking("px4")
     before = looking.yaw_deg

@@ -197,6 +197,7 @@ def test_no_client_sends_in_the_vehicles_name(worlds: Callable[..., World]) -> N
 
 @pytest.mark.parametrize("kind", ["udpin", "tcpin"])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(2)
 def test_five_vehicles_on_one_link(kind: str, flavour: str, worlds: Callable[..., World]) -> None:
     world = worlds(5, flavour)
     url = world.listen(kind, shared=True)

@@ -11,6 +11,7 @@ FLOWN = (("iris", "ardupilot"), ("aerosonde", "ardupilot"), ("iris", "px4"), ("a
 
 @pytest.mark.parametrize("flown", slow_after(2, FLOWN))
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_the_vehicles_of_the_benchmark_fly_their_mission(flown, tmp_path):
     model, flavour = flown
     flight = Flight(1, model, flavour, tmp_path / "flight.tlog")

@@ -285,6 +285,7 @@ def test_a_damaged_parameter_file_is_kept_and_reported(flavour: str, tmp_path: P
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_reboot_starts_again_from_zero(flavour: str) -> None:
     name, value = CHANGED[flavour]
     client = Client(flavour, card())

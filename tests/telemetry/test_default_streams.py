@@ -87,6 +87,7 @@ def test_px4_default_streams() -> None:
     check(gcs.rates_hz(), PX4_GCS_HZ)
 
 
+@pytest.mark.slow
 def test_px4_streams_of_a_flight() -> None:
     sitl = ready("px4", 6.0)
     client = Client(sitl)

@@ -9,6 +9,7 @@ from flightsim.world_spec import VehicleSpec, WorldSpec
 
 
 @pytest.mark.parametrize(("flavour", "timeout_s"), [("px4", 1.0), ("ardupilot", 4.0)])
+@pytest.mark.sampled(1)
 def test_a_silent_receiver_is_shown_as_none(flavour: str, timeout_s: float) -> None:
     sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),)))
     link, parser = sitl.connect(0), FrameParser()

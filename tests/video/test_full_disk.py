@@ -113,6 +113,7 @@ def test_photos_and_videos_that_do_not_fit_are_reported_and_the_next_ones_are_wh
         assert next(container.decode(video=0)).width == 320
 
 
+@pytest.mark.slow
 def test_what_is_lost_at_the_end_is_reported_too(show: Show) -> None:
     show.fill_up(True)
     show.service.photo(0, 0, NOTES)

@@ -67,7 +67,8 @@ def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_s
     a = w[0:4]
     b = w[4:8]
     if cosine < -0.99999:
-        a[:] = q_sp  # opposite axes: every rotation is as short, so go for the full attitude
+        for i in range(4):
+            a[i] = q_sp[i]  # opposite axes: every rotation is as short, so go for the full attitude
     else:
         b[0] = 1.0 + cosine
         b[1], b[2], b[3] = ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx
@@ -84,13 +85,12 @@ def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_s
             half += math.pi
         half *= p[c.YAW_WEIGHT]
         cw, cz = math.cos(half), math.sin(half)
-        b[0], b[1], b[2], b[3] = (
+        a[0], a[1], a[2], a[3] = (
             a[0] * cw - a[3] * cz,
             a[1] * cw + a[2] * cz,
             a[2] * cw - a[1] * cz,
             a[3] * cw + a[0] * cz,
         )
-        a[:] = b
     # error quaternion q^-1 (x) a, its vector part doubled
     qw = q[0] * a[0] + q[1] * a[1] + q[2] * a[2] + q[3] * a[3]
     sign = 2.0 if qw >= 0.0 else -2.0

@@ -37,6 +37,7 @@ def overshoot(values: np.ndarray, target: float) -> float:
 
 
 @pytest.mark.parametrize("physics_rate_hz", [100, 250, 400])
+@pytest.mark.sampled(1)
 def test_roll_steps(physics_rate_hz: int) -> None:
     flown = rig(physics_rate_hz=physics_rate_hz)
     for wanted_deg in (30.0, -30.0, 0.0):
@@ -51,6 +52,7 @@ def test_roll_steps(physics_rate_hz: int) -> None:
 
 
 @pytest.mark.parametrize("physics_rate_hz", [100, 250, 400])
+@pytest.mark.sampled(1)
 def test_pitch_steps(physics_rate_hz: int) -> None:
     flown = rig(physics_rate_hz=physics_rate_hz)
     for start_deg, wanted_deg in ((3.0, 13.0), (3.0, -7.0)):
@@ -101,7 +103,7 @@ def test_moderate_turbulence_and_wind(seed: int) -> None:
 
 @pytest.mark.parametrize("course_deg", [0.0, 90.0, -135.0])
 @pytest.mark.parametrize("wind_known", [True, False])
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_course_is_held_in_wind(course_deg: float, wind_known: bool) -> None:
     flown = rig(environment=Environment(wind_ned_m_s=(6.0, 8.0, 0.0)))
     flown.wind_known = wind_known
@@ -147,6 +149,7 @@ def test_calm_air_sees_no_limit_cycle() -> None:
     assert np.ptp(log[:, 12]) < 0.05
 
 
+@pytest.mark.slow
 def test_without_airspeed_height_is_still_held() -> None:
     windy = Environment(wind_ned_m_s=(4.0, 4.0, 0.0), turbulence=Turbulence.LIGHT)
     flown = rig(environment=windy)
@@ -161,6 +164,7 @@ def test_without_airspeed_height_is_still_held() -> None:
     assert AEROSONDE.airspeed_min_m_s < np.mean(airspeeds) < AEROSONDE.airspeed_max_m_s
 
 
+@pytest.mark.slow
 def test_with_a_dead_motor_height_is_given_up_for_airspeed() -> None:
     flown = rig()
     flown.vehicle.set_actuator_effectiveness(Role.THROTTLE, 0.0)
@@ -170,6 +174,7 @@ def test_with_a_dead_motor_height_is_given_up_for_airspeed() -> None:
     assert np.ptp(log[-500:, PITCH]) < math.radians(1.0)
 
 
+@pytest.mark.slow
 def test_a_lull_is_no_dead_motor() -> None:
     """A wind from behind grows faster than full throttle can follow; the height isn't given up for that."""
     lull = CosineGust(start_s=10.0, velocity_ned_m_s=(14.0, 0.0, 0.0), rise_s=5.0, hold_s=5.0, fall_s=8.0)

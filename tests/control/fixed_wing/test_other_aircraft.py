@@ -32,6 +32,7 @@ def rig(name: str, environment: Environment | None = None) -> Rig:
 
 @pytest.mark.parametrize("name", POWERED)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_height_airspeed_and_heading_are_held(name: str) -> None:
     flown = rig(name)
     log = flown.run(20.0)

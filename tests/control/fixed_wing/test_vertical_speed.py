@@ -180,6 +180,7 @@ def test_a_gust_along_the_path_moves_the_sink_little(gust_m_s: float) -> None:
 
 @pytest.mark.parametrize("gust_m_s", [2.5, -2.5])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_downdraught_moves_the_sink_little(gust_m_s: float) -> None:
     """Answered by the sink alone, without the lift that is felt, it changed it by 1.3 m/s."""
     gust = CosineGust(start_s=6.0, velocity_ned_m_s=(0.0, 0.0, gust_m_s), rise_s=0.3, hold_s=1.0, fall_s=0.3)

@@ -319,6 +319,7 @@ def test_probabilities_are_calibrated_and_the_pattern_of_all_targets_helps():
     assert right[True] / count > stated / count - 0.05
 
 
+@pytest.mark.slow
 def test_a_target_that_is_not_seen_is_not_decided_for():
     wrong = 0
     for seed in range(30):

@@ -92,6 +92,7 @@ PLACES = [(-30.0, 10.0), (-28.0, 16.0), (5.0, -42.0), (20.0, 20.0), (44.0, 30.0)
 
 
 @pytest.mark.parametrize("belief", ["particles", "gaussians"])
+@pytest.mark.sampled(1)
 def test_a_sweep_finds_every_target_where_it_is(belief):
     scores = []
     for seed in range(3):

@@ -147,6 +147,7 @@ def test_a_range_of_another_aircraft_resets_it(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.sampled(1)
 def test_60_s_without_range_widen_it_and_do_not_lose_it(kind):
     encounter = Encounter(6)
     belief = kind(RelativePoseParameters(seed=2))

@@ -111,6 +111,7 @@ class Team:
 
 
 @pytest.mark.parametrize("belief", ["particles", "gaussians"])
+@pytest.mark.sampled(1)
 def test_the_pose_is_found_from_messages(belief):
     team = Team(RelativePoseSettings(belief=belief, walk_m_sqrt_s=0.5))  # the made airspeeds have no bias
     team.fly(40.0)

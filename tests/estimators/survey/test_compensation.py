@@ -108,7 +108,7 @@ RAW = SurveyMagnetometerParameters(
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_the_figure_of_merit_falls_by_ten_times_and_more(seed):
     """One flight calibrates, the next one is judged; attitudes are 0.3 degrees off."""
     attitudes, slices = manoeuvres()
@@ -136,6 +136,7 @@ def test_noise_alone_has_the_figure_of_merit_that_is_stated_for_it():
     assert min(drawn) > 0.7 * stated
 
 
+@pytest.mark.slow
 def test_a_compensation_of_another_aircraft_does_not_help():
     attitudes, slices = manoeuvres()
     times, (cosines, rates) = cosines_of(attitudes)

@@ -128,6 +128,7 @@ def test_the_line_data_of_a_survey_are_a_map_again(tmp_path):
 
 
 @pytest.mark.parametrize("model", [FieldModel.WMM, FieldModel.IGRF])
+@pytest.mark.sampled(1)
 def test_a_main_field_is_added_to_an_anomaly(tmp_path, model):
     path = write_lines(tmp_path / "lines.csv", offset_nt=-48_000.0)
     how = MapImport(home=HOME, line_spacing_m=200.0, values=Values(f"anomaly-{model}"))

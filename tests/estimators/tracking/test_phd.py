@@ -98,6 +98,7 @@ def test_clusters_find_separate_masses_and_their_widths():
 
 @pytest.mark.parametrize("kind", ["particles", "gaussians"])
 @pytest.mark.parametrize("clutter", [0.0, 2.0])
+@pytest.mark.sampled(2)
 def test_the_expected_number_is_that_of_the_targets(kind, clutter):
     """Targets are drawn from the birth intensity, which is thinned by what was seen; over scenes the mean
     error of N_hat is within its statistical bound.

@@ -65,6 +65,7 @@ def frame(target, rng):
 
 @pytest.mark.parametrize("frames", [pytest.param(2, marks=pytest.mark.slow), 9])
 @pytest.mark.parametrize("make", [grid, particles])
+@pytest.mark.sampled(1)
 def test_the_claimed_errors_are_those_of_drawn_searches(make, frames):
     """Nine frames leave 0.13 m, a fifth of a cell, and the first one is sharper than the particles are dense.
     After it alone the detection can be false: a belief over all of the area is no Gaussian then.

@@ -63,7 +63,7 @@ def finish(rig: Aircraft, task: LandTask) -> tuple[float, float]:
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (-6.0, 0.0), (0.0, 5.0), (-4.0, -4.0), (3.0, 0.0)])
 @pytest.mark.parametrize("rangefinder", [False, True])
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 def test_lands_on_the_place_along_a_leg(wind: tuple[float, float], rangefinder: bool) -> None:
     rig = flying(wind)
     rig.rangefinder = rangefinder
@@ -334,6 +334,7 @@ def test_position_lost_high_up_it_descends_and_takes_the_approach_up_again() -> 
     assert task.phase is LandPhase.CIRCLE
 
 
+@pytest.mark.slow
 def test_descend_spirals_down_and_touches_level() -> None:
     rig = flying((2.0, 0.0), height_m=60.0)
     task = DescendTask()

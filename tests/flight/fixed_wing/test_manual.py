@@ -112,7 +112,7 @@ def test_training_stops_at_the_limits() -> None:
 
 
 @pytest.mark.parametrize("mode", list(ManualMode))
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 def test_without_a_pilot_it_flies_straight_and_level(mode: ManualMode) -> None:
     rig = Aircraft(height_m=100.0, environment=Environment(wind_ned_m_s=(3.0, 2.0, 0.0)))
     rig.fly(ManualTask(mode))

@@ -65,6 +65,7 @@ def cross_track(log: np.ndarray, start: Place, end: Place) -> tuple[np.ndarray, 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (-3.5, 4.9, 0.0)])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_whole_flight_from_runway_to_runway(wind: tuple[float, float, float]) -> None:
     """6 m/s of wind and moderate turbulence: cross-track RMS under 5 m, height under 2, airspeed under 1."""
     turbulence = "moderate" if any(wind) else "none"
@@ -333,6 +334,7 @@ def test_endless_jump_over_nothing_and_items_without_a_place() -> None:
     assert mass.ctx.setpoint[sp.LEVEL] == sp.FLY
 
 
+@pytest.mark.slow
 def test_same_flight_twice_is_the_same_to_the_bit() -> None:
     def flight() -> bytes:
         environment = Environment(wind_ned_m_s=(2.0, 3.0, 0.0), turbulence="light")

@@ -156,6 +156,7 @@ def test_without_a_home_it_circles_where_it_is() -> None:
     assert np.hypot(log[-1000:, 0] - 900.0, log[-1000:, 1] - 400.0).mean() == pytest.approx(80.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_after_its_loiter_time_it_lands() -> None:
     rig = Aircraft(height_m=60.0)
     rig.ctx.home_ned_m[2] = -0.3

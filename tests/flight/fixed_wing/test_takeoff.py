@@ -64,6 +64,7 @@ def test_takes_off_and_reaches_its_height(launch: str, wind: tuple[float, float,
     assert task.update(rig.ctx) is TaskStatus.DONE
 
 
+@pytest.mark.slow
 def test_a_place_is_flown_to_and_circled() -> None:
     rig = aircraft("runway")
     task = TakeoffTask(50.0, np.array([600.0, 300.0, math.nan]))

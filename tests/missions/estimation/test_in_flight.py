@@ -41,7 +41,7 @@ def same_estimates(folder, again):
 
 @pytest.mark.parametrize("vehicles", [1, 2])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_flight_and_replay_of_its_log_agree_to_the_last_bit(scripted, tmp_path, flavour, vehicles):
     result = flight(tmp_path, autopilot=flavour, vehicles=vehicles, estimator=LEVEL)
     assert result.outcome == "completed", result.reason
@@ -100,6 +100,7 @@ def test_rates_are_requested(scripted, tmp_path):
     assert result.summary["estimator"]["needs"][0]["met"]
 
 
+@pytest.mark.slow
 def test_the_same_flight_twice_gives_the_same_log(scripted, tmp_path):
     logs = []
     for name in ("a", "b"):

@@ -249,6 +249,7 @@ def test_a_base_station_hears_a_team_on_one_link(tmp_path):
     assert all(ours[column].tobytes() == theirs[column].tobytes() for column in ours)
 
 
+@pytest.mark.slow
 def test_it_can_be_silent(tmp_path, port, vehicle):
     there = vehicle(willing=False)
     assert estimate(tmp_path, port, "--duration", "6", "--no-request", "--no-publish") == 1
@@ -286,6 +287,7 @@ def test_what_the_link_lacks_is_reported_and_nothing_is_published(tmp_path, port
 
 @pytest.mark.parametrize(("says", "seconds", "period_ms"), [(imu, LONG, 500), (untimed, "1.5", 10)])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_its_duration_ends_on_a_vehicle_that_says_little(tmp_path, port, vehicle, says, seconds, period_ms):
     """Nothing but what was requested, as ArduPilot does; or nothing that tells a time: wall time counts.
 

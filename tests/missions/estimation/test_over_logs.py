@@ -68,6 +68,7 @@ def test_one_log_one_folder(tmp_path, capfd):
 
 
 @pytest.mark.parametrize("against", ["autopilot", "truth"])
+@pytest.mark.sampled(1)
 def test_against_one_of_them(tmp_path, against):
     log = write_log(tmp_path / "flight.tlog")
     assert replay(log, "--estimator", LEVEL, "--against", against, "--out", tmp_path / "out") == 0
@@ -127,6 +128,7 @@ def test_what_is_not_compared_says_why_and_is_drawn(tmp_path, capfd):
         ("both", False, "no estimate was made in the air: never armed"),
     ],
 )
+@pytest.mark.sampled(1)
 def test_no_truth_and_never_in_the_air(tmp_path, against, armed, says):
     encoder = FrameEncoder(1, 1)
     path = tmp_path / "flight.tlog"
@@ -216,6 +218,7 @@ def test_a_torn_log_gives_what_is_whole(tmp_path):
     assert 150 < summary_of(tmp_path / "out")["samples"] < 200
 
 
+@pytest.mark.slow
 def test_two_vehicles_in_a_log_have_a_row_and_a_file_each(tmp_path, capfd):
     one, two = (write_log(tmp_path / f"{n}.tlog", system=n) for n in (1, 2))
     both = tmp_path / "both.tlog"

@@ -157,6 +157,7 @@ def flown_readings(folder, home, system_id):
     return np.column_stack((at, [m.value for m in sent]))[at[:, 2] > 12.0]
 
 
+@pytest.mark.slow
 def test_the_field_is_not_the_published_map(found):
     """Where the vehicles flew, their magnetometers read the true field, which differs from the map by the
     error that the map states, and by the target.

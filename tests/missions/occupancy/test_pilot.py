@@ -132,6 +132,7 @@ def test_a_pass_over_a_suspect_that_was_decided_is_left_at_once():
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (-4.0, 3.0)])
 @pytest.mark.parametrize("target", [(700.0, -600.0), (-450.0, 820.0)])
+@pytest.mark.sampled(2)
 def test_team_finds_the_target_and_converges_on_it(wind, target):
     search = new_search(3)
     team = [

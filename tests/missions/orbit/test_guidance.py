@@ -116,7 +116,7 @@ def fly(direction, entry, *, seconds=150.0, **world):
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("number", slow_after(3, range(len(ENTRIES))))
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_the_circle_is_reached_from_everywhere_and_held(direction, number):
     """4 m/s of wind from somewhere, gusts of 0.7 m/s; every other target moves at 2 m/s."""
     wind, course = 1.3 * number, 0.7 * number
@@ -133,6 +133,7 @@ def test_the_circle_is_reached_from_everywhere_and_held(direction, number):
     assert tracker.status is TargetStatus.SEEN
 
 
+@pytest.mark.slow
 def test_a_leaning_gimbal_costs_some_radius_but_not_the_orbit():
     """One degree of roll error is 5.7 m at this height."""
     flown, _ = fly(1, ENTRIES[0], roll_error=math.radians(1.0))

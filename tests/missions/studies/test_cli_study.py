@@ -164,6 +164,7 @@ def test_trials_without_a_row_are_one_line_and_exit_code_1(tmp_path: Path) -> No
     assert "4 of 8 trials without success" in err
 
 
+@pytest.mark.slow
 def test_a_trial_that_never_ends_is_terminated(tmp_path: Path) -> None:
     file = own_study(tmp_path, endless=True)
     code, _, err = ran(file, "--workers", 1, "--time-limit", 1, "--out", tmp_path / "run", "--no-picture")
@@ -237,6 +238,7 @@ def test_studies_are_compared_in_pairs_of_equal_seeds(tmp_path: Path) -> None:
     assert code == 0 and "without pairs: the seeds differ" in said
 
 
+@pytest.mark.slow
 def test_the_study_of_the_page_runs(tmp_path: Path) -> None:
     """As a file of the command line, and as a program in two processes."""
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "studies.md").read_text(), re.DOTALL)

@@ -173,6 +173,7 @@ if __name__ == "__main__":
 
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGTERM])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_workers_end_with_the_process_they_work_for(tmp_path: Path, ending: signal.Signals) -> None:
     assert NEVER_DONE.name == "small"
     program = tmp_path / "program.py"

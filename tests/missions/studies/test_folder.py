@@ -134,6 +134,7 @@ except MissionError as error:
 """
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_system_is_an_error_too(tmp_path: Path) -> None:
     """A real error of the kernel, not one of the test."""
     assert resource.RLIMIT_FSIZE and signal.SIGXFSZ

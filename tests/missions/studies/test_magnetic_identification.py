@@ -102,6 +102,7 @@ def test_fitted_tables_are_what_scikit_learn_has_fitted(tmp_path):
     assert np.mean((network > 0.5) == is_target) > 0.95
 
 
+@pytest.mark.slow
 def test_the_passes_of_figures_4_to_6_are_drawn(tmp_path):
     traces = list(pass_traces(3, 1))
     assert [is_target for is_target, _ in traces] == [True, False]

@@ -102,6 +102,7 @@ def test_wrong_sweeps_are_usage_errors(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_row_names_the_command_that_flies_the_same_flight(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

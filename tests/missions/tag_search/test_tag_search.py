@@ -59,6 +59,7 @@ def test_a_tag_of_another_number_is_not_found(tmp_path):
     assert result.summary["message_counts"]["LANDING_TARGET"] >= 1
 
 
+@pytest.mark.slow
 def test_frames_that_are_not_rendered_have_the_same_detections():
     camera = search_camera(0.3)
     given = {"model": camera.model, "imager": camera.imager, "blur_px_m": camera.blur_px_m, "seed": 1}
