@@ -56,6 +56,8 @@ def draw_surface(
         for axes in (shares, times):
             axes.grid(color="#e5e7eb", linewidth=0.8)
             axes.tick_params(labelsize=8)
+            if kind == "evidence":
+                axes.set_xticks([])
     grid[0, 0].set_ylabel("share of runs that decide rightly, 95 %", fontsize=9)
     grid[1, 0].set_ylabel("mean time of a decision, s", fontsize=9)
     grid[0, 0].legend(fontsize=8, frameon=False)
