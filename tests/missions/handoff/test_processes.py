@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from autopilot_bridge.mavlink import decode
+from autopilot_bridge.mavlink.handoff_messages import read_decision
 from autopilot_bridge.tlog import TlogReader
 from estimators.library import make_estimator
 from estimators.log_replay import replay
@@ -33,6 +35,13 @@ def points_in(path):
     """Number of messages of moving points in a log; 0: it is not there yet."""
     frames = (frame for _, frame in TlogReader(path)) if path.exists() else ()
     return sum(frame.component_id == 28 and frame.definition.name == "TUNNEL" for frame in frames)
+
+
+def decisions_in(path):
+    """The decisions that were sent in a flight."""
+    tunnels = (decode(frame) for _, frame in TlogReader(path) if frame.definition.name == "TUNNEL")
+    read = (read_decision(m.payload_type, m.payload_length, m.payload) for m in tunnels)
+    return [decision for decision in read if decision is not None]
 
 
 def wait_for(found, *processes):
@@ -79,3 +88,11 @@ def test_a_handoff_in_processes_survives_the_end_of_a_vision_process_and_reports
     # the log has the frames of both links, so scans may come in another order, and tracks get other numbers
     assert decided.any() and table["probability"][decided].max() >= 0.95
     assert len(np.unique(table["track"][decided])) == 1
+    # both are the same target: it is at the same place of the aircraft's frame, within a second
+    places = np.column_stack((table["target_forward_m"], table["target_right_m"]))
+    off_m = [
+        np.hypot(*(places[near] - sent.track.place_m).T).min()
+        for sent in decisions_in(tmp_path / "fly" / "flight.tlog")
+        if sent.decided and (near := decided & (abs(table.time_us - sent.time_us) < 1_000_000)).any()
+    ]
+    assert len(off_m) > 1 and np.median(off_m) < 10.0
