@@ -50,7 +50,7 @@ _ERRORS: Final[Mapping[str, Any]] = MappingProxyType(
         "place_sigma_m": 0.1,
         "height_sigma_m": 0.2,
         "yaw_sigma_rad": 0.005,
-        "tilt_sigma_rad": 0.0025,
+        "tilt_sigma_rad": 0.0016,
         "mount_sigma_rad": math.radians(0.3),
         "place_time_s": 30.0,
         "attitude_time_s": 100.0,
