@@ -39,7 +39,7 @@ class RelativePoseSettings(RelativePoseParameters):
     reset_nis: float = 6.0
     vehicle: int = 1
     other: int = 2
-    belief: Literal["particles", "gaussians"] = "particles"
+    belief: Literal["particles", "gaussians"] = "gaussians"
 
     def __post_init__(self) -> None:
         # zero-argument super() does not reach the base of a dataclass with slots

@@ -66,9 +66,9 @@ class FrameDifferenceParameters:
         default_factory=lambda: RegistrationParameters(corners=300, apart_px=9.0, baseline_s=0.8)
     )
     objects: ObjectParameters = field(default_factory=ObjectParameters)
-    least_levels: float = 6.0
+    least_levels: float = 4.0
     noise_factor: float = 2.0
-    slack_px: float = 0.5
+    slack_px: float = 0.3
     least_px: int = 4
     largest_m: float = 12.0
 

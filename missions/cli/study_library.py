@@ -88,7 +88,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 click.Option(
                     ["--belief"],
                     type=click.Choice(["particles", "gaussians"]),
-                    default="particles",
+                    default="gaussians",
                     help="What estimates the relative pose.",
                 ),
                 click.Option(

@@ -44,7 +44,7 @@ _COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
 
 def study(
     comparison: str = Comparison.EVIDENCE.value,
-    belief: str = PoseBelief.PARTICLES.value,
+    belief: str = PoseBelief.GAUSSIANS.value,
     window: int = 100,
     trade_off: bool = False,
     camera: str = "points",

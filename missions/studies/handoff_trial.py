@@ -33,6 +33,7 @@ Early = tuple[float, bool]
 _EVERY_S: Final = 0.1  # between two samples of a window
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
+_DETECTED: Final = 0.8  # what the trackers expect, whatever the distance
 _SURE: Final = 0.995  # with a smaller probability of the identity, which limits that of the decision, the
 # operator designates anew
 _OPERATOR_S: Final = 5.0  # time that it takes
@@ -68,7 +69,7 @@ class Cell:
     comparison: str = Comparison.EVIDENCE.value
     window: int = 100
     residual_m: float = 15.0
-    belief: str = PoseBelief.PARTICLES.value
+    belief: str = PoseBelief.GAUSSIANS.value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,7 +280,7 @@ class HandoffTrial:
                 inlier_m=4.0,
                 speed_max_m_s=2.0 * s.walk_m_s[1] + 1.5 * s.wind_m_s + 2.0,
                 seed_support=round(0.6 * rate),
-                detected=s.detected,
+                detected=_DETECTED,
                 seed=2 * seed + which,
             )
         )

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from estimators.relative_pose import LevelMotion, PoseMeasurement
 from estimators.vision.ground_points import CameraAxes, on_ground
@@ -50,11 +51,13 @@ class HandoffSetting:
         tilt_sigma_rad, tilt_time_s: errors of roll and of pitch, and their correlation time. In
             docs/attitude.md the attitude filter's mean squared errors are 0.1 to 1.6 deg^2.
         half_view: half of the image's width and height, as tangents (60 by 47 degrees).
-        pixel_rad: noise of an image point. This, `detected` and `false_points` are those of the frame
-            differences on rendered video (docs/handoff.md): `python -m benchmarks.moving_objects --seconds
-            12 --seeds 2 --only study`.
+        pixel_rad: noise of an image point. This and what follows are those of the frame differences on
+            rendered pictures (docs/handoff.md): `python -m benchmarks.handoff_pixels --statistics 6`.
         seen_m: height over the ground of the middle of a target, which is what is seen: half of a person's.
-        detected: probability that a target in view gives a point.
+        detected: probability that a near target in view gives a point.
+        half_detected_m: slant distance at which half as many do.
+        distance_spread: of the logarithm of the distance at which a target is lost.
+        hidden_s: correlation time of what hides a target, as the ground behind it and its attitude.
         false_points: mean number of false points in a frame.
     """
 
@@ -79,17 +82,24 @@ class HandoffSetting:
     tilt_sigma_rad: float = 0.012
     tilt_time_s: float = 5.0
     half_view: tuple[float, float] = (0.577, 0.433)
-    pixel_rad: float = 0.00175
+    pixel_rad: float = 0.0021
     seen_m: float = 0.9
-    detected: float = 0.736
-    false_points: float = 0.003
+    detected: float = 0.945
+    half_detected_m: float = 317.0
+    distance_spread: float = 0.263
+    hidden_s: float = 0.6
+    false_points: float = 0.32
 
     def __post_init__(self) -> None:
         check_fields(
             self,
             require_not_negative,
             but=dict.fromkeys(
-                ("airspeed_m_s", "radius_m", "rate_hz", "targets", "tilt_time_s"), require_positive
+                (
+                    *("airspeed_m_s", "radius_m", "rate_hz", "targets", "tilt_time_s"),
+                    *("half_detected_m", "distance_spread", "hidden_s"),
+                ),
+                require_positive,
             ),
         )
 
@@ -107,6 +117,7 @@ class _Aircraft:
     roll_rad: float = 0.0
     yaw_rate_rad_s: float = 0.0
     tilt: Array = field(default_factory=lambda: np.zeros(2))  # errors of roll and pitch
+    hidden: Array = field(default_factory=lambda: np.zeros(0))  # standard normal, by target
 
 
 class HandoffWorld:
@@ -151,6 +162,7 @@ class HandoffWorld:
                 speed_bias_m_s=rng.normal(0.0, s.airspeed_bias_m_s),
                 rate_bias_rad_s=rng.normal(0.0, s.yaw_rate_bias_rad_s),
                 tilt=rng.normal(0.0, s.tilt_sigma_rad, 2),
+                hidden=rng.standard_normal(n),
             )
             for k in range(2)
         )
@@ -169,13 +181,15 @@ class HandoffWorld:
                     s.airspeed_m_s * np.array([math.cos(middle), math.sin(middle)]) + self.wind
                 )
                 aircraft.heading_rad += rate * dt
-        step = 1.0 / s.rate_hz
+        step, n = 1.0 / s.rate_hz, len(self.targets)
         for aircraft, heading in zip(self._aircraft, before, strict=True):
             aircraft.yaw_rate_rad_s = (aircraft.heading_rad - heading) / step
             keep = math.exp(-step / s.tilt_time_s)
             aircraft.tilt *= keep
             aircraft.tilt += aircraft.rng.normal(0.0, s.tilt_sigma_rad * math.sqrt(1.0 - keep * keep), 2)
-        n = len(self.targets)
+            keep = math.exp(-step / s.hidden_s)
+            aircraft.hidden *= keep
+            aircraft.hidden += math.sqrt(1.0 - keep * keep) * aircraft.rng.standard_normal(n)
         self._headings += s.turn_rad_sqrt_s * math.sqrt(step) * self._walk.standard_normal(n)
         outside = np.any(np.abs(self.targets) > self._half, axis=1)
         # a target at the edge turns to the middle
@@ -226,7 +240,7 @@ class HandoffWorld:
         level = self.seen_from(which, self.targets)
         points = camera.project(np.column_stack((level, np.full(len(level), a.height_m - s.seen_m))))
         inside = np.all(np.abs(points) < s.half_view, axis=1)  # NaN behind the camera is outside
-        seen = inside & (a.rng.random(len(level)) < s.detected)
+        seen = inside & (ndtr(a.hidden) < self.detectable(np.hypot(np.hypot(*level.T), a.height_m)))
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
         directions = camera.directions(np.vstack((points, false)))
@@ -236,6 +250,12 @@ class HandoffWorld:
         places, covariances = on_ground(_tilted(directions, a.tilt), height_m, sigma)
         below = np.isfinite(places).all(axis=1) & (np.hypot(*places.T) < 6.0 * a.height_m)
         return places[below], covariances[below]
+
+    def detectable(self, distances_m: Array) -> Array:
+        """Probability that a target in view at slant distances gives a point."""
+        s = self.setting
+        found: Array = s.detected * ndtr(np.log(s.half_detected_m / distances_m) / s.distance_spread)
+        return found
 
     def apparent(self, which: int) -> Array:
         """Forward and right (n, 2) of the targets as an aircraft sees them with its present errors of roll

@@ -172,7 +172,7 @@ def test_it_waits_for_a_complete_measurement():
     assert not belief.known and belief.best is None and not belief.converged and belief.modes == ()
     belief.update(PoseMeasurement(range_m=500.0, down_m=30.0, heading_rad=0.1))
     assert belief.known and not belief.converged
-    assert belief.poses.shape == (kernels.POSE, 10_000)
+    assert belief.poses.shape == (kernels.POSE, RelativePoseParameters().start_particles)
     slant = np.sqrt((belief.poses[:3] ** 2).sum(axis=0))
     assert slant.mean() == pytest.approx(500.0, abs=0.2) and slant.std() == pytest.approx(3.0, abs=0.2)
 
