@@ -262,7 +262,9 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         if taken is None:
             return Outcome.WAITING
         designation.update(taken_us, tracks.places)
-        if designation.number is None:  # the operator designates the target, and anew when it was lost
+        if (
+            not designation.count
+        ):  # by its place; one that was lost is designated by an operator's message only
             level = tracks.level(taken)
             expected = self._place.level(time_us)
             if level and expected is not None:
