@@ -18,8 +18,8 @@ class TrackOperator:
     """Confirms the track that the aircraft follows, some time after other tracks have been close to it.
 
     Tracks of moving points show nothing of what a target looks like, so this operator cannot notice an
-    exchange: from the confirmation on, the target is what the aircraft follows. In the same way the track that
-    is nearest to the place at which the target was lost becomes the target.
+    exchange: from the confirmation on, the target is what the aircraft follows. In the same way the track
+    nearest to the place at which the target was lost becomes the target.
 
     Args:
         after_s: time of doubt, or without a track, after which the target is designated; 0: never.
