@@ -158,7 +158,6 @@ class VehicleAir:
         deque(map(call, self._written, self._to_write.tolist()), 0)  # every step: no loop of bytecode
         if self._gusts:
             self._start_due_gust(steps)
-            self._note_stirring()
 
     def set_wind(
         self,
@@ -235,6 +234,7 @@ class VehicleAir:
         if steps < gust.start_s * self._physics_rate_hz:
             return
         del self._gusts[0]
+        self._note_stirring()
         speed = math.hypot(*gust.velocity_ned_m_s)
         if speed == 0.0:
             return

@@ -143,6 +143,7 @@ class Leader:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_follows_a_leader_and_holds_when_it_is_lost(flavour: str) -> None:
     flight = Flight(flavour, parameters=FOLLOW[flavour])
     flight.take_off(10.0)

@@ -61,6 +61,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.mark.parametrize("flights", slow_after(1, reversed(SETPOINT_FLIGHTS)))
+@pytest.mark.slow
 def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
     air = flights.split(",")[0]
     for seed, (name, flavour) in enumerate(SETPOINT_FLIGHTS[flights], start=1):

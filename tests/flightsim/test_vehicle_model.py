@@ -10,8 +10,10 @@ import pytest
 
 import flightsim
 from flightsim import truth as t
+from flightsim import vehicle_air
 from flightsim.airframe import AirframeError, known_models, load_airframe
 from flightsim.environment import CosineGust, Environment, Turbulence
+from flightsim.foundation.kernels import bound
 from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
@@ -85,6 +87,19 @@ def test_same_seed_same_bytes() -> None:
     first.reset()
     assert record == fly(first, 600)
     assert record != fly(make(environment=WINDY, seed_sequence=np.random.SeedSequence(1)), 600)
+
+
+def test_a_gust_to_come_costs_nothing_until_it_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel's arguments are handed over once, and once more when the gust begins."""
+    handed: list[object] = []
+
+    def counted(*arguments: object, **named: object) -> object:
+        handed.append(arguments)
+        return bound(*arguments, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(vehicle_air, "bound", counted)
+    fly(make(environment=WINDY), 400)
+    assert len(handed) <= 3
 
 
 def test_interleaved_vehicles_fly_as_alone() -> None:

@@ -120,6 +120,7 @@ def test_terminated_in_flight_it_ends_in_good_order(
     assert times_us[-1] - times_us[0] > 900_000
 
 
+@pytest.mark.slow
 def test_an_ignored_hangup_stays_ignored(in_flight: Callable[..., None]) -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as by nohup
     try:
@@ -178,6 +179,7 @@ def test_keys_that_can_not_be_stored_any_more_do_not_end_the_flight(
     assert done.output.count(reported) == 1
 
 
+@pytest.mark.slow
 def test_pictures_that_are_lost_are_reported_and_the_command_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     def lose(
         world: Sitl, video: str | None, rate_hz: float, pictures: Path | None, on_loss: Callable[[str], None]

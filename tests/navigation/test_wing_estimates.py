@@ -66,7 +66,7 @@ def split(runs: Array) -> tuple[Array, Array]:
     [(0, 0.5), (1, 0.5), (2, 0.5), (3, 0.3)],
     ids=["attitude", "velocity", "position", "wind"],
 )
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_nees_with_gps(runs: Array, index: int, low: float) -> None:
     """Mean over seeds and time: attitude, velocity, position as they should be, wind on the careful side."""
     assert low < split(runs)[0][:, :, index].mean() < 1.5

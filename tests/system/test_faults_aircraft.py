@@ -82,6 +82,7 @@ def test_px4_uses_an_airspeed_sensor_again_where_it_may() -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_gps_lost_is_reported(flavour: str) -> None:
     """Dead reckoning on airspeed: PX4 tells how well the position is still known, ArduPilot no longer calls
     it absolute.

@@ -155,6 +155,7 @@ def dies_in_warm_up() -> None:
     signal.raise_signal(signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_workers_that_end_before_they_begin_are_an_error(tmp_path: Path) -> None:
     with pytest.raises(MissionError, match=r"before they begin \(SIGKILL\); is there memory"):
         run_study(

@@ -55,6 +55,7 @@ def test_a_frame_shows_the_targets_where_they_are():
     assert 0.7 < np.mean(seen) < 1.0  # a tenth is missed
 
 
+@pytest.mark.slow
 def test_a_trial_decides_for_the_target_and_repeats_itself():
     rows = [HandoffTrial(timeout_s=120.0)(Cell(belief="gaussians"), 1) for _ in range(2)]
     assert rows[0] == rows[1]

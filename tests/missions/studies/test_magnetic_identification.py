@@ -87,6 +87,7 @@ def test_the_shipped_classifier_takes_figure_6_for_what_it_is(name):
     assert found.probability(trace_features(boat)) < 0.2
 
 
+@pytest.mark.slow
 def test_fitted_tables_are_what_scikit_learn_has_fitted(tmp_path):
     learn = pytest.importorskip("sklearn.linear_model")
     rng = np.random.default_rng(3)
