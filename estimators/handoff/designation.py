@@ -67,10 +67,16 @@ class Designation:
         apart = self._nearest_m / self.parameters.exchange_m
         return self._settled * (1.0 - 0.5 * math.exp(-0.5 * apart * apart))
 
-    def designate(self, time_us: int, number: int, place: Place) -> None:
-        """An operator designates a track, or confirms that it is the target."""
+    def designate(self, time_us: int, number: int, place: Place, sure: float = 1.0) -> None:
+        """An operator designates a track, or confirms that it is the target.
+
+        Args:
+            time_us: of the track.
+            number, place: of the track.
+            sure: probability that it is the target.
+        """
         self.number, self._place, self._seen_us = number, place, time_us
-        self._settled, self._nearest_m = 1.0, math.inf
+        self._settled, self._nearest_m = sure, math.inf
         self.count += 1
 
     def update(self, time_us: int, places: Mapping[int, Place]) -> None:

@@ -41,6 +41,7 @@ from estimators.relative_pose.estimator import RelativePoseEstimator
 from estimators.tracking.recursive_ransac import RecursiveRansac
 from estimators.vehicle_time import UNIX_TIME_US
 
+_AGAIN: Final = 0.5  # probability that the nearest track is of a target that was lost
 _PATH_S: Final = 5.0
 _PENDING_US: Final = 2_000_000
 _RECEIVED: Final = (TRACK_REPORT_PAYLOAD, HANDOFF_DECISION_PAYLOAD, TRACK_DESIGNATION_PAYLOAD)
@@ -262,15 +263,14 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         if taken is None:
             return Outcome.WAITING
         designation.update(taken_us, tracks.places)
-        if (
-            not designation.count
-        ):  # by its place; one that was lost is designated by an operator's message only
+        if designation.number is None:  # by its place
             level = tracks.level(taken)
             expected = self._place.level(time_us)
             if level and expected is not None:
                 number = min(level, key=lambda k: math.dist(level[k], expected))
                 if math.dist(level[number], expected) <= p.designate_m:
-                    designation.designate(taken_us, number, tracks.places[number])
+                    sure = _AGAIN if designation.count else 1.0
+                    designation.designate(taken_us, number, tracks.places[number], sure)
         if self._due(time_us, p.report_s):
             self._outbox += track_report_messages(
                 system=self.own,

@@ -67,8 +67,7 @@ COMMAND: Final = MissionCommand(
             "--confirm-after",
             type=float,
             help=(
-                "The tracker's operator confirms a doubtful target, or designates a lost one anew, after so "
-                "long, s; 0: never. "
+                "The tracker's operator confirms a doubtful target after so long, s; 0: never. "
                 "[default: 5; with --connect: 0]"
             ),
         ),

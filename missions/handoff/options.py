@@ -27,7 +27,7 @@ class HandoffOptions(MissionOptions):
         belief: what estimates the relative pose.
         decision: probability of a track that is decided for.
         confirm_after_s: time after which the tracker's operator confirms a target whose identity has become
-            doubtful, and designates a lost one anew; 0: there is no operator.
+            doubtful; 0: there is no operator.
         link_loss, link_delay_s: share of the messages between the aircraft that are lost, and their mean
             delay.
         estimator_seed: of the random numbers of estimators and link.

@@ -243,7 +243,10 @@ def test_a_target_that_stops_is_lost_and_not_decided_for():
     scene.velocities = scene.velocities.copy()
     scene.velocities[started] = 0.0
     scene.fly(40.0)
-    assert scene.decided is None and scene.estimator(TRACKER).designation.number is None
+    designation = scene.estimator(TRACKER).designation
+    assert scene.decided is None
+    # another target has come near its place meanwhile, and may be it
+    assert designation.number is None or designation.probability <= 0.5
 
 
 @pytest.mark.slow

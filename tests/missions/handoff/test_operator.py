@@ -47,23 +47,6 @@ def test_targets_side_by_side_are_not_confirmed():
     assert times == [] and probability < 0.75
 
 
-@pytest.mark.parametrize(("away_m", "expected"), [(40.0, [7]), (120.0, [])])
-def test_a_lost_target_is_designated_anew_where_a_track_is_near(away_m, expected):
-    """It is lost after 5 s without a track, and the operator takes 5 s more."""
-    sent, designation, numbers = [], Designation(), []
-    operator = TrackOperator(5.0, 0.99, sent.append)
-    designation.designate(0, 1, (0.0, 0.0))
-    for k in range(150):
-        places = {1: (0.0, 0.0)} if k < 10 else {7: (away_m, 0.0)}
-        designation.update(k * STEP_US, places)
-        operator.look(k * STEP_US, designation, places)
-        if sent:
-            assert k == pytest.approx(110, abs=2)
-            numbers.append(sent.pop())
-            designation.designate(k * STEP_US, numbers[-1], places[numbers[-1]])
-    assert numbers == expected
-
-
 def test_a_designation_reaches_the_estimator_of_the_tracker_and_its_log():
     sent = {1: [], 2: []}
     vehicles = [
