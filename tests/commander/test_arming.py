@@ -29,6 +29,7 @@ from tests.commander.rig import Rig
         (FlightMode.OFFBOARD, False, Reason.NO_SETPOINTS),
     ],
 )
+@pytest.mark.sampled(6)
 def test_px4_armable_modes(mode: FlightMode, armable: bool, reason: Reason | None) -> None:
     rig = Rig("px4")
     assert rig.commander.set_mode(mode).accepted  # on the ground any known mode is taken

@@ -120,6 +120,7 @@ def rate_hz(unit: SensorUnit) -> int:
 
 @every_unit
 @pytest.mark.parametrize("failure", FaultType, ids=lambda failure: failure.name)
+@pytest.mark.sampled(24)
 def test_before_and_after_a_failure_all_is_as_it_would_have_been(
     unit: SensorUnit, failure: FaultType, healthy: dict[str, Trace]
 ) -> None:
@@ -135,6 +136,7 @@ def test_before_and_after_a_failure_all_is_as_it_would_have_been(
 @pytest.mark.parametrize(
     "failure", [failure for failure in FaultType if failure], ids=lambda failure: failure.name
 )
+@pytest.mark.sampled(24)
 def test_a_failure_touches_only_its_channels(
     unit: SensorUnit, failure: FaultType, healthy: dict[str, Trace]
 ) -> None:

@@ -36,6 +36,7 @@ def test_on_a_full_disk_it_fails_in_one_line(log: str) -> None:
     assert done.stderr == "flightstack: can't write the output: No space left on device\n"
 
 
+@pytest.mark.slow
 def test_a_sitl_that_can_not_say_where_it_is_does_not_start() -> None:
     done = run("> /dev/full", "sitl", "--link", "udpin:127.0.0.1:0", "--speedup", "0", "--duration", "1")
     assert done.returncode == 1

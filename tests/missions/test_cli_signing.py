@@ -71,6 +71,7 @@ def test_a_link_open_to_the_network_is_warned_of_in_one_line() -> None:
     ],
 )
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_the_links_of_a_sitl_say_what_they_take(
     options: tuple[str, ...], warned: bool, how: str, key_file: Path
 ) -> None:

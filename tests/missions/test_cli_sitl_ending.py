@@ -132,6 +132,7 @@ def test_an_ignored_hangup_stays_ignored(in_flight: Callable[..., None]) -> None
     assert done.return_value == 0 and "stopped at 2.0 s" in done.output
 
 
+@pytest.mark.slow
 def test_a_busy_port_leaves_no_log_in_the_way(cards: Path, tmp_path: Path) -> None:
     log = tmp_path / "said.tlog"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as busy:
@@ -165,6 +166,7 @@ def test_keys_that_can_not_be_stored_are_refused_at_once(key: tuple[str, ...], t
     assert "starting" not in done.output
 
 
+@pytest.mark.slow
 def test_keys_that_can_not_be_stored_any_more_do_not_end_the_flight(
     key: tuple[str, ...], tmp_path: Path, in_flight: Callable[..., None]
 ) -> None:

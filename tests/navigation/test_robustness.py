@@ -76,6 +76,7 @@ def test_same_inputs_same_bytes() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300, -1e300])
 @pytest.mark.parametrize("sensor", ["imu", "barometer", "magnetometer", "gps", "rangefinder"])
+@pytest.mark.sampled(12)
 def test_nonsense_never_poisons_the_state(sensor: str, bad: float) -> None:
     rate_hz = 50
     readings = SensorReadings()

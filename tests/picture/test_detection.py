@@ -23,7 +23,7 @@ PICTURES = 12
         (100.0, 10.0, 0.0),
     ],
 )
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 def test_tags_are_read_as_often_as_the_model_says(
     size_px: float, depression_deg: float, blur_px: float
 ) -> None:

@@ -460,6 +460,7 @@ def sane(rig: ServiceRig) -> None:
 
 
 @pytest.mark.parametrize("place", list(RIGS))
+@pytest.mark.sampled(2)
 @settings(max_examples=60, deadline=None)
 @given(
     calls=st.lists(

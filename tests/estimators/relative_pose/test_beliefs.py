@@ -178,6 +178,7 @@ def test_it_waits_for_a_complete_measurement():
     assert slant.mean() == pytest.approx(500.0, abs=0.2) and slant.std() == pytest.approx(3.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_fewer_particles_follow_a_converged_pose_and_the_seed_decides_all():
     results = []
     for seed in (1, 1, 2):

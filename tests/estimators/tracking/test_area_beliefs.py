@@ -97,6 +97,7 @@ def missed_targets(count, seed):
 
 
 @each_belief
+@pytest.mark.sampled(2)
 def test_without_detections_it_agrees_with_drawn_targets(belief):
     """Information is honest: probability of detection and belief against brute-force Monte Carlo."""
     belief = belief()
@@ -116,6 +117,7 @@ def test_without_detections_it_agrees_with_drawn_targets(belief):
 
 
 @each_belief
+@pytest.mark.sampled(2)
 def test_detections_give_the_product_of_their_gaussians(belief):
     """Level cameras above the target: the posterior is the information filter's."""
     belief = belief()

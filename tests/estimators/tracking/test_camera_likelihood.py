@@ -104,6 +104,7 @@ def drawn_pixels(euler, place, targets, count, rng, errors=ERRORS):
     return pixels, resolutions
 
 
+@pytest.mark.slow
 def test_the_probability_of_detection_is_that_of_drawn_poses():
     euler, place = (0.2, -0.1, 0.7), (10.0, -5.0, -90.0)
     targets = np.random.default_rng(1).uniform(-110.0, 110.0, (60, 2))

@@ -106,6 +106,7 @@ def test_circle_is_held_in_wind(wind: tuple[float, float], direction: float, rad
 
 @pytest.mark.parametrize("bearing_deg", range(0, 360, 36))
 @pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.sampled(8)
 def test_circle_is_entered_along_its_tangent(bearing_deg: int, direction: float) -> None:
     bearing = math.radians(bearing_deg)
     mass = PointMass((500.0 * math.cos(bearing), 500.0 * math.sin(bearing), -100.0), 1.0, (4.0, -3.0))

@@ -265,6 +265,7 @@ print(float(kernels.bound(outer, np.array([1.0, 2.0, 3.0]))()), kernels.dumps is
 """
 
 
+@pytest.mark.slow
 def test_kernels_work_without_what_numba_promises_nothing_of(package: Package) -> None:
     """A release of Numba that moves its internals costs some speed, and no function."""
     assert package.say(MOVED_PROGRAM).split() == ["13.0", "True"]
