@@ -52,8 +52,8 @@ class HandoffSetting:
             docs/attitude.md the attitude filter's mean squared errors are 0.1 to 1.6 deg^2.
         half_view: half of the image's width and height, as tangents (60 by 47 degrees).
         pixel_rad: noise of an image point. This and what follows were measured with the frame differences on
-            the rendered pictures of six flights. Six others: `python -m benchmarks.handoff_pixels --statistics 6`
-            (docs/handoff.md).
+            the rendered pictures of six flights. Of six others (docs/handoff.md): `python -m
+            benchmarks.handoff_pixels --statistics 6`.
         seen_m: height over the ground of the middle of a target, which is what is seen: half of a person's.
         detected: probability that a near target in view gives a point.
         half_detected_m: slant distance at which half as many do.
