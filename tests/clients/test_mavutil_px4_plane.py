@@ -47,6 +47,7 @@ def flying(parked: AircraftClient) -> AircraftClient:
 
 
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="mission", vehicle="px4-plane")
+@pytest.mark.slow
 def test_mission_from_take_off_to_auto_disarm() -> None:
     with aircraft("px4") as client:
         client.ready()

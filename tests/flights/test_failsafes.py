@@ -129,6 +129,7 @@ def test_battery_px4_returns_when_critical_and_lands_when_empty() -> None:
     flight.wait_disarmed()
 
 
+@pytest.mark.slow
 def test_battery_ardupilot_returns_when_low_and_lands_when_critical() -> None:
     flight = hovering("ardupilot", height_m=6.0, BATT_FS_LOW_ACT=2, BATT_FS_CRT_ACT=1)
     set_real(flight, "BATT_LOW_VOLT", 16.0)
@@ -255,6 +256,7 @@ def test_the_vehicle_holds_its_place_with_a_poor_sensor(unit: int, failure: int)
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("unit", [GYRO, ACCEL])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_broken_inertial_sensor_breaks_no_software(flavour: str, unit: int) -> None:
     """There is one of each: the vehicle may crash, but numbers stay numbers and it goes on talking."""
     flight = hovering(flavour, height_m=6.0)

@@ -116,6 +116,7 @@ def test_circles_to_the_left(flavour: str) -> None:
     [("px4", "catapult"), ("ardupilot", "hand"), slow("px4", "hand"), slow("ardupilot", "catapult")],
 )
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_launched(flavour: str, launch: str) -> None:
     flight = AircraftFlight(flavour, launch=launch, environment=WIND)
     flight.get_ready()

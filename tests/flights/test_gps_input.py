@@ -93,7 +93,8 @@ def hovers(flight: Flight) -> None:
     assert max(away) < 1.5
 
 
-@pytest.mark.parametrize("message", ["gps_input", pytest.param("hil_gps", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("message", ["gps_input", "hil_gps"])
+@pytest.mark.slow
 def test_a_copter_flies_by_fixes_that_come_by_messages_until_they_stop(message: str) -> None:
     flight = copter(**MAV)
     flight.inject(GPS, OFF)  # whatever the one on board does
@@ -117,6 +118,7 @@ def test_a_copter_flies_by_fixes_that_come_by_messages_until_they_stop(message: 
     flight.wait_disarmed(40.0)
 
 
+@pytest.mark.slow
 def test_a_script_may_say_the_same_place_again_and_again() -> None:
     """As many do, on the ground, with whole seconds of GPS time."""
     flight = Flight("ardupilot", parameters=MAV)

@@ -45,9 +45,9 @@ def by_odometry(flavour: str, message: str = "odometry") -> tuple[Flight, Tracke
     return flight, tracker
 
 
-@pytest.mark.parametrize("message", ["odometry", pytest.param("vision", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("message", ["odometry", "vision"])
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_a_quadrotor_without_gps_flies_by_odometry(flavour: str, message: str) -> None:
     flight, _ = by_odometry(flavour, message)
     flight.repeat(10.0, lambda _: flight.position_setpoint(PLACE, yaw_rad=0.5))

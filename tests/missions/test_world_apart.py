@@ -41,6 +41,13 @@ def is_in(kind: type, packages: Iterable[str]) -> bool:
     return any(f"{kind.__module__}.".startswith(f"{package}.") for package in packages)
 
 
+def instances(*classes: type) -> list[Any]:
+    """All objects of these classes. There are millions of objects, of few types: types are compared."""
+    items = gc.get_objects()
+    kinds = {kind for kind in set(map(type, items)) if issubclass(kind, classes)}
+    return [item for item in items if type(item) in kinds]
+
+
 def neighbours(item: Any) -> Iterable[Any]:
     """What code that has an object can get from it, without modules and frames."""
     if isinstance(item, types.MethodType):
@@ -92,16 +99,15 @@ class Spy(Mission[Any]):
         self.estimators = 0
         gc.collect()
         # those of other tests in this process, which something may still refer to
-        self.earlier = {id(item) for item in gc.get_objects() if isinstance(item, Estimator | Sitl)}
+        self.earlier = {id(item) for item in instances(Estimator, Sitl)}
 
     async def fly(self, vehicle: Any, options: Any) -> None:
         await vehicle.takeoff(10.0)
         await vehicle.clock.sleep(2.0)
-        (sitl,) = (item for item in gc.get_objects() if type(item) is Sitl and id(item) not in self.earlier)
+        (sitl,) = (item for item in instances(Sitl) if id(item) not in self.earlier)
         truths = [simulated.vehicle.truth for simulated in sitl.vehicles]
         gc.collect()  # instances that were made to read their needs
-        found = [item for item in gc.get_objects() if isinstance(item, Estimator)]
-        running = [item for item in found if id(item) not in self.earlier]
+        running = [item for item in instances(Estimator) if id(item) not in self.earlier]
         self.estimators = len(running)
         for roots in ((self, vehicle, options, vehicle.notes), running):
             items = reachable(*roots)

@@ -38,6 +38,7 @@ def test_a_team_of_a_quadrotor_and_two_aircraft() -> None:
     assert heights[0] == pytest.approx(2.5, abs=0.5) and min(heights[1:]) > 15.0
 
 
+@pytest.mark.slow
 def test_what_stands_beside_an_aircraft_does_not_change_its_flight() -> None:
     def flight(models: list[str]) -> bytes:
         vehicles = team(len(models), model=models, autopilot="px4", parameters={})

@@ -53,6 +53,7 @@ async def set_out(vehicle: Vehicle, north_m: float) -> None:
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
 @pytest.mark.parametrize("leg_m", [400.0, 25.0])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_in_a_mission(flavour: str, leg_m: float) -> None:
     flying = Flying(flavour)
 

@@ -137,6 +137,7 @@ def alone() -> tuple[bytes, bytes]:
     return taken_off()
 
 
+@pytest.mark.slow
 def test_payload_and_targets_change_no_other_stream(alone: tuple[bytes, bytes]) -> None:
     seen, said = taken_off(payload=CARRIED, targets=TARGETS)
     assert seen == alone[0]

@@ -166,6 +166,7 @@ def hovering(flavour: str) -> Flying:
 
 @pytest.mark.parametrize("kind", LINKS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_random_bytes(kind: str, garbage: list[bytes]) -> None:
     flying = hovering("px4")
     watch = Watch(flying)
@@ -194,6 +195,7 @@ def test_damaged_frames(kind: str, damage: list[bytes]) -> None:
     assert flying.autopilot.parameters.as_dict() == before
 
 
+@pytest.mark.slow
 def test_damaged_frames_change_nothing_at_all(damage: list[bytes]) -> None:
     """The flight is the same to the last bit as one without them."""
     disturbed, undisturbed = hovering("px4"), hovering("px4")

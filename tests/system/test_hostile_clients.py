@@ -134,6 +134,7 @@ def test_the_same_request_again_and_again_is_answered_once_a_tick() -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_parameters_set_faster_than_they_can_be(flavour: str) -> None:
     name = b"MPC_LAND_SPEED" if flavour == "px4" else b"LAND_SPEED_HIGH"
     with scene(flavour) as there:

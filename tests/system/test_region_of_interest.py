@@ -57,6 +57,7 @@ def guided() -> Looking:
     return looking
 
 
+@pytest.mark.slow
 def test_arducopter_turns_its_nose_in_guided(guided: Looking) -> None:
     assert guided.to_the_east() > 30.0
     assert guided.look() == 0

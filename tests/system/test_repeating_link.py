@@ -11,6 +11,7 @@ WAYPOINT, COUNT = 16, 300
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.sampled(1)
+@pytest.mark.slow
 def test_uploads_a_plan(flavour: str) -> None:
     """ArduPilot answers a repeated item with INVALID_SEQUENCE and goes on with the transfer."""
     flying = Flying(flavour)

@@ -116,6 +116,7 @@ def test_ardupilot_streams_at_the_requested_rate() -> None:
     check(client.rates_hz(), {"HEARTBEAT": 1.0, "TIMESYNC": 0.1})
 
 
+@pytest.mark.slow
 def test_ardupilot_stream_groups() -> None:
     client = Client(ready("ardupilot", 45.0))
     client.request_streams(mavlink.MAV_DATA_STREAM_POSITION, 10)
@@ -164,6 +165,7 @@ def test_results_of_stream_commands(
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.sampled(1)
 def test_an_interval_is_set_read_back_and_taken_back(flavour: str) -> None:
     client = Client(ready(flavour, 6.0))
     vibration = mavlink.MAVLINK_MSG_ID_VIBRATION

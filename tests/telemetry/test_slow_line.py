@@ -72,6 +72,7 @@ def test_streams_fit_a_line_of_57600_baud(flavour: str) -> None:
         assert thinned["ATTITUDE"] / thinned["LOCAL_POSITION_NED"] == pytest.approx(100 / 30, rel=0.1)
 
 
+@pytest.mark.slow
 def test_streams_leave_room_for_a_gimbal() -> None:
     """What other components of the vehicle say is not thinned; the autopilot's streams get the rest."""
     client = Client("px4", BAUD_57600)
@@ -96,6 +97,7 @@ def test_streams_leave_room_for_a_gimbal() -> None:
     assert client.longest_backlog_s < 0.2
 
 
+@pytest.mark.slow
 def test_a_wide_line_changes_nothing() -> None:
     wide, free = Client("px4", 92160.0), Client("px4", None)
     for client in (wide, free):

@@ -166,6 +166,7 @@ def package(tmp_path: Path) -> Package:
     return Package(tmp_path)
 
 
+@pytest.mark.slow
 def test_code_is_kept_until_a_constant_of_another_module_changes(package: Package) -> None:
     both = [package.start(), package.start()]  # one of them compiles, the other one waits for the code
     assert sorted(finished(process) for process in both) == [(13.0, 0), (13.0, 1)]

@@ -162,6 +162,7 @@ def test_a_folder_that_can_not_be_made_is_an_error(tmp_path: Path) -> None:
         run_study(STUDY, out="nowhere://a")
 
 
+@pytest.mark.slow
 def test_any_file_system_of_pyarrow_has_studies(monkeypatch: pytest.MonkeyPatch) -> None:
     """On one in memory, as on an object store: created, continued and read by its URI."""
     memory = fs._MockFileSystem()

@@ -126,6 +126,7 @@ def test_a_trial_that_never_ends_becomes_a_row(cluster: Cluster, tmp_path: Path)
     assert [(row["trial"], row["outcome"]) for row in result.results.without_row()] == [(4, "timed out")]
 
 
+@pytest.mark.slow
 def test_an_unreachable_address_is_an_error(tmp_path: Path) -> None:
     address = f"127.0.0.2:{free_port()}"
     for url in (address, f"ray://{address}"):
@@ -133,6 +134,9 @@ def test_an_unreachable_address_is_an_error(tmp_path: Path) -> None:
             MissionError, match=re.escape(f"no Ray cluster at {url}: [Errno 111] Connection refused")
         ):
             run_study(STUDY, engine=RayCluster(url), out=tmp_path / url[:3], picture=False)
+
+
+def test_what_is_no_address_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         PlanError, match="`ray` 'here' is not accepted; auto, local, HOST:PORT and ray://HOST:PORT are"
     ):
