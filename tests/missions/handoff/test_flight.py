@@ -61,6 +61,7 @@ def pixel_run(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # pictures take longer than the flight
 def test_a_film_of_a_handoff_has_the_points_of_the_flight(pixel_run, tmp_path):
     folder = pixel_run.folder
     assert all((folder / f"camera{k}.png").stat().st_size > 50_000 for k in (1, 2))
@@ -79,6 +80,7 @@ def test_a_film_of_a_handoff_has_the_points_of_the_flight(pixel_run, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("which", ["run", "pixel_run"])
 def test_the_estimator_beside_the_flight_and_a_replay_have_the_same_numbers(which, request):
     run = request.getfixturevalue(which)
