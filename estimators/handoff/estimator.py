@@ -1,9 +1,9 @@
 """The estimator `handoff`: which track of the handoff aircraft is the tracker's target, without GPS
 (Tolman et al. 2021; docs/handoff.md).
 
-It runs on both aircraft. On the tracker it tracks what moves, follows the designated track, reports all
-tracks and receives the decision. On the handoff aircraft it estimates the relative pose, tracks what moves,
-compares its tracks with the reported ones, and decides.
+It runs on both aircraft, and each uses the sensors of its own. On the tracker it tracks what moves, follows
+the designated track, reports its motion and all tracks, and receives the decision. On the handoff aircraft it
+estimates the relative pose, tracks what moves, compares its tracks with the reported ones, and decides.
 """
 
 import math
@@ -25,7 +25,13 @@ from autopilot_bridge.mavlink.handoff_messages import (
     track_report_messages,
 )
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD
-from estimators.handoff.dead_reckoning import ReckonedPath
+from autopilot_bridge.mavlink.vehicle_motion import (
+    VEHICLE_MOTION_PAYLOAD,
+    VehicleMotion,
+    motion_message,
+    read_motion_payload,
+)
+from estimators.handoff.dead_reckoning import DeadReckoning, ReckonedPath
 from estimators.handoff.designation import Designation
 from estimators.handoff.estimate import HandoffEstimate
 from estimators.handoff.evidence import EvidenceComparison
@@ -38,13 +44,19 @@ from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message
 from estimators.relative_pose.aircraft import AircraftState
 from estimators.relative_pose.estimator import RelativePoseEstimator
+from estimators.relative_pose.reported_aircraft import ReportedAircraft
 from estimators.tracking.recursive_ransac import RecursiveRansac
 from estimators.vehicle_time import UNIX_TIME_US
 
 _AGAIN: Final = 0.5  # probability that the nearest track is of a target that was lost
 _PATH_S: Final = 5.0
 _PENDING_US: Final = 2_000_000
-_RECEIVED: Final = (TRACK_REPORT_PAYLOAD, HANDOFF_DECISION_PAYLOAD, TRACK_DESIGNATION_PAYLOAD)
+_RECEIVED: Final = (
+    TRACK_REPORT_PAYLOAD,
+    HANDOFF_DECISION_PAYLOAD,
+    TRACK_DESIGNATION_PAYLOAD,
+    VEHICLE_MOTION_PAYLOAD,
+)
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
 
 
@@ -53,6 +65,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
 
     Attributes:
         sight: what the own aircraft sees.
+        partner_motion: motion of the tracker, on the handoff aircraft.
         pose: relative pose, on the handoff aircraft.
         process: comparison and decision, on the handoff aircraft.
         designation: the target's track, on the tracker.
@@ -67,14 +80,15 @@ class HandoffEstimator(Estimator[HandoffSettings]):
 
     def __init__(self, parameters: HandoffSettings | None = None) -> None:
         super().__init__(parameters)
-        self.pose = RelativePoseEstimator(self.parameters)
+        self.partner_motion = ReportedAircraft()
+        self.pose = RelativePoseEstimator(self.parameters, self.partner_motion)
         self._tracks = self.parameters.role == "tracker"
         self._state = AircraftState() if self._tracks else self.pose.own
         self.reset()
 
     @property
     def needs(self) -> tuple[Need, ...]:
-        """The messages of both aircraft."""
+        """The messages of the own aircraft, and those of the other one's onboard computer."""
         needs = [
             *self.pose.needs,
             Need(
@@ -91,6 +105,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
     def reset(self) -> None:
         """Discard everything except the parameters."""
         self._ground: float | None = self.parameters.ground_altitude_m
+        self._now_us: int | None = None
         self.pose.reset()
         self._state.reset()
         self._restart()
@@ -110,48 +125,49 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             ground_m=self._ground,
         )
         self.designation = Designation()
-        partner_path = self._partner_path = ReckonedPath(_PATH_S)
-        if not self._tracks:
-            self.pose.other.on_motion = partner_path.advance
+        self._partner_path = ReckonedPath(_PATH_S)  # by the partner's clock
+        self.partner_motion.on_motion = self._partner_path.advance
+        self._partner_now = DeadReckoning()
         self.process = HandoffProcess(
-            self.pose.pose, self.sight.tracks, EvidenceComparison(p.evidence), p.windows, partner_path.newest
+            self.pose.pose, self.sight.tracks, EvidenceComparison(p.evidence), p.windows, self._partner_now
         )
         self._assembler = ReportAssembler()
         self._pending: deque[TrackReport] = deque(maxlen=50)
         self.counts: Counter[str] = self._assembler.counts
         self.decision: HandoffDecision | None = None
         self.released = False
-        self._offsets_us: dict[int, int] = {}
+        self._offset_us = 0  # of the own clock
         self._sent_us: int | None = None
-        self._number = 0
+        self._motion_sent_us: int | None = None
+        self._number = self._motion_number = 0
         self._outbox: list[MAVLinkMessage] = []
         self._estimates: tuple[HandoffEstimate, ...] = ()
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        system = message.src_system
         if message.name == "TUNNEL" and message.payload_type in _RECEIVED:
             return self._from_elsewhere(message)
-        if system not in (self.own, self.partner):
+        if message.src_system != self.own:
             return Outcome.IGNORED
-        if message.name in _INERTIAL and message.src_component == 1 and message.time_usec < UNIX_TIME_US:
-            self._offsets_us[system] = time_us - message.time_usec
+        if message.name in _INERTIAL and message.src_component == 1:
+            self._now_us = time_us
+            if message.time_usec < UNIX_TIME_US:
+                self._offset_us = time_us - message.time_usec
         if message.name == "TUNNEL":
             return self._tunnel(time_us, message)
-        outcome = Outcome.IGNORED
-        if system == self.own:
-            outcome = self.sight.take(time_us, message)
-            self._ground = None if math.isnan(self.sight.height.ground_m) else self.sight.height.ground_m
-            if self._tracks:
-                self._place.take(time_us, message)
-        fused = Outcome.IGNORED
-        if not self._tracks:
-            fused = self.pose.handle(time_us, message)
-        elif system == self.own:
+        outcome = self.sight.take(time_us, message)
+        self._ground = None if math.isnan(self.sight.height.ground_m) else self.sight.height.ground_m
+        if self._tracks:
+            self._place.take(time_us, message)
             fused = self._state.take(time_us, message)
+        else:
+            fused = self.pose.handle(time_us, message)
         if fused is Outcome.TIME_JUMP:
             self._restart()
             return fused
-        if not self._tracks:
+        if self._tracks:
+            if fused is Outcome.USED:
+                self._report_motion(time_us)
+        else:
             self._receive_pending(time_us)
             if fused is Outcome.UPDATED:
                 return self._compare(time_us)
@@ -160,8 +176,6 @@ class HandoffEstimator(Estimator[HandoffSettings]):
     # messages between the aircraft
 
     def _tunnel(self, time_us: int, message: Message) -> Outcome:
-        if message.src_system != self.own:
-            return Outcome.IGNORED
         if message.payload_type == MOVING_POINTS_PAYLOAD:
             outcome = self.sight.take(time_us, message)
             return self._report(time_us) if outcome is Outcome.UPDATED and self._tracks else outcome
@@ -171,8 +185,8 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         return self._compare(time_us) if fused is Outcome.UPDATED else fused
 
     def _from_elsewhere(self, message: Message) -> Outcome:
-        """A report or a decision, which the onboard computer of the other aircraft sends, or a designation by
-        the operator.
+        """Motion, a report or a decision, which the onboard computer of the other aircraft sends, or a
+        designation by the operator.
         """
         kind = message.payload_type
         wire = (kind, message.payload_length, message.payload)
@@ -186,6 +200,11 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             if report is not None:
                 self._pending.append(report)
             return Outcome.USED
+        if kind == VEHICLE_MOTION_PAYLOAD and not self._tracks:
+            motion = read_motion_payload(*wire)
+            if motion is None:
+                return self._malformed()
+            return self._on_motion(motion) if motion.system == self.partner else Outcome.IGNORED
         if kind == HANDOFF_DECISION_PAYLOAD and self._tracks:
             decision = read_decision(*wire)
             if decision is None:
@@ -203,6 +222,16 @@ class HandoffEstimator(Estimator[HandoffSettings]):
     def _malformed(self) -> Outcome:
         self.counts["malformed"] += 1
         return Outcome.IMPLAUSIBLE
+
+    def _on_motion(self, motion: VehicleMotion) -> Outcome:
+        """The motion of the tracker. Its arrival has the time of the newest own sample."""
+        if self._now_us is None:
+            return Outcome.WAITING
+        outcome = self.partner_motion.take(self._now_us, motion)
+        if outcome is Outcome.TIME_JUMP:  # it has started again: nothing of before is of its new reckoning
+            self.pose.reset()
+            self._restart()
+        return outcome
 
     def _on_decision(self, decision: HandoffDecision) -> Outcome:
         """The tracker receives a decision: it releases the target when it is about its designated track."""
@@ -232,10 +261,10 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         """Process the reports whose motion is known."""
         while self._pending:
             report = self._pending[0]
-            taken_us = report.time_us + self._offsets_us.get(self.partner, 0)
-            taken = self._partner_path.at(taken_us)
+            taken_us = report.time_us + self.partner_motion.offset_us
+            taken = self._partner_path.at(report.time_us)
             newest_us = self._partner_path.time_us
-            to_come = newest_us is None or taken_us > newest_us
+            to_come = newest_us is None or report.time_us > newest_us
             if taken is None and to_come and time_us - taken_us < _PENDING_US:
                 return  # the sender's motion up to then is still to come
             self._pending.popleft()
@@ -275,7 +304,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             self._outbox += track_report_messages(
                 system=self.own,
                 report=self._number,
-                time_us=taken_us - self._offsets_us.get(self.own, 0),
+                time_us=taken_us - self._offset_us,
                 target=designation.number or 0,
                 identity=designation.probability,
                 released=self.released,
@@ -300,6 +329,21 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         )
         return Outcome.UPDATED
 
+    def _report_motion(self, time_us: int) -> None:
+        """The tracker has an inertial sample."""
+        sent_us, every_us = self._motion_sent_us, round(1e6 * self.parameters.motion_s)
+        if not self._state.moved or (sent_us is not None and 0 <= time_us - sent_us < every_us):
+            return
+        self._motion_sent_us = time_us
+        self._outbox.append(
+            motion_message(
+                self._state.report(
+                    system=self.own, number=self._motion_number, time_us=time_us - self._offset_us
+                )
+            )
+        )
+        self._motion_number += 1
+
     def _due(self, time_us: int, every_s: float) -> bool:
         if self._sent_us is not None and 0 <= time_us - self._sent_us < round(1e6 * every_s):
             return False
@@ -309,6 +353,9 @@ class HandoffEstimator(Estimator[HandoffSettings]):
     def _compare(self, time_us: int) -> Outcome:
         """The handoff aircraft has moved the pose: compare, and send the decision."""
         process, p = self.process, self.parameters
+        now, known = self._partner_now, self._partner_path.newest
+        now.x_m, now.y_m, now.heading_rad = known.x_m, known.y_m, known.heading_rad
+        now.advance(*self.partner_motion.since_report(time_us))
         process.compare(time_us, self.sight.height_m)
         scores = process.comparison.scores
         number = process.comparison.decided
@@ -343,7 +390,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         decision = HandoffDecision(
             system=self.own,
             number=self._number,
-            time_us=time_us - self._offsets_us.get(self.own, 0),
+            time_us=time_us - self._offset_us,
             decided=self.process.comparison.decided is not None,
             target=report.number,
             probability=probability,
@@ -369,7 +416,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         return self._estimates
 
     def publish(self) -> Sequence[MAVLinkMessage]:
-        """Track reports, or decisions, since the last call."""
+        """Motion and track reports, or decisions, since the last call."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -378,6 +425,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         found: dict[str, float | str] = {
             **{f"scans_{name}": float(count) for name, count in sorted(self.sight.counts.items())},
             **{f"messages_{name}": float(count) for name, count in sorted(self.counts.items())},
+            **{f"motion_{name}": float(count) for name, count in sorted(self.partner_motion.counts.items())},
             "released": float(self.released),
         }
         if self._tracks:

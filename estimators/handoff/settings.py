@@ -32,6 +32,7 @@ class HandoffSettings(RelativePoseSettings):
         decision: probability of a track that is decided for.
         hold_s: time for which it must stay above.
         report_s: time between the tracker's reports.
+        motion_s: time between the tracker's messages about its motion.
         decision_s: time between messages of the decision until the tracker has answered.
     """
 
@@ -51,6 +52,7 @@ class HandoffSettings(RelativePoseSettings):
     decision: float = 0.99
     hold_s: float = 3.0
     report_s: float = 0.2
+    motion_s: float = 0.1
     decision_s: float = 0.5
 
     def __post_init__(self) -> None:
@@ -66,7 +68,7 @@ class HandoffSettings(RelativePoseSettings):
                 for name in (
                     *("designate_m", "rate_hz", "tilt_step_rad", "tilt_sigma_rad", "pose_sigma_m"),
                     *("pose_sigma_rad", "speed_max_m_s", "clutter_per_m2"),
-                    *("window_s", "hold_s", "report_s", "decision_s"),
+                    *("window_s", "hold_s", "report_s", "motion_s", "decision_s"),
                 )
             }
         )

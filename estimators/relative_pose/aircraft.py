@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.mavlink.vehicle_motion import VehicleMotion
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
 from estimators.attitude.air import pressure_pa
 from estimators.attitude.parameters import AirspeedSource
@@ -32,7 +33,10 @@ class AircraftState:
         height_m: pressure altitude; NaN: not known.
         heading_rad: magnetic heading; NaN: not known.
         newest_us: time of the newest inertial sample; None: none yet.
+        OLD_US: a newest sample that is older is not used.
     """
+
+    OLD_US: Final = 500_000
 
     def __init__(self) -> None:
         self.on_motion: Callable[[int, float, LevelMotion], None] | None = None
@@ -72,6 +76,10 @@ class AircraftState:
         self.height_m = self.heading_rad = math.nan
         self.newest_us: int | None = None
         self._height_us = self._heading_us = 0
+        self._restart()
+
+    def _restart(self) -> None:
+        self._sums, self._rates = [0.0] * 4, [0.0] * 4  # of forward, right, down and turn
         self._start_motion()
 
     def _start_motion(self) -> None:
@@ -92,7 +100,7 @@ class AircraftState:
         if outcome is Outcome.TIME_JUMP:
             self.height_m = self.heading_rad = math.nan
             self.newest_us = None
-            self._start_motion()
+            self._restart()
         elif outcome is Outcome.UPDATED:
             (estimate,) = self.filter.estimates
             self._integrate(time_us, message, estimate)
@@ -132,8 +140,11 @@ class AircraftState:
             down_m_s=-sp * x + cp * lower,
             yaw_rate_rad_s=yaw_rate,
         )
-        for axis, speed in enumerate((motion.forward_m_s, motion.right_m_s, motion.down_m_s)):
-            self._path_m[axis] += dt_s * speed
+        self._rates = [motion.forward_m_s, motion.right_m_s, motion.down_m_s, yaw_rate]
+        for axis, rate in enumerate(self._rates):
+            self._sums[axis] += dt_s * rate
+        for axis in range(3):
+            self._path_m[axis] += dt_s * self._rates[axis]
         self._turned_rad += dt_s * yaw_rate
         self._span_s += dt_s
         if self.on_motion is not None:
@@ -164,8 +175,27 @@ class AircraftState:
         """Whether there is a motion since the last call of `motion`."""
         return self._span_s > 0.0
 
-    def motion(self) -> LevelMotion:
-        """Mean motion since the last call, of an aircraft that has `moved`."""
+    def report(self, *, system: int, number: int, time_us: int) -> VehicleMotion:
+        """The motion so far, for another aircraft.
+
+        Args:
+            system: system id of this aircraft.
+            number: of the report.
+            time_us: of the newest inertial sample, by the clock of this aircraft.
+        """
+        forward, right, down, turn = self._sums
+        return VehicleMotion(
+            system=system,
+            number=number,
+            time_us=time_us,
+            sums=(forward, right, down, turn),
+            rates=(self._rates[0], self._rates[1], self._rates[2], self._rates[3]),
+            heading_rad=self.heading_rad,
+            height_m=self.height_m,
+        )
+
+    def motion(self, _until_us: int = 0) -> LevelMotion:
+        """Mean motion since the last call, up to the newest sample, of an aircraft that has `moved`."""
         span_s, path_m, turned_rad = self._span_s, self._path_m, self._turned_rad
         since_rad = self._yaw_since_rad()
         self._start_motion()

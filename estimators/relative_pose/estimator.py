@@ -17,10 +17,10 @@ from estimators.relative_pose.estimate import RelativePoseEstimate
 from estimators.relative_pose.gaussian_bank import GaussianBank
 from estimators.relative_pose.parameters import RelativePoseParameters
 from estimators.relative_pose.particle_belief import ParticlePose
+from estimators.relative_pose.reported_aircraft import ReportedAircraft
 
 _RANGE: Final = "range"
 _STEP_US: Final = 200_000  # between ranges the pose is moved at this interval
-_OLD_US: Final = 500_000  # an aircraft whose newest sample is older is not used
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +54,10 @@ class RelativePoseSettings(RelativePoseParameters):
 class RelativePoseEstimator(Estimator[RelativePoseSettings]):
     """Fuses the ranges of one aircraft with the inertial, magnetic and pressure samples of both.
 
+    Args:
+        parameters: noise, numbers and limits.
+        other: the other aircraft, which is advanced elsewhere; None: by its messages.
+
     Attributes:
         pose: the belief.
         own, other: both aircraft.
@@ -63,9 +67,11 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
     PARAMETERS = RelativePoseSettings
     TEAM: ClassVar[bool] = True
 
-    def __init__(self, parameters: RelativePoseSettings | None = None) -> None:
+    def __init__(
+        self, parameters: RelativePoseSettings | None = None, other: ReportedAircraft | None = None
+    ) -> None:
         super().__init__(parameters)
-        self.own, self.other = AircraftState(), AircraftState()
+        self.own, self.other = AircraftState(), other or AircraftState()
         self._guard = InputGuard()
         self.reset()
 
@@ -95,6 +101,8 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
         if message.name == "TUNNEL":
             return self._on_range(time_us, message)
         aircraft = self.own if message.src_system == p.vehicle else self.other
+        if isinstance(aircraft, ReportedAircraft):
+            return Outcome.IGNORED
         outcome = aircraft.take(time_us, message)
         if outcome is Outcome.TIME_JUMP:
             self.reset()
@@ -125,11 +133,11 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
     def _step(self, time_us: int, range_m: float) -> Outcome:
         own, other = self.own, self.other
         for aircraft in (own, other):
-            if aircraft.newest_us is None or time_us - aircraft.newest_us > _OLD_US:
+            if aircraft.newest_us is None or time_us - aircraft.newest_us > aircraft.OLD_US:
                 return Outcome.WAITING
         if not (own.moved and other.moved):
             return Outcome.WAITING
-        own_motion, other_motion = own.motion(), other.motion()
+        own_motion, other_motion = own.motion(), other.motion(time_us)
         if self._moved_us is not None:
             self.pose.predict((time_us - self._moved_us) * 1e-6, own_motion, other_motion)
         self._moved_us = time_us

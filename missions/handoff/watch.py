@@ -87,8 +87,8 @@ class RadioLink:
 class HandoffWatch:
     """Passes the messages of both aircraft to the estimators, and theirs over the link.
 
-    The sensor messages of the tracker reach the handoff aircraft without delay; what the estimators publish
-    goes over the link. Before the aircraft are in contact, nothing is passed between them, ranges included.
+    Each estimator receives the messages of its own aircraft. What it publishes goes over the link to the
+    other one. Before the aircraft are in contact, nothing is passed between them, and there are no ranges.
 
     Args:
         vehicles: the handoff aircraft and the tracker.
@@ -149,10 +149,8 @@ class HandoffWatch:
         for to, message in self.link.due(now_us):
             # not inside this call: on a memory link the sender of the frame has not yet returned from it
             asyncio.get_running_loop().call_soon(self._arrive, to, message)
-        for index, vehicle in enumerate(self._vehicles):
-            own = frame.system_id == vehicle.system_id and frame.component_id != RANGE_RADIO_COMPONENT
-            if own or self.contact:
-                self._feed(index, frame)
+        if self.contact or frame.component_id != RANGE_RADIO_COMPONENT:
+            self._feed([vehicle.system_id for vehicle in self._vehicles].index(frame.system_id), frame)
 
     def _feed(self, index: int, frame: Frame) -> None:
         runner = self._runners[index]

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from autopilot_bridge.mavlink.handoff_messages import (
     track_report_messages,
 )
 from autopilot_bridge.mavlink.moving_points import MovingPoints, moving_points_messages
+from autopilot_bridge.mavlink.vehicle_motion import VEHICLE_MOTION_PAYLOAD, motion_message
 from estimators.handoff import HandoffEstimator, HandoffSettings
 from estimators.handoff.designation import Designation
 from estimators.handoff.scans import ScanAssembler
@@ -73,6 +75,20 @@ def test_malformed_messages_are_dropped_and_counted(decided):
     tunnel.payload_type = HANDOFF_DECISION_PAYLOAD
     assert tracker.feed(encoded(tunnel, HANDOFF)) is Outcome.IMPLAUSIBLE
     assert tracker.estimator.counts["malformed"] == 1
+    tunnel.payload_type = VEHICLE_MOTION_PAYLOAD
+    assert handoff.feed(encoded(tunnel, TRACKER)) is Outcome.IMPLAUSIBLE
+
+
+def test_of_the_tracker_only_what_its_onboard_computer_sends_is_used(decided):
+    handoff = decided.runners[HANDOFF]
+    before = handoff.estimator.partner_motion.newest_us
+    imu = dialect.MAVLink_highres_imu_message(90_000_000, *[0.0] * 13, 0b1111111111111, 0)
+    assert handoff.feed(encoded(imu, TRACKER, 1)) is Outcome.IGNORED
+    other = replace(
+        handoff.estimator.pose.own.report(system=4, number=1, time_us=90_000_000), sums=(9e3, 9e3, 0.0, 1.0)
+    )
+    assert handoff.feed(encoded(motion_message(other), TRACKER)) is Outcome.IGNORED
+    assert handoff.estimator.partner_motion.newest_us == before
 
 
 def tracker_with(number):
