@@ -154,12 +154,12 @@ class HandoffAircraft(ABC):
         if place is not None and math.isfinite(height_m):
             self._gimbal.point(place, height_m)
 
-    async def circle(self, place_ne_m: Place, *, clockwise: bool) -> None:
+    async def circle(self, place_ne_m: Place, radius_m: float, *, clockwise: bool) -> None:
         """Circle a place by GPS, without waiting."""
         vehicle, options = self.vehicle, self.options
         lat, lon, alt = LocalFrame(vehicle.home).geodetic_from_ned(*place_ne_m, -options.own_altitude_m)
         place = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
-        await vehicle.wing.loiter(place, radius_m=options.radius_m, clockwise=clockwise, wait=False)
+        await vehicle.wing.loiter(place, radius_m=radius_m, clockwise=clockwise, wait=False)
 
     async def wait(self, ready: Callable[[], bool], what: str, timeout_s: float) -> None:
         """Wait in the air.
@@ -232,8 +232,8 @@ class TrackerFlight(HandoffAircraft):
         await self.vehicle.takeoff(options.own_altitude_m)
         async with self.looking():
             self.begin("transit")
-            await self.circle(options.target_ne_m, clockwise=True)
-            near_m = 1.3 * options.radius_m
+            await self.circle(options.target_ne_m, options.tracker_radius_m, clockwise=True)
+            near_m = 1.3 * options.tracker_radius_m
             await self.wait(
                 lambda: (
                     self.estimator.designation.number is not None
@@ -256,7 +256,7 @@ class TrackerFlight(HandoffAircraft):
         while not (self.estimator.released or run.over):
             place = self._target_ne_m()
             if place is not None:
-                await self.circle(place, clockwise=True)
+                await self.circle(place, self.options.tracker_radius_m, clockwise=True)
             await self.wait(
                 self._released_or(clock.time_us + round(_RECENTRE_S * 1e6)),
                 "the decision of the other aircraft",
@@ -295,7 +295,7 @@ class TakeoverFlight(HandoffAircraft):
         gps = await GpsSwitch.find(vehicle, options.gps_off) if options.gps_fault else None
         await self.prepare()
         bank_max = min(math.radians(50.0), 0.95 * self.limits.bank_max_rad)
-        # opposite orbits: the relative pose is easiest to observe in them
+        # opposite orbits of different radius: the relative pose is easiest to observe in them
         self._guidance = OrbitGuidance(
             OrbitParameters(radius_m=options.radius_m, direction=-1, bank_max_rad=bank_max)
         )
@@ -303,7 +303,7 @@ class TakeoverFlight(HandoffAircraft):
         await vehicle.takeoff(options.own_altitude_m)
         async with self.looking() as task:
             self.begin("transit")
-            await self.circle(options.start_ne_m, clockwise=False)
+            await self.circle(options.start_ne_m, options.radius_m, clockwise=False)
             near_m = 1.3 * options.radius_m
             await self.wait(
                 lambda: run.tracking and self.level() and self.away_m(options.start_ne_m) < near_m,

@@ -2,12 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from missions.errors import PlanError
 from missions.options import MissionOptions, check_positive
 from missions.orbit.options import GpsOff
 from missions.planning.limits import FixedWingLimits, Limits
+
+_TRACKER_ORBIT: Final = 1.3
+"""Radius of the tracker's orbit over that of the first aircraft. In opposite orbits with equal rates of turn
+the relative velocity keeps its direction, and the ranges can't tell a place from its mirror image on the
+other side of it (docs/handoff.md).
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,7 +22,7 @@ class HandoffOptions(MissionOptions):
 
     Attributes:
         altitude_m: height of the first aircraft above home; the second is `separation_m` above it.
-        radius_m: of both orbits, horizontal.
+        radius_m: of the first aircraft's orbit, horizontal.
         airspeed_m_s: equivalent airspeed; None: the aircraft's default.
         target_ne_m: place of the target from home, as the operator of the second aircraft has seen it.
         start_distance_m, start_bearing_rad: place from the target at which the first aircraft loses GPS.
@@ -81,6 +87,11 @@ class HandoffOptions(MissionOptions):
             self.target_ne_m[1] + self.start_distance_m * math.sin(self.start_bearing_rad),
         )
 
+    @property
+    def tracker_radius_m(self) -> float:
+        """Of the second aircraft's orbit, horizontal."""
+        return _TRACKER_ORBIT * self.radius_m
+
     def airspeed(self, limits: FixedWingLimits) -> float:
         """Equivalent airspeed of the orbits."""
         return limits.airspeed_trim_m_s if self.airspeed_m_s is None else self.airspeed_m_s
@@ -107,14 +118,15 @@ def check_vehicle(options: HandoffOptions, limits: Limits) -> None:
             f"{least_m:.0f} m or more can; ask for `radius_m` {10.0 * math.ceil(0.1 * least_m):g}, or "
             "a lower `airspeed_m_s`"
         )
-    reach_m = max(math.hypot(*options.target_ne_m), math.hypot(*options.start_ne_m)) + options.radius_m
+    orbit_m = options.tracker_radius_m
+    reach_m = max(math.hypot(*options.target_ne_m), math.hypot(*options.start_ne_m)) + orbit_m
     if reach_m > limits.reach_m:
         raise PlanError(
             f"the orbits may be {reach_m:.0f} m from home, more than {limits.reach_m:g} m; ask for a "
             "`target_ne_m` nearer to home, or a smaller `start_distance_m`"
         )
-    if options.own_altitude_m < 0.2 * options.radius_m:
+    if options.own_altitude_m < 0.2 * orbit_m:
         raise PlanError(
-            f"from {options.own_altitude_m:g} m at {options.radius_m:g} m targets are seen too flat to "
+            f"from {options.own_altitude_m:g} m at {orbit_m:g} m targets are seen too flat to "
             "measure their places; ask for a higher `altitude_m` or a smaller `radius_m`"
         )
