@@ -9,7 +9,7 @@ from missions.options import MissionOptions, check_positive
 from missions.orbit.options import GpsOff
 from missions.planning.limits import FixedWingLimits, Limits
 
-_TRACKER_ORBIT: Final = 1.3
+_TRACKER_ORBIT: Final = 1.25
 """Radius of the tracker's orbit over that of the first aircraft. In opposite orbits with equal rates of turn
 the relative velocity keeps its direction, and the ranges can't tell a place from its mirror image on the
 other side of it (docs/handoff.md).
@@ -41,7 +41,7 @@ class HandoffOptions(MissionOptions):
 
     altitude_m: float = 95.0
     separation_m: float = 20.0
-    radius_m: float = 150.0
+    radius_m: float = 120.0
     airspeed_m_s: float | None = None
     target_ne_m: tuple[float, float] = (900.0, 200.0)
     start_distance_m: float = 700.0
