@@ -20,6 +20,8 @@ class HandoffSettings(RelativePoseSettings):
             (`other`), which reports its tracks.
         target_north_m, target_east_m: place from home at which the tracker's operator designates the target;
             None: the track nearest to the aircraft is designated.
+        converged_sigma_m: as of `relative-pose`, but larger: to approach is what makes the pose narrower, and
+            the comparison knows how wide it is.
         designate_m: a track within this distance of the place is designated.
         ground_altitude_m: pressure altitude of the ground; None: that before the aircraft is armed.
         rate_hz: of the camera.
@@ -39,6 +41,7 @@ class HandoffSettings(RelativePoseSettings):
     role: Literal["handoff", "tracker"] = "handoff"
     target_north_m: float | None = None
     target_east_m: float | None = None
+    converged_sigma_m: float = 30.0
     designate_m: float = 80.0
     ground_altitude_m: float | None = None
     rate_hz: float = 10.0
