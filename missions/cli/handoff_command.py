@@ -41,7 +41,12 @@ COMMAND: Final = MissionCommand(
             default="900,200",
             help="Where the operator has seen the target, m from home; the nearest track is designated.",
         ),
-        option("--radius", type=float, default=150.0, help="Of both orbits, m."),
+        option(
+            "--radius",
+            type=float,
+            default=150.0,
+            help="Of the first aircraft's orbit, m; the tracker's is 1.25 times as wide.",
+        ),
         option("--altitude", type=float, default=95.0, help="Of the first aircraft, above home, m."),
         option("--separation", type=float, default=20.0, help="The second flies so much higher, m."),
         option("--airspeed", type=float, help="m/s. [default: the aircraft's own]"),

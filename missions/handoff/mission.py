@@ -66,7 +66,7 @@ class HandoffMission(TeamMission[HandoffOptions, HandoffTeam]):
         return f"{summary['timeout_s']:g} s"
 
     def title(self, options: HandoffOptions) -> str:
-        return f"GPS-denied handoff, orbits of {options.radius_m:g} m"
+        return f"GPS-denied handoff, orbits of {options.radius_m:.0f} and {options.tracker_radius_m:.0f} m"
 
     def pictures(self, debriefing: Debriefing, pictures_of: PicturesOf) -> Mapping[str, bytes]:
         team = self.team_of(debriefing)

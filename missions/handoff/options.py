@@ -41,7 +41,7 @@ class HandoffOptions(MissionOptions):
 
     altitude_m: float = 95.0
     separation_m: float = 20.0
-    radius_m: float = 120.0
+    radius_m: float = 150.0
     airspeed_m_s: float | None = None
     target_ne_m: tuple[float, float] = (900.0, 200.0)
     start_distance_m: float = 700.0
