@@ -124,12 +124,12 @@ class HandoffWatch:
     def start(self) -> None:
         """Start to process messages."""
         names = sorted(self._runners[0].read_names | self._runners[1].read_names)
-        for vehicle in self._vehicles:
+        for index, vehicle in enumerate(self._vehicles):
             connection, system_id = vehicle.link.connection, vehicle.system_id
 
-            def take(frame: Frame, own: int = system_id) -> None:
+            def take(frame: Frame, index: int = index, own: int = system_id) -> None:
                 if frame.system_id == own:
-                    self._take(frame)
+                    self._take(index, frame)
 
             self._stops += [connection.listen(name, take) for name in names]
 
@@ -144,13 +144,13 @@ class HandoffWatch:
         message = designation_message(TrackDesignation(system=self._vehicles[1].system_id, track=number))
         asyncio.get_running_loop().call_soon(self._arrive, 1, message)
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, index: int, frame: Frame) -> None:
         now_us = self._vehicles[0].clock.time_us
         for to, message in self.link.due(now_us):
             # not inside this call: on a memory link the sender of the frame has not yet returned from it
             asyncio.get_running_loop().call_soon(self._arrive, to, message)
         if self.contact or frame.component_id != RANGE_RADIO_COMPONENT:
-            self._feed([vehicle.system_id for vehicle in self._vehicles].index(frame.system_id), frame)
+            self._feed(index, frame)
 
     def _feed(self, index: int, frame: Frame) -> None:
         runner = self._runners[index]
