@@ -60,7 +60,7 @@ def test_it_converges_within_30_s(kind):
 @pytest.mark.parametrize(
     "kind",
     [
-        pytest.param(ParticlePose, marks=pytest.mark.xfail(reason="189 of 200 with 30,000 at the start, 178 with 10,000")),
+        pytest.param(ParticlePose, marks=pytest.mark.xfail(reason="189 of 200 with 30,000 at the start")),
         GaussianBank,
     ],
 )
