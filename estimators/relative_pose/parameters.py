@@ -53,7 +53,7 @@ class RelativePoseParameters:
     climb_walk_m_sqrt_s: float = 1.0
     heading_walk_rad_sqrt_s: float = 0.01
     particles: int = 1000
-    start_particles: int = 30_000
+    start_particles: int = 50_000
     resample_below: float = 0.5
     jitter: float = 0.2
     components: int = 64

@@ -57,13 +57,7 @@ def test_it_converges_within_30_s(kind):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1500)
-@pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param(ParticlePose, marks=pytest.mark.xfail(reason="189 of 200 with 30,000 at the start")),
-        GaussianBank,
-    ],
-)
+@pytest.mark.parametrize("kind", KINDS)
 def test_it_converges_within_30_s_in_95_percent_of_200_starts(kind):
     times, nees = zip(*(converged_at(kind, seed, 45.0, 1000.0) for seed in range(200)), strict=True)
     assert sum(time is not None and time <= 30.0 for time in times) >= 190
