@@ -30,6 +30,7 @@ class InitialState:
         rates_frd_rad_s: body rates against the Earth (only in the air).
         rotor_rad_s: speed of every rotor; of a fixed-wing vehicle, 0 keeps the value of its [start].
         battery_remaining: charge left, 0..1.
+        battery_ah: capacity of its battery, of the same mass, 0.1..1000 Ah; None: the model's.
         actuators: commands that the actuators have followed already (only in the air); None: at rest.
         launch: how a fixed-wing vehicle is launched: "runway", "catapult" or "hand"; None: as in its
             description. With the last two it is held on the launcher until `Vehicle.launch()`.
@@ -44,6 +45,7 @@ class InitialState:
     rates_frd_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotor_rad_s: float | tuple[float, ...] = 0.0
     battery_remaining: float = 1.0
+    battery_ah: float | None = None
     actuators: tuple[float, ...] | None = None
     launch: LaunchKind | str | None = None
 
@@ -52,6 +54,8 @@ class InitialState:
             raise ValueError(f"initial height {self.height_m} m is not in 0..10000 m")
         if not 0.0 <= self.battery_remaining <= 1.0:
             raise ValueError(f"battery remaining {self.battery_remaining} is not in 0..1")
+        if self.battery_ah is not None and not 0.1 <= self.battery_ah <= 1000.0:
+            raise ValueError(f"battery_ah {self.battery_ah} Ah is not in 0.1..1000 Ah")
         if self.launch is not None and self.launch not in tuple(LaunchKind):
             raise ValueError(
                 f"launch '{self.launch}' is unknown; accepted are "
@@ -139,7 +143,7 @@ def initialise(
         scales = dict(zip(airframe.truth, airframe.truth_scale, strict=False))
         for (index, name), speed in zip(rotors, speeds, strict=True):
             fdm.set_property_value(name, speed / scales.get((index, name), 1.0))
-    set_battery(fdm, airframe, start.battery_remaining)
+    set_battery(fdm, airframe, start)
 
 
 def standing_height_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
@@ -168,9 +172,22 @@ def height_on_wheels_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
     return cg_m - lowest_m
 
 
-def set_battery(fdm: jsbsim.FGFDMExec, airframe: Airframe, remaining: float) -> None:
-    """Set the charge left, 0..1 of capacity; nothing for a vehicle without a battery."""
+def set_battery(fdm: jsbsim.FGFDMExec, airframe: Airframe, start: InitialState) -> None:
+    """Set capacity and charge of the battery; nothing for a vehicle without a battery that has the model's.
+
+    Raises:
+        AirframeError: a capacity is given, and the model's can't be changed.
+    """
     properties = dict(airframe.truth)
-    if t.BATTERY_USED_AH in properties and t.BATTERY_CAPACITY_AH in properties:
-        capacity_ah = fdm.get_property_value(properties[t.BATTERY_CAPACITY_AH])
-        fdm.set_property_value(properties[t.BATTERY_USED_AH], (1.0 - remaining) * capacity_ah)
+    name = properties.get(t.BATTERY_CAPACITY_AH)
+    if start.battery_ah is not None:
+        if name is not None:
+            fdm.set_property_value(name, start.battery_ah)
+        if name is None or fdm.get_property_value(name) != start.battery_ah:
+            raise AirframeError(
+                f"battery_ah {start.battery_ah:g} Ah: the battery of vehicle '{airframe.name}' can't be "
+                "changed; BATTERY_CAPACITY_AH of its description must be a property that can be set"
+            )
+    if t.BATTERY_USED_AH in properties and name is not None:
+        used = 1.0 - start.battery_remaining
+        fdm.set_property_value(properties[t.BATTERY_USED_AH], used * fdm.get_property_value(name))

@@ -169,7 +169,7 @@ class Vehicle:
             self.launcher = Launcher(fdm, launch, physics_rate_hz=self.physics_rate_hz)
         if start.height_m is None:
             self._settle(_SETTLE_FIXED_WING_S if fixed_wing else _SETTLE_S)
-            set_battery(fdm, self.airframe, start.battery_remaining)
+            set_battery(fdm, self.airframe, start)
         else:
             fdm.suspend_integration()  # forces of this state, then the specific force out of them
             fdm.run()

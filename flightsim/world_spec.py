@@ -15,6 +15,7 @@ from typing import Any, Final, Self
 from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
+from flightsim.initial_state import InitialState
 from flightsim.payload import (
     GroundTargetParameters,
     MagneticField,
@@ -134,6 +135,7 @@ class VehicleSpec:
         gps: its receiver, one of `flightsim.sensors.RECEIVERS`: "differential" is about as accurate as the
             receivers in the firmwares' own simulators, "standalone" as a receiver without corrections.
         sensors: all its sensors, instead of the usual ones and of `gps`; None: the usual ones.
+        battery_ah: capacity of its battery, of the same mass; None: the model's.
     """
 
     system_id: int = 1
@@ -145,6 +147,7 @@ class VehicleSpec:
     payload: PayloadParameters = field(default_factory=PayloadParameters)
     gps: str = "differential"
     sensors: SensorSuiteParameters | None = None
+    battery_ah: float | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.system_id <= MAX_VEHICLES:
@@ -153,6 +156,7 @@ class VehicleSpec:
             accepted = ", ".join(kind.value for kind in LaunchKind)
             raise ValueError(f"launch {self.launch!r} is unknown; accepted: {accepted}")
         GpsParameters.of(self.gps)
+        InitialState(battery_ah=self.battery_ah)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

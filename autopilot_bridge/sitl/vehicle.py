@@ -67,7 +67,10 @@ class SitlVehicle:
         self.specification = specification
         launch = None if specification.launch is None else LaunchKind(specification.launch)
         self.vehicle = world.add_vehicle(
-            specification.model, initial=InitialState(offset_ne_m=specification.offset_ne_m, launch=launch)
+            specification.model,
+            initial=InitialState(
+                offset_ne_m=specification.offset_ne_m, launch=launch, battery_ah=specification.battery_ah
+            ),
         )
         airframe = self.vehicle.airframe
         aircraft = airframe.kind is AirframeKind.FIXED_WING

@@ -376,7 +376,8 @@ async def _fly_waypoints(
     over = await fly_items(
         vehicle.plans.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
     )
-    notes.begin(PATTERN, clock.stamp_us)
+    if not over:  # a tag that is found on the way to the pattern ends the flight before it
+        notes.begin(PATTERN, clock.stamp_us)
 
     reached = 0
 

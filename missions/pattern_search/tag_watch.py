@@ -10,6 +10,8 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, CameraScan, read_camera_scan
 from estimators.messages import read_message
 from estimators.vision import VehicleTrack, ground_place
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.vehicle.telemetry import Position
 
 if TYPE_CHECKING:
     from autopilot_bridge.mavlink import Frame
@@ -28,18 +30,21 @@ class FoundTag:
 
     Attributes:
         exposed_us: vehicle time of the picture.
-        place_ne_m: its place by the vehicle's own attitude and position, from the origin of the local frame;
-            None: these, or the camera's geometry, were not received.
+        place: on the ground, by the vehicle's own attitude and position; None: these, or the camera's
+            geometry, were not received.
         distance_m: from the camera, by the tag's size.
     """
 
     exposed_us: int
-    place_ne_m: tuple[float, float] | None
+    place: GeodeticPosition | None
     distance_m: float
 
 
 class TagWatch:
-    """Listens to one vehicle's camera. The search begins at nine tenths of the altitude.
+    """Listens to one vehicle's camera. The search begins at nine tenths of the altitude above home.
+
+    The ground is level, at the height of home. Both are taken from GLOBAL_POSITION_INT: the origin of the
+    autopilot's local frame may be metres above or below home.
 
     Args:
         vehicle: the vehicle.
@@ -60,6 +65,7 @@ class TagWatch:
         self._altitude_m = altitude_m
         self._limit_us = None if limit_s is None else round(limit_s * 1e6)
         self._track = VehicleTrack()
+        self._frame: LocalFrame | None = None
         self._seen: dict[int, tuple[float, float, float]] = {}
         self._ended = asyncio.Event()
         self._stops: list[Callable[[], None]] = []
@@ -70,11 +76,12 @@ class TagWatch:
         self.other_tags: set[int] = set()
 
     def start(self) -> None:
-        """Start to listen."""
+        """Start to listen. The vehicle has reported its home."""
+        self._frame = LocalFrame(self._vehicle.home)
+        self._stops.append(self._vehicle.link.listen(Position, self._on_position))
         connection = self._vehicle.link.connection
         for name, take in (
-            ("ATTITUDE", self._on_pose),
-            ("LOCAL_POSITION_NED", self._on_pose),
+            ("ATTITUDE", self._on_attitude),
             ("LANDING_TARGET", self._on_detection),
             ("TUNNEL", self._on_scan),
         ):
@@ -124,23 +131,28 @@ class TagWatch:
         if self.found is not None:
             marks["search_exposed_us"] = float(self.found.exposed_us)
             marks["search_distance_m"] = self.found.distance_m
-            if self.found.place_ne_m is not None:
-                marks["search_north_m"], marks["search_east_m"] = self.found.place_ne_m
+            if self.found.place is not None:
+                commanded = self._vehicle.notes.commanded
+                frame = LocalFrame(self._vehicle.home if commanded is None else commanded.origin)
+                place = self.found.place
+                north_m, east_m, _ = frame.ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
+                marks["search_north_m"], marks["search_east_m"] = north_m, east_m
 
     # inside
 
     def _own(self, frame: "Frame", component: int) -> bool:
         return frame.system_id == self._vehicle.system_id and frame.component_id == component
 
-    def _on_pose(self, frame: "Frame") -> None:
-        if not self._own(frame, int(dialect.MAV_COMP_ID_AUTOPILOT1)):
-            return
-        message = read_message(frame)
-        self._track.handle(message)
-        if message.name != "LOCAL_POSITION_NED":
-            return
-        self._now_us = message.time_boot_ms * 1000
-        if self.began_us is None and -message.z >= _AT_ALTITUDE * self._altitude_m:
+    def _on_attitude(self, frame: "Frame") -> None:
+        if self._own(frame, int(dialect.MAV_COMP_ID_AUTOPILOT1)):
+            self._track.handle(read_message(frame))
+
+    def _on_position(self, position: Position) -> None:
+        assert self._frame is not None
+        north_m, east_m, _ = self._frame.ned_from_geodetic(position.lat_deg, position.lon_deg, position.alt_m)
+        self._track.place(position.time_us, (north_m, east_m, -position.height_m))
+        self._now_us = position.time_us
+        if self.began_us is None and position.height_m >= _AT_ALTITUDE * self._altitude_m:
             self.began_us = self._now_us
         if self.over:
             self._ended.set()
@@ -170,9 +182,14 @@ class TagWatch:
         seen = self._seen.get(scan.time_us)
         if seen is None or self.began_us is None or self.over:
             return
-        self.found = FoundTag(exposed_us=scan.time_us, place_ne_m=self._place(scan, seen), distance_m=seen[2])
+        self.found = FoundTag(exposed_us=scan.time_us, place=self._place(scan, seen), distance_m=seen[2])
         self._ended.set()
 
-    def _place(self, scan: CameraScan, seen: tuple[float, float, float]) -> tuple[float, float] | None:
+    def _place(self, scan: CameraScan, seen: tuple[float, float, float]) -> GeodeticPosition | None:
+        assert self._frame is not None
         pose = self._track.at(scan.time_us)
-        return None if pose is None else ground_place(pose, scan, seen[0], seen[1])
+        place = None if pose is None else ground_place(pose, scan, seen[0], seen[1])
+        if place is None:
+            return None
+        lat_deg, lon_deg, alt_m = self._frame.geodetic_from_ned(*place, 0.0)
+        return GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)

@@ -45,7 +45,7 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
         return ""
     phase = notes.phase(PATTERN)
     if phase is None:
-        return "the commanded path was not begun"
+        return "" if notes.cut_short else "the commanded path was not begun"
     track = flown_track(score, phase)
     if track is None:
         return NO_TRACK

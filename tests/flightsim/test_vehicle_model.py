@@ -157,6 +157,7 @@ def test_bad_rates_are_refused(rate_hz: int) -> None:
     [
         ({"height_m": -1.0}, "-1.0"),
         ({"battery_remaining": 1.2}, "1.2"),
+        ({"battery_ah": 0.0}, "battery_ah 0.0 Ah"),
         ({"roll_rad": 0.3}, "give height_m"),
         ({"vel_ned_m_s": (1.0, 0.0, 0.0)}, "give height_m"),
     ],

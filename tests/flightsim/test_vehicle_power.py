@@ -20,9 +20,13 @@ RESISTANCE_OHM, FRICTION = 0.24, 7.6e-6
 BATTERY_OHM, AVIONICS_A, CAPACITY_AH = 0.030, 0.4, 3.5
 
 
-def make(initial: InitialState | None = None) -> Vehicle:
+def make(initial: InitialState | None = None, model: str = "iris") -> Vehicle:
     return Vehicle(
-        home=Home(), environment=Environment(), seed_sequence=np.random.SeedSequence(0), initial=initial
+        model,
+        home=Home(),
+        environment=Environment(),
+        seed_sequence=np.random.SeedSequence(0),
+        initial=initial,
     )
 
 
@@ -74,6 +78,23 @@ def test_voltage_is_open_circuit_less_sag(remaining: float, cell_v: float) -> No
     current = vehicle.truth[t.BATTERY_CURRENT_A]
     assert current > 10.0
     assert vehicle.truth[t.BATTERY_VOLTAGE_V] == pytest.approx(3.0 * cell_v - BATTERY_OHM * current, abs=0.01)
+
+
+def test_a_larger_battery_of_the_same_charge_has_the_same_voltage_and_lasts_longer() -> None:
+    large, own = (
+        make(InitialState(height_m=50.0, rotor_rad_s=500.0, battery_remaining=0.5, battery_ah=capacity_ah))
+        for capacity_ah in (12.0, None)
+    )
+    for vehicle, capacity_ah in ((large, 12.0), (own, CAPACITY_AH)):
+        vehicle.step(command(0.8, 0.8, 0.8, 0.8))
+        assert vehicle.truth[t.BATTERY_CAPACITY_AH] == capacity_ah
+        assert vehicle.truth[t.BATTERY_USED_AH] == pytest.approx(0.5 * capacity_ah, abs=1e-3)
+    assert large.truth[t.BATTERY_VOLTAGE_V] == pytest.approx(own.truth[t.BATTERY_VOLTAGE_V], abs=1e-3)
+
+
+def test_a_battery_that_cannot_be_changed_is_named() -> None:
+    with pytest.raises(AirframeError, match="battery_ah 8 Ah: the battery of vehicle 'c172x'"):
+        make(InitialState(battery_ah=8.0), model="c172x")
 
 
 def test_current_balances_the_motors(hover: HoverTrim) -> None:

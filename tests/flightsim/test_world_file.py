@@ -58,6 +58,7 @@ def test_every_table_becomes_its_parameter_class(tmp_path):
         [[vehicles]]
         autopilot = "ardupilot"
         gps = "standalone"
+        battery_ah = 12.0
         sensors = {rangefinder = false, gps = {rate_hz = 10}}
 
         [[targets]]
@@ -106,6 +107,7 @@ def test_every_table_becomes_its_parameter_class(tmp_path):
                 system_id=2,
                 autopilot="ardupilot",
                 gps="standalone",
+                battery_ah=12.0,
                 sensors=SensorSuiteParameters(rangefinder=None, gps=GpsParameters(rate_hz=10)),
             ),
         ),
@@ -173,6 +175,7 @@ def test_a_model_beside_the_file_is_found_and_a_name_stays_a_name(tmp_path):
         ("vehicles = []", "needs at least one vehicle"),
         ("vehicles = [{model = 'boeing'}]", "vehicles: vehicle model 'boeing' is unknown"),
         ("vehicles = [{}, {gps = 'best'}]", "vehicles[2]: "),
+        ("vehicles = [{battery_ah = -1}]", "vehicles[1]: battery_ah -1.0 Ah is not in 0.1..1000 Ah"),
         ("vehicles = [{system_id = 2}, {}]", "system ids [2, 2] are not all different"),
         ("vehicles = [{offset_ne_m = [1]}]", "vehicles[1].offset_ne_m is [1]; accepted: a list of 2"),
         ("vehicles = [{parameters = {A = 'x'}}]", "vehicles[1].parameters.A is 'x'; accepted: a number"),

@@ -78,6 +78,9 @@ def test_a_closed_path_is_flown_with_a_rest_before_and_after_it(seed) -> None:
 
 def test_a_path_that_was_not_begun_or_not_seen_is_no_flight() -> None:
     assert path_verdict(notes_of(flown=False), along()) == "the commanded path was not begun"
+    found_before = notes_of(flown=False)
+    found_before.cut_short = True  # a search that has ended on the way to its pattern
+    assert path_verdict(found_before, along()) == ""
     blind = SimpleNamespace(estimate=None)
     assert "no position (GLOBAL_POSITION_INT) was received" in path_verdict(notes_of(), blind)
     assert path_verdict(FlightNotes(kind="multicopter"), blind) == ""  # nothing was commanded

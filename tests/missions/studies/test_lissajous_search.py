@@ -1,9 +1,11 @@
 """The study `lissajous-search`: its statistics of censored times."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from missions.studies.lissajous_search import PAPER, PATTERNS, restricted_mean_s, study, survival
+from missions.studies.lissajous_search import PAPER, PATTERNS, restricted_mean_s, study, summarise, survival
 
 
 def test_all_patterns_of_the_table_are_there():
@@ -32,3 +34,19 @@ def test_the_curve_is_that_of_kaplan_and_meier():
 
 def test_no_search_found_anything():
     assert restricted_mean_s(np.full(5, 1800.0), np.zeros(5, dtype=bool), 1800.0) == 1800.0
+
+
+def test_a_flight_that_failed_counts_with_what_it_searched():
+    rows = {
+        "found": np.array([[1.0, 1.0, 0.0, np.nan]]),
+        "search_s": np.array([[100.0, 200.0, 500.0, np.nan]]),
+        "completed": np.array([[1.0, 0.0, 0.0, np.nan]]),
+    }
+    results = SimpleNamespace(
+        cells=[{"pattern": name} for name in PATTERNS],
+        values=lambda name: np.repeat(rows[name], len(PATTERNS), axis=0),
+    )
+    entry = summarise(results)["patterns"]["L1"]
+    assert (entry["found"], entry["runs"], entry["mean_s"], entry["median_s"]) == (2, 3, 150.0, 200.0)
+    assert entry["restricted_mean_s"] == pytest.approx(100.0 + 100.0 * 2 / 3 + 1600.0 / 3, abs=1e-3)
+    assert entry["restricted_mean_ci95_s"] is None  # one search was cut short

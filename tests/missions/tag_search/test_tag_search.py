@@ -6,6 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from pymavlink import mavutil
 
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.payload import CameraView, GroundTargetParameters, Static, TargetView
@@ -17,9 +18,28 @@ from missions.options import FlightOptions, Via
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
 
+LOW_HOME_SEED = 16
+"""With this seed the autopilot's home is 1.2 m below the origin of its local frame."""
+
+
+def newest(log, name):
+    link = mavutil.mavlink_connection(str(log), dialect="all")
+    found = None
+    while (message := link.recv_match(type=name)) is not None:
+        found = message
+    return found
+
 
 def search(
-    tmp_path, name="parallel-sweep", *, place=(9.0, -6.0), tag_id=3, seen_id=3, picture=False, **changes
+    tmp_path,
+    name="parallel-sweep",
+    *,
+    place=(9.0, -6.0),
+    tag_id=3,
+    seen_id=3,
+    seed=LOW_HOME_SEED,
+    picture=False,
+    **changes,
 ):
     options = FlightOptions(
         width_m=30.0, height_m=30.0, search=True, search_time_s=90.0, tag_id=tag_id, speed_m_s=4.0, **changes
@@ -27,7 +47,7 @@ def search(
     target = GroundTargetParameters(
         motion=Static(north_m=place[0], east_m=place[1]), size_m=0.4, tag_id=seen_id
     )
-    world = replace(WorldSpec.of_team(1, seed=5), targets=(target,))
+    world = replace(WorldSpec.of_team(1, seed=seed), targets=(target,))
     world = tag_search_world(world, options, TagTarget(size_m=0.4))
     request = RunRequest(options=options, world=world, out=tmp_path / "run", picture=picture)
     return fly(find_mission(name), request)
@@ -43,10 +63,22 @@ def test_a_flight_ends_when_the_tag_is_found(tmp_path, via):
     assert (found["north_m"], found["east_m"]) == pytest.approx((9.0, -6.0), abs=1.0)
     assert result.summary["message_counts"]["TUNNEL"] == pytest.approx(found["frames"], rel=0.1)
     assert result.summary["message_counts"]["LANDING_TARGET"] >= 1
+    home = newest(result.folder / "flight.tlog", "HOME_POSITION")
+    assert home.z > 1.0  # the height of the search is that above home
     if via is Via.WAYPOINTS:
         picture = cv2.imread(str(result.folder / "tag1.png"))
         assert picture.shape == (720, 1280, 3)
         assert (picture == (0, 255, 0)).all(axis=2).any()  # the outline
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("via", list(Via))
+def test_a_tag_on_the_way_to_the_pattern_ends_the_search(tmp_path, via):
+    result = search(tmp_path, name="lissajous", place=(-3.0, 4.0), via=via, picture=True)
+    assert (result.outcome, result.reason) == ("completed", "")
+    found = result.summary["search"]
+    assert found["found"] and found["search_s"] < 10.0
+    assert found["error_m"] < 1.0
 
 
 @pytest.mark.slow
