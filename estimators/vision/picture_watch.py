@@ -51,10 +51,10 @@ class PictureWatch:
         clocks: compares the rotation in the pictures with the attitude.
     """
 
-    MESSAGES: ClassVar[tuple[str, ...]] = VehicleTrack.MESSAGES
+    MESSAGES: ClassVar[tuple[str, ...]] = ("ATTITUDE", "GLOBAL_POSITION_INT")
     REQUESTS: ClassVar[tuple[tuple[str, int, float], ...]] = (
         ("ATTITUDE", 1, 25.0),
-        ("LOCAL_POSITION_NED", 1, 10.0),
+        ("GLOBAL_POSITION_INT", 1, 10.0),
     )
     NEEDED: ClassVar[str] = "attitude"
 
@@ -71,6 +71,9 @@ class PictureWatch:
     def handle(self, message: Message) -> None:
         """Take a message of the vehicle."""
         if message.src_component != 1:
+            return
+        if message.name == "GLOBAL_POSITION_INT":  # the distance of a tag needs the height only
+            self._track.place(message.time_boot_ms * 1000, (0.0, 0.0, -1e-3 * message.relative_alt))
             return
         self._track.handle(message)
         if message.name == "ATTITUDE":

@@ -61,34 +61,28 @@ class _Samples(Generic[T]):
 
 
 class VehicleTrack:
-    """Keeps ATTITUDE and LOCAL_POSITION_NED of the last seconds, and interpolates between them.
+    """Keeps attitudes and places of the last seconds, and interpolates between them.
 
     The newest sample stands for at most `NEAR_US` after its time.
     """
-
-    MESSAGES: Final = ("ATTITUDE", "LOCAL_POSITION_NED")
 
     def __init__(self) -> None:
         self._attitudes: _Samples[Quaternion] = _Samples()
         self._places: _Samples[Vector] = _Samples()
 
     def handle(self, message: Message) -> None:
-        """Take a message (`estimators.messages`) of the autopilot. Others are ignored, and so are values that
-        are not finite.
+        """Take an ATTITUDE (`estimators.messages`) of the autopilot. Other messages are ignored, and so are
+        values that are not finite.
         """
-        name = message.name
-        if name == "ATTITUDE":
+        if message.name == "ATTITUDE":
             angles = (message.roll, message.pitch, message.yaw)
             if all(map(math.isfinite, angles)):
                 self._attitudes.add(message.time_boot_ms * 1000, from_euler(*angles))
-        elif name == "LOCAL_POSITION_NED":
-            place = (message.x, message.y, message.z)
-            if all(map(math.isfinite, place)):
-                self.place(message.time_boot_ms * 1000, place)
 
     def place(self, time_us: int, pos_ned_m: Vector) -> None:
-        """Take a place of the vehicle from elsewhere, such as GLOBAL_POSITION_INT in a frame of the
-        caller.
+        """Take a place of the vehicle, in a frame of the caller. The origin of the autopilot's local frame
+        (LOCAL_POSITION_NED) may be metres above or below the ground; GLOBAL_POSITION_INT has the height above
+        home.
         """
         self._places.add(time_us, pos_ned_m)
 
@@ -117,7 +111,7 @@ def ground_place(
         pose: of the vehicle at the exposure.
         scan: of the camera, which is fixed to the vehicle.
         angle_x_rad, angle_y_rad: right and down (LANDING_TARGET).
-        ground_down_m: the ground's level in the vehicle's local frame.
+        ground_down_m: the ground's level in the frame of the pose.
 
     Returns:
         None: the ray does not meet the ground, or the camera is on a gimbal.

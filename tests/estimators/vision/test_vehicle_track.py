@@ -34,7 +34,7 @@ def track_of(*times_ms):
     track = VehicleTrack()
     for t in times_ms:
         track.handle(message("ATTITUDE", time_boot_ms=t, roll=0.001 * t, pitch=0.0, yaw=0.0))
-        track.handle(message("LOCAL_POSITION_NED", time_boot_ms=t, x=0.01 * t, y=0.0, z=-10.0))
+        track.place(1000 * t, (0.01 * t, 0.0, -10.0))
     return track
 
 

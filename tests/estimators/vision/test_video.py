@@ -89,7 +89,9 @@ def test_a_wrong_focal_length_does_not_fit_the_height(taken, factor):
     for k, (time_us, pixels) in enumerate(taken):
         for message in (
             dialect.MAVLink_attitude_message(time_us // 1000, 0.0, 0.0, 0.1 * k, 0.0, 0.0, 0.0),
-            dialect.MAVLink_local_position_ned_message(time_us // 1000, 0.2 * k, 0.0, -6.0, 2.0, 0.0, 0.0),
+            dialect.MAVLink_global_position_int_message(
+                time_us // 1000, 473977000 + 18 * k, 85456000, 494_000, 6_000, 200, 0, 0, 0
+            ),
         ):
             (frame,) = FrameParser().feed(FrameEncoder(1, 1).encode(message))
             watch.handle(read_message(frame))
