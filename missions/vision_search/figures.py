@@ -121,10 +121,24 @@ def search_verdict(team: "VisionSearchTeam", debriefing: "Debriefing") -> str:
     """The reason, from the vehicles' reports, why a search was not flown; "" if it was."""
     search = team.search
     if not any(search.states):
-        return "the search ended without any frame of a camera"
+        return _why_no_frame([team.watch.remarks(index) for index in range(len(team.searchers))])
     if search.reason.startswith("no scan"):
         return f"the search was given up: {search.reason} (`sensor_limit_s`)"
     late = sum(searcher.late_steps for searcher in team.searchers)
     if late > _LATE_SHARE * max(sum(search.steps), 10):
         return f"the vehicles did not reach {late} of the {sum(search.steps)} places that were planned"
     return ""
+
+
+def _why_no_frame(remarks: list[dict[str, float | str]]) -> str:
+    """The reason why no frame of a camera was used, from the remarks of the vehicles' estimators."""
+
+    def count(name: str) -> int:
+        return sum(int(each.get(f"frames_{name}", 0.0)) for each in remarks)
+
+    without_pose, low = count("without_pose"), count("too_low")
+    if not without_pose and not low:
+        return "the search ended without any frame of a camera"
+    reason = "the search ended without a frame of a camera that could be used: "
+    reason += f"{without_pose} without attitude or position near their exposure, {low} too low"
+    return "; ".join([reason, *(str(each["warning"]) for each in remarks if "warning" in each)])

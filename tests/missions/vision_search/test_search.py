@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from estimators.tracking.camera_sight import CameraSight
 from estimators.vision_search import AreaEstimate, VisionSearchEstimator
 from flightsim.foundation.vectors import from_euler, product
 from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.vision_search.figures import search_verdict
 from missions.vision_search.options import LocalizeKind, SearchPlannerKind, VisionSearchOptions
 from missions.vision_search.planner import Localizer, planner_of
 from missions.vision_search.search import VisionSearch
@@ -220,3 +222,17 @@ def test_moments_stay_few():
         search.observed(0, estimate(time_us=k * 1_000_000), nowhere)
     assert 40 < len(search.moments) < 100
     assert np.all(np.diff([moment.time_us for moment in search.moments]) > 0)
+
+
+def test_why_no_frame_was_used_is_named():
+    used = {"frames_without_pose": 0.0, "frames_too_low": 0.0}
+    apart = {"frames_without_pose": 900.0, "frames_too_low": 40.0, "warning": "the clocks are 0.33 s apart"}
+    teams = (([], "any frame"), ([used], "any frame"), ([used, apart], "900 without attitude or position"))
+    for remarks, text in teams:
+        team = SimpleNamespace(
+            search=SimpleNamespace(states=[[] for _ in remarks]),
+            searchers=remarks,
+            watch=SimpleNamespace(remarks=lambda index, remarks=remarks: remarks[index]),
+        )
+        reason = search_verdict(team, None)
+        assert text in reason and ("0.33 s apart" in reason) == (apart in remarks)
