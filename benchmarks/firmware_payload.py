@@ -1,9 +1,9 @@
-"""Missions that need a camera or a survey magnetometer, on real firmware.
+"""Searches by camera on real firmware.
 
-    python -m benchmarks.firmware_payload --out FOLDER [--px4 BUILD] [--arducopter FILE] [--arduplane FILE]
-        [--firmware px4] [--vehicle copter] [--mission vision-search] [--seed 1]
+    python -m benchmarks.firmware_payload --out FOLDER [--px4 BUILD] [--arducopter FILE]
+        [--firmware px4] [--mission vision-search] [--seed 1]
 
-The simulators of PX4 and ArduPilot have no such devices. Here a process stands between a firmware and the
+The simulators of PX4 and ArduPilot have no camera. Here a process stands between a firmware and the
 mission, as a companion computer does on a vehicle. It passes all messages on, follows the true state of the
 simulated vehicle (HIL_STATE_QUATERNION of PX4's SIH, SIM_STATE of ArduPilot's SITL), carries the payload of
 `flightstack fly` along with it, and sends what its devices measure: pictures are rendered from there, and the
@@ -35,18 +35,16 @@ import numpy as np
 from autopilot_bridge.links import Link, open_link
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.payload import PayloadStation
-from benchmarks.firmware import FIRMWARES, VEHICLES, Firmware, FirmwareMissing
+from benchmarks.firmware import FIRMWARES, Firmware, FirmwareMissing
 from flightsim import truth as t
-from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.foundation.vectors import between
 from flightsim.home import Home
-from flightsim.payload import GroundTargets, Payload, magnetic_field_of
-from flightsim.payload.magnetic_spec import MagneticSpec
+from flightsim.payload import GroundTargets, Payload
 from flightsim.world_spec import WorldSpec
 from missions.cli.fly import flight_of, fly
-from missions.embedded.sitl import publish
 
+VEHICLE: Final = "copter"
 RATE_HZ: Final = 50
 STEP_US: Final = 1_000_000 // RATE_HZ
 COMPANION: Final = (1, 195)
@@ -65,12 +63,12 @@ class Case:
     """A mission with a payload.
 
     Attributes:
-        arguments: of `flightstack fly`, by vehicle.
+        arguments: of `flightstack fly`.
         bound_m: of the distance between the target that the mission names and the true one.
         world: more arguments, for the world around the vehicle.
     """
 
-    arguments: Mapping[str, tuple[str, ...]]
+    arguments: tuple[str, ...]
     bound_m: float
     world: tuple[str, ...] = ()
 
@@ -78,23 +76,12 @@ class Case:
 CASES: Final[Mapping[str, Case]] = MappingProxyType(
     {
         "parallel-sweep": Case(
-            arguments={"copter": ("parallel-sweep", "--search", "--size", "40", "--search-time", "240")},
+            arguments=("parallel-sweep", "--search", "--size", "40", "--search-time", "240"),
             bound_m=3.0,
             world=("--target-speed", "0"),
         ),
         "vision-search": Case(
-            arguments={
-                "copter": ("vision-search", "--area", "-60,-60,60,60", "--altitude", "30"),
-                "plane": ("vision-search", "--area", "-400,-400,400,400", "--tag-size", "3"),
-            },
-            bound_m=3.0,
-        ),
-        "occupancy": Case(
-            arguments={
-                "copter": ("occupancy", "--size", "600", "--altitude", "50", "--identify", "bayes"),
-                "plane": ("occupancy", "--identify", "bayes"),
-            },
-            bound_m=60.0,
+            arguments=("vision-search", "--area", "-60,-60,60,60", "--altitude", "30"), bound_m=3.0
         ),
     }
 )
@@ -175,30 +162,19 @@ class CarriedPayload:
 
     Attributes:
         world: as passed to the constructor.
-        published_map: the map of the magnetic field; None: there is none.
     """
 
     def __init__(self, world: WorldSpec, send: Any) -> None:
         self.world = world
         self._truth = np.zeros(t.TRUTH_SIZE)
-        home = world.place
-        self._truth[t.MAG_NED_GAUSS] = magnetic_field_ned_gauss(
-            home.lat_deg, home.lon_deg, home.alt_m, world.air.decimal_year
-        )
         streams = RandomStreams(world.seed)
-        field, self.published_map = world.magnetic_field, None
-        if isinstance(field, MagneticSpec):
-            field, self.published_map = magnetic_field_of(
-                field, home=home, seed=world.seed, decimal_year=world.air.decimal_year
-            )
         payload = Payload(
             world.vehicles[0].payload,
             truth=self._truth,
-            home=home,
+            home=world.place,
             physics_rate_hz=RATE_HZ,
             seeds=lambda name: streams.child("vehicle", 0, "sensor", name),
             targets=GroundTargets(world.targets, seeds=lambda index: streams.child("target", index)),
-            magnetic_field=field,
         )
         self.station = PayloadStation(payload, system_id=world.vehicles[0].system_id, send=send)
         self._before: State | None = None
@@ -308,16 +284,11 @@ def world_of(arguments: list[str], home: Home, seed: int) -> WorldSpec:
 def named_place(summary: Mapping[str, Any]) -> tuple[float, float] | None:
     """North and east of home of the target that a mission has named; None: it named none."""
     found = summary.get("search", summary)
-    for north, east in (("north_m", "east_m"), ("target_estimate_north_m", "target_estimate_east_m")):
-        if found.get(north) is not None:
-            return found[north], found[east]
-    return None
+    return None if found.get("north_m") is None else (found["north_m"], found["east_m"])
 
 
-def true_place(world: WorldSpec, magnetic: bool) -> tuple[float, float]:
-    """North and east of home of the target of a world."""
-    if magnetic:
-        return world.magnetic_targets_ne_m[0]
+def true_place(world: WorldSpec) -> tuple[float, float]:
+    """North and east of home of the target of a world, which does not move."""
     motion: Any = world.targets[0].motion
     return motion.north_m, motion.east_m
 
@@ -325,25 +296,20 @@ def true_place(world: WorldSpec, magnetic: bool) -> tuple[float, float]:
 def fly_once(build: Firmware, name: str, folder: Path, instance: int, seed: int) -> tuple[bool, str]:
     """One flight on a firmware; whether it went well, and a line about it."""
     case = CASES[name]
-    arguments = list(case.arguments[build.vehicle])
-    model = [] if build.vehicle == "copter" else ["--model", "aerosonde"]
     folder.mkdir(parents=True)
     port = _PORT + instance
     with build.running(folder / "firmware", instance=instance):
         companion = Companion(
             open_link(build.address(instance)),
             open_link(f"udpout:127.0.0.1:{port}"),
-            lambda home: world_of([*arguments, *case.world, *model], home, seed),
+            lambda home: world_of([*case.arguments, *case.world], home, seed),
         )
         companion.start()
         try:
             if not companion.ready.wait(_BOOT_S) or companion.carried is None:
                 return False, companion.failure or f"no true state was received in {_BOOT_S:g} s"
             carried = companion.carried
-            command = [sys.executable, "-m", "missions", "fly", *arguments, "--yes"]
-            if carried.published_map is not None:
-                publish(carried.published_map, folder / "map.npz")
-                command += ["--map", str(folder / "map.npz")]
+            command = [sys.executable, "-m", "missions", "fly", *case.arguments, "--yes"]
             command += ["--connect", f"udpin:127.0.0.1:{port}", "--out", str(folder / "run")]
             with (folder / "run.txt").open("wb") as output:
                 code = subprocess.run(
@@ -360,7 +326,7 @@ def fly_once(build: Firmware, name: str, folder: Path, instance: int, seed: int)
     place = named_place(summary)
     if code or place is None:
         return False, f"{summary['outcome']}: {summary['reason'] or 'no target was named'}"
-    error_m = math.dist(place, true_place(carried.world, carried.published_map is not None))
+    error_m = math.dist(place, true_place(carried.world))
     return error_m <= case.bound_m, f"{summary['outcome']}, target {error_m:.2f} m from its true place"
 
 
@@ -372,36 +338,24 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True, help="folder of the runs; it must not exist")
     parser.add_argument("--px4", type=Path, help="PX4's build folder, with bin/px4")
     parser.add_argument("--arducopter", type=Path, help="ArduPilot's arducopter, in its source tree")
-    parser.add_argument("--arduplane", type=Path, help="ArduPilot's arduplane, in its source tree")
     parser.add_argument("--firmware", action="append", choices=FIRMWARES, help="repeat; default: both")
-    parser.add_argument("--vehicle", action="append", choices=VEHICLES, help="repeat; default: both")
     parser.add_argument("--mission", action="append", choices=tuple(CASES), help="repeat; default: all")
     parser.add_argument("--seed", type=int, default=1, help="of the target's place and the devices' noise")
     chosen = parser.parse_args()
     chosen.out.mkdir(parents=True)
-    given = {
-        ("px4", "copter"): chosen.px4,
-        ("px4", "plane"): chosen.px4,
-        ("ardupilot", "copter"): chosen.arducopter,
-        ("ardupilot", "plane"): chosen.arduplane,
-    }
+    given = {"px4": chosen.px4, "ardupilot": chosen.arducopter}
     well = True
-    wanted = itertools.product(
-        chosen.firmware or FIRMWARES, chosen.vehicle or VEHICLES, chosen.mission or tuple(CASES)
-    )
-    for firmware, vehicle, name in wanted:
-        if vehicle not in CASES[name].arguments:
-            continue
+    for firmware, name in itertools.product(chosen.firmware or FIRMWARES, chosen.mission or tuple(CASES)):
         try:
-            build = Firmware.find(firmware, vehicle, given[firmware, vehicle])
+            build = Firmware.find(firmware, VEHICLE, given[firmware])
         except FirmwareMissing as missing:
             sys.stderr.write(f"left out: {missing}\n")
             continue
         began_s = time.monotonic()
-        flown, text = fly_once(build, name, chosen.out / f"{firmware}-{vehicle}-{name}", 0, chosen.seed)
+        flown, text = fly_once(build, name, chosen.out / f"{firmware}-{name}", 0, chosen.seed)
         well = well and flown
         mark = "" if flown else "NOT AS EXPECTED "
-        sys.stdout.write(f"{firmware} {vehicle} {name}: {mark}{text} ({time.monotonic() - began_s:.0f} s)\n")
+        sys.stdout.write(f"{firmware} {name}: {mark}{text} ({time.monotonic() - began_s:.0f} s)\n")
         sys.stdout.flush()
     return int(not well)
 
