@@ -5,7 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from missions.studies.lissajous_search import PAPER, PATTERNS, restricted_mean_s, study, summarise, survival
+from missions.studies.lissajous_search import (
+    PAPER,
+    PATTERNS,
+    lines_of,
+    restricted_mean_s,
+    study,
+    summarise,
+    survival,
+)
 
 
 def test_all_patterns_of_the_table_are_there():
@@ -50,3 +58,5 @@ def test_a_flight_that_failed_counts_with_what_it_searched():
     assert (entry["found"], entry["runs"], entry["mean_s"], entry["median_s"]) == (2, 3, 150.0, 200.0)
     assert entry["restricted_mean_s"] == pytest.approx(100.0 + 100.0 * 2 / 3 + 1600.0 / 3, abs=1e-3)
     assert entry["restricted_mean_ci95_s"] is None  # one search was cut short
+    assert entry["minus_parallel_sweep_s"] == 0.0  # the same rows; pairs with a search cut short are left out
+    assert any(line.startswith("L1 ") for line in lines_of(results))
