@@ -1,11 +1,10 @@
 """Onboard estimators, and the logs that they can be fed from.
 
-from estimators import comparisons, open_log, replay
+    from estimators import comparisons, open_log, replay
 
-log = open_log("flight.tlog")
-for runner in replay(log, "attitude").fleet.runners.values():
-    print(comparisons([log], runner))
-
+    log = open_log("flight.tlog")
+    runners = replay(log, "attitude").fleet.runners.values()
+    found = [comparisons([log], runner) for runner in runners]
 """
 
 from typing import TYPE_CHECKING, Final

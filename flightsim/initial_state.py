@@ -173,10 +173,10 @@ def height_on_wheels_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
 
 
 def set_battery(fdm: jsbsim.FGFDMExec, airframe: Airframe, start: InitialState) -> None:
-    """Set capacity and charge of the battery; nothing for a vehicle without a battery that has the model's.
+    """Set capacity and charge of the battery. A vehicle without one has nothing to set.
 
     Raises:
-        AirframeError: a capacity is given, and the model's can't be changed.
+        AirframeError: a capacity is given, and the vehicle has none that can be changed.
     """
     properties = dict(airframe.truth)
     name = properties.get(t.BATTERY_CAPACITY_AH)

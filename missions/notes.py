@@ -62,7 +62,8 @@ class FlightNotes:
         link_losses: times at which the link was lost and regained.
         lost_link: the autopilot's reaction to the loss of its ground station, as text; "": not known.
         reached: items of a mission file (index from 0) and the times at which they were reached, in order.
-        cut_short: whether the user's time limit ended the mission before all was flown.
+        cut_short: whether the mission ended before all was flown, by the user's time limit or with its target
+            found.
         marks: named times and figures that the mission stores for its own score.
     """
 

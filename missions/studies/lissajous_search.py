@@ -215,9 +215,9 @@ def _pattern(results: Results, name: str) -> dict[str, Any]:
         times, missed = survival(time_s, found)
         below = np.flatnonzero(missed <= 0.5)
         entry["median_s"] = _rounded(float(times[below[0]])) if len(below) else None
-    slower = paired_difference(_restricted(results, name), _restricted(results, _BASELINE))
-    entry["minus_parallel_sweep_s"] = _rounded(slower.mean)
-    entry["minus_parallel_sweep_ci95_s"] = [_rounded(value) for value in slower.ci95]
+    gap = paired_difference(_restricted(results, name), _restricted(results, _BASELINE))
+    entry["minus_parallel_sweep_s"] = _rounded(gap.mean)
+    entry["minus_parallel_sweep_ci95_s"] = [_rounded(value) for value in gap.ci95]
     paper_found, mean_s, sd_s = PAPER[name]
     low, high = rate_of(paper_found, _PAPER_RUNS).ci95
     entry["paper"] = {
