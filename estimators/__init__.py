@@ -1,5 +1,7 @@
 """Onboard estimators, and the logs that they can be fed from.
 
+A log goes through an estimator, and is compared with what the autopilot or the truth reports:
+
     from estimators import comparisons, open_log, replay
 
     log = open_log("flight.tlog")
