@@ -10,8 +10,8 @@ simulated vehicle (HIL_STATE_QUATERNION of PX4's SIH, SIM_STATE of ArduPilot's S
 detector reads them. The mission is `flightstack fly --connect` as a user flies it, in real time; it has the
 firmware's messages and the devices', and not the true state.
 
-Prints a line for each flight. FOLDER gets the run folders. Exit code 1: a mission failed, or its target is
-farther from the true place than the bound.
+Each mission is flown twice in one session of a firmware's process. Prints a line for each flight. FOLDER gets
+the run folders. Exit code 1: a mission failed, or its target is farther from the true place than the bound.
 """
 
 import argparse
@@ -24,7 +24,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -45,6 +45,8 @@ from flightsim.world_spec import WorldSpec
 from missions.cli.fly import flight_of, fly
 
 VEHICLE: Final = "copter"
+FLIGHTS: Final = 2
+"""In one session of a firmware's process."""
 RATE_HZ: Final = 50
 STEP_US: Final = 1_000_000 // RATE_HZ
 COMPANION: Final = (1, 195)
@@ -293,40 +295,46 @@ def true_place(world: WorldSpec) -> tuple[float, float]:
     return motion.north_m, motion.east_m
 
 
-def fly_once(build: Firmware, name: str, folder: Path, instance: int, seed: int) -> tuple[bool, str]:
-    """One flight on a firmware; whether it went well, and a line about it."""
+def fly_session(build: Firmware, name: str, folder: Path, seed: int) -> Iterator[tuple[bool, str]]:
+    """Flights in one session of a firmware's process; whether each went well, and a line about it."""
     case = CASES[name]
     folder.mkdir(parents=True)
-    port = _PORT + instance
-    with build.running(folder / "firmware", instance=instance):
+    with build.running(folder / "firmware"):
         companion = Companion(
-            open_link(build.address(instance)),
-            open_link(f"udpout:127.0.0.1:{port}"),
+            open_link(build.address(0)),
+            open_link(f"udpout:127.0.0.1:{_PORT}"),
             lambda home: world_of([*case.arguments, *case.world], home, seed),
         )
         companion.start()
         try:
             if not companion.ready.wait(_BOOT_S) or companion.carried is None:
-                return False, companion.failure or f"no true state was received in {_BOOT_S:g} s"
-            carried = companion.carried
-            command = [sys.executable, "-m", "missions", "fly", *case.arguments, "--yes"]
-            command += ["--connect", f"udpin:127.0.0.1:{port}", "--out", str(folder / "run")]
-            with (folder / "run.txt").open("wb") as output:
-                code = subprocess.run(
-                    command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, timeout=_FLIGHT_S
-                ).returncode
+                yield False, companion.failure or f"no true state was received in {_BOOT_S:g} s"
+                return
+            place = true_place(companion.carried.world)
+            for flight in range(1, FLIGHTS + 1):
+                result = fly_once(case, folder / f"run{flight}", place)
+                yield (False, companion.failure) if companion.failure else result
         finally:
             companion.stop()
-    if companion.failure:
-        return False, companion.failure
-    summary_file = folder / "run" / "summary.json"
+
+
+def fly_once(case: Case, run: Path, true_ne_m: tuple[float, float]) -> tuple[bool, str]:
+    """One flight; whether it went well, and a line about it."""
+    command = [sys.executable, "-m", "missions", "fly", *case.arguments, "--yes"]
+    command += ["--connect", f"udpin:127.0.0.1:{_PORT}", "--out", str(run)]
+    said = run.with_suffix(".txt")
+    with said.open("wb") as output:
+        code = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, timeout=_FLIGHT_S
+        ).returncode
+    summary_file = run / "summary.json"
     if not summary_file.exists():
-        return False, f"exit code {code}; see {folder / 'run.txt'}"
+        return False, f"exit code {code}; see {said}"
     summary = json.loads(summary_file.read_text(encoding="utf-8"))
     place = named_place(summary)
     if code or place is None:
         return False, f"{summary['outcome']}: {summary['reason'] or 'no target was named'}"
-    error_m = math.dist(place, true_place(carried.world))
+    error_m = math.dist(place, true_ne_m)
     return error_m <= case.bound_m, f"{summary['outcome']}, target {error_m:.2f} m from its true place"
 
 
@@ -351,12 +359,12 @@ def main() -> int:
         except FirmwareMissing as missing:
             sys.stderr.write(f"left out: {missing}\n")
             continue
-        began_s = time.monotonic()
-        flown, text = fly_once(build, name, chosen.out / f"{firmware}-{name}", 0, chosen.seed)
-        well = well and flown
-        mark = "" if flown else "NOT AS EXPECTED "
-        sys.stdout.write(f"{firmware} {name}: {mark}{text} ({time.monotonic() - began_s:.0f} s)\n")
-        sys.stdout.flush()
+        flights = fly_session(build, name, chosen.out / f"{firmware}-{name}", chosen.seed)
+        for number, (flown, text) in enumerate(flights, 1):
+            well = well and flown
+            mark = "" if flown else "NOT AS EXPECTED "
+            sys.stdout.write(f"{firmware} {name} flight {number}: {mark}{text}\n")
+            sys.stdout.flush()
     return int(not well)
 
 
