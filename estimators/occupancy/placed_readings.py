@@ -1,7 +1,8 @@
 """Assigns places to the readings of a survey magnetometer.
 
 Positions and readings come in messages of different components at different times. Both carry vehicle time,
-and the place of a reading is interpolated between the two positions around it.
+and the place of a reading is interpolated between the two positions around it. A reading may arrive after
+later positions: on a vehicle it comes from another computer, and positions may come 50 times a second.
 """
 
 from collections import deque
@@ -14,6 +15,9 @@ _WAITING: Final = 100  # largest number of waiting readings: ten seconds of an o
 _STRONGEST_NT: Final = 200_000.0  # three times the Earth's field at its poles
 _STUCK_READINGS: Final = 30  # equal ones in a row: noise makes no two of ten a second equal for so long
 _GAP_US: Final = 2_000_000  # longest time between two positions; longer gaps are not interpolated
+_KEPT_US: Final = 2_000_000  # positions are kept so long, for readings that arrive late
+
+_Position = tuple[int, float, float, float]  # vehicle time in us; north, east, height in m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +63,7 @@ class ReadingPlacer:
     """Assigns places to readings; no I/O.
 
     Attributes:
-        dropped: number of readings without a position.
+        dropped: number of readings without a position, or more than 2 s later than one.
     """
 
     def __init__(self, frame: LocalFrame) -> None:
@@ -71,7 +75,7 @@ class ReadingPlacer:
         self.dropped = 0
         self._frame = frame
         self._waiting: deque[tuple[int, float]] = deque()
-        self._last: tuple[int, float, float, float] | None = None
+        self._positions: deque[_Position] = deque()
 
     def add_reading(self, time_us: int, total_nt: float) -> None:
         """Add a reading; it waits for the next position."""
@@ -87,17 +91,21 @@ class ReadingPlacer:
             time_us: vehicle time of the position.
             lat_deg, lon_deg, alt_m: WGS84, above mean sea level.
         """
-        north_m, east_m, down_m = self._frame.ned_from_geodetic(lat_deg, lon_deg, alt_m)
-        last, new = self._last, (time_us, north_m, east_m, -down_m)
-        if last is not None and time_us <= last[0]:
+        positions = self._positions
+        if positions and time_us <= positions[-1][0]:
             return []
-        self._last = new
+        north_m, east_m, down_m = self._frame.ned_from_geodetic(lat_deg, lon_deg, alt_m)
+        positions.append((time_us, north_m, east_m, -down_m))
+        while len(positions) > 2 and positions[1][0] <= time_us - _KEPT_US:
+            positions.popleft()
         placed = []
         while self._waiting and self._waiting[0][0] <= time_us:
             taken_us, total_nt = self._waiting.popleft()
-            if last is None or taken_us < last[0] or new[0] - last[0] > _GAP_US:
+            around = self._around(taken_us)
+            if around is None:
                 self.dropped += 1
                 continue
+            last, new = around
             share = (taken_us - last[0]) / (new[0] - last[0])
             north, east, height = (a + share * (b - a) for a, b in zip(last[1:], new[1:], strict=True))
             placed.append(
@@ -106,3 +114,14 @@ class ReadingPlacer:
                 )
             )
         return placed
+
+    def _around(self, taken_us: int) -> tuple[_Position, _Position] | None:
+        """The positions before and after a time, which is not later than the newest one; None: there are
+        none, or they are too far apart.
+        """
+        new = None
+        for position in reversed(self._positions):
+            if new is not None and position[0] <= taken_us:
+                return None if new[0] - position[0] > _GAP_US else (position, new)
+            new = position
+        return None

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["HandoffTruth", "handoff_figures", "handoff_truth", "handoff_verdict"]
 
 Array = NDArray[np.float64]
-
-_TRUTH: Final = "HIL_STATE_QUATERNION"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,7 +62,7 @@ class HandoffTruth:
 
 def handoff_truth(records: "FlightRecords", system_ids: Sequence[int]) -> HandoffTruth | None:
     """The truth in the records; None without it."""
-    tables = [records.table(_TRUTH, system_id) for system_id in system_ids]
+    tables = [records.truth(system_id) for system_id in system_ids]
     if any(len(table) < 2 for table in tables):
         return None
     own = tables[0]

@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 CUTOFF_M: Final = 10.0
 """Cut-off of OSPA and GOSPA."""
 
-_TRUTH: Final = "HIL_STATE_QUATERNION"
 _LATE_SHARE: Final = 0.1
 
 
@@ -53,11 +52,11 @@ class SearchScore:
 
 def true_targets(records: "FlightRecords", frame: LocalFrame) -> list[tuple[Array, Array]]:
     """Times (us) and places (n, 2) of each true target, from the truth in the log; empty: there is none."""
-    table = records.table(_TRUTH, TARGET_SYSTEM)
+    table = records.truth(TARGET_SYSTEM)
     if not len(table):
         return []
     found, component = [], 1
-    while len(own := records.table(_TRUTH, TARGET_SYSTEM, component)):
+    while len(own := records.truth(TARGET_SYSTEM, component)):
         per_lat, per_lon = frame.metres_per_degree
         places = np.column_stack(
             (
@@ -77,7 +76,7 @@ def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchSc
     if origin is None or not states:
         return None
     truth = true_targets(debriefing.records, LocalFrame(origin))
-    if not truth and not debriefing.records.table(_TRUTH, debriefing.flights[0][0].system_id).size:
+    if not truth and not debriefing.records.truth(debriefing.flights[0][0].system_id).size:
         return None
     match_m = team.watch.belief.parameters.found_distance_m
     places = np.empty((len(states), len(truth), 2))

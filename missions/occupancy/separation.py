@@ -21,7 +21,7 @@ def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float
     tracks: list[tuple[Array, Array]] = []
     origin: GeodeticPosition | None = None
     for system_id in system_ids:
-        table = records.table("HIL_STATE_QUATERNION", system_id)
+        table = records.truth(system_id)
         if len(table) < 2:
             return None
         if origin is None:

@@ -22,8 +22,6 @@ ORBIT: Final = "orbit"
 TARGET_SYSTEM: Final = 251
 """MAVLink system id of the simulated targets' truth; the first target is component 1."""
 
-_TRUTH: Final = "HIL_STATE_QUATERNION"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitTruth:
@@ -53,8 +51,8 @@ class OrbitTruth:
 
 def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
     """The true orbit from the truth frames of a vehicle and of the first target; None without them."""
-    own = records.table(_TRUTH, system_id)
-    target = records.table(_TRUTH, TARGET_SYSTEM, 1)
+    own = records.truth(system_id)
+    target = records.truth(TARGET_SYSTEM, 1)
     if len(own) < 2 or len(target) < 2:
         return None
     origin = GeodeticPosition(

@@ -71,6 +71,17 @@ class FlightRecords:
         tables = [decode_records(self._data, index.starts[index.streams == n], found) for n in streams]
         return np.concatenate(tables) if tables else np.empty(0, dtype=record_dtype(found))
 
+    def truth(self, system_id: int, component_id: int | None = None) -> NDArray[np.void]:
+        """HIL_STATE_QUATERNION of a system: what is known of its true state, with its time.
+
+        PX4's own simulator (SIH) sends these with `time_usec` 0: states without any time are left out.
+
+        Args:
+            component_id: sender; None: any component of the system, one after the other.
+        """
+        table = self.table("HIL_STATE_QUATERNION", system_id, component_id)
+        return table if table["time_usec"].any() else table[:0]
+
 
 class FlightRecorder:
     """Writes the frames of all connections, and the truth, to the log.

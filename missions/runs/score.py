@@ -95,7 +95,7 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
     """Score one vehicle's flight."""
     system_id = notes.system_id
     commanded = notes.commanded
-    truth_table, truth_bad = _usable(records.table("HIL_STATE_QUATERNION", system_id), _TRUTH_ATTITUDE)
+    truth_table, truth_bad = _usable(records.truth(system_id), _TRUTH_ATTITUDE)
     attitude, attitude_bad = _usable(records.table("ATTITUDE", system_id, 1), _EULER_ANGLES)
     target, target_bad = _usable(records.table("ATTITUDE_TARGET", system_id, 1), _TARGET_ATTITUDE)
     truth_table = _in_time_order(truth_table, "time_usec")

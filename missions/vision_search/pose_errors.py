@@ -19,7 +19,6 @@ __all__ = ["PoseErrorFigures", "pose_errors"]
 Array = NDArray[np.float64]
 PoseErrorFigures = dict[str, float]
 
-_TRUTH: Final = "HIL_STATE_QUATERNION"
 _AUTOPILOT: Final = 1
 _STEP_S: Final = 0.25
 _LEAST: Final = 40  # samples
@@ -41,7 +40,7 @@ def pose_errors(
         forward_m, right_m, height_m, yaw_rad, pitch_rad, roll_rad; place_time_s and attitude_time_s: the
         times after which the autocorrelation of the errors has fallen to 1/e, the mean of the axes.
     """
-    truth = records.table(_TRUTH, system_id)
+    truth = records.truth(system_id)
     attitude = records.table("ATTITUDE", system_id, _AUTOPILOT)
     position = records.table("GLOBAL_POSITION_INT", system_id, _AUTOPILOT)
     times = np.arange(span_us[0], span_us[1], _STEP_S * 1e6)

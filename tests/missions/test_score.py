@@ -152,6 +152,21 @@ def test_without_truth_the_estimate_is_scored():
     assert result.max_attitude_error_deg is None
 
 
+def test_a_truth_without_its_time_is_not_used():
+    """PX4's own simulator sends it so; on a link that carries it the flight counted as one of no distance."""
+    untimed = [
+        FrameEncoder(1, 1).encode(
+            dialect.MAVLink_hil_state_quaternion_message(
+                0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 473_977_400, 85_455_900, 489_400,
+                0, 0, 0, 0, 0, 0, 0, 0,
+            )
+        )
+    ] * 50  # fmt: skip
+    result = score(*make_flight(truth=False, more=untimed))
+    assert result.reference == "estimate"
+    assert result.distance_m == pytest.approx(110.0, abs=0.5)
+
+
 def test_nothing_recorded_scores_nothing():
     result = score(FlightRecords.of_frames(()), FlightNotes(system_id=1))
     assert result.path_rms_error_m is None

@@ -1,4 +1,4 @@
-"""The camera that is carried along with a firmware's simulated vehicle."""
+"""The devices that are carried along with a firmware's simulated vehicle."""
 
 import math
 
@@ -11,9 +11,9 @@ from benchmarks.firmware_payload import (
     CarriedPayload,
     State,
     VehicleTime,
-    named_place,
+    named_places,
     state_of,
-    true_place,
+    true_places,
     world_of,
 )
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -28,13 +28,8 @@ def frame_of(message):
     return frame
 
 
-def test_the_tag_below_the_vehicle_is_reported_at_the_times_of_the_firmware():
-    case = CASES["parallel-sweep"]
-    world = world_of([*case.arguments, *case.world], HOME, 1)
-    sent = []
-    carried = CarriedPayload(world, sent.append)
-    north_m, east_m = true_place(world)
-    lat_deg, lon_deg, alt_m = FRAME.geodetic_from_ned(north_m, east_m, -10.0)
+def hold(carried, north_m, east_m, *, height_m):
+    lat_deg, lon_deg, alt_m = FRAME.geodetic_from_ned(north_m, east_m, -height_m)
     for k in range(60):
         carried.follow(
             State(
@@ -47,11 +42,35 @@ def test_the_tag_below_the_vehicle_is_reported_at_the_times_of_the_firmware():
                 rates_frd_rad_s=(0.0, 0.0, 0.0),
             )
         )
+
+
+def test_the_tag_below_the_vehicle_is_reported_at_the_times_of_the_firmware():
+    case = CASES["parallel-sweep"]
+    world = world_of([*case.arguments["copter"], *case.world], HOME, 1)
+    sent = []
+    carried = CarriedPayload(world, sent.append)
+    ((north_m, east_m),) = true_places(world)
+    hold(carried, north_m, east_m, height_m=10.0)
     messages = [decode(frame) for frame in FrameParser().feed(b"".join(sent))]
     tags = [message for message in messages if message.get_type() == "LANDING_TARGET"]
     assert len(tags) >= 5
     assert all(math.hypot(tag.angle_x, tag.angle_y) < 0.05 for tag in tags)
     assert all(7_000_000 < tag.time_usec < 8_300_000 for tag in tags)
+
+
+@pytest.mark.parametrize("vehicle", ["copter", "plane"])
+def test_the_magnetometer_measures_the_target_below_it_beside_the_published_map(vehicle):
+    case = CASES["occupancy"]
+    world = world_of([*case.arguments[vehicle], *case.world], HOME, 1)
+    sent = []
+    carried = CarriedPayload(world, sent.append)
+    north_m, east_m = true_places(world)[0]
+    hold(carried, north_m, east_m, height_m=80.0)
+    messages = [decode(frame) for frame in FrameParser().feed(b"".join(sent))]
+    readings = [message.value for message in messages if message.get_type() == "NAMED_VALUE_FLOAT"]
+    assert len(readings) >= 5
+    map_nt = carried.published_map.total_at_nt(north_m, east_m)
+    assert all(abs(reading - map_nt - 30.0) < 10.0 for reading in readings)
 
 
 @pytest.mark.parametrize("firmware", ["px4", "ardupilot"])
@@ -76,7 +95,11 @@ def test_the_true_state_of_both_firmwares_has_the_time_of_the_vehicles_messages(
     assert 5_000_000 <= state.time_us < 6_000_000
 
 
-def test_the_place_of_the_target_is_that_of_the_search():
-    assert named_place({"search": {"north_m": 1.0, "east_m": 2.0}, "north_m": None}) == (1.0, 2.0)
-    assert named_place({"north_m": 3.0, "east_m": 4.0}) == (3.0, 4.0)
-    assert named_place({"north_m": None, "east_m": None}) is None
+def test_the_named_places_are_those_of_the_search_or_of_the_list():
+    assert named_places({"search": {"north_m": 1.0, "east_m": 2.0}, "north_m": None}) == [(1.0, 2.0)]
+    assert named_places({"north_m": 3.0, "east_m": 4.0}) == [(3.0, 4.0)]
+    assert named_places({"north_m": None, "east_m": None}) == []
+    assert named_places({"target_estimate_m": {"north": 5.0, "east": 6.0}}) == [(5.0, 6.0)]
+    assert named_places({"target_estimate_m": None}) == []
+    listed = {"anomalies": [{"north_m": 1.0, "east_m": 2.0}, {"north_m": 3.0, "east_m": 4.0}]}
+    assert named_places(listed) == [(1.0, 2.0), (3.0, 4.0)]

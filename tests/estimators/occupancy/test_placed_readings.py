@@ -47,6 +47,32 @@ def test_a_reading_before_the_first_position_is_dropped():
     assert placer.dropped == 1
 
 
+@given(st.integers(0, 1_700_000), st.sampled_from([20_000, 100_000, 250_000]))
+def test_a_reading_that_arrives_after_later_positions_gets_its_place(delay_us, interval_us):
+    placer = ReadingPlacer(FRAME)
+    placed = []
+    readings = list(range(5_000, 6_000_000, 130_000))
+    for now_us in range(0, 10_000_000, interval_us):
+        while readings and readings[0] + delay_us <= now_us:
+            placer.add_reading(readings.pop(0), 48_000.0)
+        placed += placer.add_position(*position(now_us, 25e-6 * now_us, 0.0))
+    assert placer.dropped == 0
+    assert [reading.time_us for reading in placed] == list(range(5_000, 6_000_000, 130_000))
+    for reading in placed:
+        assert reading.north_m == pytest.approx(25e-6 * reading.time_us, abs=1e-4)
+
+
+def test_a_reading_more_than_two_seconds_late_is_dropped():
+    placer = ReadingPlacer(FRAME)
+    for k in range(61):
+        placer.add_position(*position(100_000 * k, float(k), 0.0))
+    placer.add_reading(3_050_000, 1.0)
+    placer.add_reading(4_250_000, 2.0)
+    (reading,) = placer.add_position(*position(6_100_000, 61.0, 0.0))
+    assert (reading.north_m, reading.total_nt) == (pytest.approx(42.5, abs=1e-6), 2.0)
+    assert placer.dropped == 1
+
+
 def test_nothing_is_interpolated_across_a_gap():
     placer = ReadingPlacer(FRAME)
     placer.add_position(*position(0, 0.0, 0.0))
