@@ -105,7 +105,7 @@ class LinePlan:
             along, across = line.along_across_m(north_m, east_m)
             turned = np.abs(np.remainder(course - line.course_rad + math.pi / 2.0, math.pi) - math.pi / 2.0)
             on = (along >= 0.0) & (along <= line.length_m) & (np.abs(across) <= self.corridor_m)
-            found[_longest(on & (turned < _COURSE_RAD) & (found < 0))] = number
+            found[_longest(on & (turned < _COURSE_RAD) & (found < 0), along)] = number
         return found
 
     def to_csv(self) -> str:
@@ -198,10 +198,12 @@ def _with_ties(lines: list[SurveyLine]) -> tuple[SurveyLine, ...]:
     return tuple(found)
 
 
-def _longest(on: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Places of the longest run of True: a line counts once, also where the way in crosses its corridor."""
+def _longest(on: NDArray[np.bool_], along: Array) -> NDArray[np.int64]:
+    """Places of the run of True that covers most of a line: a line counts once, also where the way in crosses
+    its corridor, and where the vehicle has stood on it before the takeoff.
+    """
     within = np.nonzero(on)[0]
     if not len(within):
         return within
     runs = np.split(within, np.nonzero(np.diff(within) > 1)[0] + 1)
-    return max(runs, key=len)
+    return max(runs, key=lambda run: float(np.ptp(along[run])))

@@ -101,7 +101,8 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
     truth_table = _in_time_order(truth_table, "time_usec")
     attitude = _in_time_order(attitude, "time_boot_ms")
     target = _in_time_order(target, "time_boot_ms")
-    estimate_table = _in_time_order(records.table("GLOBAL_POSITION_INT", system_id, 1), "time_boot_ms")
+    estimate_table = _with_place(records.table("GLOBAL_POSITION_INT", system_id, 1))
+    estimate_table = _in_time_order(estimate_table, "time_boot_ms")
     origin = commanded.origin if commanded else _first_place(truth_table, estimate_table)
     absolute = _track(truth_table, origin, "time_usec", 1e-6) if origin is not None else None
     estimate = _estimate_track(estimate_table, origin, attitude) if origin is not None else None
@@ -178,6 +179,11 @@ def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np
     if len(names) == 1:
         kept &= np.linalg.norm(np.where(kept[:, None], values, 0.0), axis=1) > _SHORTEST_QUATERNION
     return table[kept], int(np.count_nonzero(~kept))
+
+
+def _with_place(table: NDArray[np.void]) -> NDArray[np.void]:
+    """Positions, without those at 0, 0: ArduPilot sends these until it has a position."""
+    return table[(table["lat"] != 0) | (table["lon"] != 0)]
 
 
 def _in_time_order(table: NDArray[np.void], field: str) -> NDArray[np.void]:

@@ -75,7 +75,9 @@ def test_a_missed_waypoint_that_is_crossed_later_spoils_no_other():
     assert waypoint_misses_m(commanded, eight[:1]) == ()
 
 
-def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True, more=()):
+def make_flight(
+    offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True, before=(), more=()
+):
     """A flight 10 m up along a straight path.
 
     It is off the commanded path by `offset_ned` while flying, and the autopilot's frame is off the true one
@@ -120,7 +122,7 @@ def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=
     notes.commanded = CommandedPath(
         origin=HOME, points_ned_m=straight_path(), waypoints_ned_m=np.zeros((0, 3)), acceptance_m=2.0
     )
-    return FlightRecords.of_frames([*frames, *more]), notes
+    return FlightRecords.of_frames([*before, *frames, *more]), notes
 
 
 def test_a_perfect_flight_scores_zero():
@@ -165,6 +167,15 @@ def test_a_truth_without_its_time_is_not_used():
     result = score(*make_flight(truth=False, more=untimed))
     assert result.reference == "estimate"
     assert result.distance_m == pytest.approx(110.0, abs=0.5)
+
+
+def test_a_position_at_0_0_is_no_place():
+    """ArduPilot reports it until it has a position; the picture of a flight had it thousands of km away."""
+    early = FrameEncoder(1, 1).encode(
+        dialect.MAVLink_global_position_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0xFFFF)
+    )
+    result = score(*make_flight(truth=False, before=[early]))
+    assert np.abs(result.estimate.pos_ned_m).max() < 200.0
 
 
 def test_nothing_recorded_scores_nothing():

@@ -199,6 +199,17 @@ def test_files_can_be_read_again_and_the_map_is_a_map(tmp_path):
     assert survey_files(processed(flown(1, levels_nt=np.zeros(11)), published())) == files
 
 
+def test_a_vehicle_that_stood_on_a_line_before_the_takeoff_measures_it_in_flight():
+    """Home is on the middle line of an area; the course of a vehicle at rest is zero, as that of the line."""
+    line = SurveyLine(name="L1", kind=LineKind.LINE, start_ne_m=(-300.0, 0.0), end_ne_m=(300.0, 0.0))
+    flown = np.arange(-400.0, 400.0, 2.2)
+    north, east = np.concatenate((np.zeros(900), [200.0, 300.0], flown)), np.zeros(902 + len(flown))
+    east[900:902] = 200.0
+    on = LinePlan(lines=(line,)).line_of(north, east) == 0
+    assert not on[:902].any()
+    assert np.ptp(north[on]) > 595.0
+
+
 def test_lines_are_found_in_a_track():
     readings = flown(1)
     # every 30 s of turn are missing: the track jumps from a line to the next
