@@ -316,10 +316,10 @@ def world_of(arguments: list[str], home: Home, seed: int) -> WorldSpec:
 
 def named_places(summary: Mapping[str, Any]) -> list[tuple[float, float]]:
     """North and east of home of the targets that a mission names or lists."""
-    blocks = [summary.get("search", summary), *summary.get("anomalies", ())]
-    places = [(block.get("north_m"), block.get("east_m")) for block in blocks]
-    estimate = summary.get("target_estimate_m") or {}
-    places.append((estimate.get("north"), estimate.get("east")))
+    block = summary.get("search", summary)
+    places = [(block.get("north_m"), block.get("east_m"))]
+    for other in (summary.get("target_estimate_m") or {}, *summary.get("anomalies", ())):
+        places.append((other.get("north"), other.get("east")))
     return [(north, east) for north, east in places if north is not None and east is not None]
 
 

@@ -101,5 +101,5 @@ def test_the_named_places_are_those_of_the_search_or_of_the_list():
     assert named_places({"north_m": None, "east_m": None}) == []
     assert named_places({"target_estimate_m": {"north": 5.0, "east": 6.0}}) == [(5.0, 6.0)]
     assert named_places({"target_estimate_m": None}) == []
-    listed = {"anomalies": [{"north_m": 1.0, "east_m": 2.0}, {"north_m": 3.0, "east_m": 4.0}]}
+    listed = {"anomalies": [{"north": 1.0, "east": 2.0}, {"north": 3.0, "east": 4.0}]}
     assert named_places(listed) == [(1.0, 2.0), (3.0, 4.0)]
