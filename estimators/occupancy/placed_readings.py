@@ -63,7 +63,8 @@ class ReadingPlacer:
     """Assigns places to readings; no I/O.
 
     Attributes:
-        dropped: number of readings without a position, or more than 2 s later than one.
+        dropped: number of readings without a position before and after them, or that arrived more than 2 s
+            late.
     """
 
     def __init__(self, frame: LocalFrame) -> None:
