@@ -1,10 +1,11 @@
 """Time of one measurement of the particle filter of `magnetic-identification`, beside plain NumPy.
 
-    python -m benchmarks.magnetic_identification [--particles 10000] [--repeats 200]
+    python -m benchmarks.magnetic_identification [--particles 10000] [--passes 60]
 
 Both do the same: draw the noise of the control, move, weigh with the Kalman filter of each particle,
-normalize, and resample when the effective number is low. They alternate in one process; the figures are the
-medians and their ratio.
+normalize, and resample when the effective number is low. They fly passes over a target, each from its first
+measurement on, and alternate measurement by measurement in one process. The figures are the medians of the
+passes' means, so resampling has its usual share, and their ratio.
 """
 
 import argparse
@@ -36,7 +37,7 @@ class PlainFilter:
     """The same filter in NumPy."""
 
     def __init__(self, of: GaussianClass, particles: Array, weights: Array, rng: np.random.Generator) -> None:
-        self.rows, self.weights, self.rng, self.of = particles.T.copy(), weights.copy(), rng, of
+        self.rows, self.weights, self.rng, self.of = particles.copy(), weights.copy(), rng, of
 
     def step(self, residual_nt: float) -> None:
         """One measurement."""
@@ -76,14 +77,31 @@ class PlainFilter:
 
 
 def times_ms(steps: list[Callable[[float], object]], values: Array) -> Array:
-    """(steps, values) times of each step for each measurement, alternating."""
-    found = np.empty((len(steps), len(values)))
-    for k, value in enumerate(values.tolist()):
+    """(steps,) mean time of each step over the measurements of a pass, alternating."""
+    found = np.zeros(len(steps))
+    for value in values.tolist():
         for n, step in enumerate(steps):
             began_s = wall_time_s()
             step(value)
-            found[n, k] = 1e3 * (wall_time_s() - began_s)
-    return found
+            found[n] += 1e3 * (wall_time_s() - began_s)
+    return found / len(values)
+
+
+def pass_ms(particles: int, number: int) -> Array:
+    """(2,) times of the kernels and of NumPy for a pass over the middle of the target."""
+    of = GaussianClass(name="target")
+    noise = np.random.default_rng(number)
+    along_m = STEP_M * np.arange(-7, 8)
+    values = 0.85 * of.amplitude_nt * np.exp(-0.5 * (along_m / 70.0) ** 2)
+    values += math.sqrt(WHITE_NT2) * noise.standard_normal(len(values))
+    compiled = GaussianHypothesis(of, particles, np.random.Generator(np.random.SFC64(number)))
+    compiled.start(measurement(values[0]), map_nt2=1.0)
+    plain = PlainFilter(of, compiled.particles, compiled.weights, noise)
+    return times_ms([lambda value: compiled.step(CONTROL, measurement(value)), plain.step], values[1:])
+
+
+def measurement(value: float) -> Measurement:
+    return Measurement(residual_nt=value, white_nt2=WHITE_NT2, height_m=80.0, course_rad=0.0)
 
 
 def main() -> int:
@@ -91,24 +109,10 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--particles", type=int, default=10_000)
-    parser.add_argument("--repeats", type=int, default=200)
+    parser.add_argument("--passes", type=int, default=60)
     given = parser.parse_args()
-    of = GaussianClass(name="target")
-    compiled = GaussianHypothesis(of, given.particles, np.random.Generator(np.random.SFC64(1)))
-    compiled.start(
-        Measurement(residual_nt=4.0, white_nt2=WHITE_NT2, height_m=80.0, course_rad=0.0), map_nt2=1.0
-    )
-    plain = PlainFilter(of, compiled.particles, compiled.weights, np.random.Generator(np.random.PCG64(1)))
-
-    def kernel_step(value: float) -> object:
-        return compiled.step(
-            CONTROL, Measurement(residual_nt=value, white_nt2=WHITE_NT2, height_m=80.0, course_rad=0.0)
-        )
-
-    # a pass over the target, again and again, so that resampling has its usual share
-    along_m = STEP_M * (np.arange(given.repeats + 20) % 20 - 10)
-    values = 25.0 * np.exp(-0.5 * (along_m / 70.0) ** 2)
-    found = np.median(times_ms([kernel_step, plain.step], values)[:, 20:], axis=1)
+    pass_ms(given.particles, 0)  # compiles the kernels
+    found = np.median([pass_ms(given.particles, number) for number in range(given.passes)], axis=0)
     sys.stdout.write(
         f"{given.particles} particles, per measurement: kernels {found[0]:.2f} ms, NumPy {found[1]:.2f} ms, "
         f"ratio {found[1] / found[0]:.1f}\n"

@@ -32,16 +32,16 @@ class ParticleHypothesis(ABC):
     """What the filters of both forms share: motion and resampling.
 
     Attributes:
-        particles: (n, width), see `particles`.
+        particles: (width, n), see `particles`.
         weights: (n,), sum one.
     """
 
     def __init__(self, width: int, count: int, rng: np.random.Generator, *, by_roulette: bool) -> None:
-        self.particles: Array = np.zeros((count, width))
+        self.particles: Array = np.zeros((width, count))
         self.weights: Array = np.full(count, 1.0 / count)
         self._other = np.empty_like(self.particles)
         self._noise = np.empty((2, (count + 1) // 2))
-        self._fits = np.empty((count, 2))
+        self._fits = np.empty((2, count))
         self._chosen = np.empty(count, dtype=np.int64)
         self._rng = rng
         self._by_roulette = by_roulette
@@ -109,15 +109,20 @@ class ParticleHypothesis(ABC):
         """
         chosen = np.empty(count, dtype=np.int64)
         systematic(self.weights, 0.5, chosen)
-        rows = self.particles[chosen]
-        cosine, sine = rows[:, p.COS, None], rows[:, p.SIN, None]
-        x = rows[:, p.X, None] + cosine * forward_m - sine * right_m
-        y = rows[:, p.Y, None] + sine * forward_m + cosine * right_m
-        return self._signals(rows, x, y, height_m)
+        columns = self.particles[:, chosen]
+        cosine, sine = columns[p.COS, :, None], columns[p.SIN, :, None]
+        x = columns[p.X, :, None] + cosine * forward_m - sine * right_m
+        y = columns[p.Y, :, None] + sine * forward_m + cosine * right_m
+        return self._signals(columns, x, y, height_m)
 
     @abstractmethod
-    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
-        """Signals, nT, that particles predict at places of their target's frame."""
+    def _signals(self, columns: Array, x: Array, y: Array, height_m: float) -> Array:
+        """Signals, nT, that particles predict at places of their target's frame.
+
+        Args:
+            columns: (width, n) particles.
+            x, y: (n, places).
+        """
 
     def sources(self) -> Array:
         """(n, 3) forward and right of the vehicle, and axis relative to its course (8)."""
@@ -174,13 +179,13 @@ class GaussianHypothesis(ParticleHypothesis):
         particles[:] = 0.0
         angle, axis = rng.uniform(-math.pi, math.pi, (2, count))
         size = np.exp(of.size_spread * rng.standard_normal(count))
-        particles[:, p.X] = np.sqrt(square) * np.cos(angle) * of.sigma_along_m * size
-        particles[:, p.Y] = np.sqrt(square) * np.sin(angle) * of.sigma_across_m * size
-        particles[:, p.COS], particles[:, p.SIN] = np.cos(axis), np.sin(axis)
-        particles[:, p.SIZE] = size
-        particles[:, p.AMPLITUDE] = 1.0
-        particles[:, p.AMPLITUDE_VAR] = of.amplitude_spread**2
-        particles[:, p.MAP_VAR] = map_nt2
+        particles[p.X] = np.sqrt(square) * np.cos(angle) * of.sigma_along_m * size
+        particles[p.Y] = np.sqrt(square) * np.sin(angle) * of.sigma_across_m * size
+        particles[p.COS], particles[p.SIN] = np.cos(axis), np.sin(axis)
+        particles[p.SIZE] = size
+        particles[p.AMPLITUDE] = 1.0
+        particles[p.AMPLITUDE_VAR] = of.amplitude_spread**2
+        particles[p.MAP_VAR] = map_nt2
         if before is not None:
             signals = self._simulated(before.control)
             return self._weigh_beginning(seen, before) - self._log_beginnings(
@@ -208,11 +213,11 @@ class GaussianHypothesis(ParticleHypothesis):
         )
         return then_nt, now_nt
 
-    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
+    def _signals(self, columns: Array, x: Array, y: Array, height_m: float) -> Array:
         amplitude_nt, along_m, across_m = self._signature
-        size = rows[:, p.SIZE, None]
+        size = columns[p.SIZE, :, None]
         square = (x / (along_m * size)) ** 2 + (y / (across_m * size)) ** 2
-        signals: Array = amplitude_nt * rows[:, p.AMPLITUDE, None] * np.exp(-0.5 * square)
+        signals: Array = amplitude_nt * columns[p.AMPLITUDE, :, None] * np.exp(-0.5 * square)
         return signals
 
     def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:
@@ -254,13 +259,13 @@ class DipoleHypothesis(ParticleHypothesis):
         angle = rng.uniform(-math.pi, math.pi, count)
         particles = self.particles
         particles[:] = 0.0
-        particles[:, p.X], particles[:, p.Y] = distance_m * np.cos(angle), distance_m * np.sin(angle)
-        particles[:, p.COS], particles[:, p.SIN] = math.cos(seen.course_rad), math.sin(seen.course_rad)
-        particles[:, p.HEIGHT] = seen.height_m - depth_m
-        particles[:, p.RANGE] = depth_m
+        particles[p.X], particles[p.Y] = distance_m * np.cos(angle), distance_m * np.sin(angle)
+        particles[p.COS], particles[p.SIN] = math.cos(seen.course_rad), math.sin(seen.course_rad)
+        particles[p.HEIGHT] = seen.height_m - depth_m
+        particles[p.RANGE] = depth_m
         for k in range(p.TERMS - 1):
-            particles[:, p.COVARIANCE + (p.TERMS + 1) * k] = of.strength_nt**2
-        particles[:, p.COVARIANCE + p.TERMS * p.TERMS - 1] = map_nt2
+            particles[p.COVARIANCE + (p.TERMS + 1) * k] = of.strength_nt**2
+        particles[p.COVARIANCE + p.TERMS * p.TERMS - 1] = map_nt2
         self.weights[:] = 1.0 / count
         if before is not None:
             signals = self._simulated(seen, before.control)
@@ -268,31 +273,30 @@ class DipoleHypothesis(ParticleHypothesis):
                 signals, map_nt2, threshold_nt, before
             )
         density = self._weigh(seen, 1.0, 0.0)[0]
-        return density - log_beyond(threshold_nt, np.sqrt(self._fits[:, 1]))
+        return density - log_beyond(threshold_nt, np.sqrt(self._fits[1]))
 
     def _simulated(self, seen: Measurement, control: Control) -> tuple[Array, Array]:
         """Signals before a step and after it, of dipoles with strengths of the class at the particles'
         places.
         """
-        rows = self.particles.copy()
-        rows[:, p.MEANS : p.MEANS + p.TERMS - 1] = self._class.strength_nt * self._rng.standard_normal(
-            (len(rows), p.TERMS - 1)
-        )
-        x, y, cosine, sine = (rows[:, k, None] for k in (p.X, p.Y, p.COS, p.SIN))
+        columns = self.particles.copy()
+        drawn = self._rng.standard_normal((columns.shape[1], p.TERMS - 1))
+        columns[p.MEANS : p.MEANS + p.TERMS - 1] = self._class.strength_nt * drawn.T
+        x, y, cosine, sine = (columns[k, :, None] for k in (p.X, p.Y, p.COS, p.SIN))
         then_x = x - cosine * control.forward_m + sine * control.right_m
         then_y = y - sine * control.forward_m - cosine * control.right_m
-        then_nt = self._signals(rows, then_x, then_y, seen.height_m)[:, 0]
-        return then_nt, self._signals(rows, x, y, seen.height_m)[:, 0]
+        then_nt = self._signals(columns, then_x, then_y, seen.height_m)[:, 0]
+        return then_nt, self._signals(columns, x, y, seen.height_m)[:, 0]
 
-    def _signals(self, rows: Array, x: Array, y: Array, height_m: float) -> Array:
-        up = np.maximum(1.0, height_m - rows[:, p.HEIGHT, None])
+    def _signals(self, columns: Array, x: Array, y: Array, height_m: float) -> Array:
+        up = np.maximum(1.0, height_m - columns[p.HEIGHT, :, None])
         distance = np.sqrt(x * x + y * y + up * up)
         offset = (x / distance, y / distance, -up / distance)
         along = sum(self._field_ned[k] * offset[k] for k in range(3))
         total = sum(
-            rows[:, p.MEANS + k, None] * (3.0 * along * offset[k] - self._field_ned[k]) for k in range(3)
+            columns[p.MEANS + k, :, None] * (3.0 * along * offset[k] - self._field_ned[k]) for k in range(3)
         )
-        signals: Array = (rows[:, p.RANGE, None] / distance) ** 3 * total
+        signals: Array = (columns[p.RANGE, :, None] / distance) ** 3 * total
         return signals
 
     def _weigh(self, seen: Measurement, decay: float, drive_nt2: float) -> tuple[float, float]:

@@ -2,9 +2,11 @@
 
 Source: Lum, Rysdyk and Pongpunwattana 2005, section III, equations 3 to 8, as corrected in docs/papers.md.
 
-A particle is a row of an array (n, width). It begins with the pose of the vehicle in the frame of the source:
-x along the source's axis, y to its right, and the course psi relative to that axis, kept as cosine and sine.
-What the measurement depends on linearly is not sampled: a Kalman filter in each row has the factors of the
+A particle is a column of an array (width, n): each quantity of all particles is contiguous, so that the
+compiler vectorizes the loops. A column begins with the pose of the vehicle in the frame of the source: x
+along the source's axis, y to its right, and the course psi relative to that axis, kept as cosine and sine.
+
+What the measurement depends on linearly is not sampled: a Kalman filter in each column has the factors of the
 signature's terms and, as the last one, the error of the map (Rao-Blackwellization; Doucet, Godsill and
 Andrieu 2000). With spreads of zero its innovation is the paper's residual.
 """
@@ -66,31 +68,66 @@ def move(
     side, so these two are seldom alike.
 
     Args:
-        particles: (n, width), changed in place.
+        particles: (width, n), changed in place.
         forward_m, right_m: displacement of the vehicle along and across its course before the step.
         turn_rad: change of its course.
         noise: (2, half of n or more) standard normal.
         forward_sigma_m, turn_sigma_rad: standard deviations of displacement and turn.
     """
-    turn_cosine, turn_sine = math.cos(turn_rad), math.sin(turn_rad)
-    first_half = (particles.shape[0] + 1) // 2
-    for m in range(particles.shape[0]):
-        cosine, sine = particles[m, COS], particles[m, SIN]
-        drawn, sign = (m, 1.0) if m < first_half else (m - first_half, -1.0)
-        forward = forward_m + forward_sigma_m * sign * noise[0, drawn]
-        particles[m, X] += cosine * forward - sine * right_m
-        particles[m, Y] += sine * forward + cosine * right_m
+    count = particles.shape[1]
+    half = (count + 1) // 2
+    for first, last, sign in ((0, half, 1.0), (half, count, -1.0)):
+        _move_part(
+            particles[X, first:last],
+            particles[Y, first:last],
+            particles[COS, first:last],
+            particles[SIN, first:last],
+            (forward_m, right_m),
+            (math.cos(turn_rad), math.sin(turn_rad)),
+            noise,
+            (forward_sigma_m * sign, turn_sigma_rad * sign),
+        )
+
+
+@kernel(error_model="numpy")
+def _move_part(
+    xs: Array,
+    ys: Array,
+    cosines: Array,
+    sines: Array,
+    step_m: tuple[float, float],
+    turn: tuple[float, float],
+    noise: Array,
+    sigmas: tuple[float, float],
+) -> None:
+    """Move consecutive particles.
+
+    Args:
+        xs, ys, cosines, sines: (n,) their poses, changed in place.
+        step_m: displacement forward and right.
+        turn: cosine and sine of the change of course.
+        noise: as of `move`; the n first ones count.
+        sigmas: factors of the noise: of the displacement, m, and of the turn, rad.
+    """
+    forward_m, right_m = step_m
+    turn_cosine, turn_sine = turn
+    forward_sigma_m, half_sigma = sigmas[0], 0.5 * sigmas[1]
+    for m in range(xs.size):
+        cosine, sine = cosines[m], sines[m]
+        forward = forward_m + forward_sigma_m * noise[0, m]
+        xs[m] += cosine * forward - sine * right_m
+        ys[m] += sine * forward + cosine * right_m
         # a rotation by 2 atan(noise / 2): half the time of cosine and sine, and the norm stays one
-        half = 0.5 * turn_sigma_rad * sign * noise[1, drawn]
+        half = half_sigma * noise[1, m]
         scale = 1.0 / (1.0 + half * half)
         noisy_cosine, noisy_sine = (1.0 - half * half) * scale, 2.0 * half * scale
         new_cosine = turn_cosine * noisy_cosine - turn_sine * noisy_sine
         new_sine = turn_sine * noisy_cosine + turn_cosine * noisy_sine
-        particles[m, COS] = cosine * new_cosine - sine * new_sine
-        particles[m, SIN] = sine * new_cosine + cosine * new_sine
+        cosines[m] = cosine * new_cosine - sine * new_sine
+        sines[m] = sine * new_cosine + cosine * new_sine
 
 
-@kernel
+@kernel(error_model="numpy")
 def weigh_gaussian(
     particles: Array,
     weights: Array,
@@ -103,42 +140,49 @@ def weigh_gaussian(
 ) -> tuple[float, float]:
     """Update the particles of a Gaussian signature by a measurement: weights (5), (6), and linear factors.
 
+    The exponential is the only part that is not vectorized, and therefore has a loop of its own.
+
     Args:
-        particles: (n, GAUSSIAN), changed in place.
+        particles: (GAUSSIAN, n), changed in place.
         weights: (n,) before the measurement; after it, likewise with sum one.
         signature: (3,) amplitude, nT, and standard deviations along and across, m.
         measured_nt: reading less map, less level.
         white_nt2: variance of the white noise of the measurement.
         decay, drive_nt2: of the error of the map since the last measurement: its factor, and the variance
             that is added.
-        fits: (n, 2) to work in.
+        fits: (2, n) to work in.
 
     Returns:
         As `_next_weights`.
     """
     per_along, per_across = 1.0 / signature[1], 1.0 / signature[2]
-    for m in range(particles.shape[0]):
-        per_size = 1.0 / particles[m, SIZE]
-        along, across = particles[m, X] * per_along * per_size, particles[m, Y] * per_across * per_size
-        term = signature[0] * math.exp(-0.5 * (along * along + across * across))
-        map_nt = decay * particles[m, MAP]
+    terms = fits[0]
+    for m in range(weights.size):
+        per_size = 1.0 / particles[SIZE, m]
+        along, across = particles[X, m] * per_along * per_size, particles[Y, m] * per_across * per_size
+        terms[m] = -0.5 * (along * along + across * across)
+    for m in range(weights.size):
+        terms[m] = signature[0] * math.exp(terms[m])
+    for m in range(weights.size):
+        term = fits[0, m]
+        map_nt = decay * particles[MAP, m]
         aa, ab, bb = (
-            particles[m, AMPLITUDE_VAR],
-            decay * particles[m, AMPLITUDE_MAP],
-            decay * decay * particles[m, MAP_VAR] + drive_nt2,
+            particles[AMPLITUDE_VAR, m],
+            decay * particles[AMPLITUDE_MAP, m],
+            decay * decay * particles[MAP_VAR, m] + drive_nt2,
         )
-        residual_nt = measured_nt - term * particles[m, AMPLITUDE] - map_nt
+        residual_nt = measured_nt - term * particles[AMPLITUDE, m] - map_nt
         gain_a, gain_b = term * aa + ab, term * ab + bb
         total = term * gain_a + gain_b + white_nt2
         per_total = 1.0 / total
         share = residual_nt * per_total
-        particles[m, AMPLITUDE] += gain_a * share
-        particles[m, MAP] = map_nt + gain_b * share
-        particles[m, AMPLITUDE_VAR] = aa - gain_a * gain_a * per_total
-        particles[m, AMPLITUDE_MAP] = ab - gain_a * gain_b * per_total
-        particles[m, MAP_VAR] = bb - gain_b * gain_b * per_total
-        fits[m, 0] = residual_nt * share
-        fits[m, 1] = total
+        particles[AMPLITUDE, m] += gain_a * share
+        particles[MAP, m] = map_nt + gain_b * share
+        particles[AMPLITUDE_VAR, m] = aa - gain_a * gain_a * per_total
+        particles[AMPLITUDE_MAP, m] = ab - gain_a * gain_b * per_total
+        particles[MAP_VAR, m] = bb - gain_b * gain_b * per_total
+        fits[0, m] = residual_nt * share
+        fits[1, m] = total
     return _next_weights(weights, fits)
 
 
@@ -160,7 +204,7 @@ def weigh_dipole(
     1995, section 8.3): linear in the moment.
 
     Args:
-        particles: (n, DIPOLE), changed in place.
+        particles: (DIPOLE, n), changed in place.
         field: (3,) direction of the Earth's field, NED.
         height_m: of the sensor above the map's home.
         weights, measured_nt, white_nt2, decay, drive_nt2, fits: as of `weigh_gaussian`.
@@ -170,45 +214,45 @@ def weigh_dipole(
     """
     row, gains = np.ones(TERMS), np.empty(TERMS)
     last = TERMS - 1
-    for m in range(particles.shape[0]):
-        x, y = particles[m, X], particles[m, Y]
-        up = max(1.0, height_m - particles[m, HEIGHT])
+    for m in range(particles.shape[1]):
+        x, y = particles[X, m], particles[Y, m]
+        up = max(1.0, height_m - particles[HEIGHT, m])
         distance2 = x * x + y * y + up * up
-        reach = particles[m, RANGE]
+        reach = particles[RANGE, m]
         scale = reach * reach * reach / (distance2 * math.sqrt(distance2))
         along = 3.0 * (x * field[0] + y * field[1] - up * field[2]) / distance2
         row[0] = scale * (along * x - field[0])
         row[1] = scale * (along * y - field[1])
         row[2] = scale * (-along * up - field[2])
-        particles[m, MEANS + last] *= decay
+        particles[MEANS + last, m] *= decay
         for i in range(last):
-            particles[m, COVARIANCE + TERMS * i + last] *= decay
-            particles[m, COVARIANCE + TERMS * last + i] *= decay
+            particles[COVARIANCE + TERMS * i + last, m] *= decay
+            particles[COVARIANCE + TERMS * last + i, m] *= decay
         corner = COVARIANCE + TERMS * last + last
-        particles[m, corner] = decay * decay * particles[m, corner] + drive_nt2
+        particles[corner, m] = decay * decay * particles[corner, m] + drive_nt2
         residual_nt, total = measured_nt, white_nt2
         for i in range(TERMS):
             gains[i] = 0.0
             for j in range(TERMS):
-                gains[i] += particles[m, COVARIANCE + TERMS * i + j] * row[j]
-            residual_nt -= row[i] * particles[m, MEANS + i]
+                gains[i] += particles[COVARIANCE + TERMS * i + j, m] * row[j]
+            residual_nt -= row[i] * particles[MEANS + i, m]
             total += row[i] * gains[i]
         for i in range(TERMS):
-            particles[m, MEANS + i] += gains[i] * residual_nt / total
+            particles[MEANS + i, m] += gains[i] * residual_nt / total
             for j in range(TERMS):
-                particles[m, COVARIANCE + TERMS * i + j] -= gains[i] * gains[j] / total
-        fits[m, 0] = residual_nt * residual_nt / total
-        fits[m, 1] = total
+                particles[COVARIANCE + TERMS * i + j, m] -= gains[i] * gains[j] / total
+        fits[0, m] = residual_nt * residual_nt / total
+        fits[1, m] = total
     return _next_weights(weights, fits)
 
 
-@kernel
+@kernel(error_model="numpy")
 def _next_weights(weights: Array, fits: Array) -> tuple[float, float]:
     """Multiply the weights by the likelihoods, and normalize them.
 
     Args:
         weights: (n,), changed in place.
-        fits: (n, 2) squared innovation over its variance, and that variance, nT^2.
+        fits: (2, n) squared innovation over its variance, and that variance, nT^2.
 
     Returns:
         Logarithm of the measurement's density given those before it, 1/nT; and the paper's confidence (7),
@@ -217,18 +261,18 @@ def _next_weights(weights: Array, fits: Array) -> tuple[float, float]:
     count = weights.size
     confidence = summed = 0.0
     for m in range(count):
-        value = weights[m] * math.exp(-0.5 * fits[m, 0])
-        confidence += value
-        weights[m] = value / math.sqrt(fits[m, 1])
+        weights[m] *= math.exp(-0.5 * fits[0, m])
+        confidence += weights[m]
+    for m in range(count):
+        weights[m] /= math.sqrt(fits[1, m])
+    for m in range(count):
         summed += weights[m]
     before = 0.0
     if summed < _LEAST_SUM:  # no particle is near: only the best fits count
-        best = fits[0, 0]
-        for m in range(count):
-            best = min(best, fits[m, 0])
+        best = fits[0].min()
         before, summed = -0.5 * best, 0.0
         for m in range(count):
-            weights[m] = math.exp(-0.5 * (fits[m, 0] - best)) / math.sqrt(fits[m, 1])
+            weights[m] = math.exp(-0.5 * (fits[0, m] - best)) / math.sqrt(fits[1, m])
             summed += weights[m] / count
         for m in range(count):
             weights[m] /= summed * count
@@ -241,10 +285,10 @@ def _next_weights(weights: Array, fits: Array) -> tuple[float, float]:
 
 @kernel
 def copy_chosen(chosen: Indices, particles: Array, out: Array) -> None:
-    """The next generation: row k of `out` is particle `chosen[k]`."""
-    for k in range(chosen.size):
-        for i in range(particles.shape[1]):
-            out[k, i] = particles[chosen[k], i]
+    """The next generation: column k of `out` is particle `chosen[k]`."""
+    for i in range(particles.shape[0]):
+        for k in range(chosen.size):
+            out[i, k] = particles[i, chosen[k]]
 
 
 @kernel
@@ -252,12 +296,12 @@ def relative_sources(particles: Array, out: Array) -> None:
     """Equation 8 in the project's frames: the source in the frame of the vehicle.
 
     Args:
-        particles: (n, width).
+        particles: (width, n).
         out: (n, 3) forward and right of the vehicle's course, and the source's axis relative to that course,
             clockwise, -pi..pi.
     """
-    for m in range(particles.shape[0]):
-        x, y, cosine, sine = particles[m, X], particles[m, Y], particles[m, COS], particles[m, SIN]
+    for m in range(particles.shape[1]):
+        x, y, cosine, sine = particles[X, m], particles[Y, m], particles[COS, m], particles[SIN, m]
         out[m, 0] = -cosine * x - sine * y
         out[m, 1] = sine * x - cosine * y
         out[m, 2] = math.atan2(-sine, cosine)

@@ -18,7 +18,7 @@ from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from threading import Event
-from typing import Any, BinaryIO, Final, TypeVar
+from typing import Any, BinaryIO, Final, Literal, TypeVar, overload
 
 import numba
 import numpy as np
@@ -38,6 +38,7 @@ except ImportError:  # not on Windows: there every process compiles
     fcntl = None  # type: ignore[assignment]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+_ErrorModel = Literal["python", "numpy"]
 
 _PLAIN: Final = (bool, int, float, complex, str, bytes, type(None), slice, range, np.generic, np.dtype)
 _STAMP_DIGITS: Final = 16
@@ -46,22 +47,37 @@ _TURN_CHECK_S: Final = 0.02
 _TURN_CHECKS: Final = 3000  # a process that was stopped while it compiles must not stop all others
 
 
-def kernel(function: Function) -> Function:
+@overload
+def kernel(function: Function) -> Function: ...
+
+
+@overload
+def kernel(*, error_model: _ErrorModel) -> Callable[[Function], Function]: ...
+
+
+def kernel(function: Any = None, *, error_model: _ErrorModel = "python") -> Any:
     """Compile a function with `numba.njit` on first use and keep the machine code from run to run.
 
     The code is stored beside the module, or in the user's cache folder if that place is not writable; if
     neither is writable, every process compiles again. Of several processes that need the same code at once,
     one compiles it and the others wait for it.
+
+    Args:
+        function: of Python.
+        error_model: of Numba. With "python" a division by zero raises ZeroDivisionError; with "numpy" it
+            gives inf or nan, and a loop with divisions can be vectorized.
     """
+    if function is None:
+        return partial(kernel, error_model=error_model)
     try:
-        dispatcher = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
+        dispatcher = numba.njit(cache=True, no_cfunc_wrapper=True, error_model=error_model)(function)
     except RuntimeError:  # Numba found no folder to write to
-        return numba.njit(function)
+        return numba.njit(error_model=error_model)(function)
     cache = getattr(dispatcher, "_cache", None)
     folder = getattr(cache, "cache_path", None)
     base = getattr(getattr(cache, "_impl", None), "filename_base", None)
     if cache is not None and dumps and folder and base and hasattr(cache, "_cache_file"):
-        _keep(dispatcher, _CacheFile(Path(folder), base, function))
+        _keep(dispatcher, _CacheFile(Path(folder), base, function, error_model))
     return dispatcher
 
 
@@ -275,7 +291,8 @@ def _code_parts(code: types.CodeType, names: set[str]) -> Iterator[str]:
 def _value_parts(value: object, name: str, function: Callable[..., Any], seen: set[int]) -> Iterator[str]:
     yield type(value).__name__
     if is_jitted(value):
-        yield from _parts(value.py_func, seen)  # type: ignore[attr-defined]  # is_jitted tells
+        yield value.targetoptions["error_model"]  # type: ignore[attr-defined]  # is_jitted tells
+        yield from _parts(value.py_func, seen)  # type: ignore[attr-defined]
     elif isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     elif isinstance(value, tuple):

@@ -101,8 +101,8 @@ def _measurement(value: float) -> Measurement:
 
 
 def _poses(hypothesis: GaussianHypothesis) -> Array:
-    rows = hypothesis.particles
-    return np.column_stack((rows[:, p.X], rows[:, p.Y], np.arctan2(rows[:, p.SIN], rows[:, p.COS])))
+    x, y, cosine, sine = (hypothesis.particles[k] for k in (p.X, p.Y, p.COS, p.SIN))
+    return np.column_stack((x, y, np.arctan2(sine, cosine)))
 
 
 def pass_traces(seed: int, count: int) -> Iterator[tuple[bool, Array]]:

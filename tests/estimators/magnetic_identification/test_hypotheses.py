@@ -36,10 +36,10 @@ def map_covariance():
 
 def put(hypothesis, *, y_m, **places):
     """All particles at one pose, on a straight track along x."""
-    hypothesis.particles[:, p.X], hypothesis.particles[:, p.Y] = ALONG_M[0], y_m
-    hypothesis.particles[:, p.COS], hypothesis.particles[:, p.SIN] = 1.0, 0.0
+    hypothesis.particles[p.X], hypothesis.particles[p.Y] = ALONG_M[0], y_m
+    hypothesis.particles[p.COS], hypothesis.particles[p.SIN] = 1.0, 0.0
     for place, value in places.items():
-        hypothesis.particles[:, getattr(p, place)] = value
+        hypothesis.particles[getattr(p, place)] = value
     hypothesis.weights[:] = 1.0 / len(hypothesis.weights)
 
 
@@ -73,10 +73,10 @@ def test_the_evidence_of_a_dipole_is_the_density_of_all_measurements_together():
     of = DipoleClass(name="boat", strength_nt=10.0)
     hypothesis = DipoleHypothesis(of, 10, np.random.default_rng(1), field_ned=DIRECTION)
     hypothesis.start(measurement(3.0), MAP_NT**2)
-    hypothesis.particles[:, p.MEANS : p.DIPOLE] = 0.0
+    hypothesis.particles[p.MEANS : p.DIPOLE] = 0.0
     put(hypothesis, y_m=-30.0, HEIGHT=0.0, RANGE=HEIGHT_M)
     for k, variance in enumerate((100.0, 100.0, 100.0, MAP_NT**2)):
-        hypothesis.particles[:, p.COVARIANCE + 5 * k] = variance
+        hypothesis.particles[p.COVARIANCE + 5 * k] = variance
     # the simulator's dipole; in a field this strong only its part along the field changes the magnitude
     moment = HEIGHT_M**3 / 100.0
     terms = np.array(
@@ -125,8 +125,8 @@ def test_an_anomaly_begins_where_the_track_enters_it():
     for seed in range(4):
         hypothesis = GaussianHypothesis(of, 20_000, np.random.default_rng(seed))
         found.append(hypothesis.start(measurement(now), MAP_NT**2, threshold_nt, before))
-        outwards = hypothesis.particles[:, p.X] * hypothesis.particles[:, p.COS] / of.sigma_along_m**2
-        outwards += hypothesis.particles[:, p.Y] * hypothesis.particles[:, p.SIN] / of.sigma_across_m**2
+        outwards = hypothesis.particles[p.X] * hypothesis.particles[p.COS] / of.sigma_along_m**2
+        outwards += hypothesis.particles[p.Y] * hypothesis.particles[p.SIN] / of.sigma_across_m**2
         assert hypothesis.weights[outwards > 0.0].sum() < 0.05
     rng = np.random.default_rng(9)
     count = 1_000_000
@@ -160,10 +160,10 @@ def test_without_a_signature_a_beginning_counts_given_that_it_is_one():
 
 def test_equation_8_puts_the_source_where_it_is_seen_from_the_vehicle():
     """Vehicle 100 m along and 50 m right of the axis, flying across it to the right."""
-    row = np.zeros((1, p.GAUSSIAN))
-    row[0, : p.POSE] = (100.0, 50.0, 0.0, 1.0)
+    particle = np.zeros((p.GAUSSIAN, 1))
+    particle[: p.POSE, 0] = (100.0, 50.0, 0.0, 1.0)
     out = np.empty((1, 3))
-    p.relative_sources(row, out)
+    p.relative_sources(particle, out)
     assert out[0] == pytest.approx((-50.0, 100.0, -0.5 * math.pi))
 
 

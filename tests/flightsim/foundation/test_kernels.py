@@ -80,6 +80,7 @@ def stamp(sources: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> str:
         ("layout", "'a'", "'b'"),
         ("inner", "x + 1.0", "x + 2.0"),
         ("inner", "x + 1.0", "x - 1.0"),
+        ("inner", "@kernel\n", "@kernel(error_model='numpy')\n"),
         ("outer", "+ below(0.0)", "- below(0.0)"),
     ],
 )
@@ -206,6 +207,15 @@ def test_without_a_writable_package_folder_the_users_cache_serves(package: Packa
     home.rename(tmp_path / "away")
     home.write_text("in the way", encoding="utf-8")  # no folder at all: the kernel still runs
     assert package.run(**places) == (13.0, 0)
+
+
+def test_a_division_by_zero_raises_or_gives_what_numpy_gives() -> None:
+    def inverse(x: float) -> float:
+        return 1.0 / x
+
+    with pytest.raises(ZeroDivisionError):
+        kernel(inverse)(0.0)
+    assert kernel(error_model="numpy")(inverse)(0.0) == math.inf
 
 
 def test_code_for_given_types_does_what_the_kernel_does() -> None:
