@@ -1,11 +1,17 @@
 """`flightstack study show` and `compare`: the results of studies that were run."""
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from missions.cli.options import in_options, report
+from missions.cli.study_library import STUDIES
+
+if TYPE_CHECKING:
+    from missions.studies.folder import StudyFolder
+    from missions.studies.results import Results
+    from missions.studies.study import Study
 
 
 @click.command(context_settings={"show_default": True})
@@ -15,14 +21,17 @@ from missions.cli.options import in_options, report
 def show(folder: str, failed: bool, as_json: bool) -> int:
     """Print the table of a study, complete or not.
 
-    Figures, intervals and notes are computed again from its rows.
+    Figures, intervals and notes are computed again from its rows. The studies of this program print their own
+    tables; one of a Python file prints the table of every study.
     """
     from missions.errors import PlanError
+    from missions.studies.folder import StudyFolder
     from missions.studies.running import read_results
-    from missions.studies.summary import failures_of, summary_of, table_of
+    from missions.studies.summary import failures_of, study_table, summary_of
 
     try:
-        results = read_results(folder)
+        place = StudyFolder.opened(folder)
+        results = read_results(place)
     except PlanError as error:
         raise click.UsageError(in_options(error)) from error
     if failed:
@@ -31,15 +40,31 @@ def show(folder: str, failed: bool, as_json: bool) -> int:
             click.echo(f"trial {trial['trial']}: {trial['error']}\n    {trial['command']}")
         report(f"{len(found)} of {results.table.num_rows} trials without success")
         return 0
-    summary = summary_of(None, results)
+    study = _study_of(place, results)
+    summary = summary_of(study, results)
     if as_json:
         from missions.runs.run_folder import finite
 
         click.echo(json.dumps(finite(summary), indent=2))
         return 0
-    for line in table_of(summary):
+    for line in study_table(study, results, summary):
         click.echo(line)
     return 0
+
+
+def _study_of(place: "StudyFolder", results: "Results") -> "Study[Any, Any] | None":
+    """The study of this program that the results are of; None: they are of a file or of another version."""
+    from missions.errors import PlanError
+    from missions.studies.rows import RowSchema
+
+    declared = STUDIES.get(results.name)
+    if declared is None:
+        return None
+    try:
+        study = declared.build(place.identity()["arguments"])
+    except (PlanError, KeyError, ValueError):  # an argument that this version doesn't have
+        return None
+    return study if RowSchema.of(study.row).names == set(results.fields) else None
 
 
 @click.command()

@@ -222,7 +222,7 @@ class _Session:
 
     def _concluded(self, outcome: str, reason: str, by_signal: int) -> StudyResult:
         """Write tables, summary and pictures of the rows that there are."""
-        from missions.studies.summary import summary_of, table_of
+        from missions.studies.summary import study_table, summary_of
 
         found = self._folder.tables()
         if found is None:  # interrupted before the first row
@@ -233,7 +233,7 @@ class _Session:
             self._study, results, engine=self._engine, outcome=outcome, reason=reason, wall_time_s=wall_s
         )
         summary["command"] = self._command
-        table = table_of(summary) if self._study.report is None else list(self._study.report(results))
+        table = list(study_table(self._study, results, summary))
         try:
             if results.complete:
                 self._folder.write_tables(*found)

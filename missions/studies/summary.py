@@ -33,6 +33,7 @@ __all__ = [
     "interval_text",
     "metrics_of",
     "name_of",
+    "study_table",
     "summary_of",
     "table_of",
 ]
@@ -123,17 +124,21 @@ def failures_of(results: Results) -> list[dict[str, Any]]:
     return found
 
 
+def _missing(results: Results) -> list[str]:
+    """The note on a study that is not complete."""
+    if results.complete:
+        return []
+    trials = results.runs * len(results.cells)
+    missing = trials - results.table.num_rows
+    return [f"{missing} of {trials} trials are missing: the figures are preliminary"]
+
+
 def notes_of(
     results: Results, cells: Sequence[Mapping[str, Any]], differences: Sequence[Mapping[str, Any]]
 ) -> list[str]:
     """What the number of runs does not carry."""
-    notes = []
+    notes = _missing(results)
     metrics = list(differences[0]["metrics"]) if differences else []
-    trials = results.runs * len(results.cells)
-    if not results.complete:
-        notes.append(
-            f"{trials - results.table.num_rows} of {trials} trials are missing: the figures are preliminary"
-        )
     counts = [figures["n"] for cell in cells for figures in cell["metrics"].values()]
     if results.runs < FEW:
         notes.append(
@@ -239,8 +244,19 @@ def _difference(difference: Difference) -> dict[str, Any]:
     return {**asdict(difference), "conclusive": difference.conclusive}
 
 
+def study_table(
+    study: "Study[Any, Any] | None", results: Results, summary: Mapping[str, Any]
+) -> Sequence[str]:
+    """Lines of the table of a study: its own table, or that of every study."""
+    if study is None or study.report is None:
+        return table_of(summary)
+    return [*study.report(results), *(f"Note: {note}" for note in _missing(results))]
+
+
 def table_of(summary: Mapping[str, Any]) -> list[str]:
-    """Lines of the table: one row for each cell, then the differences from the baseline, then the notes."""
+    """Lines of the table of every study: one row for each cell, then the differences from the baseline, then
+    the notes.
+    """
     cells = summary["cells"]
     names = list(cells[0]["parameters"]) if cells else []
     metrics = [

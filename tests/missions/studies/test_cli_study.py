@@ -43,6 +43,12 @@ def test_the_run_folder_has_summary_table_and_figures(tmp_path: Path) -> None:
     assert all(names <= cell.keys() for cell in summary["cells"])
     table = (out / "table.txt").read_text()
     assert table in result.stdout and "17 and 25a as printed" in table and str(out) in result.stdout
+    assert ran("show", out)[1] == table
+    assert json.loads(ran("show", out, "--json")[1])["cells"] == summary["cells"]
+    identity = json.loads((out / "study.json").read_text())
+    (out / "study.json").write_text(json.dumps(identity | {"arguments": {"equations": "of another version"}}))
+    code, said, _ = ran("show", out)
+    assert code == 0 and "success" in said  # the table of every study
 
 
 @pytest.mark.parametrize(
