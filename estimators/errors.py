@@ -19,6 +19,10 @@ class EstimatorError(ValueError):
     """
 
 
+class VideoError(EstimatorError):
+    """A video can't be opened, or its stream has ended; the message names it."""
+
+
 class EstimatorFailure(RuntimeError):
     """An estimator raised an error while it ran. The CLI prints the message and exits 1."""
 

@@ -5,8 +5,9 @@
 from dataclasses import replace
 from pathlib import Path
 
+from estimators.errors import VideoError
 from estimators.vision import CameraDescription
-from estimators.vision.video import Film, Picture, VideoError
+from estimators.vision.video import Film, Picture
 
 __all__ = ["CameraFilm"]
 

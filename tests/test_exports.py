@@ -33,3 +33,13 @@ def test_packages_import_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_worlds_without_cameras_load_no_picture_libraries():
+    code = (
+        "import sys; from flightsim.world_spec import WorldSpec; from missions.embedded import EmbeddedSitl;"
+        "EmbeddedSitl(WorldSpec.of_team(1, seed=1)).close();"
+        "print(sorted({'av', 'cv2', 'matplotlib', 'scipy.sparse.csgraph'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

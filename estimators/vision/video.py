@@ -14,9 +14,9 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.errors import EstimatorError
+from estimators.errors import VideoError
 
-__all__ = ["Film", "TimedPicture", "VideoError", "frames_of", "is_stream"]
+__all__ = ["Film", "TimedPicture", "frames_of", "is_stream"]
 
 Picture = NDArray[np.uint8]
 
@@ -34,10 +34,6 @@ _STREAMS: Final = (
 )
 _LOSSLESS: Final = {"qp": "0", "preset": "ultrafast"}
 _RTSP: Final = {"rtsp_transport": "tcp", "fflags": "nobuffer"}
-
-
-class VideoError(EstimatorError):
-    """A video can't be opened, or its stream has ended; the message names it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

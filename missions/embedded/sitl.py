@@ -3,24 +3,25 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
-from estimators.errors import LogError
+from estimators.errors import LogError, VideoError
 from estimators.logs.new_file import new_file
-from estimators.vision.video import VideoError
 from flightsim.airframe import load_airframe
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
 from missions.camera_picture import CameraPicture
-from missions.embedded.films import point_readers_of, readers_of, start_films
-from missions.embedded.rendered_points import watched
 from missions.errors import MissionError
 from missions.kind import VehicleKind
+
+if TYPE_CHECKING:
+    from missions.embedded.rendered_cameras import RenderedCameras
 
 MAX_FLIGHT_S = 24 * 3600.0
 
@@ -63,13 +64,11 @@ class EmbeddedSitl:
         if self.published_map is None and sitl.published_map is not None and publish_to is not None:
             publish(sitl.published_map, publish_to)
             self.published_map = publish_to
-        self._finders = {system_id: finder for system_id, _, finder in point_readers_of(sitl)}
+        self._cameras = cameras = _cameras_of(sitl, films_to)
         self.links: list[Link] = []
         for index, vehicle in enumerate(world.vehicles):
-            link, finder = sitl.connect(index), self._finders.get(vehicle.system_id)
-            self.links.append(link if finder is None else watched(link, vehicle.system_id, finder.watch))
-
-        self._films = [] if films_to is None else start_films(sitl, films_to)
+            link = sitl.connect(index)
+            self.links.append(link if cameras is None else cameras.link(vehicle.system_id, link))
 
         def advance() -> None:
             try:
@@ -104,16 +103,11 @@ class EmbeddedSitl:
         """The first picture of each camera in which a tag was read, as PNG with the detections drawn in, by
         file name.
         """
-        found = {}
-        for system_id, _, reader in readers_of(self.sitl):
-            if reader.kept is not None:
-                found[f"tag{system_id}.png"] = reader.kept.drawn()
-        return found
+        return {} if self._cameras is None else self._cameras.first_detections()
 
     def pictures_of(self, system_id: int) -> tuple[CameraPicture, ...]:
         """The pictures that the moving-point camera of a vehicle has kept."""
-        finder = self._finders.get(system_id)
-        return () if finder is None else finder.kept
+        return () if self._cameras is None else self._cameras.pictures_of(system_id)
 
     def on_truth(self, listener: TruthListener) -> None:
         """Subscribe to frames of truth at 50 Hz, for the log and the score."""
@@ -122,10 +116,22 @@ class EmbeddedSitl:
     def close(self) -> None:
         """Close every link, and finish the videos."""
         self.sitl.close()
-        for film in self._films:
-            film.close()
+        if self._cameras is not None:
+            self._cameras.close()
         for link in self.links:
             link.close()
+
+
+def _cameras_of(sitl: Sitl, films_to: Path | None) -> "RenderedCameras | None":
+    """The rendered cameras of a world. None: no vehicle has a camera, and what makes pictures, which takes
+    half a second to load, is not needed.
+    """
+    devices = [vehicle.payload.devices for vehicle in sitl.vehicles if vehicle.payload is not None]
+    if all(each.camera is None and each.moving_points is None for each in devices):
+        return None
+    from missions.embedded.rendered_cameras import RenderedCameras
+
+    return RenderedCameras(sitl, films_to)
 
 
 def publish(made: MagneticMap, path: Path) -> None:

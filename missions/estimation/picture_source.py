@@ -6,7 +6,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
-from estimators.vision.video import Picture, TimedPicture, VideoError, frames_of
+from estimators.errors import VideoError
+from estimators.vision.video import Picture, TimedPicture, frames_of
 
 __all__ = ["LivePictures", "StreamClock"]
 

@@ -10,9 +10,9 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.tlog import TlogWriter
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
-from estimators.vision.video import Picture, VideoError
+from estimators.vision.video import Picture
 from missions.camera_film import CameraFilm
 from missions.errors import LinkClosed
 from missions.estimation.picture_source import LivePictures

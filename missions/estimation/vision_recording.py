@@ -6,10 +6,10 @@ from typing import Any, Final, Generic
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.tlog import TlogReader, TlogWriter
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
 from estimators.vehicle_time import VehicleTime, stamp_field
-from estimators.vision.video import TimedPicture, VideoError, frames_of
+from estimators.vision.video import TimedPicture, frames_of
 from missions.estimation.vision_request import (
     COMPLETED,
     FAILED,

@@ -12,10 +12,10 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
 from autopilot_bridge.mavlink.camera_scan import read_camera_scan
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
 from estimators.vision import CameraDescription, PictureWatch, TagDetectorParameters, load_camera
-from estimators.vision.video import Film, VideoError, frames_of, is_stream
+from estimators.vision.video import Film, frames_of, is_stream
 from missions.estimation.picture_source import LivePictures, StreamClock
 from tests.clients.sitl_process import free_port
 from tests.estimators.vision.pictures import CAMERA, TAGS, pictures
