@@ -1,7 +1,7 @@
 """Compares estimates with references: errors over time, and their statistics over the time in the air."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -58,6 +58,7 @@ class Comparison:
         airborne_from: the source of the time in the air.
         figures: error statistics by name of the reference.
         not_compared: reason why there are no figures; "" if there are.
+        group: kind of things of which this is one, drawn together; "": drawn alone.
     """
 
     label: str
@@ -72,6 +73,7 @@ class Comparison:
     airborne_from: str
     figures: Mapping[str, Sequence[ErrorFigures]]
     not_compared: str
+    group: str = ""
 
     @property
     def reference(self) -> str | None:
@@ -101,6 +103,9 @@ def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = "both") ->
         raise ValueError(f"against {against!r} is not accepted; there are {', '.join(AGAINST)}")
     found = []
     for table in runner.tables.values():
+        if table.alternatives_of:
+            found += _first_alternatives(logs, runner, table)
+            continue
         if table.of_sets:
             found += [
                 _compared_sets(logs, runner, table, subject, AGAINST[against])
@@ -114,6 +119,19 @@ def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = "both") ->
         for subject, number in sorted({*zip(subjects.tolist(), numbers.tolist(), strict=True)}):
             rows = np.flatnonzero((subjects == subject) & (numbers == number))
             found.append(_compared(logs, runner, table, rows, subject, number, AGAINST[against]))
+    return found
+
+
+def _first_alternatives(logs: "Sequence[Log]", runner: Runner, table: EstimateTable) -> list[Comparison]:
+    """The most probable alternative for each thing over time; the truth about such things is not in logs."""
+    numbers = table[table.alternatives_of]
+    found = []
+    for number in np.unique(numbers[np.isfinite(numbers)]).astype(int).tolist():
+        rows = np.flatnonzero((table.target_index == 0) & (numbers == number))
+        compared = _compared(logs, runner, table, rows, 0, number, ())
+        label = f"{table.alternatives_of} {number}"
+        reason = f"logs have no reference for the column {table.alternatives_of}"
+        found.append(replace(compared, label=label, group=table.alternatives_of, not_compared=reason))
     return found
 
 

@@ -104,6 +104,9 @@ class EstimateSet(Protocol):
             with the true targets.
         time_us: vehicle time of the estimate.
         subject: system id of the vehicle that it is about; 0 for targets.
+
+    A class whose rows are alternatives for one thing, the most probable first, names the column with the
+    number of that thing in the class attribute `ALTERNATIVES_OF`.
     """
 
     COLUMNS: ClassVar[tuple[str, ...]]
@@ -130,12 +133,15 @@ class Estimator(ABC, Generic[P]):
         PARAMETERS: frozen dataclass of the parameters, with unit-suffixed fields and checks.
         TEAM: whether it receives the messages of all vehicles.
         OBSERVES: classes of the observations that it takes beside messages (`estimators.observations`).
+        EVENTS: it makes estimates only of what it finds: a run without estimates is complete if it used
+            messages.
     """
 
     NAME: ClassVar[str]
     PARAMETERS: ClassVar[type[Any]]
     TEAM: ClassVar[bool] = False
     OBSERVES: ClassVar[tuple[type[Any], ...]] = ()
+    EVENTS: ClassVar[bool] = False
 
     def __init__(self, parameters: P | None = None) -> None:
         self.parameters: P = self.PARAMETERS() if parameters is None else parameters

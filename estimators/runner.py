@@ -72,12 +72,15 @@ class EstimateTable:
         name: name of that class.
         columns: names of the values, with unit suffixes.
         of_sets: whether the estimates are sets.
+        alternatives_of: column with the number of the thing that the rows of an estimate are alternatives
+            for; "": they are things of their own.
     """
 
     def __init__(self, kind: type[Estimate] | type[EstimateSet]) -> None:
         self.name = kind.__name__
         self.columns: tuple[str, ...] = tuple(kind.COLUMNS)
         self.of_sets = hasattr(kind, "rows")
+        self.alternatives_of: str = getattr(kind, "ALTERNATIVES_OF", "")
         self._keys = array("q")  # time, subject and boot of each
         self._indices = array("q")  # of the targets in sets
         self._values = array("d")

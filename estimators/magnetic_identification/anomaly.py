@@ -42,7 +42,6 @@ BACKGROUND: Final = "background"
 _BACKGROUND_PRIOR: Final = 0.3  # of what is no target
 _UNKNOWN_PRIOR: Final = 0.1
 _LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
-_TRACE_SIGMAS: Final = 1.0
 _SHIFTS: Final = 8  # of a place to the mean around it
 
 
@@ -187,12 +186,11 @@ class Anomaly:
 
     def _white(self, seen: Measurement) -> Measurement:
         """As the paper's filter sees it: the error of the map is white."""
-        return replace(seen, white_nt2=seen.white_nt2 + (_TRACE_SIGMAS * self._map_error.sigma_nt) ** 2)
+        return replace(seen, white_nt2=seen.white_nt2 + self._map_error.sigma_nt**2)
 
     def _note(self, sample: Sample, confidence: float) -> None:
         self._place_ne_m = None
-        posterior = self._log_prior + self.log_evidence
-        sought = np.isin(np.arange(len(posterior)), self._sought)
+        sought = np.isin(np.arange(len(self.log_evidence)), self._sought)
         self.trace.append(
             TracePoint(
                 time_us=sample.time_us,
@@ -267,7 +265,8 @@ class Anomaly:
         if not isinstance(hypothesis, ParticleHypothesis):
             return []
         found = find_modes(hypothesis.sources(), hypothesis.weights)
-        return [self._mode_in_map(mode) for mode in found]
+        course = self._last.course_rad
+        return [mode.moved(self._in_map(*mode.mean[:2]), course) for mode in found]
 
     def predictions(self, north_m: Array, east_m: Array, height_m: float, count: int) -> list[Array | None]:
         """What a pass over places (n,) would measure, nT, by each hypothesis: (count, n) for as many equally
@@ -287,22 +286,6 @@ class Anomaly:
                 )
             )
         return [*found, None, np.zeros((1, len(north_m)))]
-
-    def _mode_in_map(self, mode: Mode) -> Mode:
-        north_m, east_m = self._in_map(mode.mean[0], mode.mean[1])
-        axis_rad = math.remainder(mode.mean[2] + self._last.course_rad, math.tau)
-        course = self._last.course_rad
-        cosine2, sine2 = math.cos(course) ** 2, math.sin(course) ** 2
-        forward2, right2 = mode.sigmas[0] ** 2, mode.sigmas[1] ** 2
-        return Mode(
-            weight=mode.weight,
-            mean=(north_m, east_m, axis_rad),
-            sigmas=(
-                math.sqrt(cosine2 * forward2 + sine2 * right2),
-                math.sqrt(sine2 * forward2 + cosine2 * right2),
-                mode.sigmas[2],
-            ),
-        )
 
     def _in_map(self, forward_m: float, right_m: float) -> tuple[float, float]:
         last = self._last

@@ -2,7 +2,6 @@
 any kind.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
@@ -12,6 +11,10 @@ __all__ = ["AnomalyClass", "DipoleClass", "GaussianClass", "classes_from"]
 _FORMS: Final = (
     "NAME:gaussian:AMPLITUDE:ALONG:ACROSS (nT, m, m) or NAME:dipole:STRENGTH:LEAST:MOST (nT, m, m)"
 )
+_WEAKEST_NT: Final = 1e-3
+_STRONGEST_NT: Final = 1e6
+_LEAST_M: Final = 1.0
+_MOST_M: Final = 1e5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,8 +24,8 @@ class GaussianClass:
     Attributes:
         name: name for users.
         sought: whether it is a target.
-        amplitude_nt: expected amplitude; below zero for a hole.
-        sigma_along_m, sigma_across_m: standard deviations along and across its axis.
+        amplitude_nt: expected amplitude; below zero for a hole; its size is 0.001..1e6 nT.
+        sigma_along_m, sigma_across_m: standard deviations along and across its axis, 1..1e5 m.
         amplitude_spread, size_spread: relative standard deviations of amplitude and extent within the class.
     """
 
@@ -36,10 +39,13 @@ class GaussianClass:
 
     def __post_init__(self) -> None:
         _check_name(self.name)
-        if not (math.isfinite(self.amplitude_nt) and self.amplitude_nt != 0.0):
-            raise ValueError(f"amplitude_nt {self.amplitude_nt:g} of class {self.name} is no signature")
+        if not _WEAKEST_NT <= abs(self.amplitude_nt) <= _STRONGEST_NT:
+            raise ValueError(
+                f"amplitude_nt {self.amplitude_nt:g} of class {self.name} is not accepted; sizes of "
+                f"{_WEAKEST_NT:g} to {_STRONGEST_NT:g} nT are"
+            )
         for field in ("sigma_along_m", "sigma_across_m"):
-            _check_positive(self.name, field, getattr(self, field))
+            _check_extent(self.name, field, getattr(self, field))
         for field in ("amplitude_spread", "size_spread"):
             value = getattr(self, field)
             if not 0.0 <= value < 1.0:
@@ -58,9 +64,10 @@ class DipoleClass:
     Attributes:
         name: name for users.
         sought: whether it is a target.
-        strength_nt: standard deviation of the strength mu_0 m / (4 pi d^3) per axis, at the distance d of
-            closest approach. A dipole along the field makes twice as much right above it.
-        least_m, most_m: distance of the body below the sensor.
+        strength_nt: standard deviation of the strength mu_0 m / (4 pi d^3) per axis, where d is the depth of
+            the body below the sensor; 0.001..1e6 nT. Right above the body, a dipole along a vertical field
+            makes twice as much.
+        least_m, most_m: smallest and largest depth of the body below the sensor, 1..1e5 m.
     """
 
     name: str
@@ -71,17 +78,22 @@ class DipoleClass:
 
     def __post_init__(self) -> None:
         _check_name(self.name)
-        _check_positive(self.name, "strength_nt", self.strength_nt)
-        _check_positive(self.name, "least_m", self.least_m)
-        if not self.least_m < self.most_m < math.inf:
+        if not _WEAKEST_NT <= self.strength_nt <= _STRONGEST_NT:
+            raise ValueError(
+                f"strength_nt {self.strength_nt:g} of class {self.name} is not accepted; "
+                f"{_WEAKEST_NT:g} to {_STRONGEST_NT:g} nT is"
+            )
+        for field in ("least_m", "most_m"):
+            _check_extent(self.name, field, getattr(self, field))
+        if not self.least_m < self.most_m:
             raise ValueError(
                 f"most_m {self.most_m:g} of class {self.name} is not more than least_m {self.least_m:g}"
             )
 
     @property
     def reach_m(self) -> float:
-        """Largest horizontal distance at which an anomaly of the class begins."""
-        return 2.0 * self.most_m
+        """Horizontal distance within which the strongest anomalies of the class, the shallow ones, are."""
+        return 2.0 * self.least_m
 
 
 AnomalyClass: TypeAlias = GaussianClass | DipoleClass
@@ -125,6 +137,8 @@ def _check_name(name: str) -> None:
         raise ValueError(f"class name {name!r} is not accepted; give letters, digits, '-' and '_'")
 
 
-def _check_positive(name: str, field: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{field} {value:g} of class {name} is not accepted; more than 0 is")
+def _check_extent(name: str, field: str, value_m: float) -> None:
+    if not _LEAST_M <= value_m <= _MOST_M:
+        raise ValueError(
+            f"{field} {value_m:g} of class {name} is not accepted; {_LEAST_M:g} to {_MOST_M:g} m is"
+        )

@@ -20,12 +20,14 @@ class IdentificationEstimate:
         passes: number of passes over it.
         probability: that it is one of the targets.
         background: probability that it is an error of the map.
-        confidence: the paper's C_t (7), per particle and over its greatest value; NaN: no class has it.
-        evidence: logarithm of the evidence of the most probable target over that of the most probable other
-            explanation.
+        confidence: the paper's C_t (7), per particle and over its greatest value; NaN: at the first
+            measurement of an anomaly, and if no class that is sought is Gaussian.
+        evidence: logarithm of the greatest evidence of a target over the greatest evidence of another
+            explanation; without the classes' priors.
         modes: north and east from the map's home, and the axis of the signature from north.
     """
 
+    ALTERNATIVES_OF: ClassVar[str] = "anomaly"
     COLUMNS: ClassVar[tuple[str, ...]] = (
         *("north_m", "east_m", "axis_rad", "north_sigma_m", "east_sigma_m", "axis_sigma_rad", "weight"),
         *("anomaly", "passes", "probability", "background", "confidence", "evidence"),

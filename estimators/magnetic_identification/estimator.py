@@ -24,7 +24,7 @@ from estimators.messages import Message
 from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.foundation.magnetics import magnetic_field_ned_gauss
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss, require_wmm_year
 
 __all__ = ["MagneticIdentificationEstimator", "MagneticIdentificationParameters", "field_direction"]
 
@@ -43,7 +43,7 @@ class MagneticIdentificationParameters(IdentificationParameters):
 
     Attributes:
         map_file: published magnetic map (`.npz`); without one, no reading can be compared.
-        decimal_year: date of the main field, whose direction dipoles need.
+        decimal_year: date of the main field, whose direction dipoles need; 2025..2030.
     """
 
     map_file: Path | None = None
@@ -52,6 +52,7 @@ class MagneticIdentificationParameters(IdentificationParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not reach the base of a dataclass with slots
         IdentificationParameters.__post_init__(self)
+        require_wmm_year(self.decimal_year)
 
 
 class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters]):
@@ -66,6 +67,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
     NAME: ClassVar[str] = "magnetic-identification"
     PARAMETERS = MagneticIdentificationParameters
     TEAM: ClassVar[bool] = True
+    EVENTS: ClassVar[bool] = True
 
     def __init__(self, parameters: MagneticIdentificationParameters | None = None) -> None:
         super().__init__(parameters)
@@ -92,7 +94,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
         self._guard.reset()
         self._placers: dict[int, ReadingPlacer] = {}
         self._checks: dict[int, ReadingCheck] = {}
-        self._off_map = 0
+        self._off_map = self._on_map = 0
         self._estimates: tuple[IdentificationEstimate, ...] = ()
         self._reported_us: dict[int, int] = {}
         self.identifier: Identifier | None = None
@@ -154,6 +156,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
             if math.isnan(map_nt):
                 self._off_map += 1
                 continue
+            self._on_map += 1
             progress = self.identifier.take(system, reading, map_nt)
             if progress is not None and self._report(progress):
                 outcome = Outcome.UPDATED
@@ -210,10 +213,18 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
         }
         for anomaly in self.identifier.anomalies:
             found[f"anomaly_{anomaly.number}_probability"] = round(anomaly.probability, 4)
+        warnings = []
+        if self._off_map and not self._on_map:
+            warnings.append(
+                f"all {self._off_map} readings with a position are outside the map's data; is "
+                f"{self.parameters.map_file} the map of this place?"
+            )
         if self.implausible:
-            found["warning"] = (
+            warnings.append(
                 f"{self.implausible} readings are stuck, or no field of the Earth; check the magnetometer"
             )
+        if warnings:
+            found["warning"] = "; ".join(warnings)
         return found
 
 

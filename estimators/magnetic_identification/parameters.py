@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from estimators.magnetic_identification.classes import AnomalyClass, DipoleClass, classes_from
+from estimators.magnetic_identification.classes import AnomalyClass, GaussianClass, classes_from
 from flightsim.foundation.checks import named, require_not_negative, require_positive
 
 __all__ = ["FALSE_ANOMALIES", "TARGETS", "IdentificationParameters"]
@@ -30,10 +30,10 @@ class IdentificationParameters:
             larger (paper: 1 nT).
         noise_nt: standard deviation of one reading.
         map_error_nt: standard deviation of the map; None: as the map states it, else 1 nT.
-        shape_error: error of a measurement relative to itself, as no signature is exact.
-        forward_noise: standard deviation of a displacement, relative to it.
-        turn_noise: standard deviation of a turn, relative to it.
-        course_noise_rad: standard deviation of the course at each measurement.
+        shape_error: error of a measurement relative to itself, as no signature is exact; 0..1.
+        forward_noise: standard deviation of a displacement, relative to it; 0..1.
+        turn_noise: standard deviation of a turn, relative to it; 0..1.
+        course_noise_rad: standard deviation of the course at each measurement; 0..1.
         target_speed_m_s: largest speed of a moving target, as a random walk.
         unknown_nt, unknown_m: standard deviation and correlation distance of anomalies of unknown shape.
         most_anomalies: number of anomalies that are kept; the least probable target is dropped first.
@@ -65,7 +65,7 @@ class IdentificationParameters:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        _ = self.classes
+        classes = self.classes
         if not self.targets:
             raise ValueError(
                 "targets names no class: there is nothing to identify; give one or more, such as "
@@ -74,14 +74,24 @@ class IdentificationParameters:
         require_positive(
             **named(self, "interval_s", "threshold_nt", "noise_nt", "unknown_nt", "unknown_m", "report_s")
         )
-        require_not_negative(
-            **named(self, "shape_error", "forward_noise", "turn_noise", "course_noise_rad"),
-            **named(self, "target_speed_m_s", "map_error_nt"),
-        )
+        require_not_negative(**named(self, "target_speed_m_s", "map_error_nt"))
+        for name in ("shape_error", "forward_noise", "turn_noise", "course_noise_rad"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise ValueError(f"{name} {value:g} is not in 0..1")
+        for of in classes:
+            if isinstance(of, GaussianClass) and of.sought and abs(of.amplitude_nt) <= self.threshold_nt:
+                raise ValueError(
+                    f"amplitude_nt {of.amplitude_nt:g} of class {of.name} does not exceed threshold_nt "
+                    f"{self.threshold_nt:g}: no pass would detect it; lower threshold_nt, or give the class "
+                    "of a stronger target"
+                )
         if not 0.0 < self.target_prior < 1.0:
             raise ValueError(f"target_prior {self.target_prior:g} is not between 0 and 1")
         if not 100 <= self.particles <= 1_000_000:
             raise ValueError(f"particles {self.particles} is not in 100..1000000")
+        if self.seed < 0:
+            raise ValueError(f"seed {self.seed} is not accepted; 0 or more is")
         if self.most_anomalies < 1:
             raise ValueError(f"most_anomalies {self.most_anomalies} is not accepted; 1 or more is")
 
@@ -97,4 +107,4 @@ class IdentificationParameters:
     @property
     def reach_m(self) -> float:
         """Distance from an anomaly within which measurements are about it."""
-        return max(2.0 * of.least_m if isinstance(of, DipoleClass) else of.reach_m for of in self.classes)
+        return max(of.reach_m for of in self.classes)

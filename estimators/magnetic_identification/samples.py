@@ -10,7 +10,7 @@ class Sample:
     """Averaged readings of one vehicle.
 
     Attributes:
-        time_us: vehicle time of the middle.
+        time_us: vehicle time of the first reading.
         vehicle: number of the vehicle.
         north_m, east_m, height_m: mean place from the map's home.
         course_rad: course of the vehicle over ground.
@@ -36,10 +36,11 @@ class TracePoint:
         time_us: vehicle time.
         number: number of the pass, from 0.
         residual_nt: the measurement.
-        confidence: the paper's C_t, per particle and over its greatest value; NaN: no class has it.
+        confidence: the paper's C_t, per particle and over its greatest value; NaN: at the first measurement
+            of an anomaly, and if no class that is sought is Gaussian.
         probability: that the anomaly is one of the targets.
-        evidence: logarithm of the evidence of the most probable target, less that of the most probable other
-            explanation.
+        evidence: logarithm of the greatest evidence of a target, less the greatest evidence of another
+            explanation; without the classes' priors.
     """
 
     time_us: int

@@ -47,6 +47,17 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
         compared: vehicles or targets; the first quantities of all of them are shown, those with a reference
             before those without.
     """
+    groups: dict[str, list[Comparison]] = {}
+    for c in compared:
+        if c.group:
+            groups.setdefault(c.group, []).append(c)
+    together = [
+        (members, column)
+        for group, members in groups.items()
+        for column in members[0].estimates
+        if column != group
+    ]
+    compared = [c for c in compared if not c.group]
     shown = [
         (c, column) for c in compared for column in dict.fromkeys(k for r in c.references.values() for k in r)
     ][:_MOST]
@@ -58,9 +69,9 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
     ]
     left_out = max(0, len(alone) - _MOST_ALONE)
     alone = alone[:_MOST_ALONE]
-    heights = [1.9, 1.0] * len(shown) + [1.1] * len(alone)
+    heights = [1.9, 1.0] * len(shown) + [1.1] * (len(alone) + len(together)) or [1.1]
     figure = Figure(
-        figsize=(10.0, 0.9 + 3.1 * len(shown) + 1.2 * len(alone)),
+        figsize=(10.0, 0.9 + 3.1 * len(shown) + 1.2 * max(1, len(alone) + len(together))),
         dpi=120,
         layout="constrained",
         facecolor="white",
@@ -86,7 +97,15 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
         if k == 0 and not shown:
             _legend(below, c)
         tidy(below)
-    if below is not None:
+    first: Any = None
+    for k, (members, column) in enumerate(together):
+        below = figure.add_subplot(grid[2 * len(shown) + len(alone) + k], sharex=first)
+        first = first or below
+        _draw_together(below, members, column, legend=k == 0)
+        tidy(below)
+    if below is None:
+        figure.text(0.5, 0.4, "no estimate was made", ha="center", fontsize=11, color=_INK)
+    else:
         below.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
@@ -161,6 +180,20 @@ def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
     axes.plot(time_s[thin], values[thin], color=_ESTIMATE, linewidth=0.9)
     written = _UNITS.get(unit, unit)
     axes.set_ylabel(f"{label} {name}{', ' if written else ''}{written}".strip(), fontsize=8, color=_INK)
+
+
+def _draw_together(axes: Any, members: Sequence[Comparison], column: str, *, legend: bool) -> None:
+    """Draw a column of all things of a group. Their estimates are apart in time, so they are points."""
+    name, unit, factor = quantity_of(column)
+    for c in members:
+        values = factor * (wrap_pi(c.estimates[column]) if column.endswith("_rad") else c.estimates[column])
+        axes.plot(_continuous_s(c), values, ".", markersize=5, label=c.label)
+    written = _UNITS.get(unit, unit)
+    axes.set_ylabel(f"{name}{', ' if written else ''}{written}", fontsize=8, color=_INK)
+    if legend:
+        axes.legend(
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(6, len(members)), fontsize=8, frameon=False
+        )
 
 
 def _limit(axes: Any, c: Comparison, column: str, factor: float) -> None:

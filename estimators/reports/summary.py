@@ -9,6 +9,7 @@ import numpy as np
 
 from estimators.comparison import Comparison, comparisons
 from estimators.fleet import Fleet
+from estimators.interface import Outcome
 from estimators.log_replay import log_supplies, missing_of, vehicles_in
 from estimators.logs import Log
 from estimators.needs import Supply
@@ -75,8 +76,7 @@ def assess(
     reason = failure or _reason_of(lacking, len(supplies)) or ("" if logs else "nothing was received")
     compared_of = [(runner, comparisons(logs, runner, against)) for runner in fleet.runners.values()]
     compared = [c for _, own in compared_of for c in own]
-    estimates = sum(len(table) for runner in fleet.runners.values() for table in runner.tables.values())
-    if not reason and not estimates:
+    if not reason and not any(map(_has_result, fleet.runners.values())):
         reason = "no estimate was made" if supplies else "there is no vehicle's autopilot in it"
     partial = bool(reason) or interrupted
     outcome = FAILED if reason else INTERRUPTED if interrupted else COMPLETED
@@ -92,6 +92,12 @@ def assess(
         "parameters": _plain(fleet.parameters),
     }
     return Assessment(outcome=outcome, reason=reason, compared=compared, figures=figures)
+
+
+def _has_result(runner: Runner) -> bool:
+    """Whether a runner made an estimate, or found nothing in the messages that it used."""
+    used = runner.outcomes.get(Outcome.USED, 0) if runner.estimator.EVENTS else 0
+    return used > 0 or any(len(table) for table in runner.tables.values())
 
 
 def _reason_of(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:
@@ -159,10 +165,13 @@ def notes_of(summary: Mapping[str, Any]) -> list[str]:
         which = "" if block["system_id"] is None else f"vehicle {block['system_id']}: "
         if "note" in block["remarks"]:
             found.append(which + block["remarks"]["note"])
+        subjects_by_reason: dict[str, list[str]] = {}
+        for subject in block["subjects"]:
+            if subject["not_compared"]:
+                subjects_by_reason.setdefault(subject["not_compared"], []).append(subject["subject"])
         found += [
-            f"{subject['subject']}: nothing is compared: {subject['not_compared']}"
-            for subject in block["subjects"]
-            if subject["not_compared"]
+            f"{', '.join(subjects)}: nothing is compared: {reason}"
+            for reason, subjects in subjects_by_reason.items()
         ]
     return found
 

@@ -32,11 +32,34 @@ class Mode:
         weight: its share of the belief.
         mean: (x, y, angle).
         sigmas: their standard deviations.
+        covariance_xy: covariance of x and y.
     """
 
     weight: float
     mean: tuple[float, float, float]
     sigmas: tuple[float, float, float]
+    covariance_xy: float
+
+    def moved(self, mean: tuple[float, float], turn_rad: float) -> "Mode":
+        """The mode after a rotation from x to y.
+
+        Args:
+            mean: mean of x and y after it.
+            turn_rad: angle of the rotation.
+        """
+        cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
+        x2, y2, xy = self.sigmas[0] ** 2, self.sigmas[1] ** 2, self.covariance_xy
+        twice = 2.0 * cosine * sine * xy
+        return Mode(
+            weight=self.weight,
+            mean=(*mean, math.remainder(self.mean[2] + turn_rad, math.tau)),
+            sigmas=(
+                math.sqrt(max(0.0, cosine * cosine * x2 + sine * sine * y2 - twice)),
+                math.sqrt(max(0.0, sine * sine * x2 + cosine * cosine * y2 + twice)),
+                self.sigmas[2],
+            ),
+            covariance_xy=cosine * sine * (x2 - y2) + (cosine * cosine - sine * sine) * xy,
+        )
 
 
 def find_modes(points: Array, weights: Array, *, least_cell: float = 5.0) -> list[Mode]:
@@ -137,4 +160,9 @@ def _mode_of(points: Array, weights: Array, weight: float) -> Mode:
     off = np.angle(np.exp(1j * (points[:, 2] - mean_angle)))
     spreads = (points[:, 0] - x, points[:, 1] - y, off)
     sigmas = tuple(math.sqrt(float(weights @ (spread * spread))) for spread in spreads)
-    return Mode(weight=weight, mean=(x, y, mean_angle), sigmas=(sigmas[0], sigmas[1], sigmas[2]))
+    return Mode(
+        weight=weight,
+        mean=(x, y, mean_angle),
+        sigmas=(sigmas[0], sigmas[1], sigmas[2]),
+        covariance_xy=float(weights @ (spreads[0] * spreads[1])),
+    )

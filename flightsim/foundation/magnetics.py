@@ -16,6 +16,18 @@ def _model() -> GeoMag:
     return GeoMag(coefficients_file="wmm/WMM_2025.COF")
 
 
+def require_wmm_year(decimal_year: float) -> None:
+    """Refuse a date for which WMM-2025 is not valid.
+
+    Raises:
+        ValueError: names the date and the years that are accepted.
+    """
+    if not 2025.0 <= decimal_year <= 2030.0:
+        raise ValueError(
+            f"decimal year {decimal_year} is outside the magnetic model's validity, 2025.0 to 2030.0"
+        )
+
+
 def magnetic_field_ned_gauss(
     lat_deg: float, lon_deg: float, alt_m: float, decimal_year: float
 ) -> NDArray[np.float64]:
@@ -32,10 +44,7 @@ def magnetic_field_ned_gauss(
     Raises:
         ValueError: date outside the model's validity.
     """
-    if not 2025.0 <= decimal_year <= 2030.0:
-        raise ValueError(
-            f"decimal year {decimal_year} is outside the magnetic model's validity, 2025.0 to 2030.0"
-        )
+    require_wmm_year(decimal_year)
     result = _model().calculate(
         glat=lat_deg, glon=lon_deg, alt=alt_m / 1000.0, time=decimal_year, allow_date_outside_lifespan=True
     )

@@ -142,8 +142,8 @@ def refuse_idle_options(context: click.Context, *, connected: bool) -> None:
     """Refuse options on the command line that would have no effect on this flight.
 
     Options of other missions are refused by the parser. This function refuses options of the embedded SITL
-    when vehicles are connected by links, options for connected vehicles with the embedded SITL, and options
-    that another option replaces.
+    when vehicles are connected by links, options for connected vehicles with the embedded SITL, options that
+    another option replaces, and options that need another one.
 
     Raises:
         click.UsageError: the message names the options and their use.
@@ -162,6 +162,8 @@ def refuse_idle_options(context: click.Context, *, connected: bool) -> None:
     if names:
         raise click.UsageError(f"{names}: for vehicles elsewhere; give --connect too, or leave it out")
     for option in given:
+        if option.needs is not None:
+            _refuse_without(option, options[option.needs[0]], context)
         for name in option.replaces:
             if name in chosen:
                 replaced = options[name].opts[0]
@@ -169,3 +171,15 @@ def refuse_idle_options(context: click.Context, *, connected: bool) -> None:
                     f"{replaced}: has no effect beside {option.opts[0]}, which replaces it; leave one of "
                     "them out"
                 )
+
+
+def _refuse_without(option: FlightOption, needed: FlightOption, context: click.Context) -> None:
+    """Refuse an option without the other one that it needs."""
+    assert option.needs is not None and needed.name is not None
+    name, values = needed.opts[0], option.needs[1]
+    value = context.params[needed.name]
+    if value in values or (not values and value is not None):
+        return
+    missing = f"without {name}" if value is None else f"with {name} {value}"
+    wanted = " or ".join(f"{name} {each}" for each in values) or name
+    raise click.UsageError(f"{option.opts[0]}: has no effect {missing}; give {wanted}, or leave it out")

@@ -37,6 +37,8 @@ class FlightOption(click.Option):
         group: heading under which the help lists it.
         scope: the flights it has an effect on; it is refused for the others.
         replaces: names of options that have no effect beside it; they are refused beside it.
+        needs: name of an option without which it has no effect, and the values of that option with which it
+            has one; without values, every value.
         sets: the field of the mission's options that it sets; None: the one of its name (`option_of`).
     """
 
@@ -46,6 +48,7 @@ class FlightOption(click.Option):
         group: str,
         scope: Scope = Scope.ANY,
         replaces: tuple[str, ...] = (),
+        needs: tuple[str, tuple[str, ...]] | None = None,
         sets: str | None = None,
         **attributes: Any,
     ) -> None:
@@ -53,6 +56,7 @@ class FlightOption(click.Option):
         self.group = group
         self.scope = scope
         self.replaces = replaces
+        self.needs = needs
         self.sets = sets
 
 

@@ -11,6 +11,9 @@ from missions.cli.options import PLACE, SIDES
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
 
+_BY_CLASSES: Final = ("identify", ("trace", "bayes"))
+_NO_CLASS: Final = "none"
+
 
 def _values(given: Given) -> Mapping[str, Any]:
     if given["connect"] and given["map"] is None:
@@ -18,7 +21,7 @@ def _values(given: Given) -> Mapping[str, Any]:
             "a search needs the published magnetic map of its place; give it with --map FILE "
             "(numpy .npz, format flightstack-magnetic-map-1)"
         )
-    return {}
+    return {"false_anomalies": ()} if given["false_class"] == (_NO_CLASS,) else {}
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
@@ -61,10 +64,16 @@ COMMAND: Final = MissionCommand(
             help="For a turn by 180 degrees, in mean prior scores. [default: 0.2; multicopters: 0.05]",
         ),
         option(
-            "--detection-probability", type=float, default=0.95, help="Of a target by a pass right over it."
+            "--detection-probability",
+            type=float,
+            default=0.95,
+            help="Probability that a pass right over a target detects it.",
         ),
         option(
-            "--detection-range", type=float, default=80.0, help="Sideways fall-off of that, one sigma, m."
+            "--detection-range",
+            type=float,
+            default=80.0,
+            help="Distance over which that probability falls off to the sides, one sigma, m.",
         ),
         option("--threshold", type=float, default=3.0, help="Reading less map beyond it is an anomaly, nT."),
         option("--noise", type=float, default=0.5, help="Of reading less map, one sigma, nT."),
@@ -73,30 +82,46 @@ COMMAND: Final = MissionCommand(
             type=float,
             help="Of the published map, one sigma, nT. [default: as the map states it, else 1]",
         ),
-        option("--confirmations", type=int, default=2, help="Passes that must see an anomaly at one place."),
+        option(
+            "--confirmations",
+            needs=("identify", ("threshold",)),
+            type=int,
+            default=2,
+            help="Passes that must detect an anomaly at one place, with --identify threshold.",
+        ),
         option("--raise-radius", type=float, default=300.0, help="Scores are raised around anomalies, m."),
         option(
             "--identify",
             type=click.Choice(["threshold", "trace", "bayes"]),
             default="threshold",
-            help="By passes that see an anomaly, a particle filter's confidence, or the evidence of classes.",
+            help="The target is named by passes that detect an anomaly at one place (threshold), by a "
+            "classifier on the trace of the paper's confidence (trace), or by the evidence of the classes "
+            "(bayes).",
         ),
         option(
             "--class",
             sets="targets",
+            needs=_BY_CLASSES,
             multiple=True,
             metavar="NAME:FORM:...",
-            help="Class that is sought, with --identify: NAME:gaussian:NT:ALONG:ACROSS or "
+            help="Class that is sought, with --identify trace or bayes: NAME:gaussian:NT:ALONG:ACROSS or "
             "NAME:dipole:NT:LEAST:MOST. [default: target:gaussian:30:80:60]",
         ),
         option(
             "--false-class",
             sets="false_anomalies",
+            needs=_BY_CLASSES,
             multiple=True,
             metavar="NAME:FORM:...",
-            help="Known class that is not sought. [default: boat:dipole:15:50:150]",
+            help="Known class that is not sought; none: there is none. [default: boat:dipole:15:50:150]",
         ),
-        option("--particles", type=int, default=4000, help="Of each class, with --identify."),
+        option(
+            "--particles",
+            needs=_BY_CLASSES,
+            type=int,
+            default=4000,
+            help="Particles of each class, with --identify trace or bayes.",
+        ),
         option("--search-time", type=float, default=900.0, help="Give up after so many seconds."),
         option("--altitude", type=float, default=80.0, help="Of the lowest layer, above home, m."),
         option("--separation", type=float, default=15.0, help="Between the layers of a team, m."),
@@ -122,11 +147,19 @@ COMMAND: Final = MissionCommand(
             scope=Scope.EMBEDDED,
             type=float,
             default=30.0,
-            help="Of that target's anomaly, nT.",
+            help="Amplitude of that target's Gaussian anomaly, nT.",
+        ),
+        option(
+            "--sigma",
+            type=SIDES,
+            scope=Scope.EMBEDDED,
+            default="80x60",
+            help="Extent of that target's Gaussian anomaly, one sigma along x across, m.",
         ),
         option(
             "--moment",
             scope=Scope.EMBEDDED,
+            replaces=("amplitude", "sigma"),
             type=float,
             help="Dipole moment of that target, A m2, along the Earth's field, in place of a Gaussian.",
         ),
@@ -135,7 +168,8 @@ COMMAND: Final = MissionCommand(
             scope=Scope.EMBEDDED,
             type=float,
             default=10.0,
-            help="Of a target with a moment, below home, m.",
+            needs=("moment", ()),
+            help="Depth of a target with a moment, below home, m.",
         ),
         option(
             "--false-anomalies",
@@ -143,13 +177,6 @@ COMMAND: Final = MissionCommand(
             type=click.IntRange(0, 100),
             default=0,
             help="Boats and wrecks in the embedded world, drawn from --seed.",
-        ),
-        option(
-            "--sigma",
-            type=SIDES,
-            scope=Scope.EMBEDDED,
-            default="80x60",
-            help="Its extent, m: one sigma along x across.",
         ),
     ),
     made=("missions.occupancy.options", "OccupancyOptions"),

@@ -319,6 +319,11 @@ def _check_signature(
         )
     if not (math.isfinite(depth_m) and abs(depth_m) <= _LARGEST_DEPTH_M):
         raise PlanError(f"`depth_m` {depth_m:g} m of the target is not within {_LARGEST_DEPTH_M:g} m of home")
+    if moment_a_m2 is not None and -depth_m >= options.altitude_m:
+        raise PlanError(
+            f"`depth_m` {depth_m:g} m puts the target {-depth_m:g} m above home, and the vehicles fly at "
+            f"`altitude_m` {options.altitude_m:g} m; ask for a target below them"
+        )
 
 
 def drawn_target(

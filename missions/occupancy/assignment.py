@@ -23,7 +23,7 @@ class PassAssignment:
     """The passes of a team over suspects.
 
     Attributes:
-        passes_flown: number of passes that were assigned.
+        passes_assigned: number of passes that were assigned.
     """
 
     def __init__(self, searchers: int, *, noise_nt: float, map_error: MapError) -> None:
@@ -34,7 +34,7 @@ class PassAssignment:
             noise_nt: standard deviation of a measurement.
             map_error: error of the published map.
         """
-        self.passes_flown = 0
+        self.passes_assigned = 0
         self._noise_nt = noise_nt
         self._map_error = map_error
         self._legs: list[list[tuple[float, float]]] = [[] for _ in range(searchers)]
@@ -130,7 +130,7 @@ class PassAssignment:
         suspect.assigned += 1
         self._legs[searcher] = [chosen.entry_ne_m, chosen.exit_ne_m]
         self._fresh[searcher] = True
-        self.passes_flown += 1
+        self.passes_assigned += 1
 
     def _duration_s(self, searcher: int, flown: Pass) -> float:
         """Time until a searcher has flown a pass: two turns, the way to its begin, and its length."""

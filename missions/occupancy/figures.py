@@ -53,7 +53,7 @@ def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str,
         ],
         **_identification(search),
         "searchers": [
-            _searcher_block(searcher, notes.system_id, notes.kind, heading)
+            _searcher_block(searcher, notes.system_id, notes.kind, heading, team.began_us)
             for searcher, (notes, _), heading in zip(team.searchers, debriefing.flights, scores, strict=False)
         ],
     }
@@ -101,7 +101,9 @@ def _heading(searcher: "Searcher", score: "FlightScore") -> HeadingScore:
     return heading_score(searcher.pilot.commands, track.time_s, track.yaw_rad, end_s=searcher.ended_us * 1e-6)
 
 
-def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: HeadingScore) -> dict[str, Any]:
+def _searcher_block(
+    searcher: "Searcher", system_id: int, kind: str, heading: HeadingScore, began_us: int
+) -> dict[str, Any]:
     watch = searcher.watch
     return {
         "system_id": system_id,
@@ -118,7 +120,7 @@ def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: He
         "readings_dropped": 0 if watch is None else watch.placer.dropped + watch.detector.dropped,
         "readings_implausible": 0 if watch is None else watch.check.implausible,
         "anomalies_insignificant": 0 if watch is None else watch.detector.insignificant,
-        "anomalies": [_anomaly(anomaly) for anomaly in searcher.anomalies],
+        "anomalies": [_anomaly(anomaly, began_us) for anomaly in searcher.anomalies],
     }
 
 
@@ -141,12 +143,12 @@ def _identification(search: "Search") -> dict[str, Any]:
     investigation = search.investigation
     if investigation is None:
         return {}
-    return {"identify": str(investigation.identify), "passes_on_purpose": investigation.passes_flown}
+    return {"identify": str(investigation.identify), "passes_assigned": investigation.passes_assigned}
 
 
-def _anomaly(anomaly: "Anomaly") -> dict[str, float]:
+def _anomaly(anomaly: "Anomaly", began_us: int) -> dict[str, float]:
     return {
-        "time_s": anomaly.time_us * 1e-6,
+        "time_s": round((anomaly.time_us - began_us) * 1e-6, 3),
         "north_m": round(anomaly.north_m, 2),
         "east_m": round(anomaly.east_m, 2),
         "peak_nt": round(anomaly.peak_nt, 3),

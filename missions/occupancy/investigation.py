@@ -58,9 +58,9 @@ class Investigation:
         self._passes = PassAssignment(searchers, noise_nt=noise_nt, map_error=map_error)
 
     @property
-    def passes_flown(self) -> int:
+    def passes_assigned(self) -> int:
         """Number of passes that were flown on purpose."""
-        return self._passes.passes_flown
+        return self._passes.passes_assigned
 
     def take(self, searcher: int, reading: PlacedReading, map_nt: float) -> Progress | None:
         """Process a reading of a searcher."""

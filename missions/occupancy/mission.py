@@ -40,6 +40,7 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
         known: dict[str, float | str] = {
             "threshold_nt": options.threshold_nt,
             "noise_nt": options.noise_nt,
+            "particles": options.particles,
             "targets": ",".join(options.targets),
             "false_anomalies": ",".join(options.false_anomalies),
         }
@@ -86,7 +87,8 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
         return (f"target found after {summary['time_to_find_s']:.0f} s{off}, {detected}", *broken)
 
     def title(self, options: OccupancyOptions) -> str:
-        return f"{self.name}, {options.vehicles} vehicles over {options.width_m:g} m x {options.height_m:g} m"
+        team = "1 vehicle" if options.vehicles == 1 else f"{options.vehicles} vehicles"
+        return f"{self.name}, {team} over {options.width_m:g} m x {options.height_m:g} m"
 
     def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
         team = self.team_of(debriefing)

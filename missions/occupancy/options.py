@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from estimators.errors import EstimatorError
+from estimators.magnetic_identification.classes import GaussianClass
 from estimators.magnetic_identification.parameters import FALSE_ANOMALIES, TARGETS, IdentificationParameters
 from estimators.occupancy.detection import DetectionModel, MapError
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
@@ -117,9 +118,16 @@ class OccupancyOptions(MissionOptions):
             raise PlanError(str(error)) from None
         if self.identify is not Identify.THRESHOLD:
             try:
-                _ = self.identification
+                classes = self.identification.classes
             except ValueError as error:
                 raise PlanError(f"`identify={self.identify}`: {error}") from None
+            sought = [of for of in classes if of.sought]
+            if self.identify is Identify.TRACE and not any(isinstance(of, GaussianClass) for of in sought):
+                raise PlanError(
+                    f"`identify=trace`: no class that is sought ({', '.join(of.name for of in sought)}) is "
+                    "Gaussian, and the paper's confidence is computed for a Gaussian only; ask for "
+                    "`identify=bayes`"
+                )
 
     @property
     def identification(self) -> IdentificationParameters:

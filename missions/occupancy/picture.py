@@ -3,6 +3,7 @@ result.
 """
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,6 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+
+from missions.occupancy.suspect import Suspect, Verdict
 
 if TYPE_CHECKING:
     from missions.mission import Debriefing
@@ -24,6 +27,12 @@ _GRID: Final = "#e5e7eb"
 _TARGET: Final = "#dc2626"
 _LETTERS: Final = "abcd"
 _BEFORE_US: Final = 2_000_000
+_MARK: Final[Mapping[str, Any]] = {"linestyle": "", "markeredgecolor": "white"}
+_VERDICT_MARKS: Final[Mapping[Verdict, Mapping[str, Any]]] = {
+    Verdict.DISMISSED: {**_MARK, "color": _INK, "marker": "X", "markersize": 8},
+    Verdict.OPEN: {**_MARK, "color": _TARGET, "marker": "D", "markersize": 6},
+}
+"""Marks of suspects in the last map; the target has a mark of its own."""
 
 
 def four_moments(search: "Search", end_us: int) -> list["Snapshot"]:
@@ -71,11 +80,7 @@ def draw_search(path: Path, title: str, team: "SearchTeam", debriefing: "Debrief
     bar.ax.tick_params(labelsize=8, colors=_INK)
     _draw_probability(figure.add_subplot(grid[2, :]), team, end_us)
     figure.legend(
-        handles=_handles(debriefing, search.found is not None),
-        loc="outside lower center",
-        ncols=6,
-        fontsize=8,
-        frameon=False,
+        handles=_handles(debriefing, search), loc="outside lower center", ncols=6, fontsize=8, frameon=False
     )
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
@@ -122,6 +127,11 @@ def _draw_moment(
     if found is not None and moment.time_us >= team.search.found_us:
         north_m, east_m = found.place_ne_m
         axes.plot(east_m, north_m, "*", color=_TARGET, markersize=11, markeredgecolor="white", zorder=8)
+    if moment is team.search.snapshots[-1]:
+        for candidate in team.search.candidates:
+            mark = _VERDICT_MARKS.get(candidate.verdict) if isinstance(candidate, Suspect) else None
+            if mark is not None:
+                axes.plot(*reversed(candidate.place_ne_m), zorder=8, **mark)
     axes.set_aspect("equal")
     margin_m = 1.5 * layout.cell_m
     axes.set_xlim(layout.west_m - margin_m, layout.east_m + margin_m)
@@ -160,7 +170,7 @@ def _draw_probability(axes: Any, team: "SearchTeam", end_us: int) -> None:
         axes.spines[side].set_visible(False)
 
 
-def _handles(debriefing: "Debriefing", found: bool) -> list[Any]:
+def _handles(debriefing: "Debriefing", search: "Search") -> list[Any]:
     handles: list[Any] = [
         Line2D(
             [], [], color=_COLOURS[k % len(_COLOURS)], marker="x", markersize=7, markeredgewidth=2.0,
@@ -175,7 +185,13 @@ def _handles(debriefing: "Debriefing", found: bool) -> list[Any]:
         handles.append(
             Rectangle((0, 0), 1, 1, fill=False, linestyle="--", edgecolor=_TARGET, label="target (truth)")
         )
-    if found:
+    verdicts = {candidate.verdict for candidate in search.candidates if isinstance(candidate, Suspect)}
+    handles += [
+        Line2D([], [], label=f"{verdict} at the end", **mark)
+        for verdict, mark in _VERDICT_MARKS.items()
+        if verdict in verdicts
+    ]
+    if search.found is not None:
         handles.append(
             Line2D([], [], color=_TARGET, marker="*", linestyle="", markersize=9, label="found at")
         )

@@ -102,6 +102,7 @@ def report(results: Results) -> list[str]:
             lines.append(
                 f"{condition:10s} {label:7s}" + "".join(f"{block[name][method]:12.4f}" for method in METHODS)
             )
+    lines.append("areas under the ROC; trace: by the paper's confidence alone; classifier: on its trace")
     for method, error in summary["calibration_error"].items():
         lines.append(f"calibration error of {method}, nominal: {error:.4f}")
     return lines

@@ -72,7 +72,7 @@ def trial(cell: Cell, seed: int) -> SearchRow:
         false_anomaly_named=error_m > NAMED_WITHIN_M,
         time_s=done.time_s,
         error_m=error_m,
-        passes=0 if investigation is None else investigation.passes_flown,
+        passes=0 if investigation is None else investigation.passes_assigned,
     )
 
 
@@ -89,7 +89,7 @@ def flight(cell: Cell, seed: int) -> SearchRow:
         false_anomaly_named=summary["false_anomaly_named"],
         time_s=options.search_time_s if time_s is None else time_s,
         error_m=math.nan if error_m is None else error_m,
-        passes=summary.get("passes_on_purpose", 0),
+        passes=summary.get("passes_assigned", 0),
         reason=result.reason,
     )
 
@@ -146,7 +146,7 @@ def _shown(value: float | None) -> str:
 def report(results: Results) -> list[str]:
     """The table of the command line."""
     titles = ("runs", "target", "false", "time, s", "error, m", "pairs", "later, s")
-    lines = [f"{'identify':10s}" + "".join(f"{title:>9s}" for title in titles)]
+    lines = [f"{'identify':10s}" + "".join(f"{title:>10s}" for title in titles)]
     for name, block in summarise(results)["searches"].items():
         columns = (
             f"{block['searches']}",
@@ -157,12 +157,14 @@ def report(results: Results) -> list[str]:
             f"{block.get('pairs_that_both_name_it', '-')}",
             _shown(block.get("time_to_threshold_s_median_of_pairs")),
         )
-        lines.append(f"{name:10s}" + "".join(f"{column:>9s}" for column in columns))
-    lines.append(
-        "time: median, where a search that does not name the target never does; later: than threshold,"
-    )
-    lines.append("median of the pairs of equal seeds that both name it")
-    return lines
+        lines.append(f"{name:10s}" + "".join(f"{column:>10s}" for column in columns))
+    return [
+        *lines,
+        "target, false: shares of the searches that name the target, or something else",
+        "time: median of all searches; the time of a search that does not name the target is infinite",
+        "later: time after the search by the threshold with the same seed, median of the pairs in which both "
+        "name the target",
+    ]
 
 
 def study(ways: Collection[Identify] = tuple(Identify), *, flights: bool = False) -> Study[Cell, SearchRow]:

@@ -95,6 +95,22 @@ def test_options_of_the_embedded_sitl_are_refused_with_a_vehicle_elsewhere(optio
             "--target-motion: of the embedded SITL only",
         ),
         (["lissajous", "--check", "--yes"], "--yes, --check: for vehicles elsewhere"),
+        (
+            ["occupancy", "--class", "sub:gaussian:30:80:60"],
+            "--class: has no effect with --identify threshold; give --identify trace or --identify bayes, or",
+        ),
+        (
+            ["occupancy", "--identify", "bayes", "--confirmations", "3"],
+            "--confirmations: has no effect with --identify bayes; give --identify threshold, or",
+        ),
+        (["occupancy", "--depth", "5"], "--depth: has no effect without --moment; give --moment, or leave"),
+        (["occupancy", "--moment", "1e5", "--sigma", "9"], "--sigma: has no effect beside --moment"),
+        (["occupancy", "--moment", "1e5", "--depth", "-90"], "--depth -90 m puts the target 90 m above home"),
+        (
+            ["occupancy", "--identify", "trace", "--class", "sub:dipole:15:50:150", "--false-class", "none"],
+            "--identify trace: no class that is sought (sub) is Gaussian",
+        ),
+        (["occupancy", "--identify", "bayes", "--class", "a:gaussian:1e308:8:6"], "sizes of 0.001 to 1e+06"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(

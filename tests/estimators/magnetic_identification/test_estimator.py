@@ -107,6 +107,23 @@ def test_a_map_that_does_not_exist_is_refused(tmp_path):
         make_estimator("magnetic-identification", [f"map_file={tmp_path / 'none.npz'}"])
 
 
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [("decimal_year=2050", "decimal year 2050.0 is outside"), ("seed=-1", "seed -1 is not accepted")],
+)
+def test_impossible_settings_are_refused(map_file, setting, said):
+    with pytest.raises(EstimatorError, match=said):
+        estimator(map_file, setting)
+
+
+def test_the_map_of_another_place_is_reported(map_file):
+    found = estimator(map_file)
+    for k in range(1, 40):
+        found.handle(k * 100_000, reading(k * 100_000, LEVEL_NT + k % 3))
+        found.handle(k * 100_000, position(k * 100_000, 2.5 * k, 90_000.0))
+    assert "is " + str(map_file) + " the map of this place?" in str(found.remarks()["warning"])
+
+
 def test_an_empty_class_list_is_refused():
     with pytest.raises(EstimatorError, match="targets names no class"):
         make_estimator("magnetic-identification", ["targets="])

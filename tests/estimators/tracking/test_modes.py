@@ -31,6 +31,20 @@ def test_groups_are_found_with_their_weights_places_and_angles_across_the_half_t
         assert mode.sigmas == pytest.approx((15.0, 15.0, 0.12), rel=0.25)
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.7, -2.5])
+def test_a_moved_mode_is_that_of_the_moved_particles(turn):
+    rng = np.random.default_rng(3)
+    drawn = rng.standard_normal((5000, 3)) @ np.array([[30.0, 18.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 0.1]])
+    cosine, sine = math.cos(turn), math.sin(turn)
+    moved = drawn @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]) + (0.0, 0.0, turn)
+    weights = np.full(len(drawn), 1.0 / len(drawn))
+    (before,), (after,) = (find_modes(points, weights, least_cell=200.0) for points in (drawn, moved))
+    found = before.moved(after.mean[:2], turn)
+    assert found.mean[2] == pytest.approx(after.mean[2], abs=1e-3)
+    assert found.sigmas == pytest.approx(after.sigmas, rel=0.01)
+    assert found.covariance_xy == pytest.approx(after.covariance_xy, rel=0.02)
+
+
 def test_weights_count_and_not_particles():
     points = cloud(1)
     heavy = points[:, 0] > 90.0

@@ -108,7 +108,7 @@ def test_an_open_suspect_gets_a_pass_by_one_searcher_and_the_other_searches_on()
     assert math.dist(legs[flying], end) == pytest.approx(600.0, abs=1.0)
     # nothing was measured on the way: at its end the anomaly is judged again
     found.next_leg(flying, 140_000_000, done=True)
-    assert suspect.verdict is not Verdict.OPEN or found.investigation.passes_flown == 2
+    assert suspect.verdict is not Verdict.OPEN or found.investigation.passes_assigned == 2
 
 
 def test_a_suspect_found_while_every_searcher_was_on_a_pass_gets_one_later():
@@ -142,7 +142,7 @@ def test_passes_that_detect_nothing_end_some_time(monkeypatch):
     legs = [found.next_leg(0, (100 + k) * 1_000_000, done=k > 0) for k in range(60)]
     assert 2 < suspect.assigned < 12
     assert legs[0] is not None and legs[-30:] == [None] * 30
-    assert found.investigation.passes_flown == suspect.assigned
+    assert found.investigation.passes_assigned == suspect.assigned
 
 
 def test_a_boat_is_dismissed_and_its_cell_lowered():

@@ -135,6 +135,9 @@ def test_classes_of_an_identification_are_checked_with_the_options():
         OccupancyOptions(identify=Identify.BAYES, targets=())
     with pytest.raises(PlanError, match=r"`identify=trace`: class 'x' is not accepted; give NAME:gaussian"):
         OccupancyOptions(identify=Identify.TRACE, false_anomalies=("x",))
+    with pytest.raises(PlanError, match=r"`identify=trace`: no class that is sought \(sub\) is Gaussian"):
+        OccupancyOptions(identify=Identify.TRACE, targets=("sub:dipole:15:50:150",))
+    OccupancyOptions(identify=Identify.BAYES, targets=("sub:dipole:15:50:150",), false_anomalies=())
 
 
 def test_false_anomalies_are_apart_and_follow_from_the_seed():
