@@ -1,12 +1,14 @@
 """The estimator on messages, and what it says of bad input."""
 
+import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from autopilot_bridge.mavlink import DEFINITIONS
+from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, dialect
+from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
 from estimators.interface import Outcome
 from estimators.library import make_estimator
@@ -14,6 +16,7 @@ from estimators.messages import message_class
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.home import Home
 from flightsim.payload import MagneticMap
+from missions.cli.main import run_command_line
 from tests.estimators.magnetic_identification.encounters import HEIGHT_M, readings, target, track
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
@@ -190,3 +193,34 @@ def test_along_a_border_of_stairs_readings_without_a_map_make_no_anomaly_and_the
             found.handle(taken.time_us, position(taken.time_us, taken.north_m, taken.east_m))
     assert 50 < used < len(border) - 50
     assert found.identifier.anomalies[-1].probability > 0.8
+
+
+@pytest.mark.parametrize("source", [True, False])
+def test_a_replay_with_and_without_an_anomaly_is_complete(map_file, tmp_path, source, capfd):
+    rng = np.random.default_rng(1)
+    magnetometer, autopilot = FrameEncoder(1, 158), FrameEncoder(1, 1)
+    log_file, out = tmp_path / "flight.tlog", tmp_path / "run"
+    with TlogWriter(log_file) as log:
+        log.write(10**15, autopilot.encode(dialect.MAVLink_heartbeat_message(1, 12, 128, 0, 4, 3)))
+        signatures = [target(rng)] if source else []
+        for taken in readings(rng, track(rng, offset_m=20.0, course_rad=0.4), signatures):
+            ms = taken.time_us // 1000
+            value = dialect.MAVLink_named_value_float_message(ms, b"MAG_NT", LEVEL_NT + taken.total_nt)
+            log.write(10**15 + taken.time_us, magnetometer.encode(value))
+            lat, lon, alt = FRAME.geodetic_from_ned(taken.north_m, taken.east_m, -HEIGHT_M)
+            place = dialect.MAVLink_global_position_int_message(
+                ms, round(lat * 1e7), round(lon * 1e7), round(alt * 1e3), 0, 0, 0, 0, 0
+            )
+            log.write(10**15 + taken.time_us + 1, autopilot.encode(place))
+    settings = [f"map_file={map_file}", "particles=400", "noise_nt=0.2", "report_s=1"]
+    words = [word for setting in settings for word in ("--set", setting)]
+    command = ["replay", log_file, "--estimator", "magnetic-identification", *words, "--out", out]
+    assert run_command_line([str(word) for word in command]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["outcome"], summary["reason"]) == ("completed", "")
+    subjects = [subject["subject"] for subject in summary["vehicles"][0]["subjects"]]
+    assert subjects == (["anomaly 0"] if source else [])
+    assert (out / "errors.png").exists() == source
+    if source:
+        said = capfd.readouterr().out
+        assert "anomaly 0: nothing is compared: logs have no reference for the column anomaly" in said
