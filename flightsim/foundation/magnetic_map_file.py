@@ -19,9 +19,7 @@ total_field_nt + vertical_gradient_nt_m * (h - height_m).
 
 import io
 import math
-import tokenize
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,15 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.npz_file import NpzFileError, read_npz
 
 Array = NDArray[np.float64]
 
 FORMAT: Final = "flightstack-magnetic-map-1"
-# errors that zipfile, zlib and numpy's reader of array headers raise for damaged files
-_UNREADABLE: Final = (
-    *(EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
-    *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
-)
 _ARRAYS: Final = ("north_m", "east_m", "total_field_nt")
 _NUMBERS: Final = ("height_m", "home_lat_deg", "home_lon_deg", "home_alt_m")
 _STATED: Final = ("error_nt", "line_spacing_m")
@@ -137,17 +131,11 @@ def read_map_file(path: Path) -> MapContents:
         MagneticMapError: the file does not exist or is not a map, or the map has no data.
     """
     try:
-        # not np.load, which treats a file that is not an archive as a pickle, and advises to trust it
-        with zipfile.ZipFile(path) as archive:
-            found = {}
-            for name in archive.namelist():
-                with archive.open(name) as file:
-                    found[name.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
+        found = read_npz(path)
     except OSError as error:
         raise MagneticMapError(f"{path} can't be read: {error.strerror or error}") from None
-    except _UNREADABLE as error:
-        why = str(error) or type(error).__name__
-        raise MagneticMapError(f"{path} is not a magnetic map (a numpy .npz archive): {why}") from None
+    except NpzFileError as error:
+        raise MagneticMapError(f"{path} is not a magnetic map (a numpy .npz archive): {error}") from None
     missing = [name for name in ("format", *_ARRAYS, *_NUMBERS) if name not in found]
     if missing:
         raise MagneticMapError(f"{path} is not a magnetic map: it has no {', '.join(missing)}")

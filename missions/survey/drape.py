@@ -5,6 +5,7 @@ steeper than the aircraft climbs: the upper envelope of cones on the ground's po
 lines and tie lines have the same height where they cross, as survey practice demands.
 """
 
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -12,13 +13,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.npz_file import NpzFileError, read_npz
 from missions.errors import PlanError
 
 __all__ = ["Drape", "TerrainModel", "load_terrain"]
 
 Array = NDArray[np.float64]
 
-_HEADER: Final = "north_m,east_m,ground_m"
+_NAMES: Final = ("north_m", "east_m", "ground_m")
+_HEADER: Final = ",".join(_NAMES)
 _MAX_POINTS: Final = 4_000_000
 
 
@@ -128,34 +131,52 @@ def load_terrain(path: Path) -> TerrainModel:
         PlanError: no such file, or not such a file.
     """
     try:
-        if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as found:
-                return TerrainModel(
-                    **{name: np.asarray(found[name], dtype=np.float64) for name in _HEADER.split(",")}
-                )
-        with path.open(encoding="utf-8") as file:
+        return _terrain_of_arrays(path) if path.suffix == ".npz" else _terrain_of_table(path)
+    except OSError as error:
+        raise PlanError(f"`terrain_file` {path} can't be read: {error.strerror or error}") from None
+    except PlanError as error:
+        raise PlanError(f"`terrain_file` {path}: {error}") from None
+
+
+def _terrain_of_arrays(path: Path) -> TerrainModel:
+    try:
+        found = read_npz(path)
+    except NpzFileError as error:
+        raise PlanError(
+            f"it is no numpy .npz archive ({error}); accepted is one with the arrays {', '.join(_NAMES)}"
+        ) from None
+    missing = [name for name in _NAMES if name not in found]
+    if missing:
+        raise PlanError(f"it has no {', '.join(missing)}; accepted are the arrays {', '.join(_NAMES)}")
+    for name in _NAMES:
+        if found[name].dtype.kind not in "iuf":
+            raise PlanError(f"{name} holds {found[name].dtype}; accepted are real numbers")
+    return TerrainModel(**{name: found[name].astype(np.float64) for name in _NAMES})
+
+
+def _terrain_of_table(path: Path) -> TerrainModel:
+    try:
+        with path.open(encoding="utf-8-sig") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that there are no rows, which is an error here
             header = file.readline().strip()
             if header != _HEADER:
                 raise PlanError(f"it begins with {header[:60]!r}; accepted is the header {_HEADER!r}")
             table = np.loadtxt(file, delimiter=",", ndmin=2)
-    except PlanError as error:
-        raise PlanError(f"`terrain_file` {path}: {error}") from None
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise PlanError(
-            f"`terrain_file` {path} can't be read: {error}; accepted is a table with the header {_HEADER!r}"
-        ) from None
-    if table.shape[1:] != (3,):
-        raise PlanError(f"`terrain_file` {path} has rows of {table.shape[1]} numbers; accepted: {_HEADER}")
-    north_m, rows = np.unique(table[:, 0], return_inverse=True)
-    east_m, columns = np.unique(table[:, 1], return_inverse=True)
+    except PlanError:
+        raise
+    except ValueError as error:
+        raise PlanError(f"{error}; accepted are rows of three numbers, {_HEADER}") from None
+    if not table.size:
+        raise PlanError(f"it has a header and no rows; give a row {_HEADER} for each point of a grid")
+    if table.shape[1] != len(_NAMES):
+        raise PlanError(f"it has rows of {table.shape[1]} numbers; accepted are three, {_HEADER}")
+    north_m, row = np.unique(table[:, 0], return_inverse=True)
+    east_m, column = np.unique(table[:, 1], return_inverse=True)
     if north_m.size * east_m.size > _MAX_POINTS:
-        raise PlanError(f"`terrain_file` {path}: its points are no grid; give a row for each point of one")
+        raise PlanError("its points are no grid; give a row for each point of one")
     ground = np.full((north_m.size, east_m.size), np.nan)
-    ground[rows, columns] = table[:, 2]
-    try:
-        return TerrainModel(north_m=north_m, east_m=east_m, ground_m=ground)
-    except PlanError as error:
-        raise PlanError(f"`terrain_file` {path}: {error}") from None
+    ground[row, column] = table[:, 2]
+    return TerrainModel(north_m=north_m, east_m=east_m, ground_m=ground)
 
 
 def _bilinear(lines_n: Array, lines_e: Array, grid: Array, north_m: Array, east_m: Array) -> Array:

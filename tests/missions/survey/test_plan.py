@@ -1,5 +1,6 @@
 """Lines, turns and heights of a survey, before anything is flown."""
 
+import io
 import math
 from dataclasses import replace
 
@@ -219,12 +220,57 @@ def test_terrain_that_does_not_cover_the_lines_or_is_above_the_flight_is_refused
     check_survey(options, WINGS)
     with pytest.raises(PlanError, match="is below the terrain there, which is 900 m above it"):
         check_reach(options, WINGS, HOME)
-    (tmp_path / "holes.csv").write_text("north_m,east_m,ground_m\n0,0,1\n0,100,1\n100,0,1\n")
-    with pytest.raises(PlanError, match="1 points without a height"):
-        load_terrain(tmp_path / "holes.csv")
-    (tmp_path / "bad.csv").write_text("x,y,z\n0,0,1\n")
-    with pytest.raises(PlanError, match="begins with 'x,y,z'"):
-        load_terrain(tmp_path / "bad.csv")
+
+
+HEADER = "north_m,east_m,ground_m\n"
+LINES_M = np.array([0.0, 100.0])
+
+
+def npz(**arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+GRID = npz(north_m=LINES_M, east_m=LINES_M, ground_m=np.ones((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("holes.csv", HEADER + "0,0,1\n0,100,1\n100,0,1\n", "1 points without a height"),
+        ("bad.csv", "x,y,z\n0,0,1\n", "begins with 'x,y,z'"),
+        ("header.csv", HEADER, "has a header and no rows; give a row"),
+        ("short.csv", HEADER + "0,0,1\n0,100\n", "accepted are rows of three numbers"),
+        ("pairs.csv", HEADER + "0,0\n0,100\n", "rows of 2 numbers; accepted are three"),
+        ("words.csv", HEADER + "0,0,high\n", "'high' .* accepted are rows of three numbers"),
+        ("nan.csv", HEADER + "nan,0,1\n", "accepted are two or more rising numbers"),
+        ("bytes.csv", b"\xff\xfe\x00", "can't decode byte"),
+        ("torn.npz", GRID[: len(GRID) // 2], "is no numpy .npz archive"),
+        ("text.npz", HEADER, "is no numpy .npz archive .* north_m, east_m, ground_m"),
+        ("partial.npz", npz(north_m=LINES_M), "has no east_m, ground_m"),
+        ("words.npz", npz(north_m=["a"], east_m=LINES_M, ground_m=LINES_M), "north_m holds <U1"),
+    ],
+)
+def test_terrain_that_cannot_be_used_is_refused_in_one_line(tmp_path, name, content, words):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(PlanError, match=words) as refused:
+        load_terrain(path)
+    said = str(refused.value)
+    assert said.startswith(f"`terrain_file` {path}")
+    assert "\n" not in said and "pickle" not in said
+
+
+def test_terrain_is_read_from_a_table_and_from_arrays(tmp_path):
+    (tmp_path / "a.npz").write_bytes(GRID)
+    (tmp_path / "a.csv").write_text(HEADER + "0,0,1\n0,100,1\n100,0,1\n100,100,1\n", encoding="utf-8-sig")
+    for name in ("a.npz", "a.csv"):
+        terrain = load_terrain(tmp_path / name)
+        np.testing.assert_array_equal(terrain.north_m, LINES_M)
+        np.testing.assert_array_equal(terrain.ground_m, np.ones((2, 2)))
+    with pytest.raises(PlanError, match="can't be read: No such file"):
+        load_terrain(tmp_path / "none.npz")
 
 
 def test_lines_too_far_from_home_are_refused():
