@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.magnetic_map_file import EARTH_NT
 from flightsim.foundation.magnetics import FieldModel
 from flightsim.foundation.main_field import MainField
 
@@ -22,7 +23,6 @@ VALUES: Final = (
 )
 """Usual names of the field's column, the first ones preferred."""
 
-_EARTH_NT: Final = (18_000.0, 72_000.0)  # smallest and largest total field on the Earth, with anomalies
 _ANOMALY_NT: Final = 10_000.0
 
 
@@ -63,10 +63,10 @@ def with_main_field(
         raise EstimatorError(f"{path} has no data in the map's area; is `home` of another place?")
     low, high = float(finite.min()), float(finite.max())
     if kind is Values.TOTAL:
-        if not _EARTH_NT[0] <= low <= high <= _EARTH_NT[1]:
+        if not EARTH_NT[0] <= low <= high <= EARTH_NT[1]:
             raise EstimatorError(
                 f"{path} has values from {low:g} to {high:g} nT, which is no total field of the Earth "
-                f"({_EARTH_NT[0]:g} to {_EARTH_NT[1]:g} nT); a main field is added to anomalies with "
+                f"({EARTH_NT[0]:g} to {EARTH_NT[1]:g} nT); a main field is added to anomalies with "
                 "`values=anomaly-wmm`. Values that stand for no data have to be marked as such in the file"
             )
         return values_nt

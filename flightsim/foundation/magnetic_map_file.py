@@ -6,7 +6,7 @@ The file is a numpy `.npz` archive that needs nothing of this package to be read
     format                  "flightstack-magnetic-map-1"
     north_m  (rows,)        grid lines, metres north of home, rising
     east_m   (columns,)     metres east of home, likewise
-    total_field_nt          (rows, columns) float64; NaN: no data there
+    total_field_nt          (rows, columns) float64, main field and anomaly; NaN: no data there
     vertical_gradient_nt_m  (rows, columns) change of the total field with height, upwards; absent: not known
     height_m                height above home that the map is valid at
     home_lat_deg, home_lon_deg, home_alt_m   the home whose local frame it is in (WGS84)
@@ -34,6 +34,9 @@ from flightsim.foundation.npz_file import NpzFileError, read_npz
 Array = NDArray[np.float64]
 
 FORMAT: Final = "flightstack-magnetic-map-1"
+EARTH_NT: Final = (18_000.0, 72_000.0)
+"""Smallest and largest total field on the Earth, with anomalies."""
+
 _ARRAYS: Final = ("north_m", "east_m", "total_field_nt")
 _NUMBERS: Final = ("height_m", "home_lat_deg", "home_lon_deg", "home_alt_m")
 _STATED: Final = ("error_nt", "line_spacing_m")
@@ -128,7 +131,8 @@ def read_map_file(path: Path) -> MapContents:
     """Read the file of a map.
 
     Raises:
-        MagneticMapError: the file does not exist or is not a map, or the map has no data.
+        MagneticMapError: the file does not exist or is not a map, or the map has no data or values that are
+            no total field of the Earth.
     """
     try:
         found = read_npz(path)
@@ -142,9 +146,16 @@ def read_map_file(path: Path) -> MapContents:
     if str(found["format"]) != FORMAT:
         raise MagneticMapError(f"{path} has the format {found['format']}; accepted is {FORMAT}")
     try:
-        return _contents(found)
+        contents = _contents(found)
     except ValueError as error:
         raise MagneticMapError(f"{path}: {error}") from None
+    low, high = np.nanmin(contents.total_field_nt), np.nanmax(contents.total_field_nt)
+    if not EARTH_NT[0] <= low <= high <= EARTH_NT[1]:
+        raise MagneticMapError(
+            f"{path} has values from {low:g} to {high:g} nT, which is no total field of the Earth "
+            f"({EARTH_NT[0]:g} to {EARTH_NT[1]:g} nT); total_field_nt is main field and anomaly together"
+        )
+    return contents
 
 
 def _contents(found: Mapping[str, NDArray[Any]]) -> MapContents:
