@@ -1,8 +1,9 @@
 """The values of an imported map: total field, or an anomaly and the main field it is added to."""
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +14,19 @@ from flightsim.foundation.magnetic_map_file import EARTH_NT
 from flightsim.foundation.magnetics import FieldModel
 from flightsim.foundation.main_field import MainField
 
-__all__ = ["VALUES", "Values", "with_main_field"]
+__all__ = ["LATITUDES", "LONGITUDES", "Values", "chosen", "with_main_field"]
 
 Array = NDArray[np.float64]
 
-VALUES: Final = (
+LONGITUDES: Final = ("longitude", "lon", "long", "longitude_deg", "lon_deg", "x", "easting")
+LATITUDES: Final = ("latitude", "lat", "latitude_deg", "lat_deg", "y", "northing")
+"""Usual names of coordinates, in lower case, the first ones preferred."""
+
+_VALUES: Final = (
     *("levelled_nt", "total_field_nt", "total_nt", "tmi", "total_field_anomaly_nt", "anomaly_nt"),
     *("anomaly", "mag", "z", "value"),
 )
-"""Usual names of the field's column, the first ones preferred."""
+"""Usual names of the field, likewise."""
 
 _ANOMALY_NT: Final = 10_000.0
 
@@ -32,6 +37,34 @@ class Values(StrEnum):
     TOTAL = "total"
     ANOMALY_WMM = "anomaly-wmm"
     ANOMALY_IGRF = "anomaly-igrf"
+
+
+def chosen(path: Path, found: Mapping[str, Any], column: str | None) -> Any:
+    """The variable, column or band of the field; upper and lower case are the same.
+
+    Args:
+        path: the file, for errors.
+        found: what there is, by name.
+        column: name; None: the one of the first usual name, else the only one.
+
+    Raises:
+        EstimatorError: there is no such name, or several could be it.
+    """
+    if column is not None:
+        for name in (column, *(name for name in found if name.casefold() == column.casefold())):
+            if name in found:
+                return found[name]
+        raise EstimatorError(f"{path} has no `column` {column!r}; there are {', '.join(found) or 'none'}")
+    names = {name.casefold(): name for name in found}
+    for usual in _VALUES:
+        if usual in names:
+            return found[names[usual]]
+    if len(found) != 1:
+        raise EstimatorError(
+            f"{path} has {len(found)} candidates for the field ({', '.join(found) or 'none'}); name one with "
+            "`column`"
+        )
+    return next(iter(found.values()))
 
 
 def with_main_field(

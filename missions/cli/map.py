@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from missions.cli.options import in_options
+from missions.cli.options import FiniteRange, in_options
 
 if TYPE_CHECKING:
     from flightsim.foundation.magnetic_map_file import MapContents
@@ -27,16 +27,21 @@ def magnetic_map() -> None:
 )
 @click.option("--year", type=float, default=2026.0, help="Of that main field.")
 @click.option("--home", metavar="LAT,LON,ALT", help="Origin of the map. [default: middle of the data, 0 m]")
-@click.option("--height", type=float, default=100.0, help="Above home, what the map is valid at, m.")
+@click.option("--height", type=FiniteRange(), default=100.0, help="Above home, what the map is valid at, m.")
 @click.option("--spacing", type=float, default=100.0, help="Of the map's grid lines, m.")
 @click.option("--line-spacing", type=float, help="Of the survey's lines, m; needed for line data.")
 @click.option("--error", type=float, help="Standard deviation that the survey states, nT.")
 @click.option(
     "--crs",
-    help="Coordinate reference system of the places, such as EPSG:32723. [default: the file's; WGS84 degrees "
-    "for tables]",
+    help="Coordinate reference system of the places, such as EPSG:32723, in place of the file's. [default: "
+    "the file's; WGS84 for tables, and for netCDF in degrees without one]",
 )
-@click.option("--column", metavar="NAME", help="Column or variable of the field. [default: the only one]")
+@click.option(
+    "--column",
+    metavar="NAME",
+    help="Column or variable of the field; number or description of a GeoTIFF's band. [default: the one with "
+    "a usual name, such as total_field_nt, or the only one]",
+)
 def make(**given: Any) -> int:
     """Make a map from SOURCE: GeoTIFF (.tif), netCDF (.nc, .grd), or line data (.csv, .csv.xz, .xyz).
 
@@ -90,11 +95,15 @@ def _home(text: str | None) -> Any:
 
     if text is None:
         return None
+    accepted = "accepted is LAT,LON,ALT in degrees and metres, such as 47.4,8.55,400"
     try:
-        lat_deg, lon_deg, alt_m = (float(word) for word in text.split(","))
+        lat_deg, lon_deg, alt_m = map(float, text.split(","))
+    except ValueError:
+        raise click.UsageError(f"--home {text!r} is not three numbers; {accepted}") from None
+    try:
         return GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
     except ValueError as error:
-        raise click.UsageError(f"--home {text!r} is not LAT,LON,ALT in degrees and metres: {error}") from None
+        raise click.UsageError(f"--home {text!r}: {error}; {accepted}") from None
 
 
 def _print(path: Path, contents: "MapContents") -> None:
@@ -113,7 +122,8 @@ def _print(path: Path, contents: "MapContents") -> None:
         f"{north[1] - north[0]:g} x {east[1] - east[0]:g} m"
     )
     error = "not stated" if contents.error_nt is None else f"{contents.error_nt:g} nT"
+    spacing = "not stated" if contents.line_spacing_m is None else f"{contents.line_spacing_m:g} m"
     click.echo(
         f"total field {total[finite].min():.0f} to {total[finite].max():.0f} nT, standard deviation "
-        f"{total[finite].std():.1f} nT; error {error}"
+        f"{total[finite].std():.1f} nT; error {error}; line spacing {spacing}"
     )

@@ -2,6 +2,7 @@
 
 import lzma
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def check(grid, *, atol=0.5, least=0.8):
     np.testing.assert_allclose(grid.total_field_nt[inside], field_nt(lat, lon)[inside], atol=atol)
 
 
-def write_geotiff(path, *, crs=UTM, nodata=-9999.0, hole=False):
+def write_geotiff(path, *, crs=UTM, nodata=-9999.0, hole=False, bands=(None,)):
     """The field on a grid of UTM coordinates, 30 m, from the north."""
     from rasterio.transform import from_origin
     from rasterio.warp import transform
@@ -60,16 +61,21 @@ def write_geotiff(path, *, crs=UTM, nodata=-9999.0, hole=False):
     if hole:
         band[40:50, 40:50] = -9999.0
     with rasterio.open(
-        path, "w", driver="GTiff", width=size, height=size, count=1, dtype="float64", crs=crs, nodata=nodata,
-        transform=from_origin(left, top, 30.0, 30.0),
+        path, "w", driver="GTiff", width=size, height=size, count=len(bands), dtype="float64", crs=crs,
+        nodata=nodata, transform=from_origin(left, top, 30.0, 30.0),
     ) as dataset:  # fmt: skip
-        dataset.write(band, 1)
+        dataset.descriptions = bands
+        for number in dataset.indexes:
+            dataset.write(band + 1000.0 * (number - 1), number)
     return path
 
 
-def write_netcdf(path, *, rows_first=True, names=("lat", "lon")):
-    lat, lon = 47.4 + np.arange(-60, 61) * 2.5e-4, 8.55 + np.arange(-50, 51) * 4e-4
-    values = field_nt(*np.meshgrid(lat, lon, indexing="ij"))
+LAT, LON = 47.4 + np.arange(-60, 61) * 2.5e-4, 8.55 + np.arange(-50, 51) * 4e-4
+
+
+def write_netcdf(path, *, rows_first=True, names=("lat", "lon"), lat=LAT, lon=LON, mapping=None):
+    """The field at places of WGS84, or at the same numbers of the system that `mapping` declares."""
+    values = field_nt(*np.meshgrid(LAT, LON, indexing="ij"))
     with netcdf.Dataset(path, "w") as dataset:
         for name, axis in zip(names, (lat, lon), strict=True):
             dataset.createDimension(name, axis.size)
@@ -78,6 +84,38 @@ def write_netcdf(path, *, rows_first=True, names=("lat", "lon")):
             dataset.createVariable("z", "f8", names)[:] = values
         else:
             dataset.createVariable("z", "f8", names[::-1])[:] = values.T
+        if mapping is not None:
+            dataset["z"].grid_mapping = "datum"
+            dataset.createVariable("datum", "i4", ()).setncatts(mapping)
+    return path
+
+
+def write_degrees(path, lon=LON):
+    """The field as a GeoTIFF in degrees."""
+    from rasterio.transform import from_origin
+
+    with rasterio.open(
+        path, "w", driver="GTiff", width=LON.size, height=LAT.size, count=1, dtype="float64",
+        crs="EPSG:4326", transform=from_origin(lon[0] - 2e-4, LAT[-1] + 1.25e-4, 4e-4, 2.5e-4),
+    ) as dataset:  # fmt: skip
+        dataset.write(field_nt(*np.meshgrid(LAT, LON, indexing="ij"))[::-1], 1)
+    return path
+
+
+def write_texts(path):
+    """A netCDF file with texts where a map has numbers."""
+    write_netcdf(path)
+    with netcdf.Dataset(path, "a") as dataset:
+        dataset.createVariable("comment", str, ("lat", "lon"))
+    return path
+
+
+def write_times(path):
+    """A netCDF file with a third dimension."""
+    with netcdf.Dataset(path, "w") as dataset:
+        for name in ("time", "lat", "lon"):
+            dataset.createDimension(name, 3)
+        dataset.createVariable("z", "f8", ("time", "lat", "lon"))
     return path
 
 
@@ -88,6 +126,18 @@ def write_lines(path, *, header="longitude,latitude,total_field_nt", offset_nt=0
             lon = 8.55 + (k - 6) * 2.65e-3
             rows.append(f"{lon:.7f},{lat:.7f},{field_nt(lat, lon) + offset_nt:.3f}")
     path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def write_line(path, step_lon, step_lat):
+    """Readings on one line."""
+    rows = [f"{8.55 + k * step_lon:.7f},{47.4 + k * step_lat:.7f},48000" for k in range(200)]
+    path.write_text("\n".join(("longitude,latitude,total_field_nt", *rows)) + "\n")
+    return path
+
+
+def write_empty(path):
+    path.touch()
     return path
 
 
@@ -107,6 +157,77 @@ def test_points_without_data_stay_so(tmp_path):
 @pytest.mark.parametrize("rows_first", [True, False])
 def test_a_netcdf_grid_in_either_order(tmp_path, rows_first):
     check(imported_map(write_netcdf(tmp_path / "map.nc", rows_first=rows_first), HOW))
+
+
+EUROPEAN_1950 = [
+    {"epsg_code": "EPSG:4230"},
+    {"epsg_code": np.int32(4230)},
+    {"crs_wkt": rasterio.crs.CRS.from_epsg(4230).to_wkt()},
+    {"spatial_ref": rasterio.crs.CRS.from_epsg(4230).to_wkt()},
+]
+
+
+@pytest.mark.parametrize("mapping", EUROPEAN_1950)
+def test_the_datum_that_a_netcdf_file_declares_counts(tmp_path, mapping):
+    """Places of ED50 are about 100 m from those of the same numbers in WGS84."""
+    grid = imported_map(write_netcdf(tmp_path / "map.nc", mapping=mapping), HOW)
+    given = imported_map(write_netcdf(tmp_path / "plain.nc"), replace(HOW, crs="EPSG:4230"))
+    np.testing.assert_array_equal(grid.total_field_nt, given.total_field_nt)
+    plain = imported_map(tmp_path / "plain.nc", HOW)
+    assert plain.north_m[0] - grid.north_m[0] == pytest.approx(100.0, abs=50.0)
+    check(imported_map(tmp_path / "map.nc", replace(HOW, crs="EPSG:4326")))
+
+
+def test_a_grid_mapping_of_wgs84_without_a_definition_is_wgs84(tmp_path):
+    mapping = {"grid_mapping_name": "latitude_longitude", "semi_major_axis": 6378137.0}
+    check(imported_map(write_netcdf(tmp_path / "map.nc", mapping=mapping), HOW))
+
+
+@pytest.mark.parametrize("given", [None, "EPSG:4326"])
+@pytest.mark.parametrize("write", [write_degrees, lambda path, lon: write_netcdf(path, lon=lon)])
+def test_longitudes_from_0_to_360_are_those_of_the_home(tmp_path, write, given):
+    west = LON + 180.0  # 188.55 is -171.45
+    path = write(tmp_path / ("map.tif" if write is write_degrees else "map.nc"), west)
+    grid = imported_map(path, replace(HOW, crs=given, home=None))
+    assert grid.home.lon_deg == pytest.approx(8.55 - 180.0, abs=1e-5)
+    lat, lon = degrees(grid)
+    inside = np.isfinite(grid.total_field_nt)
+    assert inside.mean() > 0.9
+    np.testing.assert_allclose(grid.total_field_nt[inside], field_nt(lat, lon + 180.0)[inside], atol=0.5)
+
+
+def test_a_grid_on_both_sides_of_180_degrees_is_one_map(tmp_path):
+    grid = imported_map(write_netcdf(tmp_path / "map.nc", lon=LON + 171.45), replace(HOW, home=None))
+    assert abs(grid.home.lon_deg) == pytest.approx(180.0, abs=1e-5)
+    assert np.ptp(grid.east_m) < 4000.0
+    assert np.isfinite(grid.total_field_nt).mean() > 0.9
+
+
+@pytest.mark.parametrize(("column", "offset_nt"), [("2", 1000.0), ("LATER", 1000.0), ("1", 0.0)])
+def test_a_band_is_chosen_by_number_or_description(tmp_path, column, offset_nt):
+    path = write_geotiff(tmp_path / "map.tif", bands=("first", "later"))
+    grid = imported_map(path, replace(HOW, column=column))
+    first = imported_map(write_geotiff(tmp_path / "first.tif"), HOW)
+    np.testing.assert_allclose(grid.total_field_nt, first.total_field_nt + offset_nt)
+
+
+LINE_HOW = MapImport(home=HOME, line_spacing_m=200.0)
+
+
+@pytest.mark.parametrize("line", ["L{}", "{}"])
+def test_a_column_may_have_the_name_line(tmp_path, line):
+    """As in the table that a survey writes."""
+    path = write_lines(tmp_path / "lines.csv")
+    head, *rows = path.read_text().splitlines()
+    text = [f"line,time,{head}", *(f"{line.format(k // 121)},{k},{row}" for k, row in enumerate(rows))]
+    path.write_text("\n".join(text) + "\n")
+    check(imported_map(path, LINE_HOW), atol=2.0)
+
+
+def test_names_of_columns_have_no_case_and_a_byte_order_mark_is_none_of_them(tmp_path):
+    path = write_lines(tmp_path / "lines.csv", header="Longitude,Latitude,Field")
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    check(imported_map(path, replace(LINE_HOW, column="FIELD")), atol=2.0)
 
 
 def test_line_data_are_gridded(tmp_path):
@@ -169,6 +290,58 @@ def test_the_two_models_of_the_main_field_agree_within_their_errors():
             "is the map of another place",
         ),
         (lambda p: write_geotiff(p / "a.tif"), MapImport(values=Values.ANOMALY_WMM), "which is no anomaly"),
+        (
+            lambda p: write_geotiff(p / "a.tif", crs='LOCAL_CS["mine",UNIT["metre",1]]'),
+            HOW,
+            "LOCAL_CS.* is neither geographic nor projected; give .* `crs`",
+        ),
+        (
+            lambda p: write_geotiff(p / "a.tif", crs="+proj=longlat +R=1737400"),  # the Moon
+            HOW,
+            "PROJ can't transform its places from .* to EPSG:4326; give .* `crs`",
+        ),
+        (lambda p: write_geotiff(p / "a.tif", bands=(None, "b")), HOW, r"2 candidates .* \(1, b\)"),
+        (
+            lambda p: write_geotiff(p / "a.tif", bands=(None, "b")),
+            replace(HOW, column="3"),
+            "has no `column` '3'; there are 1, b",
+        ),
+        (lambda p: write_geotiff(p / "a.tif"), replace(HOW, column="nosuch"), "'nosuch'; there are 1$"),
+        (
+            lambda p: write_netcdf(p / "a.nc", lon=np.sort(np.append(LON[:-1], LON[0]))),
+            HOW,
+            "its x coordinates are no grid lines; .* without repetition",
+        ),
+        (
+            lambda p: write_netcdf(p / "a.nc", lat=np.append(LAT[:-1], np.nan)),
+            HOW,
+            "its y coordinates are no grid lines; accepted are two or more finite numbers",
+        ),
+        (
+            lambda p: write_texts(p / "a.nc"),
+            replace(HOW, column="comment"),
+            "has no `column` 'comment'; there are z",
+        ),
+        (
+            lambda p: write_times(p / "a.nc"),
+            HOW,
+            "no variable of numbers over two coordinates; there is z over time, lat, lon: save one time",
+        ),
+        (
+            lambda p: write_netcdf(p / "a.nc", mapping={"grid_mapping_name": "mercator"}),
+            HOW,
+            "its grid mapping datum has no crs_wkt, spatial_ref, epsg_code; give",
+        ),
+        (
+            lambda p: write_netcdf(p / "a.nc", lat=LAT * 1e5),
+            HOW,
+            "coordinates reach 4.*, which is no latitude; give",
+        ),
+        (lambda p: write_lines(p / "a.csv", header=""), LINE_HOW, "has no header; accepted are columns"),
+        (lambda p: write_line(p / "a.csv", 0.0, 1e-4), LINE_HOW, "places are 0 m wide .* makes no area"),
+        (lambda p: write_line(p / "a.csv", 1e-4, 1e-4), LINE_HOW, "which makes no area; a map needs several"),
+        (lambda p: write_line(p / "a.csv", 0.0, 0.0), LINE_HOW, "which makes no area"),
+        (lambda p: write_empty(p / "a.csv"), LINE_HOW, "is empty; accepted are columns with names"),
         (lambda p: write_netcdf(p / "a.nc", names=("u", "v")), HOW, "is no map; accepted are coordinates"),
         (lambda p: write_lines(p / "a.csv"), HOW, "give the distance of its lines, `line_spacing_m`"),
         (
@@ -215,6 +388,32 @@ def test_the_command_makes_a_map_and_names_its_options(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "(--values total)" in said
     assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (["--height", "nan"], "'--height': nan is not a finite number"),
+        (["--home", "47.4,8.5"], "--home '47.4,8.5' is not three numbers; accepted is LAT,LON,ALT"),
+        (["--home", "95,8.5,0"], "--home '95,8.5,0': latitude 95.0 deg is not in -90..90; accepted is"),
+        (["--column", "9"], "has no --column '9'; there are 1"),
+    ],
+)
+def test_the_command_refuses_options_by_their_names(tmp_path, capsys, changes, words):
+    source = write_geotiff(tmp_path / "map.tif")
+    assert cli.run_command_line(["map", "make", str(source), "--out", str(tmp_path / "a.npz"), *changes]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "a.npz").exists()
+
+
+@pytest.mark.parametrize(("spacing", "words"), [([], "not stated"), (["--line-spacing", "250"], "250 m")])
+def test_info_prints_the_line_spacing(tmp_path, capsys, spacing, words):
+    source, out = write_geotiff(tmp_path / "map.tif"), tmp_path / "map.npz"
+    assert cli.run_command_line(["map", "make", str(source), "--out", str(out), *spacing]) == 0
+    assert cli.run_command_line(["map", "info", str(out)]) == 0
+    assert f"line spacing {words}\n" in capsys.readouterr().out.splitlines(keepends=True)[-1]
 
 
 @pytest.mark.slow
