@@ -25,7 +25,7 @@ _COMMANDS: Final = {
     "replay": ("missions.cli.replay", "replay", "Logs through an estimator, and how far off it was."),
     "vision": ("missions.cli.vision", "vision", "Tags in a video: a live stream's, or a log's."),
     "vehicle": ("missions.cli.vehicle", "vehicle", "Talk to a vehicle: info, parameters, logs, health."),
-    "map": ("missions.cli.map", "magnetic_map", "Make magnetic maps from other files, and look into them."),
+    "map": ("missions.cli.map", "magnetic_map", "Make magnetic maps, look into them, and export them."),
     "study": ("missions.cli.study", "study", "Monte Carlo: the papers' experiments."),
 }
 

@@ -1,4 +1,4 @@
-"""`flightstack map`: magnetic maps from other programs' files."""
+"""`flightstack map`: magnetic maps from and for other programs' files."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def magnetic_map() -> None:
-    """Make magnetic maps from GeoTIFF, netCDF and line data, and look into them."""
+    """Make magnetic maps from GeoTIFF, netCDF and line data, look into them, and export them."""
 
 
 @magnetic_map.command(context_settings={"show_default": True})
@@ -87,6 +87,31 @@ def info(file: Path) -> int:
         _print(file, read_map_file(file))
     except MagneticMapError as error:
         raise click.UsageError(str(error)) from error
+    return 0
+
+
+@magnetic_map.command()
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="The GeoTIFF (.tif) or netCDF file (.nc).",
+)
+def export(file: Path, out: Path) -> int:
+    """Write a map as GeoTIFF or netCDF in degrees of WGS84, for QGIS, GDAL, rasterio and xarray.
+
+    Points without data are NaN. Home, height, error and line spacing are metadata of the file.
+    """
+    from estimators.errors import EstimatorError, LogError
+    from estimators.survey.map_export import exported_map
+    from flightsim.foundation.magnetic_map_file import MagneticMapError, read_map_file
+
+    try:
+        exported_map(read_map_file(file), out)
+    except (EstimatorError, LogError, MagneticMapError) as error:
+        raise click.UsageError(in_options(error)) from error
+    click.echo(f"{out}: the map of {file} in degrees of WGS84 (EPSG:4326)")
     return 0
 
 
