@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import LocalFrame
 
-__all__ = ["SurveyReadings", "joined", "placed_readings"]
+__all__ = ["GAP_S", "SurveyReadings", "joined", "placed_readings"]
 
 Array = NDArray[np.float64]
 
-_GAP_S: Final = 2.0  # longest time between two positions or attitudes; longer gaps are not interpolated
+GAP_S: Final = 2.0
+"""Longest time between two readings, positions or attitudes that leaves no gap: across longer ones nothing is
+interpolated, and nothing counts as measured."""
 _STRONGEST_NT: Final = 200_000.0  # three times the Earth's field at its poles
 _STUCK: Final = 30  # equal readings in a row: noise makes no two of ten a second equal for so long
 
@@ -128,4 +130,4 @@ def _covered(times: Array, at: Array) -> NDArray[np.bool_]:
         return np.zeros(len(times), dtype=bool)
     after = np.clip(np.searchsorted(at, times), 1, len(at) - 1)
     inside: NDArray[np.bool_] = (times >= at[0]) & (times <= at[-1])
-    return inside & (at[after] - at[after - 1] <= _GAP_S)
+    return inside & (at[after] - at[after - 1] <= GAP_S)

@@ -97,12 +97,16 @@ class SurveyOptions(MissionOptions):
             raise PlanError(f"`map_error_nt` {self.map_error_nt:g} nT is not possible; ask for 0 or more")
         if not self.climb <= 0.3:
             raise PlanError(f"`climb` {self.climb:g} is steeper than 0.3, which no survey aircraft follows")
-        lines = self.width_m / self.spacing_m
-        if not lines <= MAX_LINES:
-            raise PlanError(
-                f"`spacing_m` {self.spacing_m:g} m makes {lines:.0f} lines; up to {MAX_LINES} are accepted: "
-                "ask for more spacing or a smaller `width_m`"
-            )
+        for name, span, step_m, what in (
+            ("spacing_m", "width_m", self.spacing_m, "lines"),
+            ("tie_spacing_m", "height_m", self.tie_m, "tie lines"),
+        ):
+            count = getattr(self, span) / step_m if step_m > 0.0 else 0.0
+            if not count <= MAX_LINES:
+                raise PlanError(
+                    f"`{name}` {step_m:g} m makes {count:.0f} {what}; up to {MAX_LINES} are accepted: ask "
+                    f"for more spacing or a smaller `{span}`"
+                )
         if self.calibrate and self.compensation_file is not None:
             raise PlanError("`compensation_file` has no use with `calibrate`, which makes one; leave it out")
 

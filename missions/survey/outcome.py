@@ -12,6 +12,7 @@ from estimators.survey.compensation import compensation_bytes
 from estimators.survey.export import survey_files
 from estimators.survey.lines import LineKind, LinePlan
 from estimators.survey.processing import ProcessingParameters, SurveyResult, process_survey
+from estimators.survey.readings import GAP_S
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
 from missions.mission import Debriefing
@@ -129,12 +130,15 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
 
 
 def covered(result: SurveyResult) -> tuple[float, ...]:
-    """Share of each line's length that its readings span."""
+    """Share of each line's length that its readings cover: the way between two readings counts unless there
+    are more than `GAP_S` between them.
+    """
     found = []
     for number, line in enumerate(result.plan.lines):
         own = result.line_of == number
         along, _ = line.along_across_m(result.readings.north_m[own], result.readings.east_m[own])
-        found.append(float(np.ptp(along)) / line.length_m if len(along) > 1 else 0.0)
+        near = np.diff(result.readings.time_s[own]) <= GAP_S
+        found.append(abs(float(np.diff(along)[near].sum())) / line.length_m)
     return tuple(found)
 
 

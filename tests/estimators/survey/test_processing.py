@@ -1,7 +1,7 @@
 """Surveys with known levels, targets and noise: what processing finds of them."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -23,6 +23,7 @@ from flightsim.payload import (
     SurveyParameters,
     truth_behind,
 )
+from missions.survey.outcome import covered
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.55, alt_m=480.0)
 MAIN = MainField(HOME)
@@ -236,6 +237,17 @@ def test_a_stuck_magnetometer_and_a_gap_of_positions_are_left_out():
     assert found.unplaced == pytest.approx(54, abs=2)
     assert len(found) == 600 - found.implausible - found.unplaced
     np.testing.assert_allclose(found.height_m, 80.0)
+
+
+@pytest.mark.parametrize(("missing_s", "share"), [(1.5, 1.0), (20.0, 1.0 - 20.1 * SPEED_M_S / 1600.0)])
+def test_a_hole_in_the_readings_of_a_line_is_not_covered(missing_s, share):
+    """A pause between two readings that is longer than two seconds leaves a hole."""
+    readings = flown(1)
+    kept = np.abs(readings.time_s - 32.0) > 0.5 * missing_s
+    columns = {f.name: getattr(readings, f.name)[kept] for f in fields(readings)[:8]}
+    coverage = covered(processed(SurveyReadings(**columns)))
+    assert coverage[0] == pytest.approx(share, abs=0.005)
+    assert min(coverage[1:]) > 0.99
 
 
 def test_white_noise_is_not_geology():

@@ -171,6 +171,7 @@ def test_waypoints_follow_the_drape_within_a_metre():
         ({"spacing_m": 0.0}, "`spacing_m`"),
         ({"spacing_m": 1.0}, "makes 2000 lines"),
         ({"tie_spacing_m": -1.0}, "`tie_spacing_m`"),
+        ({"tie_spacing_m": 0.01}, "`tie_spacing_m` 0.01 m makes 200000 tie lines; up to 1000"),
         ({"direction_rad": math.nan}, "`direction_rad`"),
         ({"area_ne_m": (0.0, math.inf)}, "`area_ne_m`"),
         ({"climb": 2.0}, "`climb`"),
