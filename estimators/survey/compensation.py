@@ -56,15 +56,10 @@ class Compensation:
     """Coefficients of the terms of an aircraft.
 
     Attributes:
-        coefficients: (TERMS,) nT of each term.
-        main_nt: magnitude of the Earth's field that the terms are for.
-        improvement: standard deviation of the calibration flight before over after, in the band of the
-            manoeuvres.
+        coefficients: (TERMS,) of the terms of `terms_of`: nT, those of eddy currents nT s.
     """
 
     coefficients: Array
-    main_nt: float
-    improvement: float
 
     def field_nt(self, cosines: Array, rates_1_s: Array) -> Array:
         """The aircraft's field (n,), to be subtracted from readings.
@@ -102,7 +97,12 @@ def direction_cosines(
 
 
 def terms_of(cosines: Array, rates_1_s: Array) -> Array:
-    """The terms (n, TERMS), per nT of permanent and per 1e4 nT of induced and eddy-current fields."""
+    """The terms (n, TERMS): 3 direction cosines (permanent), 5 products of two of them (induced), and 8
+    products of one with a rate, 1/s (eddy currents).
+
+    Args:
+        cosines, rates_1_s: (n, 3) of `direction_cosines`.
+    """
     x, y, z = cosines.T
     dx, dy, dz = rates_1_s.T
     return np.column_stack(
@@ -143,12 +143,7 @@ def fit_compensation(time_s: Array, total_nt: Array, cosines: Array, rates_1_s: 
     scaled = terms / scale
     normal = scaled.T @ scaled + _RIDGE * len(time_s) * np.eye(TERMS)
     coefficients = np.linalg.solve(normal, scaled.T @ measured) / scale
-    left = measured - terms @ coefficients
-    return Compensation(
-        coefficients=coefficients,
-        main_nt=float(total_nt.mean()),
-        improvement=float(measured.std() / max(left.std(), 1e-12)),
-    )
+    return Compensation(coefficients=coefficients)
 
 
 def figure_of_merit_nt(manoeuvres: Sequence[Array], *, rate_hz: float) -> float:
@@ -210,21 +205,12 @@ def mean_cycle(values_nt: Array, *, rate_hz: float) -> Array:
 def compensation_bytes(compensation: Compensation) -> bytes:
     """Contents of a file of coefficients (JSON), which `load_compensation` reads."""
     return (
-        json.dumps(
-            {
-                "format": FORMAT,
-                "coefficients_nt": compensation.coefficients.tolist(),
-                "main_nt": compensation.main_nt,
-                "improvement": compensation.improvement,
-            },
-            indent=1,
-        )
-        + "\n"
+        json.dumps({"format": FORMAT, "coefficients_nt": compensation.coefficients.tolist()}, indent=1) + "\n"
     ).encode()
 
 
 def load_compensation(path: Path) -> Compensation:
-    """Read coefficients.
+    """Read coefficients. Other keys of the file, as older versions have written them, do not count.
 
     Raises:
         EstimatorError: the file can't be read, or holds no coefficients.
@@ -232,20 +218,23 @@ def load_compensation(path: Path) -> Compensation:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise EstimatorError(f"`compensation_file` {path} can't be read: {error}") from None
+        raise EstimatorError(
+            f"`compensation_file` {path} can't be read: {getattr(error, 'strerror', None) or error}"
+        ) from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         raise EstimatorError(
             f"`compensation_file` {path} is no compensation; accepted is the format {FORMAT}, which "
             "a calibration flight writes"
         )
-    try:
-        coefficients = np.array(found["coefficients_nt"], dtype=np.float64)
-        main_nt, improvement = float(found["main_nt"]), float(found["improvement"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise EstimatorError(f"`compensation_file` {path}: {error!r}") from None
-    if coefficients.shape != (TERMS,) or not np.all(np.isfinite(coefficients)):
+    values = found.get("coefficients_nt")
+    accepted = (
+        isinstance(values, list)
+        and len(values) == TERMS
+        and all(isinstance(value, int | float) and math.isfinite(value) for value in values)
+    )
+    if not accepted:
         raise EstimatorError(
-            f"`compensation_file` {path}: coefficients_nt of shape {coefficients.shape}; accepted are "
-            f"{TERMS} finite numbers"
+            f"`compensation_file` {path}: coefficients_nt is {str(values)[:60]}; accepted are {TERMS} finite "
+            "numbers, as a calibration flight writes them"
         )
-    return Compensation(coefficients=coefficients, main_nt=main_nt, improvement=improvement)
+    return Compensation(coefficients=np.array(values, dtype=np.float64))
