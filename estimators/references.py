@@ -342,9 +342,18 @@ class ErrorFigures:
         }
 
 
+_QUANTITIES: Final = (
+    ("_rad", "deg", 180.0 / math.pi),
+    ("_m_s", "m_s", 1.0),
+    ("_m", "m", 1.0),
+    ("_nt", "nT", 1.0),
+)
+"""Suffixes of columns, the unit that users see, and the factor to it."""
+
+
 def quantity_of(column: str) -> tuple[str, str, float]:
     """Name of a column's quantity, its unit for users, and the factor to that unit: `roll_rad` in degrees."""
-    for suffix, unit, factor in (("_rad", "deg", 180.0 / math.pi), ("_m_s", "m_s", 1.0), ("_m", "m", 1.0)):
+    for suffix, unit, factor in _QUANTITIES:
         if column.endswith(suffix):
             return column.removesuffix(suffix), unit, factor
     return column, "", 1.0

@@ -153,7 +153,7 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
     estimate = factor * _parted(c.estimates[column], breaks, column)
     above.plot(time_s[thin], estimate[thin], color=_ESTIMATE, linewidth=0.9)
     written = _UNITS.get(unit, unit)
-    above.set_ylabel(f"{label} {name}, {written}".strip(), fontsize=9, color=_INK)
+    above.set_ylabel(_axis_label(label, name, written), fontsize=9, color=_INK)
     below.set_ylabel(f"error, {written}", fontsize=9, color=_INK)
     below.axhline(0.0, color=_INK, linewidth=0.6)
     _limit(below, c, column, factor)
@@ -179,7 +179,13 @@ def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
     values = factor * _parted(c.estimates[column], _breaks(time_s), column)
     axes.plot(time_s[thin], values[thin], color=_ESTIMATE, linewidth=0.9)
     written = _UNITS.get(unit, unit)
-    axes.set_ylabel(f"{label} {name}{', ' if written else ''}{written}".strip(), fontsize=8, color=_INK)
+    axes.set_ylabel(_axis_label(label, name, written), fontsize=8, color=_INK)
+
+
+def _axis_label(label: str, quantity: str, unit: str) -> str:
+    """Such as "vehicle 2 offset north, m": the name of a column in words, with its unit if it has one."""
+    words = f"{label} {quantity.replace('_', ' ')}".strip()
+    return f"{words}, {unit}" if unit else words
 
 
 def _draw_together(axes: Any, members: Sequence[Comparison], column: str, *, legend: bool) -> None:
