@@ -105,7 +105,7 @@ def estimate(**given: Any) -> int:
             progress,
         )
     except (AddressError, BridgeError, EstimatorError, PlanError) as error:
-        raise click.UsageError(in_options(error)) from error
+        raise click.UsageError(in_options(error, own=True)) from error
     finally:
         progress.end()
     for line in table_lines([(given["connect"], result.compared)]):

@@ -148,7 +148,7 @@ def fly(**given: Any) -> int:
     try:
         return _fly(given)
     except PlanError as error:
-        raise click.UsageError(in_options(error)) from error
+        raise click.UsageError(in_options(error, own=True)) from error
     except KeyboardInterrupt as interrupt:
         click.echo("interrupted", err=True)
         return KILLED + signal_of(interrupt)

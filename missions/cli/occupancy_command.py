@@ -52,6 +52,7 @@ COMMAND: Final = MissionCommand(
         option(
             "--size",
             type=SIDES,
+            metavar="SIDE|WIDTHxHEIGHT",
             default="2400",
             help="Of the searched area, m: SIDE or WIDTHxHEIGHT (east x north).",
         ),

@@ -112,18 +112,31 @@ def option_of(field: str) -> str:
     return _NAMES.get(field, "--" + _UNIT.sub("", field).replace("_", "-"))
 
 
-def in_options(message: object) -> str:
+def in_options(message: object, *, own: bool = False) -> str:
     """A message with the options in place of the fields that it names.
 
     Errors name fields in backquotes: `` `altitude_m` ``, with a value: `` `via=setpoints` ``, or several
     fields that one option sets: `` `width_m, height_m` ``.
+
+    Args:
+        message: the message.
+        own: only with options that the running command has; other fields are parameters of an estimator,
+            which `--set` names as the message does.
     """
+    context = click.get_current_context() if own else None
+    known = (
+        None if context is None else {name for p in context.command.get_params(context) for name in p.opts}
+    )
 
     def options(found: re.Match[str]) -> str:
         names, value = found.groups()
         if value is None:
-            return " or ".join(dict.fromkeys(map(option_of, names.split(", "))))
-        return _NAMES.get(f"{names}={value}", f"{option_of(names)} {value}")
+            shown = list(dict.fromkeys(map(option_of, names.split(", "))))
+        else:
+            shown = [_NAMES.get(f"{names}={value}", f"{option_of(names)} {value}")]
+        if known is not None and not known.issuperset(text.split(" ")[0] for text in shown):
+            return found.group().strip("`")
+        return " or ".join(shown)
 
     return _FIELD.sub(options, str(message))
 

@@ -62,6 +62,7 @@ _EVERY: Final = (
     option(
         "--size",
         type=SIDES,
+        metavar="SIDE|WIDTHxHEIGHT",
         default="100",
         help="Size of the pattern, m: SIDE or WIDTHxHEIGHT (east x north)."
         + _WINGS.format("1000 or more, as its turns need"),

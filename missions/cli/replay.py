@@ -107,7 +107,7 @@ def replay(**given: Any) -> int:
         check_out(request)
         results = replay_logs(request, on_done)
     except (EstimatorError, LogError, PlanError) as error:
-        raise click.UsageError(in_options(error)) from error
+        raise click.UsageError(in_options(error, own=True)) from error
     done = [(label, result) for label, result in results if isinstance(result, EstimationResult)]
     for line in table_lines([(label, result.compared) for label, result in done]):
         click.echo(line)

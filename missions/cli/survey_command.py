@@ -44,6 +44,7 @@ COMMAND: Final = MissionCommand(
         option(
             "--size",
             type=SIDES,
+            metavar="SIDE|WIDTHxHEIGHT",
             default="2000",
             help="Of the area, m: SIDE or WIDTHxHEIGHT (across the lines x along them).",
         ),
