@@ -53,14 +53,14 @@ class Debriefing:
         options: options of the first vehicle.
         target_ne_m: true place of the first magnetic target of an embedded world, north and east of the map's
             home; None: not known.
-        targets_ne_m: the same of all magnetic targets.
+        targets_ne_m: the same of all magnetic targets; None: not known, () if the world has none.
     """
 
     records: "FlightRecords"
     flights: "Sequence[tuple[FlightNotes, FlightScore]]"
     options: MissionOptions
     target_ne_m: tuple[float, float] | None = None
-    targets_ne_m: tuple[tuple[float, float], ...] = ()
+    targets_ne_m: tuple[tuple[float, float], ...] | None = None
 
 
 def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
@@ -139,6 +139,14 @@ class Mission(Generic[AnyOptions]):
 
         An estimator that runs during the flight receives the parameters that it has and that the user did not
         set.
+        """
+        return {}
+
+    def estimator_files(self, options: AnyOptions) -> Mapping[str, tuple[str, bytes]]:
+        """Files that estimators read, which follow from the mission: name and contents of each, by the name
+        of the parameter that names the file.
+
+        They are in the run folder before the flight if its estimator has the parameter.
         """
         return {}
 

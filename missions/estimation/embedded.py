@@ -79,15 +79,19 @@ class FlightEstimators:
         self._links: Sequence[Link] = ()
         self._clock: Clock | None = None
 
+    def accepts(self, parameter: str) -> bool:
+        """Whether the estimator has a parameter."""
+        return any(field.name == parameter for field in fields(self._class.PARAMETERS))
+
     def know(self, known: Mapping[str, float | str]) -> None:
         """Parameters that follow from the mission, once they are known; before the first message.
 
         Raises:
             EstimatorError: a parameter does not accept its value.
         """
-        has = {field.name for field in fields(self._class.PARAMETERS)}
         # a later setting replaces an earlier one
-        self._settings = (*(f"{name}={value}" for name, value in known.items() if name in has), *self._given)
+        from_mission = (f"{name}={value}" for name, value in known.items() if self.accepts(name))
+        self._settings = (*from_mission, *self._given)
         parameters = parameters_from(self._class, self._settings)
         self.fleet = Fleet(lambda: self._class(parameters))
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
-from missions.runs.claimed_folder import claim_folder
+from missions.runs.claimed_folder import ClaimedFolder, claim_folder
 from missions.vehicle.connection import Connection, Recorder
 from missions.runs.ending import EndingSignals, signal_of
 from missions.errors import MissionError, PlanError
@@ -170,8 +170,9 @@ def _fly_interruptible(
         stage = opener.open_vehicles(request) if request.connect else opener.open_world(request, claimed)
         if stage.published_map is not None:
             request = replace(request, options=mission.with_map(request.options, stage.published_map))
-            if estimators is not None:
-                estimators.know(mission.estimator_settings(request.options))
+        if estimators is not None:
+            own = _estimator_files(mission, request, estimators, claimed)
+            estimators.know({**mission.estimator_settings(request.options), **own})
         request.on_open()
         check_stage(mission, request, stage, opener)
     except BaseException:
@@ -234,6 +235,28 @@ def _fly_interruptible(
         if written:
             replace_summary(folder, summary)
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary, signal=by_signal)
+
+
+def _estimator_files(
+    mission: Mission[Any], request: RunRequest, estimators: "FlightEstimators", claimed: ClaimedFolder
+) -> dict[str, str]:
+    """Write the files that the estimator reads; returns their paths by parameter.
+
+    Raises:
+        MissionError: a file can't be written.
+    """
+    paths = {}
+    for parameter, (name, contents) in mission.estimator_files(request.options).items():
+        if not estimators.accepts(parameter):
+            continue
+        path = claimed.path / name
+        claimed.published.append(path)
+        try:
+            path.write_bytes(contents)
+        except OSError as error:
+            raise MissionError(f"can't write {path}: {error.strerror or error}; check the disk") from error
+        paths[parameter] = str(path)
+    return paths
 
 
 async def _fly(
@@ -360,7 +383,7 @@ def _debrief(request: RunRequest, records: FlightRecords, flight: Flight) -> Deb
     notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
     flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
     options = notes[0].options if notes and notes[0].options is not None else request.options
-    targets_ne_m = () if request.world is None else request.world.magnetic_targets_ne_m
+    targets_ne_m = None if request.world is None else request.world.magnetic_targets_ne_m
     return Debriefing(
         records=records,
         flights=flights,

@@ -64,12 +64,24 @@ class SurveyMission(Mission[SurveyOptions]):
         return options if options.map_file is not None else replace(options, map_file=str(published))
 
     def estimator_settings(self, options: SurveyOptions) -> Mapping[str, float | str]:
-        known: dict[str, float | str] = {"line_spacing_m": options.spacing_m}
+        known: dict[str, float | str] = {
+            "line_spacing_m": options.spacing_m,
+            "level": "true" if options.level else "false",
+        }
         for name in ("map_file", "map_error_nt", "compensation_file", "grid_m"):
             value = getattr(options, name)
             if value is not None:
                 known[name] = value
         return known
+
+    def estimator_files(self, options: SurveyOptions) -> Mapping[str, tuple[str, bytes]]:
+        from estimators.survey.export import LINES
+        from missions.survey.plan import line_plan
+
+        if options.calibrate:
+            return {}
+        # the turns of the aircraft change the order of the lines, not their places
+        return {"lines_file": (LINES, line_plan(options, turn_radius_m=0.0).to_csv().encode())}
 
     async def outline(self, vehicle: "Vehicle", options: SurveyOptions) -> "Outline | None":
         from missions.survey.flight import outline_of, planned_survey
@@ -145,4 +157,4 @@ class SurveyMission(Mission[SurveyOptions]):
         if outcome.calibration is not None:
             draw_calibration(path, title, outcome.calibration)
         elif outcome.survey is not None:
-            draw_survey(path, title, outcome.survey, debriefing.targets_ne_m)
+            draw_survey(path, title, outcome.survey, debriefing.targets_ne_m or ())
