@@ -21,10 +21,16 @@ from estimators.occupancy.placed_readings import ReadingCheck
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map
 from estimators.survey.compensation import Compensation, load_compensation
 from estimators.survey.estimate import SurveyEstimate
-from estimators.survey.export import survey_files
+from estimators.survey.export import MAP, survey_files
 from estimators.survey.gridding import block_means
 from estimators.survey.lines import LinePlan, detected_lines, load_lines
-from estimators.survey.processing import ProcessingParameters, SurveyResult, aircraft_field_nt, process_survey
+from estimators.survey.processing import (
+    ProcessingParameters,
+    SurveyResult,
+    aircraft_field_nt,
+    check_grid,
+    process_survey,
+)
 from estimators.survey.readings import SurveyReadings, joined, placed_readings
 from flightsim.foundation.checks import require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -84,6 +90,8 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
         self._compensation: Compensation | None = (
             None if p.compensation_file is None else load_compensation(p.compensation_file)
         )
+        if self._lines is not None:
+            check_grid(self._lines, p)
         self._guard = InputGuard()
         self.reset()
 
@@ -98,7 +106,11 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
                 purpose="places of the readings",
             ),
             Need(
-                messages=("ATTITUDE",), rate_hz=2.0, wanted_rate_hz=25.0, purpose="attitude for compensation"
+                messages=("ATTITUDE",),
+                rate_hz=2.0,
+                wanted_rate_hz=25.0,
+                purpose="attitude for compensation",
+                optional=self._compensation is None,
             ),
         )
 
@@ -128,6 +140,8 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
         if message.src_component != _AUTOPILOT or name not in ("GLOBAL_POSITION_INT", "ATTITUDE"):
             return Outcome.IGNORED
         if name == "ATTITUDE":
+            if self._compensation is None:
+                return Outcome.IGNORED
             values: tuple[float, ...] = (message.roll, message.pitch, message.yaw)
         else:
             values = (message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
@@ -168,7 +182,7 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
         return refused or Outcome.USED
 
     def _next_block(self, system: int) -> tuple[SurveyEstimate, ...]:
-        """Place the readings up to the newest position and attitude."""
+        """Place the readings up to the newest position, and with a compensation up to the newest attitude."""
         block = self._place(last=False)
         home, main = self._home, self._main
         if block is None or home is None or main is None or not len(block):
@@ -208,9 +222,10 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
         """Place waiting readings; those after the newest position or attitude wait on, unless it is the last
         time.
         """
-        if not (self._readings and self._positions and self._attitudes and self._home is not None):
+        tables = [self._positions] if self._compensation is None else [self._positions, self._attitudes]
+        if not (self._readings and all(tables) and self._home is not None):
             return None
-        until_s = math.inf if last else min(self._positions[-1][0], self._attitudes[-1][0])
+        until_s = math.inf if last else min(table[-1][0] for table in tables)
         ready = [row for row in self._readings if row[0] <= until_s]
         self._readings = [row for row in self._readings if row[0] > until_s]
         times, values = np.array(ready).reshape(-1, 2).T
@@ -218,7 +233,7 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
             times,
             values,
             positions=np.array(self._positions),
-            attitudes=np.array(self._attitudes),
+            attitudes=None if self._compensation is None else np.array(self._attitudes),
             frame=LocalFrame(self._home),
         )
         del self._positions[:-_KEPT], self._attitudes[:-_KEPT]
@@ -274,6 +289,8 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
             "grid_error_nt": result.grid_error_nt,
         }
         found |= {name: round(value, 4) for name, value in figures.items() if math.isfinite(value)}
+        if result.no_grid:
+            found["warning"] = f"there is no {MAP}: {result.no_grid}"
         if not result.plan.lines:
             found["warning"] = "no straight flight was found that is long enough for a line (least_line_m)"
         elif not result.on_lines.any():

@@ -30,7 +30,7 @@ _FORMATS: Final = ("%.7f", "%.7f", *["%.2f"] * 3, "%.3f", *["%.3f"] * 5)
 
 
 def survey_files(result: SurveyResult) -> Mapping[str, bytes]:
-    """Contents of the files, by name; the map is missing when there are too few lines for one.
+    """Contents of the files, by name; the map is missing if there is no grid.
 
     The map has the format of `flightsim.foundation.magnetic_map_file`.
     """
@@ -51,7 +51,7 @@ def survey_files(result: SurveyResult) -> Mapping[str, bytes]:
                 height_m=result.grid_height_m,
                 home=result.home,
                 error_nt=error_nt if math.isfinite(error_nt) and error_nt > 0.0 else None,
-                line_spacing_m=result.parameters.line_spacing_m,
+                line_spacing_m=result.line_spacing_m,
             )
         )
     return files

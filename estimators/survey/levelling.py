@@ -14,6 +14,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from estimators.survey.lines import LineKind, SurveyLine
 
@@ -51,7 +53,9 @@ class Levelling:
     Attributes:
         level_nt: (lines,) to be subtracted from the readings of each line; NaN-free, 0 for lines without a
             crossing.
-        before_nt, after_nt: root mean square of the misclosures before and after; NaN without crossings.
+        before_nt: root mean square of the misclosures before levelling; NaN without crossings.
+        after_nt: standard deviation of the misclosures after levelling: their squares over the crossings less
+            the free levels; NaN if the levels explain all crossings exactly, as with a single tie line.
         crossings: number of crossings.
     """
 
@@ -106,12 +110,23 @@ def levelled(count: int, found: Sequence[Crossing]) -> Levelling:
         left = np.abs(misclosure - design @ level)
         scale = 1.4826 * float(np.median(left)) * 1.345 + 1e-9
         weight = np.minimum(1.0, scale / np.maximum(left, 1e-12))
+    spare = len(found) - _free_levels(found)
+    left = misclosure - design @ level
     return Levelling(
         level_nt=level,
         before_nt=float(np.sqrt(np.mean(misclosure**2))),
-        after_nt=float(np.sqrt(np.mean((misclosure - design @ level) ** 2))),
+        after_nt=math.sqrt(float(left @ left) / spare) if spare else math.nan,
         crossings=len(found),
     )
+
+
+def _free_levels(found: Sequence[Crossing]) -> int:
+    """Number of levels that crossings determine: one less than the lines of each connected net of lines."""
+    numbers = np.array([(c.line, c.tie) for c in found])
+    count = int(numbers.max()) + 1
+    net = coo_array((np.ones(len(found)), (numbers[:, 0], numbers[:, 1])), shape=(count, count))
+    nets, _ = connected_components(net, directed=False)
+    return count - int(nets)  # a line without a crossing is a net of its own
 
 
 def _intersection(a: SurveyLine, b: SurveyLine) -> tuple[float, float] | None:

@@ -4,9 +4,8 @@ Survey lines are parallel; tie lines cross them, and the differences at the cros
 the lines (`levelling`).
 """
 
-import csv
-import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -26,9 +25,11 @@ HEADER: Final = "name,kind,start_north_m,start_east_m,end_north_m,end_east_m"
 
 _COURSE_RAD: Final = math.radians(20.0)  # readings on another course are of a turn
 _STRAIGHT_RAD: Final = math.radians(8.0)  # of a detected line's course, either side
+_DECIMALS: Final = 2  # of places in a file of lines, m
 _TIE_RAD: Final = math.radians(45.0)
 _GAP_M: Final = 100.0  # a detected line ends where places are missing
 _CORRIDOR_M: Final = 50.0
+_CORRIDOR_SPACINGS: Final = 0.4
 
 
 class LineKind(StrEnum):
@@ -85,11 +86,34 @@ class LinePlan:
 
     Attributes:
         lines: in the order of flight.
-        corridor_m: readings farther from a line do not belong to it.
+        spacing_m: distance of the survey lines; None: not known.
     """
 
     lines: tuple[SurveyLine, ...]
-    corridor_m: float = _CORRIDOR_M
+    spacing_m: float | None = None
+
+    @classmethod
+    def of(cls, lines: Sequence[SurveyLine]) -> "LinePlan":
+        """The plan of commanded lines, with the distance that they have: the median between neighbours; None
+        with fewer than two survey lines.
+        """
+        survey = [line for line in lines if line.kind is LineKind.LINE]
+        middles = (
+            np.array([(line.start_ne_m, line.end_ne_m) for line in survey]).reshape(-1, 2, 2).mean(axis=1)
+        )
+        gaps = np.zeros(0)
+        if len(survey) > 1:
+            _, across = survey[0].along_across_m(*middles.T)
+            gaps = np.round(np.diff(np.sort(across)), _DECIMALS)
+            gaps = gaps[gaps > 0.0]  # a line that was flown again
+        return cls(lines=tuple(lines), spacing_m=float(np.median(gaps)) if len(gaps) else None)
+
+    @property
+    def corridor_m(self) -> float:
+        """Readings farther from a line do not belong to it: 0.4 line spacings, 50 m at most."""
+        return (
+            _CORRIDOR_M if self.spacing_m is None else min(_CORRIDOR_M, _CORRIDOR_SPACINGS * self.spacing_m)
+        )
 
     def line_of(self, north_m: Array, east_m: Array) -> NDArray[np.int64]:
         """Number of the line (n,) that each reading belongs to, in the order of flight; -1: to none.
@@ -112,13 +136,13 @@ class LinePlan:
         """The lines as a table."""
         rows = (
             f"{line.name},{line.kind},"
-            + ",".join(f"{value:.2f}" for value in (*line.start_ne_m, *line.end_ne_m))
+            + ",".join(f"{value:.{_DECIMALS}f}" for value in (*line.start_ne_m, *line.end_ne_m))
             for line in self.lines
         )
         return "\n".join((HEADER, *rows)) + "\n"
 
 
-def load_lines(path: Path, *, corridor_m: float = _CORRIDOR_M) -> LinePlan:
+def load_lines(path: Path) -> LinePlan:
     """Read a table that `LinePlan.to_csv` has made.
 
     Raises:
@@ -127,26 +151,47 @@ def load_lines(path: Path, *, corridor_m: float = _CORRIDOR_M) -> LinePlan:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise EstimatorError(f"lines_file {path} can't be read: {error}") from None
+        raise EstimatorError(
+            f"lines_file {path} can't be read: {getattr(error, 'strerror', None) or error}"
+        ) from None
     first = text.partition("\n")[0].strip()
     if first != HEADER:
         raise EstimatorError(f"lines_file {path} begins with {first[:60]!r}; accepted is {HEADER!r}")
     lines = []
-    for number, row in enumerate(csv.DictReader(io.StringIO(text)), 2):
+    for number, row in enumerate(text.splitlines()[1:], 2):
+        if not row:
+            continue
         try:
-            lines.append(
-                SurveyLine(
-                    name=row["name"],
-                    kind=LineKind(row["kind"]),
-                    start_ne_m=(float(row["start_north_m"]), float(row["start_east_m"])),
-                    end_ne_m=(float(row["end_north_m"]), float(row["end_east_m"])),
-                )
-            )
-        except (ValueError, TypeError) as error:
+            lines.append(_line_of(row.split(",")))
+        except EstimatorError as error:
             raise EstimatorError(f"lines_file {path}, line {number}: {error}") from None
     if not lines:
         raise EstimatorError(f"lines_file {path} has a header and no lines")
-    return LinePlan(lines=tuple(lines), corridor_m=corridor_m)
+    return LinePlan.of(lines)
+
+
+def _line_of(cells: Sequence[str]) -> SurveyLine:
+    """The line of a row of the table.
+
+    Raises:
+        EstimatorError: a cell is missing, or has a value that is not accepted.
+    """
+    columns = HEADER.split(",")
+    if len(cells) != len(columns):
+        raise EstimatorError(f"{len(cells)} values; accepted are {len(columns)}: {HEADER}")
+    name, kind, *places = cells
+    if kind not in list(LineKind):
+        raise EstimatorError(f"kind {kind!r} is not accepted; there are {', '.join(LineKind)}")
+    numbers = []
+    for column, text in zip(columns[2:], places, strict=True):
+        try:
+            numbers.append(float(text))
+        except ValueError:
+            raise EstimatorError(f"{column} {text!r} is not a number; give metres") from None
+    north_m, east_m, end_north_m, end_east_m = numbers
+    return SurveyLine(
+        name=name, kind=LineKind(kind), start_ne_m=(north_m, east_m), end_ne_m=(end_north_m, end_east_m)
+    )
 
 
 def detected_lines(north_m: Array, east_m: Array, *, least_length_m: float = 500.0) -> LinePlan:

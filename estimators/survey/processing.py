@@ -6,7 +6,7 @@ differential measurement, reading - map, is that of Lum, Rysdyk and Pongpunwatta
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,15 +17,23 @@ from estimators.errors import EstimatorError
 from estimators.occupancy.survey_map import SurveyMap, map_error_of
 from estimators.survey.anomalies import LinePeak, Search, SurveyAnomaly, line_peaks, survey_anomalies
 from estimators.survey.compensation import Compensation, direction_cosines
-from estimators.survey.gridding import SurveyGrid, block_means, grid_lines, interpolated
+from estimators.survey.gridding import SurveyGrid, block_means, grid_axes, grid_lines, interpolated
 from estimators.survey.levelling import Levelling, crossings, levelled
 from estimators.survey.lines import LineKind, LinePlan
 from estimators.survey.readings import SurveyReadings
 from flightsim.foundation.checks import require_not_negative, require_positive
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.magnetics import require_wmm_year
 from flightsim.foundation.main_field import MainField
 
-__all__ = ["ProcessingParameters", "SurveyResult", "process_survey", "white_noise_nt"]
+__all__ = [
+    "LEAST_SPACING_M",
+    "ProcessingParameters",
+    "SurveyResult",
+    "check_grid",
+    "process_survey",
+    "white_noise_nt",
+]
 
 Array = NDArray[np.float64]
 
@@ -34,7 +42,10 @@ _AWAY_M: Final = 3.0  # widths of an anomaly within which readings are not "wher
 _LEAST_REACH_M: Final = 150.0
 _NORMAL: Final = 1.4826  # standard deviation over median absolute deviation
 _CONFIDENCE: Final = 0.9  # that the error of the grid is not larger than stated
-_BLOCKS: Final = 4.0  # of a line spacing, along a line
+_BLOCKS: Final = 4.0  # of a line spacing: blocks along a line, and cells of the grid
+_USUAL_SPACING_M: Final = 200.0
+LEAST_SPACING_M: Final = 1.0
+"""Smallest distance of lines that is processed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,25 +53,39 @@ class ProcessingParameters:
     """How a survey is processed.
 
     Attributes:
-        line_spacing_m: distance of the survey lines.
+        line_spacing_m: distance of the survey lines, 1 m or more; None: that of the plan, else 200 m.
         grid_m: distance of the grid's lines; None: a quarter of the line spacing.
         map_error_nt: standard deviation of the published map; None: as the map states it, else 1 nT.
         level: estimate the levels of the lines from the crossings with tie lines.
-        decimal_year: date of the main field (WMM-2025).
+        decimal_year: date of the main field (WMM-2025), 2025 to 2030.
     """
 
-    line_spacing_m: float = 200.0
+    line_spacing_m: float | None = None
     grid_m: float | None = None
     map_error_nt: float | None = None
     level: bool = True
     decimal_year: float = 2026.0
 
     def __post_init__(self) -> None:
-        require_positive(line_spacing_m=self.line_spacing_m)
+        spacing_m = self.line_spacing_m
+        if spacing_m is not None and not (math.isfinite(spacing_m) and spacing_m >= LEAST_SPACING_M):
+            raise ValueError(
+                f"line_spacing_m = {spacing_m!r} is not accepted: a finite number of at least "
+                f"{LEAST_SPACING_M:g} is"
+            )
         if self.grid_m is not None:
             require_positive(grid_m=self.grid_m)
         if self.map_error_nt is not None:
             require_not_negative(map_error_nt=self.map_error_nt)
+        require_wmm_year(self.decimal_year)
+
+    def spacing_m(self, plan: LinePlan) -> float:
+        """Distance of the survey lines of a plan."""
+        return self.line_spacing_m or plan.spacing_m or _USUAL_SPACING_M
+
+    def cell_m(self, plan: LinePlan) -> float:
+        """Distance of the grid's lines of a plan."""
+        return self.grid_m or self.spacing_m(plan) / _BLOCKS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,12 +106,15 @@ class SurveyResult:
             away from anomalies.
         against_map: the reference is a published map.
         anomalies: what differs from the map, the strongest first; none without a map.
-        grid: levelled total field on a grid; None: too few lines.
-        grid_height_m: mean height of the readings on the lines, at which the grid is valid.
+        grid: levelled total field on a grid; None: there is none.
+        no_grid: why there is no grid; "" if there is one.
+        grid_height_m: mean height of the readings on the lines, at which the grid is valid. Readings at other
+            heights, over terrain, are not continued to it.
         grid_error_nt: error of the grid: root mean square of the tie lines' readings about a grid of the
             survey lines alone, as the upper limit of a confidence of 90 % for as many independent places as
             there are crossings; NaN without tie lines.
         home: origin of the frame.
+        line_spacing_m: distance of the survey lines.
     """
 
     plan: LinePlan
@@ -102,10 +130,11 @@ class SurveyResult:
     against_map: bool
     anomalies: tuple[SurveyAnomaly, ...]
     grid: SurveyGrid | None
+    no_grid: str
     grid_height_m: float
     grid_error_nt: float
     home: GeodeticPosition
-    parameters: ProcessingParameters = field(default_factory=ProcessingParameters)
+    line_spacing_m: float
 
     @property
     def on_lines(self) -> NDArray[np.bool_]:
@@ -158,7 +187,7 @@ def process_survey(
     differential = levelled_nt - reference
     noise_nt = white_noise_nt(differential, line_of)
     anomalies = _anomalies(readings, plan, line_of, differential, noise_nt, main, survey_map, p)
-    grid, misfit_nt = _grid(readings, plan, line_of, levelled_nt - main_nt, main, p)
+    grid, no_grid, misfit_nt = _grid(readings, plan, line_of, levelled_nt - main_nt, main, p)
     count = max(1, levelling.crossings or len(plan.lines))
     error_nt = misfit_nt * math.sqrt(count / float(chi2.ppf(1.0 - _CONFIDENCE, count)))
     return SurveyResult(
@@ -175,11 +204,22 @@ def process_survey(
         against_map=survey_map is not None,
         anomalies=tuple(anomalies),
         grid=grid,
+        no_grid=no_grid,
         grid_height_m=float(readings.height_m[on].mean()) if on.any() else math.nan,
         grid_error_nt=error_nt,
         home=home,
-        parameters=p,
+        line_spacing_m=p.spacing_m(plan),
     )
+
+
+def check_grid(plan: LinePlan, parameters: ProcessingParameters) -> None:
+    """Refuse a grid that is too fine for the area of the lines, before they are flown or processed.
+
+    Raises:
+        EstimatorError: there are too many grid points.
+    """
+    ends = np.array([end for line in plan.lines for end in (line.start_ne_m, line.end_ne_m)])
+    grid_axes(np.concatenate((ends - plan.corridor_m, ends + plan.corridor_m)), parameters.cell_m(plan))
 
 
 def aircraft_field_nt(readings: SurveyReadings, compensation: Compensation, direction_ned: Array) -> Array:
@@ -271,31 +311,45 @@ def _grid(
     anomaly_nt: Array,
     main: MainField,
     p: ProcessingParameters,
-) -> tuple[SurveyGrid | None, float]:
-    """The grid of total field from all lines, and how well the survey lines predict the tie lines."""
+) -> tuple[SurveyGrid | None, str, float]:
+    """The grid of total field from all lines or why there is none, and how well the survey lines predict the
+    tie lines.
+    """
+    block_m = p.spacing_m(plan) / _BLOCKS
     blocks: dict[LineKind, list[tuple[Array, Array]]] = {kind: [] for kind in LineKind}
     for number, line in enumerate(plan.lines):
         own = line_of == number
         places = np.column_stack((readings.north_m[own], readings.east_m[own]))
-        blocks[line.kind].append(block_means(places, anomaly_nt[own], p.line_spacing_m / _BLOCKS))
+        blocks[line.kind].append(block_means(places, anomaly_nt[own], block_m))
     lines, ties = (_joined(blocks[kind]) for kind in (LineKind.LINE, LineKind.TIE))
     places, values = (np.concatenate(parts) for parts in zip(lines, ties, strict=True))
     if len(places):
         # a tie line's block beside a line's has the same place and another value: the spline would bend
-        places, values = _apart(places, values, 0.5 * p.line_spacing_m / _BLOCKS)
-    error_nt = math.nan
+        places, values = _apart(places, values, 0.5 * block_m)
+    error_nt = _tie_misfit_nt(*lines, *ties)
     try:
-        if len(ties[0]):
-            error_nt = float(np.sqrt(np.mean((interpolated(*lines, ties[0]) - ties[1]) ** 2)))
-        grid = grid_lines(places, values, line_spacing_m=p.line_spacing_m, cell_m=p.grid_m)
-    except (EstimatorError, ValueError, np.linalg.LinAlgError):
-        return None, error_nt  # too few places, or all of them on one line
+        grid = grid_lines(places, values, line_spacing_m=p.spacing_m(plan), cell_m=p.cell_m(plan))
+    except EstimatorError as error:
+        return None, str(error).replace("`", ""), error_nt
     total = (
         grid.values_nt
         + main.total_at_nt(grid.north_m[:, None], grid.east_m[None, :])
         + (main.gradient_up_nt_m * float(readings.height_m[line_of >= 0].mean()))
     )
-    return SurveyGrid(north_m=grid.north_m, east_m=grid.east_m, values_nt=total), error_nt
+    return SurveyGrid(north_m=grid.north_m, east_m=grid.east_m, values_nt=total), "", error_nt
+
+
+def _tie_misfit_nt(places_m: Array, values_nt: Array, tie_places_m: Array, tie_values_nt: Array) -> float:
+    """Root mean square of the tie lines' values about a grid of the survey lines; NaN: there are no tie
+    lines, or no two survey lines.
+    """
+    if not len(tie_places_m):
+        return math.nan
+    try:
+        left = interpolated(places_m, values_nt, tie_places_m) - tie_values_nt
+    except (ValueError, np.linalg.LinAlgError):
+        return math.nan
+    return float(np.sqrt(np.mean(left**2)))
 
 
 def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:

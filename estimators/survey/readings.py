@@ -27,9 +27,9 @@ class SurveyReadings:
     Attributes:
         time_s: vehicle time.
         north_m, east_m, height_m: place, from the origin of the survey's frame.
-        roll_rad, pitch_rad, yaw_rad: attitude.
+        roll_rad, pitch_rad, yaw_rad: attitude; NaN if none was given.
         total_nt: total field.
-        unplaced: readings that were left out, because no position or attitude is near them in time.
+        unplaced: readings that were left out, because no position, or no attitude, is near them in time.
         implausible: readings that were left out, because the magnetometer was stuck or saturated.
     """
 
@@ -61,14 +61,14 @@ def joined(parts: Sequence[SurveyReadings]) -> SurveyReadings:
 
 
 def placed_readings(
-    time_s: Array, total_nt: Array, *, positions: Array, attitudes: Array, frame: LocalFrame
+    time_s: Array, total_nt: Array, *, positions: Array, attitudes: Array | None, frame: LocalFrame
 ) -> SurveyReadings:
     """Give readings the place and the attitude at their times, linearly between two messages.
 
     Args:
         time_s, total_nt: (n,) readings, in any order of time.
         positions: (m, 4) time s, latitude deg, longitude deg, altitude m above mean sea level.
-        attitudes: (k, 4) time s, roll, pitch, yaw, rad.
+        attitudes: (k, 4) time s, roll, pitch, yaw, rad; None: the attitude is not needed.
         frame: local frame of the survey.
     """
     order = _increasing(time_s)
@@ -76,8 +76,11 @@ def placed_readings(
     sound = plausible(values)
     implausible = len(values) - int(sound.sum())
     times, values = times[sound], values[sound]
-    positions, attitudes = (table[_increasing(table[:, 0])] for table in (positions, attitudes))
-    kept = _covered(times, positions[:, 0]) & _covered(times, attitudes[:, 0])
+    positions = positions[_increasing(positions[:, 0])]
+    kept = _covered(times, positions[:, 0])
+    if attitudes is not None:
+        attitudes = attitudes[_increasing(attitudes[:, 0])]
+        kept &= _covered(times, attitudes[:, 0])
     unplaced = len(times) - int(kept.sum())
     times, values = times[kept], values[kept]
     if not len(times):
@@ -86,7 +89,10 @@ def placed_readings(
     north_per_deg, east_per_deg = frame.metres_per_degree
     origin = frame.origin
     roll, pitch, yaw = (
-        np.interp(times, attitudes[:, 0], np.unwrap(attitudes[:, column])) for column in (1, 2, 3)
+        np.full(len(times), np.nan)
+        if attitudes is None
+        else np.interp(times, attitudes[:, 0], np.unwrap(attitudes[:, column]))
+        for column in (1, 2, 3)
     )
     return SurveyReadings(
         time_s=times,

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from estimators.errors import EstimatorError
+from estimators.survey.processing import check_grid
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.planning.limits import FixedWingLimits, Limits
@@ -34,6 +36,10 @@ def check_survey(options: SurveyOptions, limits: Limits) -> None:
         return
     plan = planned_lines(options, limits)
     check_lines(plan)
+    try:
+        check_grid(plan, options.processing)
+    except EstimatorError as error:
+        raise PlanError(str(error)) from None
     ends = np.array([end for line in plan.lines for end in (line.start_ne_m, line.end_ne_m)])
     along = np.linspace(0.0, 1.0, 200)[:, None]
     places = np.concatenate(

@@ -8,6 +8,7 @@ from typing import Final
 from estimators.errors import EstimatorError
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map
 from estimators.survey.compensation import Compensation, load_compensation
+from estimators.survey.processing import LEAST_SPACING_M, ProcessingParameters
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.options import MissionOptions, check_positive
@@ -73,6 +74,10 @@ class SurveyOptions(MissionOptions):
             grid_m=self.grid_m,
             climb=self.climb,
         )
+        if not self.spacing_m >= LEAST_SPACING_M:
+            raise PlanError(
+                f"`spacing_m` {self.spacing_m:g} m is too small; ask for {LEAST_SPACING_M:g} m or more"
+            )
         for name, side_m in (("width_m", self.width_m), ("height_m", self.height_m)):
             if not 0.0 < side_m <= LARGEST_SIDE_M:
                 raise PlanError(
@@ -114,6 +119,16 @@ class SurveyOptions(MissionOptions):
     def tie_m(self) -> float:
         """Distance of the tie lines; 0: none."""
         return TIE_SPACING * self.spacing_m if self.tie_spacing_m is None else self.tie_spacing_m
+
+    @property
+    def processing(self) -> ProcessingParameters:
+        """How the readings are processed."""
+        return ProcessingParameters(
+            line_spacing_m=self.spacing_m,
+            grid_m=self.grid_m,
+            map_error_nt=self.map_error_nt,
+            level=self.level,
+        )
 
     def for_vehicle(self, limits: Limits) -> "SurveyOptions":
         """The same options, with the aircraft's own airspeed unless one was specified."""

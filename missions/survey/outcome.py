@@ -9,9 +9,9 @@ import numpy as np
 
 from estimators.errors import EstimatorError
 from estimators.survey.compensation import compensation_bytes
-from estimators.survey.export import survey_files
+from estimators.survey.export import MAP, survey_files
 from estimators.survey.lines import LineKind, LinePlan
-from estimators.survey.processing import ProcessingParameters, SurveyResult, process_survey
+from estimators.survey.processing import SurveyResult, process_survey
 from estimators.survey.readings import GAP_S
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
@@ -91,7 +91,13 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
     notes = debriefing.flights[0][0]
     survey_map = options.survey_map()
     origin = home if survey_map is None else survey_map.home
-    readings = flight_readings(debriefing.records, notes.system_id, LocalFrame(origin))
+    compensation = options.compensation()
+    readings = flight_readings(
+        debriefing.records,
+        notes.system_id,
+        LocalFrame(origin),
+        attitude=options.calibrate or compensation is not None,
+    )
     if len(readings) < 2:
         return Outcome(
             failure=f"vehicle {notes.system_id} sent no readings of the magnetic field with a place"
@@ -112,13 +118,8 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
         plan,
         home=origin,
         survey_map=survey_map,
-        compensation=options.compensation(),
-        parameters=ProcessingParameters(
-            line_spacing_m=options.spacing_m,
-            grid_m=options.grid_m,
-            map_error_nt=options.map_error_nt,
-            level=options.level,
-        ),
+        compensation=compensation,
+        parameters=options.processing,
     )
     coverage = covered(result)
     return Outcome(
@@ -143,7 +144,7 @@ def covered(result: SurveyResult) -> tuple[float, ...]:
 
 
 def _survey_figures(
-    result: SurveyResult, coverage: Sequence[float], targets_ne_m: Sequence[tuple[float, float]]
+    result: SurveyResult, coverage: Sequence[float], targets_ne_m: Sequence[tuple[float, float]] | None
 ) -> dict[str, Any]:
     lines = result.plan.lines
     found: dict[str, Any] = {
@@ -160,6 +161,7 @@ def _survey_figures(
         "misclosure_before_nt": _rounded(result.levelling.before_nt),
         "misclosure_after_nt": _rounded(result.levelling.after_nt),
         "grid_error_nt": _rounded(result.grid_error_nt),
+        "no_map": result.no_grid or None,
         "compared_with_map": result.against_map,
         "anomalies": [
             {
@@ -172,8 +174,8 @@ def _survey_figures(
             for anomaly in result.anomalies
         ],
     }
-    if targets_ne_m:
-        within_m = max(_FOUND_LEAST_M, _FOUND_WITHIN * result.parameters.line_spacing_m)
+    if targets_ne_m is not None:
+        within_m = max(_FOUND_LEAST_M, _FOUND_WITHIN * result.line_spacing_m)
         errors = [
             min((math.dist(place, (a.north_m, a.east_m)) for a in result.anomalies), default=math.inf)
             for place in targets_ne_m
@@ -214,16 +216,20 @@ def report_lines(summary: Mapping[str, Any]) -> Sequence[str]:
         f"{summary['readings_on_lines']} readings with {_nt(summary['noise_nt'])} of noise"
     ]
     if summary["crossings"]:
+        after_nt = summary["misclosure_after_nt"]
+        after = "unknown (the levels explain all crossings)" if after_nt is None else _nt(after_nt)
         lines.append(
             f"{summary['crossings']} crossings: misclosure {_nt(summary['misclosure_before_nt'])} before "
-            f"levelling, {_nt(summary['misclosure_after_nt'])} after; map by the lines within "
-            f"{_nt(summary['grid_error_nt'])} of the tie lines"
+            f"levelling, after it {after}; map by the lines within {_nt(summary['grid_error_nt'])} of the "
+            "tie lines"
         )
+    if summary["no_map"] is not None:
+        lines.append(f"warning: there is no {MAP}: {summary['no_map']}")
     if summary["compared_with_map"]:
         count = len(summary["anomalies"])
         of_targets = (
             f"; {summary['targets_found']} of {len(summary['targets'])} targets are among them"
-            if "targets" in summary
+            if summary.get("targets")
             else ""
         )
         lines.append(

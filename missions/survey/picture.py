@@ -8,12 +8,15 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from estimators.survey.lines import LineKind
 from estimators.survey.processing import SurveyResult
 from missions.survey.records import Calibration
 
 __all__ = ["draw_calibration", "draw_survey"]
+
+Array = NDArray[np.float64]
 
 _INK: Final = "#1f2937"
 _GRID: Final = "#e5e7eb"
@@ -22,6 +25,7 @@ _TIE: Final = "#c2410c"
 _TARGET: Final = "#dc2626"
 _KILOMETRE: Final = 1e-3
 _MOST_NAMES: Final = 14  # of lines beside the map
+_NAME_PT: Final = 8.0  # distance of a line's name from its end
 _LIMITS: Final = (2.0, 98.0)  # percentiles of the colours
 
 
@@ -58,15 +62,20 @@ def _draw_lines(
         vmin=-size, vmax=size, zorder=2, linewidths=0.0,
     )  # fmt: skip
     what = "reading - map" if result.against_map else "reading - main field"
-    figure.colorbar(shades, ax=axes, shrink=0.8, label=f"{what}, nT")
+    figure.colorbar(shades, ax=axes, shrink=0.8, label=f"{what}, nT", extend=_beyond(values, -size, size))
     step = math.ceil(len(result.plan.lines) / _MOST_NAMES)
     for line in result.plan.lines:
         if line.kind is LineKind.LINE and _number(line.name) % step:
             continue
-        end = line.end_ne_m
+        # survey lines have their names at one end, tie lines at the other, both outside of the area
+        kind, way_rad = line.kind, line.course_rad
+        end, away = (
+            (line.end_ne_m, 1.0) if _backwards(way_rad) is (kind is LineKind.TIE) else (line.start_ne_m, -1.0)
+        )
         axes.annotate(
-            line.name, (end[1] * _KILOMETRE, end[0] * _KILOMETRE), fontsize=6, ha="center",
-            color=_LINE if line.kind is LineKind.LINE else _TIE,
+            line.name, (end[1] * _KILOMETRE, end[0] * _KILOMETRE), fontsize=6, ha="center", va="center",
+            xytext=(_NAME_PT * away * math.sin(way_rad), _NAME_PT * away * math.cos(way_rad)),
+            textcoords="offset points", color=_LINE if kind is LineKind.LINE else _TIE,
         )  # fmt: skip
     for k, (north_m, east_m) in enumerate(targets_ne_m):
         axes.plot(
@@ -86,7 +95,8 @@ def _draw_lines(
 def _draw_map(figure: Figure, axes: Any, result: SurveyResult) -> None:
     grid = result.grid
     if grid is None:
-        axes.text(0.5, 0.5, "too few lines for a map", ha="center", transform=axes.transAxes, color=_INK)
+        axes.text(0.5, 0.5, f"no map: {result.no_grid}", ha="center", wrap=True, transform=axes.transAxes,
+                  color=_INK)  # fmt: skip
         axes.set_axis_off()
         return
     low, high = np.nanpercentile(grid.values_nt, _LIMITS)
@@ -94,7 +104,8 @@ def _draw_map(figure: Figure, axes: Any, result: SurveyResult) -> None:
         grid.east_m * _KILOMETRE, grid.north_m * _KILOMETRE, grid.values_nt, cmap="turbo", vmin=low,
         vmax=high, shading="nearest", rasterized=True,
     )  # fmt: skip
-    figure.colorbar(shades, ax=axes, shrink=0.8, label="total field, nT")
+    extend = _beyond(grid.values_nt, low, high)
+    figure.colorbar(shades, ax=axes, shrink=0.8, label="total field, nT", extend=extend)
     _map_axes(axes, "map from the flight")
 
 
@@ -121,10 +132,18 @@ def _draw_profiles(axes: Any, result: SurveyResult) -> None:
                   transform=axes.get_yaxis_transform())  # fmt: skip
     axes.set_yticks([])
     axes.set_xlabel("along the line, km", fontsize=9, color=_INK)
-    axes.set_title(f"differential measurement; lines are {step:.1f} nT apart", fontsize=10, color=_INK)
+    axes.set_title(
+        f"differential measurement; profiles are drawn {step:.1f} nT apart", fontsize=10, color=_INK
+    )
     axes.grid(True, axis="x", color=_GRID, linewidth=0.6)
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
+
+
+def _beyond(values: Array, low: float, high: float) -> str:
+    """The ends of a colour scale beyond which there are values, as matplotlib names them."""
+    below, above = bool(np.any(values < low)), bool(np.any(values > high))
+    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
 
 
 def _map_axes(axes: Any, title: str) -> None:

@@ -29,8 +29,6 @@ _STEP_M: Final = 2.0
 _LEVEL_M: Final = 1.0  # waypoints along a line stay within this height of the drape
 _DRAPE_STEP_M: Final = 50.0
 _TURN_DEVIATION_M: Final = 2.0
-_CORRIDOR_SPACINGS: Final = 0.4
-_CORRIDOR_M: Final = 50.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,8 +78,7 @@ def line_plan(options: SurveyOptions, *, turn_radius_m: float) -> LinePlan:
         if flown and ordered:
             ordered = _beginning_near(flown[-1].end_ne_m, ordered)
         flown += [line if k % 2 == 0 else line.reversed() for k, line in enumerate(ordered)]
-    corridor_m = min(_CORRIDOR_M, _CORRIDOR_SPACINGS * options.spacing_m)
-    return LinePlan(lines=tuple(flown), corridor_m=corridor_m)
+    return LinePlan.of(flown)
 
 
 def survey_path(

@@ -32,8 +32,17 @@ _AUTOPILOT: Final = 1
 _MARGIN_S: Final = 5.0  # of the flight around the manoeuvres, for the filter's ends
 
 
-def flight_readings(records: FlightRecords, system_id: int, frame: LocalFrame) -> SurveyReadings:
-    """All readings of a vehicle's magnetometer in a flight, placed in a frame."""
+def flight_readings(
+    records: FlightRecords, system_id: int, frame: LocalFrame, *, attitude: bool
+) -> SurveyReadings:
+    """All readings of a vehicle's magnetometer in a flight, placed in a frame.
+
+    Args:
+        records: of the flight.
+        system_id: the vehicle.
+        frame: the frame.
+        attitude: give them the vehicle's attitude, for a compensation; readings without one are left out.
+    """
     sent = records.table("NAMED_VALUE_FLOAT", system_id, SURVEY_MAGNETOMETER_COMPONENT)
     sent = sent[sent["name"] == TOTAL_FIELD_NAME.encode()]
     positions = records.table("GLOBAL_POSITION_INT", system_id, _AUTOPILOT)
@@ -44,7 +53,7 @@ def flight_readings(records: FlightRecords, system_id: int, frame: LocalFrame) -
         sent["time_boot_ms"] * 1e-3,
         sent["value"].astype(np.float64),
         positions=_columns(positions, ("lat", 1e-7), ("lon", 1e-7), ("alt", 1e-3)),
-        attitudes=_columns(attitudes, ("roll", 1.0), ("pitch", 1.0), ("yaw", 1.0)),
+        attitudes=_columns(attitudes, ("roll", 1.0), ("pitch", 1.0), ("yaw", 1.0)) if attitude else None,
         frame=frame,
     )
 

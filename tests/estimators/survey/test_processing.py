@@ -1,6 +1,7 @@
 """Surveys with known levels, targets and noise: what processing finds of them."""
 
 import math
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 
 from estimators.errors import EstimatorError
 from estimators.occupancy.survey_map import SurveyMap
+from estimators.survey.estimator import SurveyEstimator, SurveyEstimatorParameters
 from estimators.survey.export import ANOMALIES, LINE_DATA, LINE_DATA_XYZ, LINES, MAP, survey_files
-from estimators.survey.lines import LineKind, LinePlan, SurveyLine, detected_lines, load_lines
+from estimators.survey.levelling import Crossing, levelled
+from estimators.survey.lines import HEADER, LineKind, LinePlan, SurveyLine, detected_lines, load_lines
 from estimators.survey.processing import ProcessingParameters, process_survey, white_noise_nt
 from estimators.survey.readings import SurveyReadings, placed_readings
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -23,7 +26,9 @@ from flightsim.payload import (
     SurveyParameters,
     truth_behind,
 )
+from missions.survey.options import SurveyOptions
 from missions.survey.outcome import covered
+from missions.survey.plan import line_plan
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.55, alt_m=480.0)
 MAIN = MainField(HOME)
@@ -62,7 +67,7 @@ def plan() -> LinePlan:
         for k, y in enumerate((-500.0, 500.0))
     ]
     flown = [line if k % 2 == 0 else line.reversed() for k, line in enumerate(lines)]
-    return LinePlan(lines=(*flown, *ties))
+    return LinePlan.of((*flown, *ties))
 
 
 def flown(seed, *, levels_nt=None, target=None, survey_map=None):
@@ -185,7 +190,7 @@ def test_files_can_be_read_again_and_the_map_is_a_map(tmp_path):
     assert set(files) == {LINES, LINE_DATA, LINE_DATA_XYZ, ANOMALIES, MAP}
     for name, contents in files.items():
         (tmp_path / name).write_bytes(contents)
-    assert load_lines(tmp_path / LINES).lines == plan().lines
+    assert load_lines(tmp_path / LINES) == plan()
     table = np.genfromtxt(tmp_path / LINE_DATA, delimiter=",", names=True, dtype=None, encoding="utf-8")
     assert len(table) == result.on_lines.sum()
     north_m, east_m, _ = LocalFrame(HOME).ned_from_geodetic(
@@ -250,6 +255,79 @@ def test_a_hole_in_the_readings_of_a_line_is_not_covered(missing_s, share):
     assert min(coverage[1:]) > 0.99
 
 
+def test_one_tie_line_leaves_no_misclosure_to_judge_the_levels_by():
+    """Its level and those of the lines explain as many crossings as there are lines."""
+    tied = plan().lines[:-1]
+    parameters = ProcessingParameters(map_error_nt=0.0)
+    one, two = (
+        process_survey(flown(1), LinePlan.of(lines), home=HOME, parameters=parameters).levelling
+        for lines in (tied, plan().lines)
+    )
+    assert one.crossings == 9
+    assert one.before_nt > 0.0 and math.isnan(one.after_nt)
+    # 18 crossings determine 10 levels: the rest has the noise of a difference of two crossing values
+    assert two.after_nt == pytest.approx(NOISE_NT * math.sqrt(2.0 / 80.0), rel=0.6)
+
+
+def test_lines_and_their_levels_in_two_separate_nets_are_counted_apart():
+    found = [
+        Crossing(line=line, tie=tie, north_m=0.0, east_m=0.0, misclosure_nt=value)
+        for (line, tie), value in zip(
+            [(0, 4), (1, 4), (0, 5), (1, 5), (2, 6), (3, 6)], [1.0, -1.0, -1.0, 1.0, 3.0, 5.0], strict=True
+        )
+    ]
+    # seven lines in two nets: five levels for six crossings, and squares that sum to 4
+    assert levelled(7, found).after_nt == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (
+            {"decimal_year": 1e9},
+            "decimal year 1000000000.0 is outside the magnetic model's validity, 2025.0 to 2030.0",
+        ),
+        ({"line_spacing_m": 0.5}, "line_spacing_m = 0.5 is not accepted: a finite number of at least 1 is"),
+        ({"grid_m": 0.0}, "grid_m"),
+    ],
+)
+def test_parameters_that_cannot_be_processed_are_refused(values, words):
+    with pytest.raises(ValueError, match=words):
+        SurveyEstimatorParameters(**values)
+
+
+def test_a_grid_that_is_too_fine_is_refused_before_and_named_after_the_flight(tmp_path):
+    (tmp_path / LINES).write_text(plan().to_csv())
+    words = r"`grid_m` 0.1 m makes \d+ x \d+ grid points; up to 1000000 are accepted: choose a larger one"
+    with pytest.raises(EstimatorError, match=words):
+        SurveyEstimator(SurveyEstimatorParameters(lines_file=tmp_path / LINES, grid_m=0.1))
+    result = processed(flown(1), grid_m=0.1)
+    assert result.grid is None
+    assert re.match(words.replace("`", ""), result.no_grid)
+
+
+@pytest.mark.parametrize(("spacing_m", "corridor_m"), [(50.0, 20.0), (100.0, 40.0), (400.0, 50.0)])
+def test_lines_from_a_file_have_the_spacing_and_the_corridor_of_the_flight(tmp_path, spacing_m, corridor_m):
+    options = SurveyOptions(
+        width_m=4.0 * spacing_m, height_m=900.0, spacing_m=spacing_m, direction_rad=0.7, tie_spacing_m=300.0
+    )
+    planned = line_plan(options, turn_radius_m=100.0)
+    (tmp_path / LINES).write_text(planned.to_csv())
+    for plan_of in (planned, load_lines(tmp_path / LINES)):
+        assert plan_of.spacing_m == pytest.approx(spacing_m, abs=0.01)
+        assert plan_of.corridor_m == pytest.approx(corridor_m, abs=0.01)
+        assert ProcessingParameters().cell_m(plan_of) == pytest.approx(spacing_m / 4.0, abs=0.01)
+
+
+def test_readings_need_no_attitude_without_a_compensation():
+    time_s = 0.1 * np.arange(100)
+    positions = np.column_stack((time_s, np.full(100, 47.4), np.full(100, 8.55), np.full(100, 560.0)))
+    values = 48_000.0 + np.random.default_rng(1).standard_normal(100)
+    found = placed_readings(time_s, values, positions=positions, attitudes=None, frame=LocalFrame(HOME))
+    assert len(found) == 100
+    assert np.isnan(found.roll_rad).all()
+
+
 def test_white_noise_is_not_geology():
     rng = np.random.default_rng(2)
     along = 2.5 * np.arange(4000)
@@ -262,12 +340,11 @@ def test_white_noise_is_not_geology():
     ("text", "words"),
     [
         ("nonsense\n", "begins with 'nonsense'"),
-        ("name,kind,start_north_m,start_east_m,end_north_m,end_east_m\n", "a header and no lines"),
-        ("name,kind,start_north_m,start_east_m,end_north_m,end_east_m\nL1,road,0,0,1,1\n", "line 2: 'road'"),
-        (
-            "name,kind,start_north_m,start_east_m,end_north_m,end_east_m\nL1,line,0,0,0,0\n",
-            "line 2: line L1 .* no length",
-        ),
+        (f"{HEADER}\n", "a header and no lines"),
+        (f"{HEADER}\nL1,road,0,0,1,1\n", "line 2: kind 'road' is not accepted; there are line, tie"),
+        (f"{HEADER}\nL1,line,0,0,1\n", "line 2: 5 values; accepted are 6: name,kind"),
+        (f"{HEADER}\nL1,line,0,here,1,1\n", "line 2: start_east_m 'here' is not a number; give metres"),
+        (f"{HEADER}\nL1,line,0,0,0,0\n", "line 2: line L1 .* no length"),
     ],
 )
 def test_files_that_are_no_lines_are_refused(tmp_path, text, words):
@@ -295,5 +372,6 @@ def test_a_survey_that_ends_after_one_line_has_no_map_and_no_error():
     )
     result = processed(short, published())
     assert result.grid is None
+    assert result.no_grid == "all places are on one line; two lines or more make a grid"
     assert MAP not in survey_files(result)
     assert result.on_lines.sum() > 500

@@ -101,8 +101,45 @@ def test_the_estimator_over_the_log_makes_the_same_survey(flown):
     np.testing.assert_allclose(own["differential_nt"], again["differential_nt"], atol=0.02)
 
 
-def test_an_estimator_without_a_map_finds_lines_by_itself(flown):
-    done = replay(open_log(flown.folder / "flight.tlog"), "survey")
+def test_a_replay_with_the_files_of_the_flight_makes_its_map(flown, tmp_path):
+    """The lines file has the distance of the lines, which is not the usual one here."""
+    parameters = SurveyEstimatorParameters(
+        map_file=flown.folder / MAP_NAME, lines_file=flown.folder / LINES, map_error_nt=0.0
+    )
+    done = replay(open_log(flown.folder / "flight.tlog"), lambda: SurveyEstimator(parameters))
+    (runner,) = done.fleet.runners.values()
+    (tmp_path / MAP).write_bytes(runner.files[MAP])
+    own, again = read_map_file(flown.folder / MAP), read_map_file(tmp_path / MAP)
+    assert again.line_spacing_m == own.line_spacing_m == SMALL.spacing_m
+    np.testing.assert_array_equal(again.north_m, own.north_m)
+    np.testing.assert_array_equal(again.east_m, own.east_m)
+    np.testing.assert_allclose(again.total_field_nt, own.total_field_nt, atol=0.02)
+
+
+def test_an_estimator_beside_the_flight_agrees_with_the_mission(tmp_path):
+    options = replace(SMALL, width_m=300.0, height_m=300.0, spacing_m=150.0, tie_spacing_m=300.0, level=False)
+    asked = replace(request(tmp_path / "run", options, exact_map=True), estimator="survey")
+    summary = fly(SurveyMission(), asked).summary
+    assert (summary["outcome"], summary["reason"]) == ("completed", "")
+    assert summary["crossings"] == 0  # without levelling
+    assert summary["false_anomalies"] == len(summary["anomalies"])
+    assert summary["targets"] == []
+    (block,) = summary["estimator"]["vehicles"]
+    remarks = block["remarks"]
+    assert remarks["lines"] == summary["lines"] + summary["tie_lines"]
+    assert remarks["readings_on_lines"] == summary["readings_on_lines"]
+    assert remarks["crossings"] == 0
+    for name in ("noise_nt", "differential_noise_nt", "grid_error_nt"):
+        assert remarks[name] == pytest.approx(summary[name], abs=0.001)
+
+
+def test_an_estimator_without_a_map_finds_lines_by_itself(flown, tmp_path):
+    cut = tmp_path / "cut.tlog"  # without attitudes, which only a compensation needs
+    types = "HEARTBEAT,NAMED_VALUE_FLOAT,GLOBAL_POSITION_INT"
+    arguments = ["log", "cut", str(flown.folder / "flight.tlog"), str(cut), "--types", types]
+    assert cli.run_command_line(arguments) == 0
+    done = replay(open_log(cut), "survey")
+    assert not done.partial
     (runner,) = done.fleet.runners.values()
     assert runner.remarks["lines"] >= 5
     assert runner.remarks["anomalies"] == 0
@@ -121,6 +158,8 @@ def test_an_estimator_without_a_map_finds_lines_by_itself(flown):
         (["--vehicles", "2"], "flown by one aircraft"),
         (["--altitude", "5"], "--altitude 5 m is not in"),
         (["--size", "30000"], "--size"),
+        (["--tie-spacing", "0.01"], "--tie-spacing 0.01 m makes 200000 tie lines"),
+        (["--grid", "0.1"], "--grid 0.1 m makes 21001 x 21001 grid points"),
     ],
 )
 def test_the_command_line_refuses_with_usage_errors(arguments, words, tmp_path, capsys):
@@ -135,6 +174,38 @@ def test_a_map_that_does_not_cover_the_lines_is_refused_before_anything_starts(f
     arguments = ["--map", str(flown.folder / MAP_NAME), "--area", "3000,0", "--out", str(out)]
     assert cli.run_command_line(["fly", "survey", *arguments]) == 2
     assert "the magnetic map has no data at" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["replay", "LOG", "--estimator", "survey", "--set", "map_file=no.npz"], "map_file no.npz can't be"),
+        (
+            ["replay", "LOG", "--estimator", "survey", "--set", "compensation_file=no"],
+            ": compensation_file no can't be read: No such",
+        ),
+        (
+            ["replay", "LOG", "--estimator", "survey", "--set", "lines_file=no"],
+            "lines_file no can't be read: ",
+        ),
+        (["replay", "LOG", "--estimator", "survey", "--set", "decimal_year=1e9"], "2025.0 to 2030.0"),
+        (["replay", "LOG", "--estimator", "survey", "--set", "foo"], "--set 'foo' is not NAME=VALUE"),
+        (
+            ["fly", "lissajous", "--estimator", "survey", "--set", "map_file=no.npz"],
+            ": map_file no.npz can't",
+        ),
+        (["fly", "survey", "--map", "no.npz"], "--map no.npz can't be read"),
+    ],
+)
+def test_parameters_of_the_estimator_keep_their_names_where_no_option_sets_them(
+    flown, arguments, words, tmp_path, capsys
+):
+    log = str(flown.folder / "flight.tlog")
+    out = tmp_path / "run"
+    given = [log if word == "LOG" else word for word in arguments]
+    assert cli.run_command_line([*given, "--out", str(out)]) == 2
+    assert words in " ".join(capsys.readouterr().err.split())
     assert not out.exists()
 
 
@@ -155,7 +226,8 @@ def test_a_survey_over_terrain_keeps_its_height(autopilot, tmp_path):
     result = fly(SurveyMission(), request(tmp_path / "run", options, autopilot=autopilot, exact_map=True))
     assert (result.outcome, result.reason) == ("completed", "")
     home = load_survey_map(result.folder / MAP_NAME).home
-    readings = flight_readings(FlightRecords.from_tlog(result.folder / "flight.tlog"), 1, LocalFrame(home))
+    records = FlightRecords.from_tlog(result.folder / "flight.tlog")
+    readings = flight_readings(records, 1, LocalFrame(home), attitude=False)
     table = np.genfromtxt(result.folder / LINE_DATA, delimiter=",", names=True, dtype=None, encoding="utf-8")
     clearance = table["height_m"] - options.terrain().at(table["north_m"], table["east_m"])
     assert clearance.min() > options.altitude_m - 6.0
