@@ -32,7 +32,8 @@ _FORMATS: Final = ("%.7f", "%.7f", *["%.2f"] * 3, "%.3f", *["%.3f"] * 5)
 def survey_files(result: SurveyResult) -> Mapping[str, bytes]:
     """Contents of the files, by name; the map is missing if there is no grid.
 
-    The map has the format of `flightsim.foundation.magnetic_map_file`.
+    The map has the format of `flightsim.foundation.magnetic_map_file`. Its one height is the mean height of
+    the readings on the lines; over terrain they are at other heights.
     """
     files = {
         LINES: result.plan.to_csv().encode(),

@@ -142,6 +142,12 @@ class SurveyResult:
         found: NDArray[np.bool_] = np.isfinite(self.levelled_nt)
         return found
 
+    @property
+    def heights_m(self) -> tuple[float, float]:
+        """Lowest and highest reading on the lines, above home; NaN without readings."""
+        heights = self.readings.height_m[self.on_lines]
+        return (float(heights.min()), float(heights.max())) if len(heights) else (math.nan, math.nan)
+
 
 def process_survey(
     readings: SurveyReadings,

@@ -25,6 +25,7 @@ COMPENSATION: Final = "compensation.json"
 LEAST_COVERAGE: Final = 0.97
 """Share of each line that readings must cover."""
 
+_ONE_HEIGHT_M: Final = 20.0  # readings over level ground are closer together, in gusts too
 _FOUND_WITHIN: Final = 0.5  # of a line spacing, and the least distance below: a target on the list
 _FOUND_LEAST_M: Final = 100.0
 
@@ -162,6 +163,9 @@ def _survey_figures(
         "misclosure_after_nt": _rounded(result.levelling.after_nt),
         "grid_error_nt": _rounded(result.grid_error_nt),
         "no_map": result.no_grid or None,
+        "map_height_m": _rounded(result.grid_height_m, 1),
+        "lowest_height_m": _rounded(result.heights_m[0], 1),
+        "highest_height_m": _rounded(result.heights_m[1], 1),
         "compared_with_map": result.against_map,
         "anomalies": [
             {
@@ -225,6 +229,11 @@ def report_lines(summary: Mapping[str, Any]) -> Sequence[str]:
         )
     if summary["no_map"] is not None:
         lines.append(f"warning: there is no {MAP}: {summary['no_map']}")
+    elif summary["highest_height_m"] - summary["lowest_height_m"] > _ONE_HEIGHT_M:
+        lines.append(
+            f"the map is stated for {summary['map_height_m']:.0f} m above home, the mean height of readings "
+            f"at {summary['lowest_height_m']:.0f} to {summary['highest_height_m']:.0f} m"
+        )
     if summary["compared_with_map"]:
         count = len(summary["anomalies"])
         of_targets = (

@@ -59,6 +59,8 @@ def test_all_lines_are_measured_and_the_target_is_listed(flown):
     assert (flown.outcome, flown.reason) == ("completed", "")
     assert (summary["lines"], summary["tie_lines"], summary["crossings"]) == (3, 2, 6)
     assert summary["least_coverage"] > 0.98
+    assert summary["no_map"] is None
+    assert summary["lowest_height_m"] < summary["map_height_m"] < summary["highest_height_m"]
     assert summary["noise_nt"] == pytest.approx(NOISE_NT, rel=0.1)
     assert summary["path_max_error_m"] < 20.0
     assert summary["targets_found"] == 1
@@ -207,6 +209,24 @@ def test_parameters_of_the_estimator_keep_their_names_where_no_option_sets_them(
     assert cli.run_command_line([*given, "--out", str(out)]) == 2
     assert words in " ".join(capsys.readouterr().err.split())
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"misclosure_after_nt": None}, "after it unknown (the levels explain all crossings)"),
+        ({"no_map": "all places are on one line"}, "warning: there is no survey_map.npz: all places are on"),
+        (
+            {"map_height_m": 110.7, "lowest_height_m": 88.0, "highest_height_m": 138.0},
+            "the map is stated for 111 m above home, the mean height of readings at 88 to 138 m",
+        ),
+        ({"targets": []}, "nT elsewhere"),
+    ],
+)
+def test_the_report_has_what_is_unknown_or_missing_in_words(flown, changed, words):
+    lines = "\n".join(SurveyMission().report_lines({**flown.summary, **changed}))
+    assert words in lines
+    assert "0 of 0" not in lines
 
 
 @pytest.mark.slow
