@@ -1,6 +1,7 @@
 """The estimators that a flight runs if requested; their modules are imported only then."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from missions.errors import PlanError
@@ -26,14 +27,26 @@ def estimators_of(request: RunRequest, known: Mapping[str, float | str]) -> "Fli
                 f"{request.estimator_settings[0]!r} is for an estimator; name one with `estimator`"
             )
         return None
-    from estimators.errors import EstimatorError
     from missions.estimation.embedded import COMPONENT_ID, FlightEstimators
 
     # A mission on board may itself use the first id of an onboard computer.
     component_id = COMPONENT_ID + (request.identity[1] == COMPONENT_ID)
-    try:
+    with refused_in_plan():
         return FlightEstimators(
             request.estimator, request.estimator_settings, component_id=component_id, known=known
         )
+
+
+@contextmanager
+def refused_in_plan() -> Iterator[None]:
+    """Context in which an estimator that refuses its parameters refuses the flight.
+
+    Raises:
+        PlanError: in place of an EstimatorError.
+    """
+    from estimators.errors import EstimatorError
+
+    try:
+        yield
     except EstimatorError as error:
         raise PlanError(str(error)) from error

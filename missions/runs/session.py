@@ -18,7 +18,7 @@ from missions.runs.claimed_folder import ClaimedFolder, claim_folder
 from missions.vehicle.connection import Connection, Recorder
 from missions.runs.ending import EndingSignals, signal_of
 from missions.errors import MissionError, PlanError
-from missions.estimation.in_flight import estimators_of
+from missions.estimation.in_flight import estimators_of, refused_in_plan
 from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.library import find_mission
 from missions.mission import Debriefing, Mission
@@ -172,7 +172,8 @@ def _fly_interruptible(
             request = replace(request, options=mission.with_map(request.options, stage.published_map))
         if estimators is not None:
             own = _estimator_files(mission, request, estimators, claimed)
-            estimators.know({**mission.estimator_settings(request.options), **own})
+            with refused_in_plan():
+                estimators.know({**mission.estimator_settings(request.options), **own})
         request.on_open()
         check_stage(mission, request, stage, opener)
     except BaseException:

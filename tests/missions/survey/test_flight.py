@@ -155,6 +155,7 @@ def test_an_estimator_without_a_map_finds_lines_by_itself(flown, tmp_path):
         (["--spacing", "0"], "--spacing 0 is not possible"),
         (["--map", "nowhere.npz"], "--map nowhere.npz can't be read"),
         (["--terrain", "nowhere.csv"], "--terrain nowhere.csv can't be read"),
+        (["--estimator", "survey", "--set", "grid_m=0.1"], "0.1 m makes 21001 x 21001 grid points"),
         (["--calibrate", "--compensation", "c.json"], "has no use with --calibrate"),
         (["--model", "iris"], "flown by an aircraft with wings"),
         (["--vehicles", "2"], "flown by one aircraft"),
