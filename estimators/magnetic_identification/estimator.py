@@ -23,6 +23,7 @@ from estimators.magnetic_identification.parameters import IdentificationParamete
 from estimators.messages import Message
 from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
+from estimators.survey_magnetometer import COMPONENT, TOTAL_FIELD_NAME
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.magnetics import magnetic_field_ned_gauss, require_wmm_year
 
@@ -31,8 +32,6 @@ __all__ = ["MagneticIdentificationEstimator", "MagneticIdentificationParameters"
 Array = NDArray[np.float64]
 
 _AUTOPILOT: Final = 1
-_MAGNETOMETER: Final = 158
-_TOTAL_FIELD: Final = "MAG_NT"
 _POSITION_HZ: Final = 2.0
 _PUBLISHED: Final = b"MAGTGT_P"
 
@@ -116,7 +115,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
     def handle(self, time_us: int, message: Message) -> Outcome:
         name = message.name
         if name == "NAMED_VALUE_FLOAT":
-            if message.src_component != _MAGNETOMETER or message.name_ != _TOTAL_FIELD:
+            if message.src_component != COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message)
         if name == "GLOBAL_POSITION_INT" and message.src_component == _AUTOPILOT:

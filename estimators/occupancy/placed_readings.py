@@ -9,11 +9,10 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
+from estimators.survey_magnetometer import STRONGEST_NT, STUCK_READINGS
 from flightsim.foundation.geodesy import LocalFrame
 
 _WAITING: Final = 100  # largest number of waiting readings: ten seconds of an ordinary magnetometer
-_STRONGEST_NT: Final = 200_000.0  # three times the Earth's field at its poles
-_STUCK_READINGS: Final = 30  # equal ones in a row: noise makes no two of ten a second equal for so long
 _GAP_US: Final = 2_000_000  # longest time between two positions; longer gaps are not interpolated
 _KEPT_US: Final = 2_000_000  # positions are kept so long, for readings that arrive late
 
@@ -53,7 +52,7 @@ class ReadingCheck:
         """Whether a reading may be the Earth's field; it is counted if not."""
         self._repeats = self._repeats + 1 if total_nt == self._last_nt else 0
         self._last_nt = total_nt
-        if 0.0 < total_nt < _STRONGEST_NT and self._repeats < _STUCK_READINGS:
+        if 0.0 < total_nt < STRONGEST_NT and self._repeats < STUCK_READINGS:
             return True
         self.implausible += 1
         return False

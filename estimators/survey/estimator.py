@@ -32,6 +32,7 @@ from estimators.survey.processing import (
     process_survey,
 )
 from estimators.survey.readings import SurveyReadings, joined, placed_readings
+from estimators.survey_magnetometer import COMPONENT, TOTAL_FIELD_NAME
 from flightsim.foundation.checks import require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
@@ -41,8 +42,6 @@ __all__ = ["SurveyEstimator", "SurveyEstimatorParameters"]
 Array = NDArray[np.float64]
 
 _AUTOPILOT: Final = 1
-_MAGNETOMETER: Final = 158
-_TOTAL_FIELD: Final = "MAG_NT"
 _BLOCK_US: Final = 1_000_000
 _KEPT: Final = 500  # positions and attitudes that are kept for readings that arrive late
 _TRACK_M: Final = 10.0
@@ -134,7 +133,7 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
     def handle(self, time_us: int, message: Message) -> Outcome:
         name = message.name
         if name == "NAMED_VALUE_FLOAT":
-            if message.src_component != _MAGNETOMETER or message.name_ != _TOTAL_FIELD:
+            if message.src_component != COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message.value)
         if message.src_component != _AUTOPILOT or name not in ("GLOBAL_POSITION_INT", "ATTITUDE"):

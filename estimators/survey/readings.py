@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.survey_magnetometer import STRONGEST_NT, STUCK_READINGS
 from flightsim.foundation.geodesy import LocalFrame
 
 __all__ = ["GAP_S", "SurveyReadings", "joined", "placed_readings"]
@@ -16,8 +17,6 @@ Array = NDArray[np.float64]
 GAP_S: Final = 2.0
 """Longest time between two readings, positions or attitudes that leaves no gap: across longer ones nothing is
 interpolated, and nothing counts as measured."""
-_STRONGEST_NT: Final = 200_000.0  # three times the Earth's field at its poles
-_STUCK: Final = 30  # equal readings in a row: noise makes no two of ten a second equal for so long
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,13 +109,13 @@ def placed_readings(
 
 def plausible(total_nt: Array) -> NDArray[np.bool_]:
     """Whether readings (n,) may be the Earth's field: finite, not saturated, and the sensor not stuck."""
-    sound: NDArray[np.bool_] = np.isfinite(total_nt) & (total_nt > 0.0) & (total_nt < _STRONGEST_NT)
+    sound: NDArray[np.bool_] = np.isfinite(total_nt) & (total_nt > 0.0) & (total_nt < STRONGEST_NT)
     if len(total_nt) > 1:
         ends = np.concatenate((np.nonzero(np.diff(total_nt) != 0.0)[0] + 1, [len(total_nt)]))
         starts = np.concatenate(([0], ends[:-1]))
         for start, end in zip(starts, ends, strict=True):
-            if end - start > _STUCK:
-                sound[start + _STUCK : end] = False
+            if end - start > STUCK_READINGS:
+                sound[start + STUCK_READINGS : end] = False
     return sound
 
 

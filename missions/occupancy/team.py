@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
+from estimators import survey_magnetometer
 from estimators.magnetic_identification.estimator import field_direction
 from estimators.magnetic_identification.identifier import Identifier
 from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
@@ -23,7 +24,6 @@ from missions.occupancy.suspect import Identify
 from missions.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.firmware import Mode
-from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 from missions.vehicle.telemetry import Attitude, Position
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class SearchTeam:
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
         check_reach(own, limits, self._frame, vehicle.home)
-        await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
+        await vehicle.payload.require(survey_magnetometer.COMPONENT)
         await require_quiet(vehicle, threshold_nt=own.threshold_nt)
         if vehicle.kind is VehicleKind.FIXED_WING:
             await vehicle.wing.prepare_piloting()

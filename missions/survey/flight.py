@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mission_plan import MissionItem
+from estimators import survey_magnetometer
 from estimators.survey.lines import LinePlan, SurveyLine
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
@@ -22,7 +23,6 @@ from missions.survey.manoeuvres import Programme, manoeuvres
 from missions.survey.options import SurveyOptions, map_frame
 from missions.survey.plan import SurveyPath, line_plan, survey_path
 from missions.vehicle.firmware import Mode
-from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 from missions.vehicle.vehicle import Vehicle
@@ -286,7 +286,7 @@ async def _prepare(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLi
             f"the flight at {options.altitude_m:g} m is above {limits.altitude_max_m:g} m, the ceiling of "
             "the open category (EU 2019/947): it needs an authorization"
         )
-    await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
+    await vehicle.payload.require(survey_magnetometer.COMPONENT)
     for name, rate_hz in _RATES_HZ.items():
         await vehicle.commands.set_message_rate(name, rate_hz)
     await vehicle.link.wait_until(

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators import survey_magnetometer
 from estimators.errors import EstimatorError
 from estimators.survey.compensation import (
     Compensation,
@@ -22,7 +23,6 @@ from flightsim.foundation.main_field import MainField
 from missions.notes import FlightNotes
 from missions.runs.records import FlightRecords
 from missions.survey.manoeuvres import BOXES, manoeuvres
-from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT, TOTAL_FIELD_NAME
 
 __all__ = ["Calibration", "calibrated", "flight_readings"]
 
@@ -43,8 +43,8 @@ def flight_readings(
         frame: the frame.
         attitude: give them the vehicle's attitude, for a compensation; readings without one are left out.
     """
-    sent = records.table("NAMED_VALUE_FLOAT", system_id, SURVEY_MAGNETOMETER_COMPONENT)
-    sent = sent[sent["name"] == TOTAL_FIELD_NAME.encode()]
+    sent = records.table("NAMED_VALUE_FLOAT", system_id, survey_magnetometer.COMPONENT)
+    sent = sent[sent["name"] == survey_magnetometer.TOTAL_FIELD_NAME.encode()]
     positions = records.table("GLOBAL_POSITION_INT", system_id, _AUTOPILOT)
     attitudes = records.table("ATTITUDE", system_id, _AUTOPILOT)
     finite = np.all([np.isfinite(attitudes[name]) for name in ("roll", "pitch", "yaw")], axis=0)

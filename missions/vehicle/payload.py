@@ -9,17 +9,16 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import decode, dialect
+from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.errors import VehicleTimeout
 from missions.vehicle.link import VehicleLink
 
 CAMERA_COMPONENT: Final = 100
 GIMBAL_COMPONENT: Final = 154
-SURVEY_MAGNETOMETER_COMPONENT: Final = 158
 TARGET_SENSOR_COMPONENT: Final = 26
 RANGE_RADIO_COMPONENT: Final = 27
 MOVING_POINT_COMPONENT: Final = 28
-TOTAL_FIELD_NAME: Final = "MAG_NT"
 
 # within this time the gimbal manager reports which component has the control
 _CONTROL_REPORTED_US: Final = 3_000_000
@@ -54,12 +53,12 @@ class Payload:
         """
 
         def sample(m: Any) -> tuple[int, float] | None:
-            if str(m.name).rstrip("\0") != TOTAL_FIELD_NAME or not math.isfinite(m.value):
+            if str(m.name).rstrip("\0") != survey_magnetometer.TOTAL_FIELD_NAME or not math.isfinite(m.value):
                 return None
             return int(m.time_boot_ms) * 1000, float(m.value)
 
         return self._listen(
-            "NAMED_VALUE_FLOAT", SURVEY_MAGNETOMETER_COMPONENT, sample, lambda s: listener(*s)
+            "NAMED_VALUE_FLOAT", survey_magnetometer.COMPONENT, sample, lambda s: listener(*s)
         )
 
     def _listen(
@@ -85,7 +84,7 @@ class Payload:
         names = {
             CAMERA_COMPONENT: "camera",
             GIMBAL_COMPONENT: "gimbal",
-            SURVEY_MAGNETOMETER_COMPONENT: "survey magnetometer",
+            survey_magnetometer.COMPONENT: "survey magnetometer",
             TARGET_SENSOR_COMPONENT: "target sensor",
             RANGE_RADIO_COMPONENT: "range radio",
             MOVING_POINT_COMPONENT: "moving-point camera",

@@ -13,6 +13,7 @@ import pytest
 
 from autopilot_bridge.mavlink import decode, definition
 from autopilot_bridge.tlog import TlogReader
+from estimators import survey_magnetometer
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.home import Home
@@ -29,7 +30,6 @@ from missions.runs.records import FlightRecords
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
-from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 
 SMALL = OccupancyOptions(
     vehicles=2,
@@ -142,7 +142,7 @@ def flown_readings(folder, home, system_id):
         decode(frame)
         for _, frame in TlogReader(folder / "flight.tlog")
         if (frame.message_id, frame.system_id) == (definition("NAMED_VALUE_FLOAT").message_id, system_id)
-        and frame.component_id == SURVEY_MAGNETOMETER_COMPONENT
+        and frame.component_id == survey_magnetometer.COMPONENT
     ]
     per_lat, per_lon = LocalFrame(home).metres_per_degree
     places = np.column_stack(
