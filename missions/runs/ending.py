@@ -1,8 +1,8 @@
 """The signals that end a command: from Ctrl-C, `kill`, a service manager, or a closed terminal.
 
 `kill`, `timeout` and service managers send SIGTERM; a closed terminal sends SIGHUP. By default both end a
-process immediately, with its vehicles in the air. Here they act like Ctrl-C: a process that receives one leaves
-its vehicles safe before it ends.
+process immediately, with its vehicles in the air. Here they act like Ctrl-C: a process that receives one
+leaves its vehicles safe before it ends.
 """
 
 import asyncio
@@ -21,7 +21,6 @@ _SAME_S: Final = 1.0
 """A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: within this time they
 count as one.
 """
-
 
 
 def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:

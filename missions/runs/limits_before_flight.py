@@ -3,16 +3,15 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Mission
-from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.options import MissionOptions
 from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
 from missions.runs.request import RunRequest
+from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.vehicle.firmware_records import FIRMWARES
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar  # type: ignore[import-untyped]
 
-from flightsim.foundation.geodesy import LocalFrame
 from estimators.reports.picture import tidy
+from flightsim.foundation.geodesy import LocalFrame
 from missions.notes import PATTERN, FlightNotes
 from missions.runs.score import FlightScore, Track
 
@@ -59,9 +59,7 @@ def _shown(track: Track, notes: FlightNotes) -> Track:
         track = track.between(notes.phases[0].start_us, notes.phases[-1].end_us)
     stride = max(1, len(track.time_s) // 6000)
     return Track(
-        time_s=track.time_s[::stride],
-        pos_ned_m=track.pos_ned_m[::stride],
-        yaw_rad=track.yaw_rad[::stride],
+        time_s=track.time_s[::stride], pos_ned_m=track.pos_ned_m[::stride], yaw_rad=track.yaw_rad[::stride]
     )
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import SigningKey
-from missions.vehicle.connection import GROUND_STATION
 from missions.errors import PlanError
 from missions.options import FlightOptions, MissionOptions
 from missions.planning.limits import FORECAST_WIND_M_S
+from missions.vehicle.connection import GROUND_STATION
 from missions.vehicle.firmware import Mode
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ class RunRequest:
         system_ids: system ids of the vehicles, one per connection; empty: the first vehicle received on each
             connection.
         world: the embedded world; None: quadrotors with PX4 in still air, one per vehicle of the options.
-            Missions and estimators can't reach it. With `connect` only its magnetic target is used, as the place
-            that a result is compared with.
+            Missions and estimators can't reach it. With `connect` only its magnetic target is used, as the
+            place that a result is compared with.
         speedup: simulated seconds per wall second at most in the embedded world; None: no limit.
         expected_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
             is not used: a mission plans in the same way for embedded and for other vehicles.

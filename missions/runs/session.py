@@ -14,17 +14,15 @@ from typing import TYPE_CHECKING, Any, Final
 from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
-from missions.runs.claimed_folder import ClaimedFolder, claim_folder
-from missions.vehicle.connection import Connection, Recorder
-from missions.runs.ending import EndingSignals, signal_of
 from missions.errors import MissionError, PlanError
 from missions.estimation.in_flight import estimators_of, refused_in_plan
-from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.library import find_mission
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
-from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.options import MissionOptions
+from missions.runs.claimed_folder import ClaimedFolder, claim_folder
+from missions.runs.ending import EndingSignals, signal_of
+from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.runs.records import FlightRecorder, FlightRecords
 from missions.runs.request import RunRequest
 from missions.runs.run_folder import (
@@ -40,7 +38,9 @@ from missions.runs.run_folder import (
     write_summary,
 )
 from missions.runs.signing import client_signing, require_key
+from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.vehicle.concurrency import run_concurrently
+from missions.vehicle.connection import Connection, Recorder
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -226,9 +226,8 @@ def _fly_interruptible(
                 mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
             drawn = {**stage.pictures(), **mission.pictures(debriefing, stage.pictures_of)}
             for name, data in drawn.items():
-                with whole(folder / name):
-                    with (folder / name).open("xb") as file:
-                        file.write(data)
+                with whole(folder / name), (folder / name).open("xb") as file:
+                    file.write(data)
     except OSError as error:
         missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
@@ -290,7 +289,9 @@ async def _fly(
             await stack.enter_async_context(estimators.on_board(flight.vehicles, stage.links, clock))
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
-            await run_concurrently([_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles])
+            await run_concurrently(
+                [_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles]
+            )
             flight.require_log()
             await _fly_all(mission, flight.vehicles, request)
         finally:
@@ -344,7 +345,9 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
         await confirmed(looks, request.confirm)
     if not mission.commands:
-        await run_concurrently([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
+        await run_concurrently(
+            [mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)]
+        )
         return
     if not mission.flies_as_team:
         await run_concurrently(
@@ -431,7 +434,9 @@ def _summary(
     vehicles = () if world is None else world.vehicles
     summary: dict[str, Any] = {
         "mission": mission.name,
-        "vehicle": "remote" if world is None else ",".join(dict.fromkeys(str(spec.model) for spec in vehicles)),
+        "vehicle": "remote"
+        if world is None
+        else ",".join(dict.fromkeys(str(spec.model) for spec in vehicles)),
         "autopilot": notes[0].autopilot if notes else vehicles[0].autopilot if vehicles else None,
         "seed": None if world is None else world.seed,
         "outcome": outcome,

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import Final
 
-
 FAILED: Final = 1
 END_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals that end a command: Ctrl-C, `kill` and service managers, a closed terminal."""
