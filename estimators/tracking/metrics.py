@@ -65,7 +65,12 @@ def calibration_error(probabilities: Array, happened: NDArray[np.bool_], bins: i
     Args:
         probabilities, happened: (n,) stated probabilities of events, and whether each happened.
         bins: number of bins.
+
+    Returns:
+        the error, 0..1; NaN without a statement.
     """
+    if not len(probabilities):
+        return math.nan
     which = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
     excess = np.bincount(which, weights=probabilities - happened, minlength=bins)
     return float(np.sum(np.abs(excess)) / len(probabilities))

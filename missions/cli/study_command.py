@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+import re
 import shlex
 import sys
 import traceback
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 _FAILED: Final = 1
 _KILLED: Final = 128
+_SEPARATORS: Final = re.compile(r"[,;=]")  # of the values in one word
+_FILE: Final = re.compile(r"[/\\]|\.[A-Za-z]\w*$")  # a folder or a suffix
 _LIMIT: Final = FiniteRange(min=0.0, min_open=True, max=1e7)
 
 
@@ -116,7 +120,7 @@ def run_declared(declared: StudyCommand, name: str, given: dict[str, Any]) -> in
     from missions.studies.folder import StudyFolder
 
     if given["resume"] is not None:
-        _take_up(declared, given, StudyFolder.opened(given["resume"]).identity())
+        _take_up(declared, name, given, StudyFolder.opened(given["resume"]).identity())
     study = declared.build(given)
     runs = study.runs if given["runs"] is None else given["runs"]
     if given["trial"] is not None:
@@ -131,14 +135,57 @@ def run_declared(declared: StudyCommand, name: str, given: dict[str, Any]) -> in
     return run_and_tell(study, given, repeat=repeat, arguments=arguments)
 
 
-def _take_up(declared: StudyCommand, given: dict[str, Any], identity: Mapping[str, Any]) -> None:
-    """Give options that the user did not specify the values that a study was begun with."""
+def _take_up(declared: StudyCommand, study: str, given: dict[str, Any], identity: Mapping[str, Any]) -> None:
+    """Give options that the user did not specify the values that a study was begun with.
+
+    The folder may come from another person. It sets the study's own options, the number of runs and the seed,
+    and nothing else: where trials are run and which files are read, written or executed is the command
+    line's.
+
+    Raises:
+        PlanError: a value is not accepted, or names a file.
+    """
+    from missions.errors import PlanError
+
     context = click.get_current_context()
-    before = {**identity["arguments"], "runs": identity["runs"], "seed": identity["seed"]}
-    for name, value in before.items():
-        source = context.get_parameter_source(name)
-        if name in given and source is not click.core.ParameterSource.COMMANDLINE:
-            given[name] = tuple(value) if isinstance(value, list) else value
+    own = {option.name for option in declared.options}
+    arguments = identity.get("arguments")
+    before = dict(arguments) if isinstance(arguments, dict) else {}
+    before = {name: value for name, value in before.items() if name in own}
+    before |= {name: identity.get(name) for name in ("runs", "seed")}
+    for option in context.command.params:
+        source = None if option.name is None else context.get_parameter_source(option.name)
+        if option.name not in before or source is click.core.ParameterSource.COMMANDLINE:
+            continue
+        value = before[option.name]
+        try:
+            taken = option.type_cast_value(context, tuple(value) if isinstance(value, list) else value)
+        except (click.BadParameter, TypeError) as error:
+            raise PlanError(
+                f"{given['resume']}/study.json: {option.name} {value!r} is not accepted: {error}"
+            ) from error
+        parts = (part for text in _texts(taken) for part in _SEPARATORS.split(text))
+        files = sorted({part for part in parts if _is_file(part)})
+        if files:
+            words = words_of(declared.options, {**given, **before})
+            repeated = shlex.join(["flightstack", "study", study, "--resume", given["resume"], *words])
+            raise PlanError(
+                f"{given['resume']} names files ({', '.join(files)}), and a study's folder does not choose "
+                f"which files are opened; check them, and repeat its options: {repeated}"
+            )
+        given[option.name] = taken
+
+
+def _texts(value: object) -> list[str]:
+    """The texts in the value of an option."""
+    if isinstance(value, tuple):
+        return [text for item in value for text in _texts(item)]
+    return [value] if isinstance(value, str) else []
+
+
+def _is_file(word: str) -> bool:
+    """Whether a word looks like the name of a file, or is one."""
+    return bool(_FILE.search(word)) or os.path.isfile(word)
 
 
 def _one_trial(study: "Study[Any, Any]", runs: int, seed: int, index: int) -> int:
@@ -240,18 +287,21 @@ def _tell(result: "StudyResult") -> int:
 def words_of(options: tuple[click.Parameter, ...], given: Given) -> list[str]:
     """The words of a command line that give options these values; those with their default are left out."""
     words: list[str] = []
+    arguments: list[str] = []
     for option in options:
         value = None if option.name is None else given[option.name]
-        if value is None or value == option.default or value == ():
+        if value is None or value == option.default or value in ((), []):
             continue
         if isinstance(option, click.Argument):
-            words += [str(v) for v in value] if isinstance(value, tuple) else [str(value)]
+            arguments += [str(v) for v in value] if isinstance(value, (list, tuple)) else [str(value)]
         elif isinstance(option, click.Option) and option.is_flag:
             words += [option.opts[0]] if value else []
         else:
-            for each in value if isinstance(value, tuple) else (value,):
+            for each in value if isinstance(value, (list, tuple)) else (value,):
                 words += [option.opts[0], str(each)]
-    return words
+    if any(word.startswith("-") for word in arguments):
+        words.append("--")
+    return words + arguments
 
 
 class _ProgressLine:

@@ -281,6 +281,7 @@ def draw(results: Results, folder: Path) -> None:
     axes.set_ylabel("share of searches that have found the tag", fontsize=9)
     axes.grid(color="#e5e7eb", linewidth=0.8)
     axes.tick_params(labelsize=8)
-    axes.legend(fontsize=8, frameon=False)
+    if axes.lines:
+        axes.legend(fontsize=8, frameon=False)
     with (folder / "search.png").open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})

@@ -45,14 +45,23 @@ def area_under_curve(of_targets: Array, of_others: Array) -> float:
 
 def scores_of(results: Results) -> dict[str, Array]:
     """Scores by method, (cells, runs, 2 * passes)."""
-    cells, runs, _ = results.values("peak_nt").shape
-    features = results.values("features").reshape(cells, runs, 2 * PASSES, len(FEATURES))
     return {
-        "threshold": results.values("peak_nt"),
-        "trace": results.values("confidence"),
-        "classifier": shipped_classifier().probability(features),
-        "bayes": results.values("evidence"),
+        "threshold": _of_passes(results, "peak_nt"),
+        "trace": _of_passes(results, "confidence"),
+        "classifier": shipped_classifier().probability(_features(results)),
+        "bayes": _of_passes(results, "evidence"),
     }
+
+
+def _of_passes(results: Results, name: str) -> Array:
+    """A column with a value for each pass, (cells, runs, 2 * passes)."""
+    return results.values(name, 2 * PASSES)
+
+
+def _features(results: Results) -> Array:
+    """Features of each pass, (cells, runs, 2 * passes, features)."""
+    values = results.values("features", 2 * PASSES * len(FEATURES))
+    return values.reshape(*values.shape[:2], 2 * PASSES, len(FEATURES))
 
 
 def summarise(results: Results) -> dict[str, Any]:
@@ -60,7 +69,7 @@ def summarise(results: Results) -> dict[str, Any]:
     condition under `conditions`.
     """
     scores = scores_of(results)
-    probability = {"classifier": scores["classifier"], "bayes": results.values("probability")}
+    probability = {"classifier": scores["classifier"], "bayes": _of_passes(results, "probability")}
     conditions: dict[str, Any] = {}
     for k, cell in enumerate(results.cells):
         block: dict[str, Any] = {}
@@ -72,8 +81,9 @@ def summarise(results: Results) -> dict[str, Any]:
         block["calibration_error"] = {
             method: round(_calibration(values[k]), 4) for method, values in probability.items()
         }
-        errors_m = results.values("error_m")[k, :, PASSES - 1]
-        block["error_m_median_two_passes"] = round(float(np.nanmedian(errors_m)), 2)
+        errors_m = _of_passes(results, "error_m")[k, :, PASSES - 1]
+        known_m = errors_m[np.isfinite(errors_m)]
+        block["error_m_median_two_passes"] = round(float(np.median(known_m)), 2) if len(known_m) else None
         block["undetected"] = int(np.nansum(2 - results.values("detected")[k]))
         conditions[str(cell["condition"])] = block
     nominal = conditions.get("nominal", next(iter(conditions.values())))
@@ -99,13 +109,16 @@ def report(results: Results) -> list[str]:
     lines = [f"{'condition':10s} {'passes':7s}" + "".join(f"{method:>12s}" for method in METHODS)]
     for condition, block in summary["conditions"].items():
         for label, name in (("one", "auc_one_pass"), ("two", "auc_two_passes")):
-            lines.append(
-                f"{condition:10s} {label:7s}" + "".join(f"{block[name][method]:12.4f}" for method in METHODS)
-            )
+            shown = "".join(f"{_shown(block[name][method]):>12s}" for method in METHODS)
+            lines.append(f"{condition:10s} {label:7s}{shown}")
     lines.append("areas under the ROC; trace: by the paper's confidence alone; classifier: on its trace")
     for method, error in summary["calibration_error"].items():
-        lines.append(f"calibration error of {method}, nominal: {error:.4f}")
+        lines.append(f"calibration error of {method}, nominal: {_shown(error)}")
     return lines
+
+
+def _shown(value: float) -> str:
+    return f"{value:.4f}" if math.isfinite(value) else "-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +136,7 @@ class Output:
         from missions.studies.magnetic_passes import diagonal_pass, pass_traces
 
         scores = {method: values[0] for method, values in scores_of(results).items()}
-        probability = {"classifier": scores["classifier"], "bayes": results.values("probability")[0]}
+        probability = {"classifier": scores["classifier"], "bayes": _of_passes(results, "probability")[0]}
         draw_curves(folder / "roc.png", scores, probability, passes=PASSES)
         draw_passes(
             folder / "passes.png",
@@ -131,7 +144,7 @@ class Output:
             list(pass_traces(results.seed, _TRACES)),
         )
         if self.train:
-            features = results.values("features").reshape(-1, 2 * PASSES, len(FEATURES))
+            features = _features(results).reshape(-1, 2 * PASSES, len(FEATURES))
             is_target = np.zeros(features.shape[:2], dtype=np.bool_)
             is_target[:, _TARGET] = True
             known = np.all(np.isfinite(features), axis=-1)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.magnetic_identification.classifier import FEATURES
-from missions.errors import PlanError
+from missions.errors import MissionError, PlanError
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,16 @@ def fitted_tables(features: Array, is_target: NDArray[np.bool_]) -> dict[str, di
     Args:
         features: (n, features) of `trace_features`.
         is_target: (n,).
+
+    Raises:
+        MissionError: there are no passes of targets, or none of false anomalies.
     """
+    targets = int(is_target.sum())
+    if not 0 < targets < len(is_target):
+        raise MissionError(
+            f"the classifier can't be fitted to {targets} passes of targets and "
+            f"{len(is_target) - targets} of false anomalies; both kinds are needed"
+        )
     from sklearn.linear_model import LogisticRegression
     from sklearn.neural_network import MLPClassifier
 

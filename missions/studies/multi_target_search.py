@@ -73,14 +73,15 @@ def summarise(results: Results) -> Mapping[str, Any]:
 def _experiment(results: Results, name: str) -> dict[str, Any]:
     experiment = EXPERIMENTS[name]
     time_s = experiment.time_s
-    curves = results.values("found_over_time")
+    curves = results.values("found_over_time", len(time_s))
     areas, complete = results.values("area"), results.values("all_found")
     cells = {planner: _rows(results, name, planner) for planner in PLANNERS}
     own = cells[PROPOSED]
     later = time_s >= _FIRST * time_s[-1]
-    planners = {}
+    planners, means = {}, {}
     for planner, cell in cells.items():
         mean, low, high = _interval(curves[cell])
+        means[planner] = mean
         known = complete[cell][np.isfinite(complete[cell])]
         rate = rate_of(int(known.sum()), len(known))
         planners[planner] = {
@@ -96,14 +97,15 @@ def _experiment(results: Results, name: str) -> dict[str, Any]:
         if planner == PROPOSED:
             continue
         area = paired_difference(areas[own], areas[cell])
-        gap = np.nanmean(curves[own], axis=0) - np.nanmean(curves[cell], axis=0)
+        gap = means[PROPOSED] - means[planner]
         worst = int(np.argmin(np.where(later, gap, np.inf)))
+        compared = bool(np.isfinite(gap[worst]))
         against[planner] = {
             "area_difference": _rounded(area.mean),
             "area_difference_ci95": [_rounded(value) for value in area.ci95],
             "conclusive": bool(area.conclusive),
             "least_found_difference": _rounded(gap[worst]),
-            "least_found_difference_s": _rounded(time_s[worst]),
+            "least_found_difference_s": _rounded(time_s[worst]) if compared else None,
             "never_fewer": bool(gap[worst] >= 0.0),
         }
     found = {
@@ -181,8 +183,8 @@ def draw(results: Results, folder: Path) -> None:
 
     figure = Figure(figsize=(10.0, 4.2), dpi=120, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
-    curves = results.values("found_over_time")
     for axes, (name, experiment) in zip(figure.subplots(1, 2), EXPERIMENTS.items(), strict=True):
+        curves = results.values("found_over_time", len(experiment.time_s))
         for planner, colour in _COLOURS.items():
             mean, low, high = _interval(curves[_rows(results, name, planner)])
             axes.plot(experiment.time_s, mean, color=colour, label=planner)

@@ -66,8 +66,13 @@ class Results:
         found: list[dict[str, Any]] = chosen.select(["trial", "outcome", "error", "command"]).to_pylist()
         return found
 
-    def values(self, name: str) -> Array:
+    def values(self, name: str, length: int = 0) -> Array:
         """Values of a column, or of a number by name (`figures.key`), as an array.
+
+        Args:
+            name: of the column.
+            length: least length of the sequences of a column of sequences. Without it, the length is that of
+                the longest row, and 0 when no trial has a row.
 
         Returns:
             (cells, runs), or (cells, runs, length) for a column of sequences. True is 1, False is 0. NaN
@@ -75,7 +80,7 @@ class Results:
         """
         column = self.table[name]
         if pa.types.is_list(column.type):
-            return self._placed_sequences(column)
+            return self._placed_sequences(column, length)
         if pa.types.is_boolean(column.type):
             column = column.cast(pa.int8())
         numbers = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
@@ -128,9 +133,9 @@ class Results:
     def _run(self) -> NDArray[np.int64]:
         return np.asarray(self.table["run"].to_numpy())
 
-    def _placed_sequences(self, column: pa.ChunkedArray) -> Array:
+    def _placed_sequences(self, column: pa.ChunkedArray, length: int) -> Array:
         lists = column.to_pylist()
-        length = max((len(numbers) for numbers in lists if numbers is not None), default=0)
+        length = max(length, *(len(numbers) for numbers in lists if numbers is not None), 0)
         placed = np.full((len(self.cells), self.runs, length), np.nan)
         for cell, run, numbers in zip(self._cell, self._run, lists, strict=True):
             if numbers is not None:

@@ -6,7 +6,9 @@ import shlex
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Never
 
 import click
 import pyarrow.parquet as pq
@@ -15,6 +17,9 @@ from click.testing import CliRunner
 
 from missions.cli.main import command_line, run_command_line
 from missions.cli.study import study
+from missions.cli.study_library import STUDIES
+from missions.cli.sweep import SWEEP
+from missions.studies.running import run_study
 from tests.clients.tied_process import tied
 
 ROOT = Path(__file__).parents[3]
@@ -152,6 +157,87 @@ def test_a_study_is_continued_with_what_it_was_begun_with(tmp_path: Path) -> Non
     assert code == 2 and "has another study: its options" in err
     code, _, err = ran(own_study(tmp_path), "--resume", out)
     assert code == 2 and "has another study: its study lissajous-localization is not own" in err
+
+
+def with_arguments(folder: Path, **values: object) -> None:
+    """Change what a study's folder says that the study was begun with, as another person may have done."""
+    identity = json.loads((folder / "study.json").read_text())
+    identity["arguments"] |= values
+    (folder / "study.json").write_text(json.dumps(identity))
+
+
+def test_the_engine_and_the_paths_are_not_taken_from_a_study_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder of another person must not make this machine join a cluster, write elsewhere, or run code."""
+    out = tmp_path / "run"
+    arguments = ("lissajous-localization", "--runs", 1, "--workers", 1, "--no-picture")
+    assert ran(*arguments, "--equations", "corrected", "--out", out)[0] == 0
+    elsewhere = tmp_path / "elsewhere"
+    with_arguments(out, ray="127.0.0.1:1", workers=4000, out=str(elsewhere), keep_logs="all", trial=0)
+    engines: list[tuple[object, ...]] = []
+    monkeypatch.setattr(
+        "missions.cli.study_command.engine_of",
+        lambda given: engines.append((given["ray"], given["workers"], given["out"], given["keep_logs"])),
+    )
+    assert ran("lissajous-localization", "--no-picture", "--resume", out)[0] == 0
+    assert engines == [(None, None, None, "none")] and not elsewhere.exists()
+
+
+@pytest.mark.parametrize("key", ["mission", "words", "vary"])
+def test_files_are_not_taken_from_a_study_folder(tmp_path: Path, key: str) -> None:
+    """A mission file is code: it is executed only if the user has named it."""
+    trap = tmp_path / "trap.py"
+    trap.write_text(f"open({str(tmp_path / 'sprung')!r}, 'w')\nasync def fly(vehicle, options): ...\n")
+    out = tmp_path / "run"
+    out.mkdir()
+    values: dict[str, object] = {"mission": "lissajous", "words": [], "vary": []}
+    values[key] = {"mission": str(trap), "words": ["--estimator", str(trap)]}.get(key, [f"model={trap},iris"])
+    identity = {"format": 1, "study": "sweep-lissajous", "arguments": values, "runs": 1, "seed": 0}
+    (out / "study.json").write_text(json.dumps(identity))
+    code, _, err = ran("sweep", "--resume", out)
+    assert code == 2 and f"names files ({trap})" in err, err
+    assert not (tmp_path / "sprung").exists()
+    repeated = shlex.split(err.partition("repeat its options: ")[2])
+    with click.Context(command_line), study.make_context("study", repeated[2:]) as context:
+        parsed = SWEEP.command("sweep").make_context("sweep", repeated[3:], parent=context).params
+    assert {name: parsed[name] for name in values} == {
+        name: tuple(value) if isinstance(value, list) else value for name, value in values.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"runs": "many"}, "runs 'many' is not accepted"),
+        ({"seed": [1, 2]}, "seed [1, 2] is not accepted"),
+        ({"arguments": {"equations": 7}}, "equations 7 is not accepted"),
+    ],
+)
+def test_a_damaged_study_folder_is_one_sentence(
+    tmp_path: Path, values: dict[str, object], words: str
+) -> None:
+    identity = {"format": 1, "study": "lissajous-localization", "arguments": {}, "runs": 1, "seed": 0}
+    (tmp_path / "study.json").write_text(json.dumps(identity | values))
+    code, _, err = ran("lissajous-localization", "--resume", tmp_path)
+    assert code == 2 and words in err, err
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_whose_trials_all_fail_has_a_table(tmp_path: Path, name: str) -> None:
+    """Without a single row there are no figures, and no traceback."""
+
+    def fails(_parameters: object, _seed: int) -> Never:
+        raise RuntimeError("no flight")
+
+    with STUDIES[name].command(name).make_context(name, []) as context:
+        declared = STUDIES[name].build(context.params)
+    failing = replace(declared, trial=fails, warm_up=None)
+    result = run_study(failing, runs=2, out=tmp_path / "study")
+    assert result.outcome == "completed" and result.table
+    assert all(entry["error"] for entry in result.results.without_row())
+    assert "nan" not in "\n".join(result.table).lower()
 
 
 def test_trials_without_a_row_are_one_line_and_exit_code_1(tmp_path: Path) -> None:
