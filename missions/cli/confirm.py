@@ -68,8 +68,8 @@ async def _line(terminal: int) -> str:
     return typed.decode(errors="replace")
 
 
-def is_hardware(connections: Sequence[str]) -> bool:
-    """Whether a link may lead to a real vehicle: serial, or a network beyond this machine.
+def leaves_this_machine(connections: Sequence[str]) -> bool:
+    """Whether a link is a serial line, or a network beyond this machine.
 
     Raises:
         AddressError: a connection string is invalid.
@@ -87,28 +87,29 @@ def confirmation(
     yes: bool,
     check: bool,
     screen: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> "Confirm | None":
-    """Return how the flight is confirmed; None: no confirmation is needed, on links of this machine.
+) -> "Confirm":
+    """Return how a flight is confirmed, unless its vehicles prove to be simulations.
 
     Args:
         connections: connection strings of the vehicles.
         yes: ask no question; fly when the checks find no problem.
-        check: also check vehicles on links of this machine.
+        check: ask for simulations too.
         screen: makes a context in which nothing else writes to the terminal.
 
     Raises:
-        click.UsageError: the vehicle is real, there is no terminal to ask on, and --yes is missing.
+        click.UsageError: the link leads away from this machine or `check` is set, there is no terminal to ask
+            on, and --yes is missing.
     """
-    hardware = is_hardware(connections)
-    if not (hardware or check):
-        return None
-    if not yes and not can_ask():
-        raise click.UsageError(
-            f"{', '.join(connections)}: may be a real vehicle, and there is no terminal to confirm the "
-            "flight; give --yes to fly it when the checks find no problem"
-        )
+    must_ask = (
+        f"{', '.join(connections)}: may be a real vehicle, and there is no terminal to confirm the "
+        "flight; give --yes to fly it when the checks find no problem"
+    )
+    if (check or leaves_this_machine(connections)) and not yes and not can_ask():
+        raise click.UsageError(must_ask)
 
     async def confirm(looks: "Sequence[Look]") -> bool:
+        from missions.errors import MissionError
+
         problems = sum(len(look.problems) for look in looks)
         with screen():
             for look in looks:
@@ -117,6 +118,8 @@ def confirmation(
                     click.echo(f"  {finding}", err=True)
             if yes:
                 return not problems
+            if not can_ask():
+                raise MissionError(f"not flown: {must_ask}")
             if not problems:
                 return is_yes(await ask(f"Fly? Type {YES_WORDS}"))
             count = "1 problem" if problems == 1 else f"{problems} problems"

@@ -102,12 +102,14 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     help="Or on Ctrl-C, SIGTERM, SIGHUP.",
 )
 @_elsewhere(
-    "--yes", is_flag=True, help="With a real vehicle: fly without asking, when nothing is found against it."
+    "--yes",
+    is_flag=True,
+    help="Fly a vehicle that may be real without asking, when nothing is found against it.",
 )
 @_elsewhere(
     "--check",
     is_flag=True,
-    help="Look at the vehicle and ask before the flight, on links of this machine too.",
+    help="Look at the vehicle and ask before the flight, also if it proves to be a simulation.",
 )
 @_elsewhere("--regain", type=SECONDS, help="So long a lost link may take to come back, s. [default: 60]")
 @_flight(
@@ -255,6 +257,7 @@ def _fly(given: dict[str, Any]) -> int:
         request = replace(
             request,
             confirm=confirm,
+            confirm_simulations=given["check"],
             on_open=lambda: warn_if_open(given["connect"], key),
             command=" ".join(["flightstack", *sys.argv[1:]]),
             signing_key=key,

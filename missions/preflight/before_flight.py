@@ -14,8 +14,8 @@ from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.outline import Outline
 from missions.preflight.finding import Finding, Level, ok, problem, warning
-from missions.preflight.health import health_findings
-from missions.preflight.lost_link import PARAMETERS, lost_link_words
+from missions.preflight.health import health_findings, remote_control_received
+from missions.preflight.lost_link import PARAMETERS, lost_link, lost_link_words
 from missions.preflight.settings import (
     FENCE_PARAMETERS,
     RULES,
@@ -80,20 +80,26 @@ meanwhile.
 """
 
 
-async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions) -> Look:
-    """Check a vehicle that is ready to arm, and the mission to be flown with it."""
+async def look(
+    vehicle: Vehicle, mission: Mission[Any], options: MissionOptions, simulation_proof: str = ""
+) -> Look:
+    """Check a vehicle that is ready to arm, and the mission to be flown with it.
+
+    Args:
+        simulation_proof: what proves that the vehicle is a simulation; "": nothing.
+    """
     snapshot, fence_items = await _snapshot(vehicle)
     outline = await mission.outline(vehicle, options)
     planned = () if outline is None else outline.fence
     own_fence = planned or tuple(fence_items)
     findings = [
-        *_match(vehicle, mission),
+        *_match(vehicle, mission, simulation_proof),
         *health_findings(snapshot),
         fence(snapshot, len(planned)),
         *_way(vehicle, outline, own_fence, snapshot.parameters),
         _endurance(snapshot, outline),
         *settings_findings(snapshot),
-        _lost_link(vehicle, snapshot.parameters),
+        _lost_link(vehicle, snapshot),
     ]
     return Look(system_id=vehicle.system_id, findings=tuple(findings))
 
@@ -163,8 +169,9 @@ async def _parameters(vehicle: Vehicle) -> dict[str, float]:
     return {name: value for name, value in zip(names, values, strict=True) if value is not None}
 
 
-def _match(vehicle: Vehicle, mission: Mission[Any]) -> list[Finding]:
-    text = f"{vehicle.autopilot} {vehicle.kind}, system id {vehicle.system_id}, mode {vehicle.mode}"
+def _match(vehicle: Vehicle, mission: Mission[Any], simulation_proof: str) -> list[Finding]:
+    text = f"{vehicle.autopilot} {vehicle.kind}, system id {vehicle.system_id}, mode {vehicle.mode}; "
+    text += f"simulated: {simulation_proof}" if simulation_proof else "nothing proves that it is simulated"
     findings = []
     if vehicle.kind not in mission.kinds:
         kinds = " or a ".join(mission.kinds)
@@ -253,9 +260,8 @@ def _endurance(snapshot: Snapshot, outline: Outline | None) -> Finding:
     return ok("duration", text)
 
 
-def _lost_link(vehicle: Vehicle, parameters: Mapping[str, float]) -> Finding:
-    words = lost_link_words(vehicle.autopilot, vehicle.kind, parameters)
+def _lost_link(vehicle: Vehicle, snapshot: Snapshot) -> Finding:
+    words = lost_link_words(vehicle.autopilot, vehicle.kind, snapshot.parameters)
     vehicle.notes.lost_link = "; ".join(words)
-    if not words:
-        return warning("lost link", "the autopilot's reaction is not known", "look at its parameters")
-    return ok("lost link", "; ".join(words))
+    received = remote_control_received(snapshot)
+    return lost_link(words, vehicle.autopilot, snapshot.parameters, received=received)

@@ -224,12 +224,18 @@ def battery(snapshot: Snapshot) -> Finding:
     return ok("battery", ", ".join(parts))
 
 
-def remote_control(snapshot: Snapshot) -> Finding:
-    """Finding on whether a pilot could take over."""
+def remote_control_received(snapshot: Snapshot) -> bool:
+    """Whether the autopilot receives a remote control, so that a pilot has sticks."""
     present = snapshot.whole("SYS_STATUS", "onboard_control_sensors_present") or 0
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
-    channels = snapshot.whole("RC_CHANNELS", "chancount") or 0
-    if channels > 0 or present & health & _RC_BIT:
+    if present & _RC_BIT:  # a receiver that has lost its transmitter may still send its last channels
+        return bool(health & _RC_BIT)
+    return (snapshot.whole("RC_CHANNELS", "chancount") or 0) > 0
+
+
+def remote_control(snapshot: Snapshot) -> Finding:
+    """Finding on whether a pilot could take over."""
+    if remote_control_received(snapshot):
         rssi = snapshot.whole("RC_CHANNELS", "rssi")
         strength = "" if rssi in (None, 255, 0) else f", signal {100 * (rssi or 0) // 254} %"
         return ok("remote control", f"received{strength}")

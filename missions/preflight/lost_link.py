@@ -1,10 +1,11 @@
-"""The autopilot's reaction to the loss of its ground station, from its parameters."""
+"""The autopilot's reaction to the loss of its ground station or of setpoints, from its parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
 from missions.kind import VehicleKind
+from missions.preflight.finding import Finding, ok, warning
 
 _PX4_DATA_LINK: Final = {0: "goes on", 1: "holds", 2: "returns", 3: "lands", 5: "terminates", 6: "disarms"}
 _PX4_OFFBOARD: Final = {
@@ -17,6 +18,8 @@ _PX4_OFFBOARD: Final = {
     6: "terminates",
     7: "disarms",
 }
+_PX4_PILOTED: Final = (0, 1, 2)
+"""Actions of COM_OBL_RC_ACT that leave the vehicle to the sticks of a remote control."""
 _COPTER_GCS: Final = {
     1: "returns",
     2: "returns",
@@ -57,6 +60,37 @@ def lost_link_words(flavour: str, kind: VehicleKind, parameters: Mapping[str, fl
     if flavour == "px4":
         return _px4(parameters)
     return _plane(parameters) if kind is VehicleKind.FIXED_WING else _copter(parameters)
+
+
+def lost_link(
+    words: Sequence[str], flavour: str, parameters: Mapping[str, float], *, received: bool
+) -> Finding:
+    """Finding about the reaction to a lost link.
+
+    Args:
+        words: the reaction, from `lost_link_words`; empty: not known.
+        flavour, parameters: of the vehicle.
+        received: whether a remote control is received.
+    """
+    text = "; ".join(words)
+    if not words:
+        return warning("lost link", "the autopilot's reaction is not known", "look at its parameters")
+    needed = _pilot_needed(flavour, parameters)
+    if needed and not received:
+        return warning(
+            "lost link",
+            f"{text}, but no remote control is received",
+            f"set {needed} to an action that needs no pilot, or connect one",
+        )
+    if any(" goes on (" in word for word in words):
+        return warning("lost link", text, "see that this is what you want")
+    return ok("lost link", text)
+
+
+def _pilot_needed(flavour: str, parameters: Mapping[str, float]) -> str:
+    """The parameter by which the reaction hands the vehicle to a pilot; "": none does."""
+    name = "COM_OBL_RC_ACT"
+    return name if flavour == "px4" and _known(parameters, name) in _PX4_PILOTED else ""
 
 
 def _known(parameters: Mapping[str, float], name: str) -> int | None:

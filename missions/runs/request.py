@@ -46,6 +46,7 @@ class RunRequest:
         estimator_settings: its parameters as NAME=VALUE.
         confirm: coroutine function that receives the findings about the vehicles before they fly and returns
             whether to continue; None: the vehicles are not checked.
+        confirm_simulations: whether vehicles that prove to be simulations are checked and confirmed, too.
         on_open: called once the links or the world are open.
         regain_s: longest time for which a lost link may stay lost before the mission fails, in seconds of
             this machine's clock.
@@ -68,6 +69,7 @@ class RunRequest:
     estimator: str | None = None
     estimator_settings: Sequence[str] = ()
     confirm: "Confirm | None" = None
+    confirm_simulations: bool = True
     on_open: Callable[[], object] = lambda: None
     regain_s: float = REGAIN_S
     command: str = ""

@@ -45,6 +45,7 @@ from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators
+    from missions.preflight.before_flight import Confirm
     from missions.runs.score import FlightScore
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
@@ -340,10 +341,7 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         options.append(own)
         vehicle.notes.options = own
     if request.confirm is not None:
-        from missions.preflight.before_flight import confirmed, look
-
-        looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
-        await confirmed(looks, request.confirm)
+        await _confirm(mission, vehicles, options, request.confirm, simulations=request.confirm_simulations)
     if not mission.commands:
         await run_concurrently(
             [mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)]
@@ -361,6 +359,28 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
     for vehicle in vehicles:
         flying = _fly_one(flying, vehicle, request)
     await flying
+
+
+async def _confirm(
+    mission: Mission[Any],
+    vehicles: Sequence[Vehicle],
+    options: Sequence[MissionOptions],
+    confirm: "Confirm",
+    *,
+    simulations: bool,
+) -> None:
+    """Check the vehicles and ask for confirmation, unless all prove to be simulations."""
+    from missions.preflight.before_flight import confirmed, look
+    from missions.preflight.simulation import simulation_proof
+
+    proofs = [await simulation_proof(vehicle) for vehicle in vehicles]
+    if all(proofs) and not simulations:
+        return
+    looks = [
+        await look(vehicle, mission, own, proof)
+        for vehicle, own, proof in zip(vehicles, options, proofs, strict=True)
+    ]
+    await confirmed(looks, confirm)
 
 
 async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest) -> None:

@@ -14,8 +14,8 @@ from autopilot_bridge.links import Address
 from autopilot_bridge.mavlink import dialect, enum_name
 from missions.errors import MissionError, VehicleTimeout
 from missions.preflight.finding import Finding, ok, problem, warning
-from missions.preflight.health import PREARM_BIT, health_findings
-from missions.preflight.lost_link import lost_link_words
+from missions.preflight.health import PREARM_BIT, health_findings, remote_control_received
+from missions.preflight.lost_link import lost_link, lost_link_words
 from missions.preflight.settings import fence, settings_findings
 from missions.preflight.snapshot import Snapshot
 from missions.vehicle_client.client import WANTED, VehicleClient, open_client
@@ -147,11 +147,8 @@ def _lost_link(snapshot: Snapshot) -> list[Finding]:
     words = lost_link_words(snapshot.flavour, snapshot.kind, snapshot.parameters)
     if not words:
         return []
-    goes_on = [w for w in words if " goes on (" in w]
-    text = "; ".join(words)
-    if goes_on:
-        return [warning("lost link", text, "see that this is what you want")]
-    return [ok("lost link", text)]
+    received = remote_control_received(snapshot)
+    return [lost_link(words, snapshot.flavour, snapshot.parameters, received=received)]
 
 
 def _link(quality: LinkQuality, client: VehicleClient, missing: list[str]) -> Finding:

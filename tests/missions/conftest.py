@@ -16,6 +16,7 @@ import pytest
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition, dialect
+from autopilot_bridge.mavlink.simulation_marks import PX4_SITL_UID
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -77,6 +78,8 @@ class FakeAutopilot:
         }
         self.mute_commands = set()  # MAV_CMDs that are not answered
         self.refuse_modes = set()  # kinds of mode that are refused
+        self.base_mode = 0  # further bits of the heartbeat
+        self.version = (PX4_SITL_UID, [0] * 18)  # AUTOPILOT_VERSION: uid and uid2; None: it does not answer
         self.unready_in_mission = False  # the pre-arm checks fail in the mode of a mission
         self.arm_refusals = 0
         self.mission_result = 0
@@ -276,7 +279,7 @@ class FakeAutopilot:
         n, e, down = self.pos
         if name == "HEARTBEAT":
             px4 = self.flavour == "px4"
-            base = 1 | (128 if self.armed else 0)
+            base = 1 | (128 if self.armed else 0) | self.base_mode
             self.send(
                 d.MAVLink_heartbeat_message(2, 12 if px4 else 3, base, self.mode, 4 if self.armed else 3, 3)
             )
@@ -320,6 +323,11 @@ class FakeAutopilot:
             )
         elif name == "MISSION_CURRENT":
             self.send(d.MAVLink_mission_current_message(self.current))
+        elif name == "AUTOPILOT_VERSION" and self.version is not None:
+            uid, uid2 = self.version
+            self.send(
+                d.MAVLink_autopilot_version_message(0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, uid, uid2)
+            )
 
     # motion
 

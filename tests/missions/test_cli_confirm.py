@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import pytest
 from click.testing import CliRunner
 
-from missions.cli.confirm import confirmation, is_hardware
+from missions.cli.confirm import confirmation, leaves_this_machine
 from missions.cli.fly import fly
+from missions.errors import MissionError
 from missions.preflight.before_flight import Confirm, Look
 from missions.preflight.finding import ok, problem
 
@@ -18,7 +19,7 @@ SICK = Look(system_id=1, findings=(ok("GPS", "3D fix"), problem("home", "not set
 
 
 @pytest.mark.parametrize(
-    ("connections", "hardware"),
+    ("connections", "leaves"),
     [
         (SERIAL, True),
         (["/dev/ttyUSB0,57600"], True),
@@ -29,12 +30,15 @@ SICK = Look(system_id=1, findings=(ok("GPS", "3D fix"), problem("home", "not set
         (["tcp:127.0.0.1:5760", *SERIAL], True),
     ],
 )
-def test_what_may_be_a_real_vehicle(connections: list[str], hardware: bool) -> None:
-    assert is_hardware(connections) is hardware
+def test_which_links_leave_this_machine(connections: list[str], leaves: bool) -> None:
+    assert leaves_this_machine(connections) is leaves
 
 
-def test_nothing_is_asked_on_links_of_this_machine() -> None:
-    assert confirmation(["udpin:127.0.0.1:14550"], yes=False, check=False) is None
+def test_on_a_link_of_this_machine_the_vehicle_decides_whether_it_is_asked() -> None:
+    """It may forward a real aircraft: without a terminal it is not flown."""
+    confirm = confirmation(["udpin:127.0.0.1:14550"], yes=False, check=False)
+    with pytest.raises(MissionError, match="no terminal to confirm the flight; give --yes"):
+        asyncio.run(confirm([FINE]))
 
 
 @pytest.mark.parametrize("connection", [*SERIAL, "udpin:0.0.0.0:14550"])
@@ -53,7 +57,6 @@ def test_options_for_real_vehicles_are_refused_without_one(option: list[str]) ->
 
 def test_yes_flies_only_when_nothing_is_found(capsys: pytest.CaptureFixture[str]) -> None:
     confirm = confirmation(SERIAL, yes=True, check=False)
-    assert confirm is not None
     assert asyncio.run(confirm([FINE]))
     assert not asyncio.run(confirm([FINE, SICK]))
     assert "problem  home: not set; wait" in capsys.readouterr().err
@@ -63,7 +66,6 @@ def test_yes_flies_only_when_nothing_is_found(capsys: pytest.CaptureFixture[str]
 def confirm(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
     confirm = confirmation(SERIAL, yes=False, check=False)
-    assert confirm is not None
     yield confirm
 
 

@@ -14,7 +14,7 @@ from missions.kind import VehicleKind
 from missions.preflight.before_flight import first_outside
 from missions.preflight.finding import Finding, Level
 from missions.preflight.health import health_findings, not_ready_because, reasons_against_arming, sensors
-from missions.preflight.lost_link import lost_link_words
+from missions.preflight.lost_link import lost_link, lost_link_words
 from missions.preflight.settings import areas_watched, fence, settings_findings, shapes_join
 from missions.preflight.snapshot import Snapshot
 
@@ -240,6 +240,39 @@ def test_a_fence_that_is_switched_off_is_not_in_the_way(
 )
 def test_what_happens_without_a_link(flavour: str, kind: VehicleKind, parameters: dict, words: str) -> None:
     assert words in "; ".join(lost_link_words(flavour, kind, parameters))
+
+
+@pytest.mark.parametrize(
+    ("flavour", "kind", "parameters", "received", "level"),
+    [
+        ("px4", COPTER, {"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 0.0}, False, Level.WARNING),
+        ("px4", PLANE, {"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 1.0}, False, Level.WARNING),
+        ("px4", COPTER, {"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 2.0}, False, Level.WARNING),
+        ("px4", COPTER, {"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 0.0}, True, Level.OK),
+        ("px4", COPTER, {"NAV_DLL_ACT": 2.0, "COM_OBL_RC_ACT": 3.0}, False, Level.OK),
+        ("px4", COPTER, {"NAV_DLL_ACT": 0.0, "COM_OBL_RC_ACT": 3.0}, True, Level.WARNING),
+        ("ardupilot", COPTER, {"FS_GCS_ENABLE": 1.0, "GUID_TIMEOUT": 3.0}, False, Level.OK),
+        ("ardupilot", PLANE, {"FS_GCS_ENABL": 0.0}, True, Level.WARNING),
+        ("ardupilot", PLANE, {}, True, Level.WARNING),
+    ],
+)
+def test_a_reaction_that_relies_on_sticks_is_not_ok_without_them(
+    flavour: str, kind: VehicleKind, parameters: dict[str, float], received: bool, level: Level
+) -> None:
+    words = lost_link_words(flavour, kind, parameters)
+    finding = lost_link(words, flavour, parameters, received=received)
+    assert finding.level is level
+    assert ("no remote control is received" in finding.text) == (
+        not received and parameters.get("COM_OBL_RC_ACT", 3.0) < 3.0
+    )
+
+
+def test_a_receiver_that_has_lost_its_transmitter_is_no_remote_control() -> None:
+    lost = {PRESENT: 0x0301402F, HEALTH: 0x1320C83F}
+    assert (
+        found({"SYS_STATUS": lost, "RC_CHANNELS": {"chancount": 8, "rssi": 200}})["remote control"].level
+        is Level.WARNING
+    )
 
 
 def items(command: int, param1: float, *places: tuple[float, float]) -> list[MissionItem]:

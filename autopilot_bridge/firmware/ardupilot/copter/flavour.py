@@ -21,6 +21,7 @@ from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.texts import Notice, Severity
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
 from autopilot_bridge.flight.plan_reading import ARDUCOPTER_PLANS
+from autopilot_bridge.mavlink.simulation_marks import FLIGHTSTACK_UID2
 from flightsim.airframe import AirframeKind
 
 _MODES: Final = load_data("ardupilot.copter", "modes.toml")
@@ -75,7 +76,7 @@ IDENTITY: Final = Identity(
     product_id=0,
     uid=0,
     flight_custom_version=b"3fc7011a",
-    uid2=b"flightstack-sitl".ljust(18, b"\0"),
+    uid2=FLIGHTSTACK_UID2,
 )
 
 

@@ -18,6 +18,7 @@ from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.firmware.px4.services import SERVICES
 from autopilot_bridge.firmware.px4.texts import copter_notices
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
+from autopilot_bridge.mavlink.simulation_marks import PX4_SITL_UID
 from autopilot_bridge.services.channel import AddressRule
 from flightsim.airframe import AirframeKind
 
@@ -71,7 +72,7 @@ IDENTITY: Final = Identity(
     board_version=1,
     vendor_id=0,
     product_id=0,
-    uid=5283920058631409231,
+    uid=PX4_SITL_UID,
     flight_custom_version=(bytes.fromhex("94cb2012") + bytes(4))[::-1],
     uid2=bytes(18),
 )
