@@ -104,7 +104,8 @@ class Mission(Generic[AnyOptions]):
     def check_place(self, options: AnyOptions, limits: Limits, home: "GeodeticPosition") -> None:
         """Raise PlanError, before takeoff, if one vehicle can't fly the mission from its home.
 
-        Called for embedded vehicles, whose home is known; for other vehicles the mission itself calls it.
+        Called for embedded vehicles before anything is started, for other vehicles as soon as their home is
+        known.
         """
 
     def with_map(self, options: AnyOptions, published: "Path") -> AnyOptions:

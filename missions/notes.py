@@ -1,6 +1,7 @@
 """What a mission records about its flight while it flies: phases, progress, and the commanded path."""
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,13 @@ from missions.options import MissionOptions
 
 PATTERN = "pattern"
 """Name of the phase that is scored against the commanded path."""
+
+
+class CutShort(StrEnum):
+    """Why a mission ended before all was flown."""
+
+    TIME = "time limit"
+    FOUND = "target found"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +70,7 @@ class FlightNotes:
         link_losses: times at which the link was lost and regained.
         lost_link: the autopilot's reaction to the loss of its ground station, as text; "": not known.
         reached: items of a mission file (index from 0) and the times at which they were reached, in order.
-        cut_short: whether the mission ended before all was flown, by the user's time limit or with its target
-            found.
+        cut_short: why the mission ended before all was flown, as it may; None: all was to be flown.
         marks: named times and figures that the mission stores for its own score.
     """
 
@@ -79,7 +86,7 @@ class FlightNotes:
     link_losses: list[LinkLoss] = field(default_factory=list)
     lost_link: str = ""
     reached: list[tuple[int, int]] = field(default_factory=list)
-    cut_short: bool = False
+    cut_short: CutShort | None = None
     marks: dict[str, float] = field(default_factory=dict)
     _open: tuple[str, int] | None = None
 

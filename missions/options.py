@@ -53,6 +53,7 @@ class MissionOptions:
         centre: centre of the mission; None: the vehicle's home.
         rate_hz: setpoints per vehicle second.
         arguments: further arguments that the user gave to their own mission, by name.
+        allow_below_home: heights below home may be commanded: where the ground is lower.
         given: names of the fields that the user specified; None: the fields that differ from their default. A
             mission may give the other fields values that suit the vehicle (`for_vehicle`).
     """
@@ -64,6 +65,7 @@ class MissionOptions:
     centre: GeodeticPosition | None = None
     rate_hz: float = 25.0
     arguments: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    allow_below_home: bool = False
     given: frozenset[str] | None = None
 
     def __post_init__(self) -> None:

@@ -24,6 +24,13 @@ def arguments_of(pairs: tuple[str, ...]) -> dict[str, str]:
     return values
 
 
+_ALLOW_BELOW_HOME: Final = option(
+    "--allow-below-home",
+    is_flag=True,
+    help="Heights below home may be commanded: where the ground is lower. [default: refused]",
+    show_default=False,
+)
+
 OWN: Final = MissionCommand(
     help=(
         "Fly a mission of your own: a Python file with `async def fly(vehicle, options)`.\n\n"
@@ -40,6 +47,7 @@ OWN: Final = MissionCommand(
         option(
             "--separation", type=float, default=4.0, help="Between the altitudes of a team, m. Aircraft: 20."
         ),
+        _ALLOW_BELOW_HOME,
     ),
     made=("missions.options", "FlightOptions"),
     values=lambda given: {"arguments": arguments_of(given["arg"])},
@@ -61,6 +69,7 @@ FILE: Final = MissionCommand(
             help="After a mission that does not land by itself. [default: return; required for aircraft]",
         ),
         option("--time-limit", type=float, help="End the mission after so many seconds, with --then."),
+        _ALLOW_BELOW_HOME,
     ),
     made=("missions.plan_files.options", "FileOptions"),
 )

@@ -13,7 +13,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import PlanError, VehicleTimeout
-from missions.notes import PATTERN, CommandedPath
+from missions.notes import PATTERN, CommandedPath, CutShort
 from missions.options import FlightOptions, Via
 from missions.outline import Outline
 from missions.pattern_search.wings.pattern import check_wings, fly_pattern_with_wings, pattern_flight_of
@@ -193,7 +193,7 @@ async def _fly_setpoints(
                 return None
             setpoint = setpoint_at(trajectory.at(t), centre)
             if search is not None and search.over:
-                last, notes.cut_short = setpoint, True
+                last, notes.cut_short = setpoint, search.ended_by
                 assert notes.commanded is not None
                 path = notes.commanded.points_ned_m
                 notes.commanded = replace(
@@ -396,7 +396,7 @@ async def _fly_waypoints(
             raise
         over = True  # the search time has ended
     if over:
-        notes.cut_short = True
+        notes.cut_short = CutShort.TIME if search is None else search.ended_by
         flown = [item.command for item in plan.items[: reached + 1]].count(dialect.MAV_CMD_NAV_WAYPOINT)
         notes.commanded = replace(
             notes.commanded, waypoints_ned_m=notes.commanded.waypoints_ned_m[:flown]

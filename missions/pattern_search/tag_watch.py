@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, CameraScan
 from estimators.messages import read_message
 from estimators.vision import VehicleTrack, ground_place
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.notes import CutShort
 from missions.vehicle.telemetry import Position
 
 if TYPE_CHECKING:
@@ -103,6 +104,11 @@ class TagWatch:
         """Whether the tag was found, or the time is over."""
         deadline_us = self.deadline_us
         return self.found is not None or (deadline_us is not None and self._now_us >= deadline_us)
+
+    @property
+    def ended_by(self) -> CutShort:
+        """What has ended the search, when it is over."""
+        return CutShort.TIME if self.found is None else CutShort.FOUND
 
     async def unless_over(self, waiting: Awaitable[None]) -> bool:
         """Wait for something of the flight, or the end of the search; returns whether the search ended."""

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from autopilot_bridge.mavlink import command_name
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
+from missions.vehicle.heights import refuse_low_items
+from missions.vehicle.items import item_name
 
 NAV_WAYPOINT: Final = 16
 NAV_LOITER_UNLIM: Final = 17
@@ -23,20 +24,6 @@ NAV_DELAY: Final = 93
 DO_JUMP: Final = 177
 DO_CHANGE_SPEED: Final = 178
 DO_LAND_START: Final = 189
-
-FLOWN_TO: Final = frozenset(
-    {
-        NAV_WAYPOINT,
-        NAV_LOITER_UNLIM,
-        NAV_LOITER_TURNS,
-        NAV_LOITER_TIME,
-        NAV_LAND,
-        NAV_TAKEOFF,
-        NAV_LOITER_TO_ALT,
-        NAV_SPLINE_WAYPOINT,
-    }
-)
-"""Commands that contain a place to fly to."""
 
 INT_FRAMES: Final = {0: 5, 3: 6, 10: 11}
 """Global frames in files -> the same frames with integer coordinates, as in items."""
@@ -78,13 +65,30 @@ class MissionDocument:
         """An error that names an item."""
         return PlanError(f"{self.path}: {self.item_name(index)}: {why}")
 
+    def check_heights(self, home_alt_m: float | None, *, below_home_allowed: bool) -> None:
+        """Refuse items and rally points below home, unless that is allowed, and those below the ground.
+
+        Args:
+            home_alt_m: altitude of home above mean sea level; None: not known, and only heights in other
+                frames are checked.
+            below_home_allowed: the user allows heights below home.
+
+        Raises:
+            PlanError: names the file, the items and their altitudes.
+        """
+        try:
+            refuse_low_items(self.items, home_alt_m, below_home_allowed=below_home_allowed)
+            refuse_low_items(
+                self.rally,
+                home_alt_m,
+                below_home_allowed=below_home_allowed,
+                name=lambda index, _command: f"rally point {index + 1}",
+            )
+        except PlanError as error:
+            raise PlanError(f"{self.path}: {error}") from None
+
     @property
     def lands(self) -> bool:
         """Whether the mission itself lands the vehicle: by a landing, or by a return as its last item."""
         commands = [item.command for item in self.items]
         return NAV_LAND in commands or NAV_RETURN_TO_LAUNCH in commands
-
-
-def item_name(index: int, command: int) -> str:
-    """Name of an item from its index in the mission (from 0), numbered from 1 as in ground stations."""
-    return f"item {index + 1} ({command_name(command)})"

@@ -8,7 +8,7 @@ import numpy as np
 from autopilot_bridge.mission_plan import MissionType
 from missions.errors import PlanError, VehicleTimeout
 from missions.kind import VehicleKind
-from missions.notes import CommandedPath
+from missions.notes import CommandedPath, CutShort
 from missions.plan_files.document import NAV_WAYPOINT, MissionDocument
 from missions.plan_files.options import FileOptions, Then
 from missions.plan_files.progress import MissionWatch
@@ -45,13 +45,12 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
     """Upload the document and fly it, including takeoff and landing.
 
     Raises:
-        PlanError: the mission is too far away, or gives an aircraft no way to land.
+        PlanError: an item is below home.
         MissionError: the vehicle refused the mission, or the flight failed.
     """
     notes, clock, home = vehicle.notes, vehicle.clock, vehicle.home
     wings = vehicle.kind is VehicleKind.FIXED_WING
     route = route_of(document, home)
-    check_distance(route, document.path, home)
     if document.firmware not in (None, vehicle.autopilot):
         notes.warn(
             f"{document.path} was planned for {document.firmware}, and is flown by {vehicle.autopilot}"
@@ -86,7 +85,7 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
     except VehicleTimeout:
         if options.time_limit_s is None:
             raise
-        ended, notes.cut_short = False, True
+        ended, notes.cut_short = False, CutShort.TIME
     if notes.current != "return":
         notes.begin("return", clock.stamp_us)
     if not (ended and watch.lands):

@@ -15,7 +15,7 @@ from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.notes import PATTERN, Phase
-from missions.plan_files.document import FLOWN_TO, NAV_LAND, MissionDocument
+from missions.plan_files.document import NAV_LAND, MissionDocument
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
 from missions.plan_files.options import FileOptions
@@ -23,6 +23,7 @@ from missions.plan_files.progress import CURVED
 from missions.plan_files.route import Stop, route_of, scored_stops, straight
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.vehicle.item_tracker import THROUGH
+from missions.vehicle.items import FLOWN_TO
 
 if TYPE_CHECKING:
     from missions.notes import FlightNotes
@@ -61,6 +62,10 @@ class FileMission(Mission[FileOptions]):
             raise PlanError(
                 f"`arguments` {name}: {self.document.path} takes none; they are for missions of your own"
             )
+        home = self.document.home
+        self.document.check_heights(
+            None if home is None else home.alt_m, below_home_allowed=options.allow_below_home
+        )
         wings = isinstance(limits, FixedWingLimits)
         kind = VehicleKind.FIXED_WING if wings else VehicleKind.MULTICOPTER
         if self.document.kind not in (None, kind):
@@ -80,6 +85,7 @@ class FileMission(Mission[FileOptions]):
 
     def check_place(self, options: FileOptions, limits: Limits, home: GeodeticPosition) -> None:
         check_distance(route_of(self.document, home), self.document.path, home)
+        self.document.check_heights(home.alt_m, below_home_allowed=options.allow_below_home)
 
     async def fly(self, vehicle: "Vehicle", options: FileOptions) -> None:
         await fly_document(vehicle, options, self.document)
@@ -134,7 +140,7 @@ class FileMission(Mission[FileOptions]):
             track,
             np.array([stop.position_ned_m for stop in waypoints]),
             max(commanded.acceptance_m + WAYPOINT_SLACK_M[kind], max_error_m or 0.0),
-            cut_short=notes.cut_short,
+            notes.cut_short,
         )
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:

@@ -14,7 +14,6 @@ from autopilot_bridge.mission_wire import GLOBAL_FRAMES
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.plan_files.document import (
     DO_CHANGE_SPEED,
-    FLOWN_TO,
     LOITERS,
     NAV_DELAY,
     NAV_LAND,
@@ -27,6 +26,7 @@ from missions.plan_files.document import (
 )
 from missions.plan_files.validation import has_place
 from missions.vehicle.item_tracker import FlownOrder
+from missions.vehicle.items import FLOWN_TO
 
 _PATH_STEP_M: Final = 1.0
 _LOITER_RADIUS_M: Final = 60.0

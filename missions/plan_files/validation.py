@@ -13,7 +13,8 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES
 from missions.errors import PlanError
-from missions.plan_files.document import DO_JUMP, FLOWN_TO, NAV_LAND, NAV_TAKEOFF, MissionDocument
+from missions.plan_files.document import DO_JUMP, NAV_LAND, NAV_TAKEOFF, MissionDocument
+from missions.vehicle.items import FLOWN_TO
 
 MAX_ITEMS: Final = 5000
 """More items than any flight controller stores."""

@@ -337,9 +337,12 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         vehicle.forecast_wind_m_s = request.planning_wind_m_s
         limits, home = await vehicle.limits(), vehicle.home
         own_options = replace(vehicle_options(request.options, index), centre=centre)
-        own, _ = adapted(mission, own_options, limits, home.alt_m)
+        own, own_limits = adapted(mission, own_options, limits, home.alt_m)
         options.append(own)
         vehicle.notes.options = own
+        vehicle.allow_below_home = own.allow_below_home
+        if request.connect:  # before a question is asked and before anything is uploaded
+            mission.check_place(own, own_limits, home)
     if request.confirm is not None:
         await _confirm(mission, vehicles, options, request.confirm, simulations=request.confirm_simulations)
     if not mission.commands:

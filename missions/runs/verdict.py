@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from missions.kind import VehicleKind
-from missions.notes import PATTERN, FlightNotes, Phase
+from missions.notes import PATTERN, CutShort, FlightNotes, Phase
 
 if TYPE_CHECKING:
     from missions.runs.score import FlightScore, Track
@@ -45,7 +45,8 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
         return ""
     phase = notes.phase(PATTERN)
     if phase is None:
-        return "" if notes.cut_short else "the commanded path was not begun"
+        # a target may be found on the way to the pattern
+        return "" if notes.cut_short is CutShort.FOUND else "the commanded path was not begun"
     track = flown_track(score, phase)
     if track is None:
         return NO_TRACK
@@ -60,9 +61,9 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
         )
     if len(commanded.waypoints_ned_m):
         near_m = max(commanded.acceptance_m + WAYPOINT_SLACK_M[kind], max_error_m or 0.0)
-        return waypoint_verdict(track, commanded.waypoints_ned_m, near_m, cut_short=notes.cut_short)
+        return waypoint_verdict(track, commanded.waypoints_ned_m, near_m, notes.cut_short)
     places = points[np.unique(np.linspace(0, len(points) - 1, _PLACES).astype(np.int64))]
-    missed = missed_places(track, places, bound_m, cut_short=notes.cut_short)
+    missed = missed_places(track, places, bound_m, notes.cut_short)
     if not missed:
         return ""
     return (
@@ -99,9 +100,11 @@ def _largest_error_m(path_ned_m: Array, track: "Track") -> float:
     return float(errors[received].max(initial=0.0)) if len(errors) else 0.0
 
 
-def waypoint_verdict(track: "Track", waypoints_ned_m: Array, near_m: float, *, cut_short: bool) -> str:
+def waypoint_verdict(
+    track: "Track", waypoints_ned_m: Array, near_m: float, cut_short: CutShort | None
+) -> str:
     """The reason why not all waypoints were flown; "" if they were."""
-    missed = missed_places(track, waypoints_ned_m, near_m, cut_short=cut_short)
+    missed = missed_places(track, waypoints_ned_m, near_m, cut_short)
     if not missed:
         return ""
     shown = ", ".join(f"{k + 1} ({miss_m:.1f} m)" for k, miss_m in missed[:_NAMED])
@@ -113,19 +116,23 @@ def waypoint_verdict(track: "Track", waypoints_ned_m: Array, near_m: float, *, c
 
 
 def missed_places(
-    track: "Track", places_ned_m: Array, near_m: float, *, cut_short: bool
+    track: "Track", places_ned_m: Array, near_m: float, cut_short: CutShort | None
 ) -> list[tuple[int, float]]:
     """Places (index, nearest approach) that a track did not pass in order.
 
-    Places that may have been passed while no position was received are left out; with `cut_short`, also those
-    after the last pass.
+    Places that may have been passed while no position was received are left out. In a flight that was cut
+    short, so are those after the last pass; without any pass all were missed, unless the target was found
+    before the first.
     """
     distances = [_distances_m(place, track.pos_ned_m) for place in places_ned_m]
     chosen = _passed_in_order([_stays(distance <= near_m) for distance in distances])
     gaps = np.nonzero(np.diff(track.time_s) > _GAP_S)[0]
+    excused_after = len(places_ned_m)
+    if cut_short is not None and (chosen or cut_short is CutShort.FOUND):
+        excused_after = max(chosen, default=-1)
     missed = []
     for k, distance in enumerate(distances):
-        if k in chosen or (cut_short and k > max(chosen, default=-1)):
+        if k in chosen or k > excused_after:
             continue
         before = max((leg for j, leg in chosen.items() if j < k), default=0)
         after = min((leg for j, leg in chosen.items() if j > k), default=len(distance) - 1)

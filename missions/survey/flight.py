@@ -286,6 +286,8 @@ async def _prepare(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLi
             f"the flight at {options.altitude_m:g} m is above {limits.altitude_max_m:g} m, the ceiling of "
             "the open category (EU 2019/947): it needs an authorization"
         )
+    if options.terrain_file is not None:  # the height over its ground was checked, which may be below home
+        vehicle.allow_below_home = True
     await vehicle.payload.require(survey_magnetometer.COMPONENT)
     for name, rate_hz in _RATES_HZ.items():
         await vehicle.commands.set_message_rate(name, rate_hz)

@@ -7,6 +7,7 @@ from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, d
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode, ModeCommand
+from missions.vehicle.heights import HeightRule
 from missions.vehicle.link import VehicleLink, describe_ack
 
 ACK_S: Final = 1.0
@@ -26,11 +27,13 @@ class VehicleCommands:
 
     Attributes:
         link: as passed to the constructor.
+        heights: whether heights below home may be commanded.
         modes_requested: custom modes that were requested since this set was cleared.
     """
 
     def __init__(self, link: VehicleLink) -> None:
         self.link = link
+        self.heights = HeightRule()
         self.modes_requested: set[int] = set()
         self._rates_hz: dict[str, float] = {}  # rates requested by this mission
         self._arming_us: int | None = None  # time at which arming was requested or accepted

@@ -48,9 +48,10 @@ class GuidedSession:
 
         Raises:
             MissionError: the vehicle left the guided mode (a failsafe, a pilot), or its link was lost.
-            PlanError: the source returned something that is not a setpoint.
+            PlanError: the source returned something that is not a setpoint, or a position below home, which
+                is not allowed (`Vehicle.allow_below_home`).
         """
-        first = _setpoint_of(source, 0.0)
+        first = self._setpoint_of(source, 0.0)
         if first is None:
             return
         if not self._entered:
@@ -95,7 +96,7 @@ class GuidedSession:
                 self._last = _held(self._last)
             elif self._source is not None:
                 elapsed_s = max(0.0, (due_us - self._start_us + _LEAD * self._period_us) * 1e-6)
-                setpoint = _setpoint_of(self._source, elapsed_s)
+                setpoint = self._setpoint_of(self._source, elapsed_s)
                 if setpoint is None:
                     self._source = None
                     self._done.set()
@@ -108,6 +109,17 @@ class GuidedSession:
             if due_us < clock.time_us - self._period_us:
                 due_us = clock.time_us
             await clock.sleep_until(due_us)
+
+    def _setpoint_of(self, source: SetpointSource, time_s: float) -> AnySetpoint | None:
+        given: object = source(time_s)
+        if isinstance(given, Setpoint) and given.position_ned_m is not None:
+            self._commands.heights.check(-given.position_ned_m[2], f"follow, {time_s:.1f} s")
+        if given is None or isinstance(given, AnySetpoint):
+            return given
+        raise PlanError(
+            f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint, an "
+            "AttitudeSetpoint or None"
+        )
 
     async def _until_done(self, stream: asyncio.Task[None]) -> None:
         target = self._link.firmware.modes[Mode.GUIDED]
@@ -189,13 +201,3 @@ def _held(setpoint: AnySetpoint | None) -> AnySetpoint | None:
     if not isinstance(setpoint, Setpoint) or setpoint.position_ned_m is None:
         return Setpoint(velocity_ned_m_s=(0.0, 0.0, 0.0)) if isinstance(setpoint, Setpoint) else setpoint
     return Setpoint(position_ned_m=setpoint.position_ned_m, yaw_rad=setpoint.yaw_rad)
-
-
-def _setpoint_of(source: SetpointSource, time_s: float) -> AnySetpoint | None:
-    given: object = source(time_s)
-    if given is None or isinstance(given, AnySetpoint):
-        return given
-    raise PlanError(
-        f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint, an "
-        "AttitudeSetpoint or None"
-    )

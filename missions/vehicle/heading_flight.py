@@ -78,7 +78,8 @@ class HeadingFlight:
         )
 
     async def change_altitude(self, altitude_m: float) -> None:
-        """Change the height above home."""
+        """Change the height above home; refused below home as `Vehicle.change_altitude` is."""
+        self._commands.heights.check(altitude_m, "change_altitude")
         if self._link.firmware.roll_alone:
             await self._adapter.change_altitude(altitude_m)
         self._pilot.hold(altitude_m=altitude_m)

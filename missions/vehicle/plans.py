@@ -8,6 +8,7 @@ from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode
+from missions.vehicle.heights import HeightRule, refuse_low_items
 from missions.vehicle.item_tracker import (
     FlownOrder,
     ItemTracker,
@@ -31,10 +32,12 @@ class VehiclePlans:
 
     Args:
         link: messages of the vehicle.
+        heights: whether items below home may be uploaded.
     """
 
-    def __init__(self, link: VehicleLink) -> None:
+    def __init__(self, link: VehicleLink, heights: HeightRule) -> None:
         self._link = link
+        self._heights = heights
         self._tracker: ItemTracker | None = None  # tracker of the mission that was uploaded last
 
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
@@ -42,9 +45,15 @@ class VehiclePlans:
         item 0 is home).
 
         The flight starts at its first item. Jumps name items by their index in `items`.
+
+        Raises:
+            PlanError: an item is below home, which is not allowed (`Vehicle.allow_below_home`), or below the
+                ground; nothing was sent.
+            CommandRejected, VehicleTimeout: see `upload`.
         """
         first = 1 if self._link.firmware.first_mission_item_is_home else 0
         home = self._link.home
+        refuse_low_items(items, home.alt_m, below_home_allowed=self._heights.below_home_allowed)
         marker = MissionItem(
             command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m
         )

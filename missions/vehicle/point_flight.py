@@ -30,7 +30,7 @@ class PointFlight:
     async def fly(self, tolerance_m: float, timeout_s: float | None) -> None:
         """Command the flight, and wait until the vehicle is within the tolerance and slow."""
         link, target, firmware = self._link, self._target, self._link.firmware
-        self._check_distance()
+        self._check_target()
         goto_mode = firmware.modes[firmware.goto_mode]
         expected = {link.custom_mode, goto_mode}
         self._commands.modes_requested.clear()
@@ -69,10 +69,8 @@ class PointFlight:
         p = self._link.latest(Position)
         return math.hypot(*self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)) if p else math.inf
 
-    def _check_distance(self) -> None:
-        home, target = self._link.home_or_none(), self._target
-        if home is None:
-            return
+    def _check_target(self) -> None:
+        home, target = self._link.home, self._target
         ned = LocalFrame(home).ned_from_geodetic(target.lat_deg, target.lon_deg, target.alt_m)
         away_m = math.hypot(*ned)
         if not away_m <= _FARTHEST_M:
@@ -80,6 +78,8 @@ class PointFlight:
                 f"the target {target} is {away_m * 1e-3:.1f} km from home; accepted: at most "
                 f"{_FARTHEST_M * 1e-3:g} km"
             )
+        # altitudes are compared, not the frame's down: far away the horizon is below it
+        self._commands.heights.check(target.alt_m - home.alt_m, "goto")
 
     def _require_flying(self, expected: set[int]) -> None:
         """Raise an error when the vehicle is disarmed, or in a mode neither expected nor requested."""

@@ -60,7 +60,7 @@ class Vehicle:
         self.link = VehicleLink(connection, system_id)
         self.commands = VehicleCommands(self.link)
         self.parameters = VehicleParameters(self.link)
-        self.plans = VehiclePlans(self.link)
+        self.plans = VehiclePlans(self.link, self.commands.heights)
         self.payload = Payload(self.link)
         self.forecast_wind_m_s: float = FORECAST_WIND_M_S
         self.local_origin = LocalOrigin(self.commands)
@@ -140,6 +140,17 @@ class Vehicle:
     def home(self) -> GeodeticPosition:
         """Home as reported by the vehicle."""
         return self.link.home
+
+    @property
+    def allow_below_home(self) -> bool:
+        """Whether heights below home may be commanded: where the ground is lower. They are refused by
+        default.
+        """
+        return self.commands.heights.below_home_allowed
+
+    @allow_below_home.setter
+    def allow_below_home(self, allowed: bool) -> None:
+        self.commands.heights.below_home_allowed = allowed
 
     def latest(self, kind: type[T]) -> T | None:
         """Newest telemetry of a kind, for example `latest(Position)`; see `VehicleLink.latest`."""
@@ -275,7 +286,8 @@ class Vehicle:
         For multicopters only, because a fixed wing can't be slow; see `wing.loiter` for those.
 
         Raises:
-            PlanError: the target is more than 10 km from home; nothing was sent.
+            PlanError: the target is more than 10 km from home, or below home, which is not allowed
+                (`allow_below_home`); nothing was sent.
             MissionError: the vehicle disarmed, or changed to a mode that this mission did not command (a
                 failsafe, a pilot).
         """
@@ -291,7 +303,12 @@ class Vehicle:
         await self.goto(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt), tolerance_m=tolerance_m)
 
     async def change_altitude(self, altitude_m: float) -> None:
-        """Change the height above home."""
+        """Change the height above home.
+
+        Raises:
+            PlanError: it is below home, which is not allowed (`allow_below_home`); nothing was sent.
+        """
+        self.commands.heights.check(altitude_m, "change_altitude")
         await self.adapter.change_altitude(altitude_m)
 
     async def set_speed(self, speed_m_s: float) -> None:

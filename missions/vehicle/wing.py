@@ -145,7 +145,8 @@ class FixedWing:
             wait: whether to wait until it circles there, near the altitude.
 
         Raises:
-            PlanError: the radius is not possible, or the place is too far away; nothing was sent.
+            PlanError: the radius is not possible, or the place is too far away, or below home, which is not
+                allowed (`Vehicle.allow_below_home`); nothing was sent.
         """
         if radius_m is not None and not (math.isfinite(radius_m) and radius_m > 0.0):
             raise PlanError(f"a circle of radius {radius_m:g} m can't be flown; ask for more than 0 m")
@@ -159,6 +160,7 @@ class FixedWing:
                 f"the place {place} is {away_m * 1e-3:.1f} km away; accepted: at most "
                 f"{_FARTHEST_M * 1e-3:g} km"
             )
+        self._commands.heights.check(place.alt_m - self._link.home.alt_m, "loiter")
         await self._adapter.loiter(place, radius_m, clockwise)
         if not wait:
             return
@@ -203,6 +205,7 @@ class FixedWing:
         """
         if self.pilot is None:
             raise PlanError("call `await vehicle.wing.prepare_piloting()` on the ground, before takeoff")
+        self._commands.heights.check(altitude_m, "heading_flight")
         async with open_heading_flight(
             self._commands, self._adapter, self._parameters, self.pilot, altitude_m, airspeed_m_s
         ) as flight:

@@ -9,7 +9,7 @@ import pytest
 
 from flightsim.world_spec import WorldSpec
 from missions.kind import VehicleKind
-from missions.notes import PATTERN, CommandedPath, FlightNotes
+from missions.notes import PATTERN, CommandedPath, CutShort, FlightNotes
 from missions.options import FlightOptions, Via
 from missions.runs import session
 from missions.runs.score import Track
@@ -21,7 +21,7 @@ PATH = np.column_stack((np.arange(0.0, 201.0), np.zeros(201), np.full(201, -10.0
 TIME_S = np.arange(0.0, 40.01, 0.1)
 
 
-def notes_of(*, waypoints=(), kind=VehicleKind.MULTICOPTER, cut_short=False, flown=True) -> FlightNotes:
+def notes_of(*, waypoints=(), kind=VehicleKind.MULTICOPTER, cut_short=None, flown=True) -> FlightNotes:
     notes = FlightNotes(kind=str(kind), system_id=1, cut_short=cut_short)
     notes.commanded = CommandedPath(
         origin=HOME,
@@ -79,7 +79,7 @@ def test_a_closed_path_is_flown_with_a_rest_before_and_after_it(seed) -> None:
 def test_a_path_that_was_not_begun_or_not_seen_is_no_flight() -> None:
     assert path_verdict(notes_of(flown=False), along()) == "the commanded path was not begun"
     found_before = notes_of(flown=False)
-    found_before.cut_short = True  # a search that has ended on the way to its pattern
+    found_before.cut_short = CutShort.FOUND  # a search that has ended on the way to its pattern
     assert path_verdict(found_before, along()) == ""
     blind = SimpleNamespace(estimate=None)
     assert "no position (GLOBAL_POSITION_INT) was received" in path_verdict(notes_of(), blind)
@@ -96,7 +96,19 @@ def test_with_a_time_limit_the_rest_need_not_be_flown() -> None:
     half = along(2.5)
     waypoints = (0.0, 100.0, 200.0)
     assert "1 of 3 waypoints" in path_verdict(notes_of(waypoints=waypoints), half)
-    assert path_verdict(notes_of(waypoints=waypoints, cut_short=True), half) == ""
+    assert path_verdict(notes_of(waypoints=waypoints, cut_short=CutShort.TIME), half) == ""
+
+
+@pytest.mark.parametrize("waypoints", [(), (100.0, 150.0, 200.0)])
+def test_a_time_limit_does_not_excuse_a_flight_that_passed_nothing(waypoints) -> None:
+    beside = along(0.0, east_m=9.0 if waypoints else 12.0)
+    notes = notes_of(waypoints=waypoints, cut_short=CutShort.TIME)
+    text = path_verdict(notes, beside, max_error_m=5.0)
+    assert ("3 of 3 waypoints were not passed" if waypoints else "100 % of the commanded path") in text
+    notes.cut_short = CutShort.FOUND  # a search may end on the way
+    assert path_verdict(notes, beside, max_error_m=5.0) == ""
+    not_begun = notes_of(waypoints=waypoints, cut_short=CutShort.TIME, flown=False)
+    assert path_verdict(not_begun, beside) == "the commanded path was not begun"
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

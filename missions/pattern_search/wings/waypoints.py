@@ -8,7 +8,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import VehicleTimeout
-from missions.notes import PATTERN
+from missions.notes import PATTERN, CutShort
 from missions.options import FlightOptions
 from missions.pattern_search.wings.flight import Entry, PatternFlight
 from missions.pattern_search.wings.place import PlaceOnPath
@@ -88,7 +88,7 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     except VehicleTimeout:
         if options.search_time_s is None:
             raise
-        notes.cut_short = True
+        notes.cut_short = CutShort.TIME
         await vehicle.wing.land_along(flight.approach(vehicle), wait=False)  # the search time has ended
     notes.begin("return", clock.stamp_us)
     await vehicle.link.wait_disarmed(600.0 + 2.0 * flight.away_s)

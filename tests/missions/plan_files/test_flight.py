@@ -13,6 +13,7 @@ from missions.options import FlightOptions
 from missions.plan_files.export import export_plan
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.options import FileOptions, Then
+from missions.planning.limits import WIDEST_LIMITS
 from missions.runs.session import RunRequest, fly
 from tests.missions.plan_files.plans import LANDING, LAT, LON, changed, simple, waypoint, write
 
@@ -92,6 +93,39 @@ def test_what_can_not_be_flown_is_refused_before_anything_starts(tmp_path: Path)
     wings = write(tmp_path, aircraft, "c.plan")
     with pytest.raises(PlanError, match=r"does not land; .* what comes after it: `then=land`"):
         fly(find_mission(str(wings)), request(wings, out=tmp_path / "wings"))
+    assert not (tmp_path / "run").exists()
+
+
+def test_items_below_home_are_refused_before_anything_starts(tmp_path: Path) -> None:
+    """By the home of the file, by that of the embedded world where the file has none or another, in every
+    frame; not where the user allows it.
+    """
+    amsl = tmp_path / "amsl.waypoints"
+    amsl.write_text(
+        "QGC WPL 110\n"
+        "0 1 0 16 0 0 0 0 -35.363261 149.16523 584.0 1\n"
+        "1 0 0 22 0 0 0 0 -35.363261 149.16523 100 1\n"
+        "2 0 0 16 0 0 0 0 -35.362861 149.16523 100 1\n".replace(" ", "\t").replace("QGC\tWPL\t", "QGC WPL ")
+    )
+    with pytest.raises(
+        PlanError, match=r"item 1 \(NAV_TAKEOFF\).* 484 m below home .* item 2 \(NAV_WAYPOINT"
+    ):
+        fly(find_mission(str(amsl)), request(amsl))
+    high = request(amsl, home="-35.363261,149.16523,900")
+    allowed = replace(high, options=FileOptions(allow_below_home=True))
+    find_mission(str(amsl)).check(allowed.options, WIDEST_LIMITS)
+    relative = write(tmp_path, changed("mission", "items", 1, to=waypoint(2, 5e-4, 0.0, -5)))
+    with pytest.raises(PlanError, match=r"item 2 \(NAV_WAYPOINT\): altitude -5 m is 5 m below home; where"):
+        fly(find_mission(str(relative)), request(relative))
+    low_amsl = simple(2, 16, [0, 0, 0, None, LAT, LON, 300], 0)
+    homeless = changed("mission", "items", 1, to=low_amsl)
+    homeless["mission"]["plannedHomePosition"] = None
+    unknown = write(tmp_path, homeless, "b.plan")
+    with pytest.raises(PlanError, match=r"item 2 .* is 189 m below home \(489 m"):
+        fly(find_mission(str(unknown)), request(unknown, home=f"{LAT},{LON},489.4"))
+    rally = write(tmp_path, changed("rallyPoints", "points", to=[[LAT, LON, -20]]), "c.plan")
+    with pytest.raises(PlanError, match="rally point 1: altitude -20 m is 20 m below home"):
+        fly(find_mission(str(rally)), request(rally))
     assert not (tmp_path / "run").exists()
 
 
