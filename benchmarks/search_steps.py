@@ -24,7 +24,7 @@ from missions.mission import Mission
 from missions.multi_target.steps import BacksteppingLaw, TrajectoryLaw
 from missions.options import MissionOptions
 from missions.planning.limits import MulticopterLimits
-from missions.runs.records import FlightRecords
+from missions.runs.records import FlightRecords, positions_ned_m
 from missions.runs.request import RunRequest
 from missions.runs.session import fly
 from missions.vehicle.setpoint import Setpoint
@@ -98,10 +98,7 @@ def measured(mission: Steps, log: Path) -> list[tuple[float, float, float, float
     """Time to 7 m and to 8.5 m, overshoot and deviation of each step."""
     truth = FlightRecords.from_tlog(log).table("HIL_STATE_QUATERNION", 1)
     assert mission.home is not None
-    frame = LocalFrame(mission.home)
-    per_lat, per_lon = frame.metres_per_degree
-    north = (truth["lat"] * 1e-7 - mission.home.lat_deg) * per_lat
-    east = (truth["lon"] * 1e-7 - mission.home.lon_deg) * per_lon
+    north, east, _ = positions_ned_m(truth, LocalFrame(mission.home)).T
     found = []
     for time_us, before, after in mission.jumps:
         inside = (truth["time_usec"] >= time_us) & (truth["time_usec"] < time_us + HOLD_S * 1e6)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from estimators.tracking.metrics import mean_square
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from flightsim.foundation.vectors import euler_from_quaternions, wrap_180, wrap_pi
+from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
 
 if TYPE_CHECKING:
     from estimators.logs import Log, Table
@@ -161,24 +161,21 @@ def targets_reference(
 
 def _offsets(log: "Log", own: Mapping[str, Series]) -> dict[str, Series]:
     """From a vehicle to the first ground target of our SITL, at the times of the vehicle's truth."""
-    target = target_reference(log, 0, origin=None)
     lat, lon = own["lat_deg"], own["lon_deg"]
-    if target is None or not len(lat.time_us):
+    if not len(lat.time_us):
         return {}
-    per_lat, per_lon = LocalFrame(
-        GeodeticPosition(lat_deg=float(lat.values[0]), lon_deg=float(lon.values[0]), alt_m=0.0)
-    ).metres_per_degree
+    first = GeodeticPosition(lat_deg=float(lat.values[0]), lon_deg=float(lon.values[0]), alt_m=0.0)
+    target = target_reference(log, 0, origin=first)
+    if target is None:
+        return {}
+    north_m, east_m, _ = LocalFrame(first).ned_from_geodetic(
+        lat.values, lon.values, np.zeros_like(lat.values)
+    )
     return {
-        name: Series(
-            series.source,
-            series.time_us,
-            per_degree * (target.columns[column].at(series.time_us) - series.values),
-            angle=False,
+        f"offset_{name}": Series(
+            lat.source, lat.time_us, target.columns[name].at(lat.time_us) - values, angle=False
         )
-        for name, column, series, per_degree in (
-            ("offset_north_m", "lat_deg", lat, per_lat),
-            ("offset_east_m", "lon_deg", lon, per_lon),
-        )
+        for name, values in (("north_m", north_m), ("east_m", east_m))
     }
 
 
@@ -272,12 +269,13 @@ def _places(table: "Table", frame: LocalFrame | None) -> dict[str, Column]:
 
 
 def _placed(lat_deg: Column, lon_deg: Column, frame: LocalFrame | None) -> dict[str, Column]:
+    known = np.isfinite(lat_deg) & np.isfinite(lon_deg)
+    lat_deg, lon_deg = np.where(known, lat_deg, np.nan), np.where(known, lon_deg, np.nan)
     places = {"lat_deg": lat_deg, "lon_deg": lon_deg}
     if frame is None:
         return places
-    per_lat, per_lon = frame.metres_per_degree
-    east_deg = wrap_180(lon_deg - frame.origin.lon_deg)
-    return places | {"north_m": per_lat * (lat_deg - frame.origin.lat_deg), "east_m": per_lon * east_deg}
+    north_m, east_m, _ = frame.ned_from_geodetic(lat_deg, lon_deg, np.zeros_like(lat_deg))
+    return places | {"north_m": north_m, "east_m": east_m}
 
 
 def _moving(north_m_s: Column, east_m_s: Column) -> dict[str, Column]:

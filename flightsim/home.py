@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Self
 
-from flightsim.foundation.geodesy import curvature_radii_m
+from flightsim.foundation.geodesy import curvature_radii_m, longitude_near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,5 +59,5 @@ class Home:
         parallel_m = (normal_m + self.alt_m) * math.cos(math.radians(self.lat_deg))
         return (
             self.lat_deg + math.degrees(north_m / (meridian_m + self.alt_m)),
-            self.lon_deg + math.degrees(east_m / parallel_m),
+            float(longitude_near(self.lon_deg + math.degrees(east_m / parallel_m))),
         )

@@ -20,7 +20,7 @@ from estimators.logs.log import Log
 from estimators.logs.raw_records import Record, positions, read_records, record_times_us
 from estimators.logs.source import Stream
 from estimators.logs.units import to_si
-from flightsim.foundation.geodesy import MEAN_RADIUS_M
+from flightsim.foundation.geodesy import MEAN_RADIUS_M, longitude_near
 
 _SPIKE_SHARE: Final = 0.01
 _GLOBAL: Final = frozenset({"lat", "lon"})
@@ -168,9 +168,10 @@ def _changed(
         scale = 1.0 / to_si(stream.description.units.get(field, ""))[0]
         if field in _GLOBAL:
             scale = _wire_per_metre(field, records)
-        records[field] = _fitted(
-            _spoiled(column.astype(np.float64), times_s, fault, scale, rng), column.dtype
-        )
+        spoiled = _spoiled(column.astype(np.float64), times_s, fault, scale, rng)
+        if field == "lon" and fault.kind is not FaultKind.GARBAGE:  # an error across 180 degrees
+            spoiled = 1e7 * longitude_near(1e-7 * spoiled)
+        records[field] = _fitted(spoiled, column.dtype)
     return {
         position: _reframed(frame, record.tobytes(), definition)
         for position, frame, record in zip(order.tolist(), raw, records, strict=True)

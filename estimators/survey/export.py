@@ -60,11 +60,13 @@ def survey_files(result: SurveyResult) -> Mapping[str, bytes]:
 
 def _table(result: SurveyResult) -> Array:
     readings = result.readings
-    north_per_deg, east_per_deg = LocalFrame(result.home).metres_per_degree
+    lat_deg, lon_deg, _ = LocalFrame(result.home).geodetic_from_ned(
+        readings.north_m, readings.east_m, -readings.height_m
+    )
     return np.column_stack(
         (
-            result.home.lon_deg + readings.east_m / east_per_deg,
-            result.home.lat_deg + readings.north_m / north_per_deg,
+            lon_deg,
+            lat_deg,
             *(readings.north_m, readings.east_m, readings.height_m, readings.time_s, readings.total_nt),
             *(result.compensated_nt, result.levelled_nt, result.reference_nt, result.differential_nt),
         )

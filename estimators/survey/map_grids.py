@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from estimators.errors import EstimatorError
-from estimators.survey.map_places import EXAMPLE, WGS84, ReferenceSystem, library, wrapped_deg
+from estimators.survey.map_places import EXAMPLE, WGS84, ReferenceSystem, library
 from estimators.survey.map_values import LATITUDES, LONGITUDES, chosen
-from flightsim.foundation.geodesy import WGS84_A_M
+from flightsim.foundation.geodesy import WGS84_A_M, longitude_near
 
 __all__ = ["GridSource", "geotiff", "netcdf"]
 
@@ -186,7 +186,7 @@ def _regular(path: Path, crs: ReferenceSystem, columns: Array, rows: Array, valu
 
     def sample(at_x: Array, at_y: Array) -> Array:
         if crs.geographic:
-            at_x = wrapped_deg(at_x, 0.5 * float(x[0] + x[-1]))
+            at_x = longitude_near(at_x, 0.5 * float(x[0] + x[-1]))
         found: Array = inside(np.column_stack((_on_edge(at_y, y), _on_edge(at_x, x))))
         return found
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from estimators.errors import EstimatorError
 from estimators.survey.map_grids import geotiff, netcdf
 from estimators.survey.map_lines import gridded, line_data
-from estimators.survey.map_places import WGS84, ReferenceSystem, grid_degrees, transformed, wrapped_deg
+from estimators.survey.map_places import WGS84, ReferenceSystem, grid_degrees, transformed
 from estimators.survey.map_values import Values, with_main_field
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame, longitude_near
 from flightsim.foundation.magnetic_map_file import MagneticMapError, MapContents
 from flightsim.foundation.vectors import wrap_180
 
@@ -106,10 +106,7 @@ def _from_lines(path: Path, how: MapImport) -> MapContents:
     crs = ReferenceSystem.of(path, how.crs or WGS84.text)
     lon, lat = transformed(path, crs, WGS84, x, y)
     home, north_m, east_m = _grid_over(path, lat, lon, how)
-    per_lat, per_lon = LocalFrame(home).metres_per_degree
-    places = np.column_stack(
-        ((lat - home.lat_deg) * per_lat, (wrapped_deg(lon, home.lon_deg) - home.lon_deg) * per_lon)
-    )
+    places = np.column_stack(LocalFrame(home).ned_from_geodetic(lat, lon, np.zeros_like(lat))[:2])
     spacings = {"spacing_m": how.spacing_m, "line_spacing_m": how.line_spacing_m}
     grid = gridded(path, places, values, north_m, east_m, **spacings)
     return _made(path, how, home, north_m, east_m, grid)
@@ -145,17 +142,15 @@ def _grid_over(
             "system with `crs`, such as EPSG:32723"
         )
     lat, lon = lat_deg[finite], lon_deg[finite]
-    lon = wrapped_deg(lon, float(lon[0]))  # data on both sides of 180 degrees stay together
+    lon = longitude_near(lon, float(lon[0]))  # data on both sides of 180 degrees stay together
     home = how.home or GeodeticPosition(
         lat_deg=round(0.5 * float(lat.min() + lat.max()), 6),
         lon_deg=round(wrap_180(0.5 * float(lon.min() + lon.max())), 6),
         alt_m=0.0,
     )
-    lon = wrapped_deg(lon, home.lon_deg)
-    per_lat, per_lon = LocalFrame(home).metres_per_degree
     step = how.spacing_m
     axes = []
-    for values in ((lat - home.lat_deg) * per_lat, (lon - home.lon_deg) * per_lon):
+    for values in LocalFrame(home).ned_from_geodetic(lat, lon, np.zeros_like(lat))[:2]:
         away_m = max(float(values.min()), -float(values.max()), 0.0)
         if away_m > _FARTHEST_M:
             raise EstimatorError(

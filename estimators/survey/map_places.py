@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame, longitude_near
 
-__all__ = ["WGS84", "ReferenceSystem", "grid_degrees", "library", "transformed", "wrapped_deg"]
+__all__ = ["WGS84", "ReferenceSystem", "grid_degrees", "library", "transformed"]
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def transformed(
     errors, failures, warp = (library(f"rasterio.{name}", path) for name in ("errors", "_err", "warp"))
     try:
         with library("rasterio", path).Env():
-            found = warp.transform(source.text, target.text, wrapped_deg(x) if source.geographic else x, y)
+            found = warp.transform(source.text, target.text, longitude_near(x) if source.geographic else x, y)
     except (errors.RasterioError, failures.CPLE_BaseError, ValueError):
         systems = " to ".join(system.text[:60] for system in (source, target))
         raise EstimatorError(
@@ -83,12 +83,6 @@ def transformed(
             f"with `crs`, {EXAMPLE}"
         ) from None
     return np.asarray(found[0], dtype=np.float64), np.asarray(found[1], dtype=np.float64)
-
-
-def wrapped_deg(lon_deg: Array, middle_deg: float = 0.0) -> Array:
-    """Longitudes within 180 degrees of a middle one."""
-    turns = np.round((lon_deg - middle_deg) / 360.0)
-    return np.asarray(lon_deg - 360.0 * turns)
 
 
 def grid_degrees(home: GeodeticPosition, north_m: Array, east_m: Array) -> tuple[Array, Array]:

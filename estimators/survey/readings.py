@@ -85,8 +85,7 @@ def placed_readings(
     if not len(times):
         nothing = np.zeros(0)
         return SurveyReadings(**dict.fromkeys(_COLUMNS, nothing), unplaced=unplaced, implausible=implausible)
-    north_per_deg, east_per_deg = frame.metres_per_degree
-    origin = frame.origin
+    north_m, east_m, down_m = frame.ned_from_geodetic(*positions[:, 1:4].T)
     roll, pitch, yaw = (
         np.full(len(times), np.nan)
         if attitudes is None
@@ -95,9 +94,9 @@ def placed_readings(
     )
     return SurveyReadings(
         time_s=times,
-        north_m=np.interp(times, positions[:, 0], (positions[:, 1] - origin.lat_deg) * north_per_deg),
-        east_m=np.interp(times, positions[:, 0], (positions[:, 2] - origin.lon_deg) * east_per_deg),
-        height_m=np.interp(times, positions[:, 0], positions[:, 3]) - origin.alt_m,
+        north_m=np.interp(times, positions[:, 0], north_m),
+        east_m=np.interp(times, positions[:, 0], east_m),
+        height_m=-np.interp(times, positions[:, 0], down_m),
         roll_rad=roll,
         pitch_rad=pitch,
         yaw_rad=yaw,

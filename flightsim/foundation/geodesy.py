@@ -8,7 +8,9 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from flightsim.foundation.vectors import wrap_180
+import numpy as np
+
+from flightsim.foundation.vectors import Angle, wrap_180
 
 WGS84_A_M: Final = 6378137.0
 WGS84_E2: Final = 6.69437999014e-3
@@ -49,6 +51,14 @@ def earth_rate_ned_rad_s(lat_deg: float) -> tuple[float, float, float]:
     return EARTH_RATE_RAD_S * math.cos(lat), 0.0, -EARTH_RATE_RAD_S * math.sin(lat)
 
 
+def longitude_near(lon_deg: Angle, middle_deg: float = 0.0) -> Angle:
+    """A longitude, or an array of them, within 180 degrees of a middle one.
+
+    One that is within stays exactly as it is; `wrap_180` rounds.
+    """
+    return lon_deg - 360.0 * np.round((lon_deg - middle_deg) / 360.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeodeticPosition:
     """A point on or above the WGS84 ellipsoid: degrees, degrees, metres above mean sea level."""
@@ -81,8 +91,12 @@ class LocalFrame:
         """Metres per degree of latitude and of longitude at the origin."""
         return self._m_per_deg_lat, self._m_per_deg_lon
 
-    def ned_from_geodetic(self, lat_deg: float, lon_deg: float, alt_m: float) -> tuple[float, float, float]:
-        """(north, east, down) in metres of a geodetic point."""
+    def ned_from_geodetic(self, lat_deg: Angle, lon_deg: Angle, alt_m: Angle) -> tuple[Angle, Angle, Angle]:
+        """(north, east, down) in metres of a geodetic point, or of an array of them (n,) each.
+
+        East is the short way round: nothing else subtracts longitudes, so that no place loses it at 180
+        degrees. Places are interpolated and averaged after this conversion, not before.
+        """
         dlon = wrap_180(lon_deg - self.origin.lon_deg)
         return (
             (lat_deg - self.origin.lat_deg) * self._m_per_deg_lat,
@@ -90,8 +104,8 @@ class LocalFrame:
             self.origin.alt_m - alt_m,
         )
 
-    def geodetic_from_ned(self, north_m: float, east_m: float, down_m: float) -> tuple[float, float, float]:
-        """(latitude deg, longitude deg, altitude m) of a local point."""
+    def geodetic_from_ned(self, north_m: Angle, east_m: Angle, down_m: Angle) -> tuple[Angle, Angle, Angle]:
+        """(latitude deg, longitude deg, altitude m) of a local point, or of an array of them (n,) each."""
         return (
             self.origin.lat_deg + north_m / self._m_per_deg_lat,
             wrap_180(self.origin.lon_deg + east_m / self._m_per_deg_lon),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightsim import interface as i
 from flightsim import truth as t
 from flightsim.foundation.checks import check_amounts, require_rate
-from flightsim.foundation.geodesy import curvature_radii_m
+from flightsim.foundation.geodesy import curvature_radii_m, longitude_near
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_180
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -219,7 +219,7 @@ def add_local_bias(values: Array, bias: Array) -> None:
     per_lat_deg, per_lon_deg = _metres_per_degree(values[i.GPS_LAT_DEG], values[i.GPS_ALT_M])
     values += bias
     values[i.GPS_LAT_DEG] += bias[0] / per_lat_deg - bias[0]
-    values[i.GPS_LON_DEG] += bias[1] / per_lon_deg - bias[1]
+    values[i.GPS_LON_DEG] = longitude_near(values[i.GPS_LON_DEG] + (bias[1] / per_lon_deg - bias[1]))
 
 
 _curvature_radii_m = kernel(curvature_radii_m)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions
 from missions.multi_target.figures import true_targets
+from missions.runs.records import place_of, positions_ned_m
 
 if TYPE_CHECKING:
     from estimators.handoff import HandoffEstimate
@@ -66,22 +67,14 @@ def handoff_truth(records: "FlightRecords", system_ids: Sequence[int]) -> Handof
     if any(len(table) < 2 for table in tables):
         return None
     own = tables[0]
-    origin = GeodeticPosition(
-        lat_deg=own["lat"][0] * 1e-7, lon_deg=own["lon"][0] * 1e-7, alt_m=own["alt"][0] * 1e-3
-    )
-    frame = LocalFrame(origin)
-    per_lat, per_lon = frame.metres_per_degree
+    frame = LocalFrame(place_of(own[0]))
     time_us = own["time_usec"].astype(np.float64)
     aircraft = []
     for table in tables:
         yaw = np.unwrap(
             euler_from_quaternions(np.array(table["attitude_quaternion"].tolist(), dtype=np.float64))[2]
         )
-        columns = (
-            (table["lat"] * 1e-7 - origin.lat_deg) * per_lat,
-            (table["lon"] * 1e-7 - origin.lon_deg) * per_lon,
-            yaw,
-        )
+        columns = (*positions_ned_m(table, frame).T[:2], yaw)
         times = table["time_usec"].astype(np.float64)
         aircraft.append(np.column_stack([np.interp(time_us, times, column) for column in columns]))
     targets = [

@@ -11,6 +11,7 @@ from estimators.tracking.association import assign
 from estimators.tracking.ospa import gospa, ospa
 from flightsim.foundation.geodesy import LocalFrame
 from missions.orbit.score import TARGET_SYSTEM
+from missions.runs.records import positions_ned_m
 
 if TYPE_CHECKING:
     from missions.mission import Debriefing
@@ -57,14 +58,7 @@ def true_targets(records: "FlightRecords", frame: LocalFrame) -> list[tuple[Arra
         return []
     found, component = [], 1
     while len(own := records.truth(TARGET_SYSTEM, component)):
-        per_lat, per_lon = frame.metres_per_degree
-        places = np.column_stack(
-            (
-                (own["lat"] * 1e-7 - frame.origin.lat_deg) * per_lat,
-                (own["lon"] * 1e-7 - frame.origin.lon_deg) * per_lon,
-            )
-        )
-        found.append((own["time_usec"].astype(np.float64), places))
+        found.append((own["time_usec"].astype(np.float64), positions_ned_m(own, frame)[:, :2]))
         component += 1
     return found
 

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import LocalFrame
+from missions.runs.records import place_of, positions_ned_m
 
 if TYPE_CHECKING:
     from missions.runs.records import FlightRecords
@@ -19,24 +20,13 @@ _AIRBORNE_M: Final = 10.0  # height above the start; vehicles next to each other
 def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float | None:
     """Smallest distance of two vehicles while both were above 10 m; None: never, or no truth in the log."""
     tracks: list[tuple[Array, Array]] = []
-    origin: GeodeticPosition | None = None
+    frame: LocalFrame | None = None
     for system_id in system_ids:
         table = records.truth(system_id)
         if len(table) < 2:
             return None
-        if origin is None:
-            first = table[0]
-            origin = GeodeticPosition(
-                lat_deg=first["lat"] * 1e-7, lon_deg=first["lon"] * 1e-7, alt_m=first["alt"] * 1e-3
-            )
-        per_lat, per_lon = LocalFrame(origin).metres_per_degree
-        places = np.column_stack(
-            (
-                (table["lat"] * 1e-7 - origin.lat_deg) * per_lat,
-                (table["lon"] * 1e-7 - origin.lon_deg) * per_lon,
-                table["alt"] * 1e-3,
-            )
-        )
+        frame = frame or LocalFrame(place_of(table[0]))
+        places = positions_ned_m(table, frame)
         tracks.append((table["time_usec"].astype(np.float64) * 1e-6, places))
     if len(tracks) < 2:
         return None
@@ -46,7 +36,7 @@ def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float
     even = [np.column_stack([np.interp(at_s, time, axis) for axis in places.T]) for time, places in tracks]
     for k, own in enumerate(even):
         for other in even[k + 1 :]:
-            up = (own[:, 2] > own[0, 2] + _AIRBORNE_M) & (other[:, 2] > other[0, 2] + _AIRBORNE_M)
+            up = (own[:, 2] < own[0, 2] - _AIRBORNE_M) & (other[:, 2] < other[0, 2] - _AIRBORNE_M)
             if up.any():
                 least = min(least, float(np.linalg.norm(own[up] - other[up], axis=1).min()))
     return least if np.isfinite(least) else None

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking.metrics import rms
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import LocalFrame
 from missions.mission import Debriefing
 from missions.notes import FlightNotes
 from missions.orbit.options import OrbitOptions
-from missions.runs.records import FlightRecords
+from missions.runs.records import FlightRecords, place_of, positions_ned_m
 
 Array = NDArray[np.float64]
 
@@ -55,27 +55,13 @@ def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
     target = records.truth(TARGET_SYSTEM, 1)
     if len(own) < 2 or len(target) < 2:
         return None
-    origin = GeodeticPosition(
-        lat_deg=own["lat"][0] * 1e-7, lon_deg=own["lon"][0] * 1e-7, alt_m=own["alt"][0] * 1e-3
-    )
+    frame = LocalFrame(place_of(own[0]))
     time_s = own["time_usec"] * 1e-6
-    aircraft, theirs = _ned(own, origin), _ned(target, origin)
+    aircraft, theirs = positions_ned_m(own, frame), positions_ned_m(target, frame)
     at = np.column_stack([np.interp(time_s, target["time_usec"] * 1e-6, axis) for axis in theirs.T])
     offset = at - aircraft
     return OrbitTruth(
         time_s=time_s, aircraft_ned_m=aircraft, target_ned_m=at, radius_m=np.hypot(offset[:, 0], offset[:, 1])
-    )
-
-
-def _ned(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
-    """Positions of a table in a local frame; within some kilometres the error is a few centimetres."""
-    per_lat, per_lon = LocalFrame(origin).metres_per_degree
-    return np.column_stack(
-        (
-            (table["lat"] * 1e-7 - origin.lat_deg) * per_lat,
-            (table["lon"] * 1e-7 - origin.lon_deg) * per_lon,
-            origin.alt_m - table["alt"] * 1e-3,
-        )
     )
 
 

@@ -14,6 +14,7 @@ from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs.columns import decode_records, record_dtype
 from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, message_table, scan
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 UnixTime = Callable[[], int]
 """Returns microseconds of the Unix epoch."""
@@ -81,6 +82,19 @@ class FlightRecords:
         """
         table = self.table("HIL_STATE_QUATERNION", system_id, component_id)
         return table if table["time_usec"].any() else table[:0]
+
+
+def place_of(row: np.void) -> GeodeticPosition:
+    """The place in one message with `lat`, `lon` (degE7) and `alt` (mm)."""
+    return GeodeticPosition(lat_deg=row["lat"] * 1e-7, lon_deg=row["lon"] * 1e-7, alt_m=row["alt"] * 1e-3)
+
+
+def positions_ned_m(table: NDArray[np.void], frame: LocalFrame) -> NDArray[np.float64]:
+    """Local positions (n, 3) of messages with `lat`, `lon` (degE7) and `alt` (mm)."""
+    lat_deg, lon_deg, alt_m = (
+        table[name] * scale for name, scale in (("lat", 1e-7), ("lon", 1e-7), ("alt", 1e-3))
+    )
+    return np.column_stack(frame.ned_from_geodetic(lat_deg, lon_deg, alt_m))
 
 
 class FlightRecorder:

@@ -16,7 +16,7 @@ from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, quaternions_from_euler
 from missions.notes import PATTERN, FlightNotes
-from missions.runs.records import FlightRecords
+from missions.runs.records import FlightRecords, place_of, positions_ned_m
 from missions.runs.track import waypoint_misses_m
 
 Array = NDArray[np.float64]
@@ -199,19 +199,8 @@ def _in_time_order(table: NDArray[np.void], field: str) -> NDArray[np.void]:
 def _first_place(*tables: NDArray[np.void]) -> GeodeticPosition | None:
     for table in tables:
         if len(table):
-            row = table[0]
-            return GeodeticPosition(
-                lat_deg=row["lat"] * 1e-7, lon_deg=row["lon"] * 1e-7, alt_m=row["alt"] * 1e-3
-            )
+            return place_of(table[0])
     return None
-
-
-def _positions(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
-    frame = LocalFrame(origin)
-    n0, e0, _ = frame.ned_from_geodetic(origin.lat_deg + 1e-3, origin.lon_deg + 1e-3, 0.0)
-    north = (table["lat"] * 1e-7 - origin.lat_deg) * n0 * 1e3
-    east = (table["lon"] * 1e-7 - origin.lon_deg) * e0 * 1e3
-    return np.column_stack((north, east, origin.alt_m - table["alt"] * 1e-3))
 
 
 def _track(table: NDArray[np.void], origin: GeodeticPosition, field: str, scale: float) -> Track | None:
@@ -219,7 +208,7 @@ def _track(table: NDArray[np.void], origin: GeodeticPosition, field: str, scale:
         return None
     return Track(
         time_s=table[field] * scale,
-        pos_ned_m=_positions(table, origin),
+        pos_ned_m=positions_ned_m(table, LocalFrame(origin)),
         yaw_rad=euler_from_quaternions(table["attitude_quaternion"])[2],
     )
 
@@ -229,7 +218,7 @@ def _estimate_track(
 ) -> Track | None:
     if not len(table):
         return None
-    position = _positions(table, origin)
+    position = positions_ned_m(table, LocalFrame(origin))
     position[:, 2] = -table["relative_alt"] * 1e-3
     time_s = table["time_boot_ms"] * 1e-3
     if len(attitude):

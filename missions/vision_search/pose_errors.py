@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
+from missions.runs.records import positions_ned_m
 
 if TYPE_CHECKING:
     from missions.runs.records import FlightRecords
@@ -57,10 +58,10 @@ def pose_errors(
         for name, true in zip(("roll", "pitch", "yaw"), true_angles, strict=True)
     ]
     own_us = position["time_boot_ms"] * 1e3
-    per_lat, per_lon = frame.metres_per_degree
+    own_ne_m, true_ne_m = (positions_ned_m(table, frame).T[:2] for table in (position, truth))
     north, east = (
-        factor * 1e-7 * (_at(times, own_us, position[name] * 1.0) - _at(times, true_us, truth[name] * 1.0))
-        for name, factor in (("lat", per_lat), ("lon", per_lon))
+        _at(times, own_us, own) - _at(times, true_us, true)
+        for own, true in zip(own_ne_m, true_ne_m, strict=True)
     )
     # height above home: that of the truth from its own begin, before the take-off
     height = _at(times, own_us, position["relative_alt"] * 1e-3)
