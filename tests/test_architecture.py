@@ -285,6 +285,42 @@ def test_the_test_sees_options():
     assert [text for text in found if FLAG.search(text)] == ["give --b "]
 
 
+LONGITUDE = re.compile(r"(?<![a-z])(lon|lng|longitude)(?![a-z])", re.IGNORECASE)
+WRAPS = ("wrap_180", "longitude_near")
+
+
+def longitude_differences(source):
+    """Subtractions of longitudes that are not the argument of a function that wraps."""
+    tree = parsed(source)
+    wrapped = {
+        id(argument)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] in WRAPS
+        for argument in node.args
+    }
+    return [
+        ast.unparse(node)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub) and id(node) not in wrapped
+        if LONGITUDE.search(ast.unparse(node.right))
+    ]
+
+
+def test_longitudes_are_subtracted_in_one_place():
+    """Elsewhere `LocalFrame` and `HomeFrame` make metres of places: a longitude jumps at 180 degrees."""
+    evenly = "estimators.survey.map_export"  # the step of a grid whose longitudes may pass 180 degrees
+    found = found_by_module(
+        lambda name: longitude_differences(source_of(name)), without=("flightsim.foundation.geodesy", evenly)
+    )
+    assert found == {}
+
+
+def test_the_test_sees_longitudes():
+    assert longitude_differences(
+        "e = (t['lon'] * 1e-7 - o.lon_deg) * k\nwrap_180(lon - o.lon)\nalong - b"
+    ) == ["t['lon'] * 1e-07 - o.lon_deg"]
+
+
 def earth_constants(source):
     """Constants of WGS84 and of the standard atmosphere among the numbers of a source."""
     return sorted(

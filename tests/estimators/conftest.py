@@ -32,11 +32,11 @@ class LogMaker:
         message = dialect.MAVLink_attitude_message(round(time_s * 1e3), roll, pitch, 0.1, 0.0, 0.0, 0.0)
         self.say(message, system, component)
 
-    def truth(self, time_s, roll, system=1, component=25):
+    def truth(self, time_s, roll, system=1, component=25, lon=85455900):
         q = [math.cos(roll / 2), math.sin(roll / 2), 0.0, 0.0]
         self.say(
             dialect.MAVLink_hil_state_quaternion_message(
-                round(time_s * 1e6), q, 0.0, 0.0, 0.0, 473977400, 85455900, 500000, 0, 0, 0, 0, 0, 0, 0, 0
+                round(time_s * 1e6), q, 0.0, 0.0, 0.0, 473977400, lon, 500000, 0, 0, 0, 0, 0, 0, 0, 0
             ),
             system,
             component,

@@ -120,6 +120,17 @@ def test_positions_are_counted_from_home(make_log):
     assert columns["course_rad"].values == pytest.approx([math.atan2(4.0, 3.0)])
 
 
+def test_offsets_to_a_target_are_the_short_way_across_180_degrees(make_log):
+    log = make_log()
+    for k in range(30):
+        log.attitude(0.1 * k)
+        for system, component, lon in ((1, 25, 1_799_999_000), (251, 1, -1_799_999_000)):
+            log.truth(0.1 * k, 0.0, system, component, lon)
+    columns = references(open_log(log.close()), 1)["truth"].columns
+    assert columns["offset_north_m"].values == pytest.approx(np.zeros(30))
+    assert columns["offset_east_m"].values == pytest.approx(np.full(30, 15.1), abs=0.1)
+
+
 def test_comparison_over_two_boots(make_log, level):
     """The same times twice, with other truths: each boot is compared with its own."""
     found = estimator_class(level)

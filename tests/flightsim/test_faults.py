@@ -10,7 +10,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from flightsim import interface as i
 from flightsim import truth as t
 from flightsim.foundation.random_streams import RandomStreams
+from flightsim.home import Home
 from flightsim.interface import Reading
+from flightsim.payload.home_frame import HomeFrame
 from flightsim.sensors import (
     AirspeedParameters,
     BarometerParameters,
@@ -20,6 +22,7 @@ from flightsim.sensors import (
     SensorUnit,
     UnsupportedFaultError,
 )
+from flightsim.sensors.gps import add_local_bias
 
 Array = NDArray[np.float64]
 
@@ -243,6 +246,18 @@ def test_wrong_and_drift_add_a_bias(
     elapsed_s = np.arange(1, during.sum() + 1) / rate_hz(unit)
     grown = (drift.values - good.values)[during][:, channels]
     np.testing.assert_allclose(grown, elapsed_s[:, None] * expected, atol=1e-9)
+
+
+def test_positions_of_the_world_and_biased_ones_stay_within_180_degrees() -> None:
+    home = Home(lat_deg=20.0, lon_deg=179.9999, alt_m=100.0)
+    lat_deg, lon_deg = home.offset(3.0, 50.0)
+    assert -180.0 <= lon_deg < -179.999
+    assert HomeFrame(home).north_east_m(lat_deg, lon_deg) == pytest.approx((3.0, 50.0), abs=1e-6)
+    assert home.offset(0.0, 0.0) == (20.0, 179.9999)
+    values = np.zeros(i.GPS_SIZE)
+    values[[i.GPS_LAT_DEG, i.GPS_LON_DEG]] = 20.0, 179.9999
+    add_local_bias(values, np.array([0.0, 50.0, 0.0, *np.zeros(i.GPS_SIZE - 3)]))
+    assert values[i.GPS_LON_DEG] == pytest.approx(lon_deg, abs=1e-8)
 
 
 def test_gps_bias_is_in_metres(healthy: dict[str, Trace]) -> None:

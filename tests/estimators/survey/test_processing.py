@@ -244,6 +244,18 @@ def test_a_stuck_magnetometer_and_a_gap_of_positions_are_left_out():
     np.testing.assert_allclose(found.height_m, 80.0)
 
 
+def test_readings_are_placed_across_180_degrees():
+    time_s = 0.1 * np.arange(100)
+    frame = LocalFrame(replace(HOME, lon_deg=179.9999))
+    east_m = 20.0 * time_s
+    lat, lon, alt = frame.geodetic_from_ned(np.zeros(100), east_m, np.full(100, -80.0))
+    positions = np.column_stack((time_s, lat, lon, alt))
+    total_nt = 48_000.0 + np.random.default_rng(1).standard_normal(100)
+    found = placed_readings(time_s, total_nt, positions=positions[::3], attitudes=None, frame=frame)
+    np.testing.assert_allclose(found.east_m, 20.0 * found.time_s, atol=1e-4)
+    assert len(found) == 100
+
+
 @pytest.mark.parametrize(("missing_s", "share"), [(1.5, 1.0), (20.0, 1.0 - 20.1 * SPEED_M_S / 1600.0)])
 def test_a_hole_in_the_readings_of_a_line_is_not_covered(missing_s, share):
     """A pause between two readings that is longer than two seconds leaves a hole."""

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pymap3d
 import pytest
 
@@ -9,6 +10,7 @@ from flightsim.foundation.geodesy import (
     GeodeticPosition,
     LocalFrame,
     earth_rate_ned_rad_s,
+    longitude_near,
     normal_gravity_m_s2,
 )
 
@@ -51,6 +53,26 @@ def test_across_the_date_line():
     north, east, down = frame.ned_from_geodetic(0.0, -179.9999, 5.0)
     exact = pymap3d.geodetic2ned(0.0, -179.9999, 5.0, 0.0, 179.9999, 0.0)
     assert (north, east, down) == pytest.approx(exact, abs=1e-3)
+
+
+@pytest.mark.parametrize("lat_deg", [0.0, 89.0])
+def test_a_track_across_the_date_line_is_converted_as_its_points_are(lat_deg):
+    frame = LocalFrame(GeodeticPosition(lat_deg=lat_deg, lon_deg=179.9999, alt_m=20.0))
+    track = np.linspace(-300.0, 300.0, 50), np.linspace(-400.0, 400.0, 50), np.linspace(0.0, -30.0, 50)
+    lat, lon, alt = frame.geodetic_from_ned(*track)
+    assert np.abs(lon).max() <= 180.0
+    assert lon.min() < 0.0 < lon.max()
+    np.testing.assert_allclose(frame.ned_from_geodetic(lat, lon, alt), track, atol=1e-6)
+    assert frame.ned_from_geodetic(*(float(values[7]) for values in (lat, lon, alt))) == tuple(
+        values[7] for values in frame.ned_from_geodetic(lat, lon, alt)
+    )
+
+
+def test_a_longitude_within_half_a_turn_is_left_exactly_as_it_is():
+    within = np.random.default_rng(1).uniform(-180.0, 180.0, 1000)
+    np.testing.assert_array_equal(longitude_near(within), within)
+    assert longitude_near(180.001) == pytest.approx(-179.999)
+    assert longitude_near(-179.5, 179.5) == pytest.approx(180.5)
 
 
 def test_altitude_scales_the_frame():
