@@ -13,7 +13,7 @@ GROUND_FLOOR = tuple(
     f"autopilot_bridge.{name}"
     for name in (
         *("mavlink", "links", "routing", "clock", "tlog", "packet_records", "errors"),
-        *("mission_plan", "mission_wire", "fence_shapes"),
+        *("mission_plan", "mission_wire", "mission_feasibility", "fence_shapes"),
         *("parameters", "parameter_files"),
     )
 )
@@ -34,7 +34,10 @@ SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "thre
 SANS_IO = (
     *(
         f"autopilot_bridge.{name}"
-        for name in (*("mavlink", "routing"), *("mission_plan", "mission_wire", "fence_shapes"))
+        for name in (
+            *("mavlink", "routing"),
+            *("mission_plan", "mission_wire", "mission_feasibility", "fence_shapes"),
+        )
     ),
     *(
         f"autopilot_bridge.{name}"

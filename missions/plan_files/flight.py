@@ -5,7 +5,6 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.mission_plan import MissionType
 from missions.errors import PlanError, VehicleTimeout
 from missions.kind import VehicleKind
 from missions.notes import CommandedPath, CutShort
@@ -67,12 +66,8 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
     notes.begin("upload", clock.stamp_us)
     if wings:
         vehicle.wing.note_runway()
-    if document.fence:
-        await vehicle.plans.upload_plan(MissionType.FENCE, document.fence)
-    if document.rally:
-        await vehicle.plans.upload_plan(MissionType.RALLY, document.rally)
     items = placed(document.items, home, vehicle.firmware.unset)
-    first = await vehicle.plans.upload_mission(items)
+    first = await vehicle.plans.upload_mission(items, fence=document.fence, rally=document.rally)
     notes.begin("takeoff", clock.stamp_us)
     watch = MissionWatch(vehicle, document, stops, first, acceptance_m)
     expected_s = route.duration_s(own_speed_m_s(document, vehicle.kind))

@@ -17,7 +17,9 @@ from missions.vehicle.item_tracker import (
     mission_steps,
 )
 from missions.vehicle.link import VehicleLink
+from missions.vehicle.mission_rules import refuse_infeasible
 from missions.vehicle.mission_transfer import clear, download, renumbered, upload
+from missions.vehicle.parameters import VehicleParameters
 
 _REWINDS: Final = 4
 _REWIND_S: Final = 1.5
@@ -32,28 +34,46 @@ class VehiclePlans:
 
     Args:
         link: messages of the vehicle.
+        parameters: its parameters.
         heights: whether items below home may be uploaded.
     """
 
-    def __init__(self, link: VehicleLink, heights: HeightRule) -> None:
+    def __init__(self, link: VehicleLink, parameters: VehicleParameters, heights: HeightRule) -> None:
         self._link = link
+        self._parameters = parameters
         self._heights = heights
         self._tracker: ItemTracker | None = None  # tracker of the mission that was uploaded last
 
-    async def upload_mission(self, items: Sequence[MissionItem]) -> int:
+    async def upload_mission(
+        self,
+        items: Sequence[MissionItem],
+        *,
+        fence: Sequence[MissionItem] = (),
+        rally: Sequence[MissionItem] = (),
+    ) -> int:
         """Upload a plan; returns the sequence number of its first item on the link (1 for ArduPilot, whose
         item 0 is home).
 
         The flight starts at its first item. Jumps name items by their index in `items`.
 
+        Args:
+            items: the mission.
+            fence, rally: geofence and rally points that replace those on the vehicle; empty: it keeps its
+                own.
+
         Raises:
             PlanError: an item is below home, which is not allowed (`Vehicle.allow_below_home`), or below the
-                ground; nothing was sent.
+                ground, or the vehicle would not fly the mission (`mission_rules`); nothing was sent.
             CommandRejected, VehicleTimeout: see `upload`.
         """
         first = 1 if self._link.firmware.first_mission_item_is_home else 0
         home = self._link.home
         refuse_low_items(items, home.alt_m, below_home_allowed=self._heights.below_home_allowed)
+        await refuse_infeasible(self._link, self._parameters, items, fence)
+        if fence:
+            await upload(self._link, fence, MissionType.FENCE)
+        if rally:
+            await upload(self._link, rally, MissionType.RALLY)
         marker = MissionItem(
             command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m
         )

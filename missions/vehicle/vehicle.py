@@ -60,7 +60,7 @@ class Vehicle:
         self.link = VehicleLink(connection, system_id)
         self.commands = VehicleCommands(self.link)
         self.parameters = VehicleParameters(self.link)
-        self.plans = VehiclePlans(self.link, self.commands.heights)
+        self.plans = VehiclePlans(self.link, self.parameters, self.commands.heights)
         self.payload = Payload(self.link)
         self.forecast_wind_m_s: float = FORECAST_WIND_M_S
         self.local_origin = LocalOrigin(self.commands)

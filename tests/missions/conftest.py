@@ -75,6 +75,11 @@ class FakeAutopilot:
             "WPNAV_SPEED": (1000.0, 9),
             "WPNAV_ACCEL": (250.0, 9),
             "WPNAV_RADIUS": (200.0, 9),
+            "MIS_TKO_LAND_REQ": (0, 6),
+            "GF_MAX_HOR_DIST": (0.0, 9),
+            "GF_MAX_VER_DIST": (0.0, 9),
+            "ARMING_CHECK": (1, 6),
+            "ARMING_MIS_ITEMS": (0, 6),
         }
         self.mute_commands = set()  # MAV_CMDs that are not answered
         self.refuse_modes = set()  # kinds of mode that are refused

@@ -325,7 +325,7 @@ def test_guided_items_of_old_clients(ardupilot: Vehicle, px4: Vehicle) -> None:
         ([item(0, TAKEOFF, frame=5, z=495.0)], None),
         ([item(0), item(1, TAKEOFF)], "Mission rejected: takeoff not first waypoint item"),
         ([item(0, TAKEOFF), item(1, TAKEOFF)], "Mission rejected: takeoff not first waypoint item"),
-        ([item(0, 84), item(1)], "Mission rejected: item 1: unsupported command: 84"),
+        ([item(0, 84), item(1)], "Mission rejected: Mission contains VTOL items but vehicle is not a VTOL"),
         ([item(0, LAND)], "Mission rejected: starts with landing"),
     ],
 )

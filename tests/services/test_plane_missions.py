@@ -11,10 +11,15 @@ from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.firmware.ardupilot import texts as ardupilot_texts
 from autopilot_bridge.firmware.ardupilot.mission_rules import ARDUPLANE_MISSION_POLICY
 from autopilot_bridge.firmware.px4 import texts as px4_texts
-from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
 from autopilot_bridge.firmware.px4.mission_rules import PX4_PLANE_MISSION_POLICY
-from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
+from autopilot_bridge.mission_feasibility.ardupilot import (
+    COPTER_PARAMETERS,
+    PLANE_PARAMETERS,
+    copter_problems,
+    plane_problems,
+)
+from autopilot_bridge.mission_feasibility.px4 import Px4MissionRules, mission_problems
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
@@ -23,7 +28,8 @@ from tests.services.mission_rig import HOME, Recorder
 
 TAKEOFF, WAYPOINT, LAND, LOITER_TO_ALT, LAND_START = 22, 16, 21, 31, 189
 FRAME = LocalFrame(HOME)
-RULES = AircraftRules(landing_angle_rad=math.radians(5.0), loiter_radius_m=80.0, required=2)
+RULES = Px4MissionRules(fixed_wing=True, required=2)
+LARGEST_SLOPE_RAD = math.radians(5.1)  # FW_LND_ANG and a tenth of a degree
 
 
 def item(command: int, north_m: float = 0.0, east_m: float = 0.0, z: float = 50.0, **fields) -> MissionItem:
@@ -31,8 +37,8 @@ def item(command: int, north_m: float = 0.0, east_m: float = 0.0, z: float = 50.
     return MissionItem(command=command, **{"frame": 6, "x": lat, "y": lon, "z": z, **fields})
 
 
-def problems(*items: MissionItem, rules: AircraftRules = RULES, landed: bool = True) -> tuple[str, ...]:
-    return mission_problems(items, home_alt_m=HOME.alt_m, landed=landed, aircraft=rules)
+def problems(*items: MissionItem, rules: Px4MissionRules = RULES, landed: bool = True) -> tuple[str, ...]:
+    return mission_problems(items, rules, home_alt_m=HOME.alt_m, landed=landed)
 
 
 START = item(TAKEOFF, 200.0)
@@ -40,11 +46,13 @@ LAND_HERE = item(LAND, 0.0, 0.0, 0.0)
 
 
 def test_a_shallow_approach_is_flyable_and_a_steep_one_is_not() -> None:
-    distance_m = 40.0 / math.tan(math.radians(5.0))
+    distance_m = 40.0 / math.tan(LARGEST_SLOPE_RAD)
     assert problems(START, item(WAYPOINT, -distance_m - 1.0, 0.0, 40.0), LAND_HERE) == ()
     steep = problems(START, item(WAYPOINT, -0.9 * distance_m, 0.0, 40.0), LAND_HERE)
-    assert steep == ("Mission rejected: the landing approach is too steep",)
-    gentle = AircraftRules(landing_angle_rad=math.radians(10.0), loiter_radius_m=80.0, required=2)
+    assert steep == (
+        "Mission rejected: the landing glide slope is steeper than the vehicle setting of 5.0 degrees",
+    )
+    gentle = Px4MissionRules(fixed_wing=True, landing_angle_rad=math.radians(10.0), required=2)
     assert problems(START, item(WAYPOINT, -0.9 * distance_m, 0.0, 40.0), LAND_HERE, rules=gentle) == ()
 
 
@@ -55,12 +63,13 @@ def test_altitudes_over_sea_level_count_from_home() -> None:
 
 def test_a_circle_is_left_along_its_tangent() -> None:
     height_m = 30.0
-    way_m = height_m / math.tan(RULES.landing_angle_rad)
+    way_m = height_m / math.tan(LARGEST_SLOPE_RAD)
     centre_m = math.hypot(way_m, 80.0)
-    assert problems(START, item(LOITER_TO_ALT, -centre_m - 1.0, 0.0, height_m), LAND_HERE) == ()
-    assert problems(START, item(LOITER_TO_ALT, -centre_m + 5.0, 0.0, height_m), LAND_HERE) != ()
+    circle = {"z": height_m, "param2": 80.0}
+    assert problems(START, item(LOITER_TO_ALT, -centre_m - 1.0, **circle), LAND_HERE) == ()
+    assert problems(START, item(LOITER_TO_ALT, -centre_m + 5.0, **circle), LAND_HERE) != ()
     assert problems(START, item(LOITER_TO_ALT, -90.0, 0.0, 30.0, param2=100.0), LAND_HERE) == (
-        "Mission rejected: landing point is within the loiter radius",
+        "Mission rejected: the landing point must be outside the orbit radius",
     )
 
 
@@ -68,7 +77,10 @@ def test_the_approach_comes_from_above_and_from_somewhere() -> None:
     assert problems(START, item(WAYPOINT, -500.0, 0.0, -5.0), LAND_HERE) == (
         "Mission rejected: the approach waypoint must be above the landing point",
     )
-    assert problems(START, LAND_HERE) == ("Mission rejected: need landing approach",)
+    (text,) = problems(START, LAND_HERE)
+    assert "unsupported landing approach entrance waypoint type" in text
+    speed = MissionItem(command=178, frame=2)
+    assert problems(START, speed, LAND_HERE) == ()  # an item without a place directly before it: not checked
 
 
 @pytest.mark.parametrize(
@@ -84,10 +96,12 @@ def test_the_approach_comes_from_above_and_from_somewhere() -> None:
         (4, True, False, False),
         (4, False, False, True),
         (4, True, True, True),
+        (5, True, True, True),
+        (5, False, False, False),  # in flight
     ],
 )
 def test_required_items(required: int, takeoff: bool, landing: bool, accepted: bool) -> None:
-    rules = AircraftRules(landing_angle_rad=0.1, loiter_radius_m=80.0, required=required)
+    rules = Px4MissionRules(fixed_wing=True, landing_angle_rad=0.1, required=required)
     plan = (
         *((START,) if takeoff else ()),
         item(WAYPOINT, -900.0, 0.0, 40.0),
@@ -133,8 +147,45 @@ def test_the_rules_follow_the_parameters() -> None:
     assert service.mission_valid()
 
 
-def test_a_multicopters_missions_are_judged_as_before() -> None:
-    assert mission_problems((START, item(WAYPOINT)), home_alt_m=HOME.alt_m) == ()
+def test_a_multicopter_lands_from_anywhere_and_needs_what_its_parameter_asks_for() -> None:
+    copter = Px4MissionRules(fixed_wing=False)
+    assert problems(START, item(WAYPOINT), rules=copter) == ()
+    assert problems(START, LAND_HERE, rules=copter) == ()
+    strict = Px4MissionRules(fixed_wing=False, required=2)
+    assert problems(START, item(WAYPOINT), rules=strict) == (
+        "Mission rejected: Landing waypoint/pattern required",
+    )
+    home = item(20, 0.0, 0.0, 0.0)
+    assert problems(START, item(WAYPOINT), home, rules=strict) != ()  # a return is no landing
+
+
+def test_a_return_behind_the_start_of_a_landing_is_refused() -> None:
+    begin, entry, back = MissionItem(command=LAND_START, frame=2), item(WAYPOINT, -900.0, 0.0, 40.0), item(20)
+    assert problems(START, entry, LAND_HERE, begin, back)[0] == (
+        "Mission rejected: land start item before RTL item is not possible"
+    )
+
+
+def test_what_arduplane_does_not_arm_with() -> None:
+    begin = MissionItem(command=LAND_START, frame=2)
+    usual = dict(PLANE_PARAMETERS)
+    assert plane_problems((START, begin, LAND_HERE), usual) == (
+        "Arm: DO_LAND_START set and RTL_AUTOLAND disabled",
+    )
+    assert plane_problems((START, begin, LAND_HERE), {**usual, "RTL_AUTOLAND": 2.0}) == ()
+    assert plane_problems((START, begin, LAND_HERE), {**usual, "ARMING_CHECK": 0.0}) == ()
+    required = {**usual, "ARMING_MIS_ITEMS": 1.0 + 8.0}
+    assert plane_problems((START,), required) == ("Arm: Missing mission item: land",)
+    assert plane_problems((START, LAND_HERE), required) == ()
+    assert plane_problems((START,), {**required, "ARMING_CHECK": 4.0}) == ()  # without the mission's check
+
+
+def test_arducopter_takes_off_first() -> None:
+    usual, missing = dict(COPTER_PARAMETERS), ("Auto: Missing Takeoff Cmd",)
+    speed, delay = MissionItem(command=178, frame=2), MissionItem(command=93, frame=2)
+    assert copter_problems((speed, delay, START, item(WAYPOINT)), usual, landed=True) == ()
+    assert copter_problems((item(WAYPOINT), START), usual, landed=True) == missing
+    assert copter_problems((item(WAYPOINT),), usual, landed=False) == ()
 
 
 def test_arduplane_holds_655_items() -> None:

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.firmware.data import commands, load_data
-from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
-from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
+from autopilot_bridge.mission_feasibility.px4 import PARAMETERS, Px4MissionRules, mission_problems
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.parameters import ParameterStore
@@ -123,16 +123,13 @@ def _heading(degrees: float) -> float:
     return degrees % 360.0
 
 
-def _multicopter_problems(
-    items: tuple[MissionItem, ...], parameters: ParameterStore, **situation: Any
+def _problems(
+    items: tuple[MissionItem, ...], parameters: ParameterStore, *, fixed_wing: bool = False, **situation: Any
 ) -> tuple[str, ...]:
-    return mission_problems(items, **situation)
-
-
-def _aircraft_problems(
-    items: tuple[MissionItem, ...], parameters: ParameterStore, **situation: Any
-) -> tuple[str, ...]:
-    return mission_problems(items, aircraft=AircraftRules.of(parameters), **situation)
+    values = {
+        name: parameters.get(name) if name in parameters else usual for name, usual in PARAMETERS.items()
+    }
+    return mission_problems(items, Px4MissionRules.of(values, fixed_wing=fixed_wing), **situation)
 
 
 PX4_MISSION_POLICY: Final = MissionPolicy(
@@ -171,6 +168,6 @@ PX4_MISSION_POLICY: Final = MissionPolicy(
     sends_current_on_change=True,
     acks_set_current=False,
     guided_items=False,
-    feasibility=_multicopter_problems,
+    feasibility=_problems,
 )
-PX4_PLANE_MISSION_POLICY: Final = replace(PX4_MISSION_POLICY, feasibility=_aircraft_problems)
+PX4_PLANE_MISSION_POLICY: Final = replace(PX4_MISSION_POLICY, feasibility=partial(_problems, fixed_wing=True))

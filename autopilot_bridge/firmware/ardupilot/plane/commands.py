@@ -11,6 +11,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.flight.plan_reading import in_landing_sequence, landing_start
+from autopilot_bridge.mission_feasibility.ardupilot import PLANE_PARAMETERS, plane_problems
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands import handlers as handlers
@@ -21,7 +22,6 @@ _AIRSPEED, _GROUND_SPEED = 0, 1  # SPEED_TYPE
 _DEFAULT_SPEED: Final = -2.0
 _COURSE, _HEADING = 0, 1  # HEADING_TYPE
 _LEAST_TURN_M_S2: Final = 0.05
-_AUTOLAND_OFF: Final = 0  # RTL_AUTOLAND
 _SWITCH_HIGH: Final = 2
 _SWITCHES: Final = {
     4: FlightMode.RETURN,
@@ -68,16 +68,16 @@ class ArduPlaneCommands(ArduPilotCommands):
         if command.p1 == 1.0 and checked and not self.commander.armed:
             problem = self._mission_problem()
             if problem is not None:
-                self.hooks.announce(_CRITICAL, f"Arm: {problem}")
+                self.hooks.announce(_CRITICAL, problem)
                 return Result.FAILED
         return super().arm_disarm(command, source)
 
     def _mission_problem(self) -> str | None:
-        missions = self.commander.missions
-        autoland = self.hooks.parameters.get("RTL_AUTOLAND")
-        if landing_start(missions.items) is not None and autoland == _AUTOLAND_OFF:
-            return "DO_LAND_START set and RTL_AUTOLAND disabled"
-        return None
+        store = self.hooks.parameters
+        values = {
+            name: store.get(name) if name in store else usual for name, usual in PLANE_PARAMETERS.items()
+        }
+        return next(iter(plane_problems(self.commander.missions.items[1:], values)), None)
 
     def set_flight_mode(self, mode: FlightMode) -> Result:
         """Select a mode; leaving AUTO on the ground after a landing resets the mission."""
