@@ -1,7 +1,7 @@
 """ArduPilot's rules for stored missions: what arming and the mode AUTO refuse.
 
-The premise of each rule is noted with it. Sources: ArduPilot 4.6.3, ArduCopter/mode_auto.cpp (ModeAuto::init),
-AP_Mission::is_takeoff_next, AP_Arming::mission_checks, ArduPlane/AP_Arming.cpp (mission_checks).
+The premise of each rule is noted with it. Sources: ArduPilot 4.6.3, ArduCopter/mode_auto.cpp
+(ModeAuto::init), AP_Mission::is_takeoff_next, AP_Arming::mission_checks, ArduPlane/AP_Arming.cpp.
 """
 
 from collections.abc import Mapping, Sequence
