@@ -29,6 +29,10 @@ from flightsim.turbulence import BLOCK_STEPS
 Array = NDArray[np.float64]
 
 _LEAST_AIRSPEED_M_S: Final = 1.0  # as for the turbulence that it goes with
+_STILL_AIR_M_S: Final = 1e-3
+"""Slower air makes no moments. In the step in which gusts begin around a vehicle that stands in calm air,
+JSBSim multiplies the new dynamic pressure by rates over the airspeed of the step before, which is near zero.
+"""
 _ROTARY: Final = 1  # added to the spawn key of the turbulence's stream
 
 
@@ -62,7 +66,8 @@ def advance_rotary(
         gust_ned_m_s: (3,) its velocity.
         q_ned_from_frd: (4,) attitude.
         work: (3,), written.
-        out: (3,) rotation of the air over ground, body axes, rad/s, written.
+        out: (3,) rotation of the air over ground, body axes, rad/s, written; zero around a vehicle in still
+            air.
     """
     span_m, dt_s = constants[0], constants[1]
     travelled_m = max(airspeed_m_s, _LEAST_AIRSPEED_M_S) * dt_s
@@ -82,6 +87,8 @@ def advance_rotary(
     work[1] = s * p + c * q
     work[2] = right_m_s / lateral_m
     rotate_inverse(q_ned_from_frd, work, out)
+    if airspeed_m_s < _STILL_AIR_M_S:
+        out[:] = 0.0
 
 
 class RotaryGusts:

@@ -6,7 +6,7 @@ clock.
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from autopilot_bridge.commander import events
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.external_mapping import connected
 from autopilot_bridge.firmware.flavour import Flavour
@@ -26,6 +27,7 @@ from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Service, Source, TimedService, receivers_by_id
 from autopilot_bridge.services.commands.handlers import CommandHooks
@@ -57,6 +59,15 @@ _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MA
 
 FailureHook = Callable[[int, int, int], Result]
 EntryT = TypeVar("EntryT")
+
+
+class _TypedParameters(NamedTuple):
+    """What the parts of the autopilot use of the parameters; control laws and flight differ by vehicle."""
+
+    navigation: NavigationParameters
+    controller: Any
+    flight: Any
+    commander: CommanderParameters
 
 
 class _Progress:
@@ -135,7 +146,12 @@ class Autopilot:
         memory = VehicleMemory(
             card=card,
             stored=boot_parameters(
-                self.parameters, card, firmware.card, system_id=system_id, given=parameters or {}
+                self.parameters,
+                card,
+                firmware.card,
+                system_id=system_id,
+                given=parameters or {},
+                check=self._typed_parameters,
             ),
             time_us=lambda: self._time_us,
             unix_epoch_us=unix_epoch_us,
@@ -145,18 +161,15 @@ class Autopilot:
         )
         readings = connected(readings, flavour.gps_source(self.parameters))
         self._readings = readings
+        typed = self._typed_parameters()
         self.navigation = NavigationFilter(
-            flavour.navigation_parameters(self.parameters), readings=readings, physics_rate_hz=physics_rate_hz
+            typed.navigation, readings=readings, physics_rate_hz=physics_rate_hz
         )
         self.controller = flavour.controller(
-            flavour.controller_parameters(self.parameters, **self._vehicle),
-            physics_rate_hz=physics_rate_hz,
-            nav=self.navigation.state,
+            typed.controller, physics_rate_hz=physics_rate_hz, nav=self.navigation.state
         )
         self.context = FlightContext(
-            nav=self.navigation.state,
-            setpoint=self.controller.setpoint,
-            parameters=flavour.flight_parameters(self.parameters, **self._vehicle),
+            nav=self.navigation.state, setpoint=self.controller.setpoint, parameters=typed.flight
         )
         self.context.health = self.navigation.health
         self.context.attitude_setpoint = self.controller.attitude_setpoint
@@ -165,7 +178,7 @@ class Autopilot:
         self.commander = Commander(
             self.context,
             policy=flavour.policy,
-            parameters=flavour.commander_parameters(self.parameters),
+            parameters=typed.commander,
             vehicle=flavour.vehicle_tasks(self.context, stores[MissionType.MISSION], flavour.policy),
             health=HealthMonitor(
                 readings,
@@ -382,12 +395,26 @@ class Autopilot:
         self._streams.push(mavlink.MAVLINK_MSG_ID_HOME_POSITION, self._time_us)
         self._streams.push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, self._time_us)
 
-    def _on_parameter(self, name: str, value: float) -> None:
+    def _typed_parameters(self) -> _TypedParameters:
+        """The parameters as the parts use them.
+
+        Raises:
+            ValueError, ArithmeticError: there is no vehicle with such parameters.
+        """
         flavour, store = self.flavour, self.parameters
-        self.controller.set_parameters(flavour.controller_parameters(store, **self._vehicle))
-        self.commander.guidance.set_parameters(flavour.flight_parameters(store, **self._vehicle))
-        self.commander.parameters = flavour.commander_parameters(store)
-        self.navigation.set_parameters(flavour.navigation_parameters(store))
+        return _TypedParameters(
+            navigation=flavour.navigation_parameters(store),
+            controller=flavour.controller_parameters(store, **self._vehicle),
+            flight=flavour.flight_parameters(store, **self._vehicle),
+            commander=flavour.commander_parameters(store),
+        )
+
+    def _on_parameter(self, name: str, value: float) -> None:
+        typed = self._typed_parameters()
+        self.controller.set_parameters(typed.controller)
+        self.commander.guidance.set_parameters(typed.flight)
+        self.commander.parameters = typed.commander
+        self.navigation.set_parameters(typed.navigation)
         self._streams.change(name, self._time_us)
 
     def _report_fixed(self, name: str) -> None:

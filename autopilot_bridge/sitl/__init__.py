@@ -9,6 +9,7 @@ from autopilot_bridge.sitl.backend import (
     EmulatedBackend,
     emulated,
 )
+from autopilot_bridge.sitl.containment import VehicleFailure
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
 from autopilot_bridge.sitl.sitl import Sitl
@@ -29,6 +30,7 @@ __all__ = [
     "SitlServer",
     "SitlVehicle",
     "UnsignedFrom",
+    "VehicleFailure",
     "compile_flight_code",
     "default_ports",
     "emulated",

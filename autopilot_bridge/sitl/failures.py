@@ -56,6 +56,7 @@ class FailureInjector:
         self._sensors = sensors
         self._signal_lost = False
         self._lose_radio: Callable[[bool], None] | None = None
+        self._parameters = SimulatorParameters(vehicle, sensors, self.fail_radio, self.weaken_motors)
         self._others: Mapping[int, Callable[[int, int], bool]] = {
             mavlink.FAILURE_UNIT_SYSTEM_MOTOR: self._motor,
             mavlink.FAILURE_UNIT_SYSTEM_SERVO: self._servo,
@@ -71,9 +72,12 @@ class FailureInjector:
         """An autopilot has booted: use its parameters and its pilot input from now on."""
         self._lose_radio = lose_radio
         self._signal_lost = False
-        parameters = SimulatorParameters(self._vehicle, self._sensors, self.fail_radio, self.weaken_motors)
-        store.subscribe(lambda name, value: parameters.changed(store, name))
-        parameters.apply(store)
+        store.subscribe(lambda name, value: self._parameters.changed(store, name))
+        self._parameters.apply(store)
+
+    def vehicle_restarted(self) -> None:
+        """The simulated vehicle has started again, in the air that it started in."""
+        self._parameters.vehicle_restarted()
 
     def inject(self, unit: int, failure: int, instance: int) -> Result:
         """Switch a failure on or off; UNSUPPORTED for a unit or a failure that the vehicle does not have."""

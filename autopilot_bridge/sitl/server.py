@@ -10,6 +10,7 @@ from typing import Final
 from autopilot_bridge.clock import RealTimeClock
 from autopilot_bridge.firmware.simulator import Port, default_ports
 from autopilot_bridge.links import Link, open_link, reach_of
+from autopilot_bridge.sitl.containment import FailureReport, VehicleFailure
 from autopilot_bridge.sitl.sitl import Sitl
 from autopilot_bridge.sitl.vehicle import SitlVehicle
 
@@ -49,14 +50,31 @@ def objects_kept() -> Iterator[None]:
 class SitlServer:
     """Runs a `Sitl` for clients on real links.
 
+    No message of a client ends it: a vehicle that fails ends alone (`sitl.containment`).
+
     Args:
         sitl: the world.
         speedup: simulated seconds per wall second; None: as fast as the machine can.
         monotonic: wall clock, seconds.
+        on_failure: called with each failure of a vehicle.
+
+    Attributes:
+        sitl: as given.
+        failures: the failures of vehicles so far.
     """
 
-    def __init__(self, sitl: Sitl, *, speedup: float | None, monotonic: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        sitl: Sitl,
+        *,
+        speedup: float | None,
+        monotonic: Callable[[], float],
+        on_failure: FailureReport | None = None,
+    ) -> None:
         self.sitl = sitl
+        self.failures: list[VehicleFailure] = []
+        self._on_failure = on_failure
+        sitl.contain(self._note)
         self._monotonic = monotonic
         self._speedup = speedup
         self._first: Link | None = None  # the first link opened
@@ -102,6 +120,11 @@ class SitlServer:
                 opened += [(vehicle, port, link.description) for vehicle in self.sitl.vehicles]
             undo.pop_all()
         return opened
+
+    def _note(self, failure: VehicleFailure) -> None:
+        self.failures.append(failure)
+        if self._on_failure is not None:
+            self._on_failure(failure)
 
     def _open(self, port: Port) -> Link:
         link = open_link(port.address, monotonic=self._monotonic)

@@ -54,11 +54,21 @@ class SimulatorParameters:
         self._applied: dict[str, Any] = {}
 
     def apply(self, store: ParameterStore) -> None:
-        """Record the values at boot; those that differ from their defaults act at once."""
-        for name in _GROUP_OF:
+        """At boot: what differs from its default acts at once, and what acted before and no longer differs
+        ends.
+        """
+        for name, group in _GROUP_OF.items():
             definition = store.find(name)
-            if definition is not None and store.get(name) != definition.convert(definition.default):
+            if definition is None:
+                continue
+            differs = store.get(name) != definition.convert(definition.default)
+            if differs or group.__name__ in self._applied:
                 self.changed(store, name)
+
+    def vehicle_restarted(self) -> None:
+        """The simulated vehicle has started again: its air and its motors are as at the start."""
+        for group in _OF_VEHICLE:
+            self._applied.pop(group, None)
 
     def changed(self, store: ParameterStore, name: str) -> None:
         """A parameter has a new value."""
@@ -222,6 +232,7 @@ _GROUPS: Final[Mapping[Group, tuple[str, ...]]] = {
     _P._wind: ("SIM_WIND_SPD", "SIM_WIND_DIR", "SIM_WIND_DIR_Z", "SIM_WIND_TURB", *_WIND_OVER_HEIGHT),
 }
 _GROUP_OF: Final = {name: group for group, names in _GROUPS.items() for name in names}
+_OF_VEHICLE: Final = ("_wind", "_motors")
 _UNITS: Final = {
     "_gps": SensorUnit.GPS,
     "_barometer": SensorUnit.BARO,

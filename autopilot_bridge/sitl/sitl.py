@@ -10,6 +10,7 @@ from typing import Final
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
 from autopilot_bridge.sitl.backend import BackendMaker, emulated
+from autopilot_bridge.sitl.containment import FailureReport
 from autopilot_bridge.sitl.failures import NEVER_US
 from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters
@@ -108,6 +109,8 @@ class Sitl:
         if time_us >= self._next_truth_us:
             self._next_truth_us = time_us + self._truth_interval_us
             for vehicle in self.vehicles:
+                if vehicle.stopped:
+                    continue
                 self._report_truth(time_us, vehicle.truth_encoder.encode(time_us))
             for frame in self._target_truth.encode(time_us):
                 self._report_truth(time_us, frame)
@@ -115,6 +118,11 @@ class Sitl:
     def _report_truth(self, time_us: int, frame: bytes) -> None:
         for listener in self._truth_listeners:
             listener(time_us, frame)
+
+    def contain(self, report: FailureReport) -> None:
+        """Let a vehicle that fails end alone from now on (`sitl.containment`), and report it."""
+        for vehicle in self.vehicles:
+            vehicle.contain(report)
 
     def poll(self) -> None:
         """Receive from all links, as much as the time budget allows."""

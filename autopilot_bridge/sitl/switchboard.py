@@ -5,7 +5,7 @@ frame for another component of the vehicle goes there; as long as no message of 
 it goes to the autopilot, which may answer for it (ArduPilot).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.links import Link, MemoryLink, PeerId, Reach
@@ -44,6 +44,11 @@ class Switchboard:
         self._router: Router[LinkChannel] = Router()
         self._loops = LoopGuard()
         self._reach: dict[LinkChannel, Reach] = {}
+        self._contained: Callable[[Exception], None] | None = None
+
+    def contain(self, failed: Callable[[Exception], None]) -> None:
+        """Call a function when a received frame makes the vehicle fail, instead of raising."""
+        self._contained = failed
 
     def open(
         self,
@@ -112,6 +117,14 @@ class Switchboard:
             peer: the sender among several on the link; None: there is only one, or the link routes between
                 them.
         """
+        try:
+            self._take(channel, frames, peer)
+        except Exception as error:
+            if self._contained is None:
+                raise
+            self._contained(error)
+
+    def _take(self, channel: LinkChannel, frames: Sequence[Frame], peer: PeerId | None) -> None:
         own = self._system_id
         several = len(self.channels) > 1
         for frame in frames:

@@ -4,6 +4,7 @@ Execution order of a step: vehicle dynamics, sensors, autopilot (navigation, slo
 payload.
 """
 
+import contextlib
 from collections.abc import Sequence
 from functools import partial
 from typing import Final
@@ -19,6 +20,7 @@ from autopilot_bridge.payload import PayloadStation
 from autopilot_bridge.services.vehicle_memory import PowerAction
 from autopilot_bridge.sitl.backend import BackendMaker, BackendSetup, EmulatedBackend, ReadsParameters
 from autopilot_bridge.sitl.channel import LinkChannel
+from autopilot_bridge.sitl.containment import Aftermath, FailureReport, Probation, VehicleFailure, reason_of
 from autopilot_bridge.sitl.failures import NEVER_US, FailureInjector, FaultSchedule
 from autopilot_bridge.sitl.launch_crew import LaunchCrew
 from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
@@ -48,6 +50,7 @@ class SitlVehicle:
         payload: its payload, as MAVLink components on a separate link; None: no payload.
         links: its open links with their peers, and its signing key.
         crashed: the vehicle has crashed; clients were informed.
+        stopped: a failure of its simulation was contained, and it stays stopped.
     """
 
     def __init__(
@@ -117,6 +120,11 @@ class SitlVehicle:
             ),
         )
         self.crashed = False
+        self.stopped = False
+        self._time_us = 0
+        self._card = card
+        self._report_failure: FailureReport | None = None
+        self._probation = Probation()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
         self.payload: PayloadStation | None = None
         if specification.payload != PayloadParameters():
@@ -172,8 +180,24 @@ class SitlVehicle:
         """The vehicle's own frames that came back on a link; they were dropped."""
         return self.links.echoes
 
+    def contain(self, report: FailureReport) -> None:
+        """Contain failures of this vehicle from now on (`sitl.containment`), and report them."""
+        self._report_failure = report
+        self.links.contain(self._fail)
+
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
+        self._time_us = time_us
+        if self.stopped:
+            return
+        try:
+            self._step(time_us)
+        except Exception as error:
+            if self._report_failure is None:
+                raise
+            self._fail(error)
+
+    def _step(self, time_us: int) -> None:
         if time_us >= self._power_us:
             self._power_cycle(time_us)
         if time_us >= self._faults.next_us:
@@ -182,7 +206,9 @@ class SitlVehicle:
         self.vehicle.step(self._actuators)
         self.sensors.step(time_us - boot_us)
         if time_us > boot_us:
-            self._actuators = self.backend.step(time_us - boot_us)
+            actuators = self.backend.step(time_us - boot_us)
+            if self._boot_us == boot_us:  # it did not fail on a frame that it was sent within the step
+                self._actuators = actuators
         if self.payload is not None:
             self.payload.step(time_us)
         if self._crew is not None and self._crew.watch(time_us):
@@ -191,6 +217,41 @@ class SitlVehicle:
             self.crashed = True
             text = self.truth_encoder.encode_text(f"Simulator: {self.vehicle.crash}")
             self.links.send_to_all(text)
+
+    def _fail(self, error: Exception) -> None:
+        """Stop the vehicle after a failure, report it, and let it start again if that can help.
+
+        Its simulated part starts again at once, as the motion may be undefined; its autopilot boots after
+        `REBOOT_US`.
+        """
+        assert self._report_failure is not None
+        if self.stopped:
+            return
+        aftermath = self._probation.judge(self._time_us)
+        with contextlib.suppress(Exception):  # it has failed already
+            self.backend.close()
+        self.links.restart(None)
+        self._actuators = self._off
+        self._crew = None
+        try:
+            self.vehicle.reset()
+        except Exception:  # noqa: BLE001 - nothing of it can be simulated any more
+            aftermath = Aftermath.LEFT_STOPPED
+        self.failures.vehicle_restarted()
+        self.crashed = False
+        if aftermath is Aftermath.STARTS_WITHOUT_STORED:
+            self._card.parameters_trusted = False
+        self._power, self._starts_again = None, True
+        self._boot_us = self._power_us = self._time_us + REBOOT_US
+        self.stopped = aftermath is Aftermath.LEFT_STOPPED
+        failure = VehicleFailure(
+            system_id=self.specification.system_id,
+            time_us=self._time_us,
+            reason=reason_of(error),
+            aftermath=aftermath,
+        )
+        self.links.send_to_all(self.truth_encoder.encode_text(f"Simulator: failed, {aftermath.short}"))
+        self._report_failure(failure)
 
     def _on_power(self, action: PowerAction, starts_again: bool) -> None:
         self._power, self._power_us, self._starts_again = action, 0, starts_again

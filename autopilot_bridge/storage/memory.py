@@ -174,8 +174,10 @@ class MemoryCard:
         files: the card's own file system; by default in memory, empty.
         logs: flights are logged on it.
         boots: number of boots of an autopilot with it, in this run.
+        parameters_trusted: False: the stored parameters made the vehicle fail; the next boot sets them aside.
     """
 
     files: FileStore = field(default_factory=MemoryStore)
     logs: bool = False
     boots: int = 0
+    parameters_trusted: bool = True

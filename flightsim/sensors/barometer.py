@@ -90,8 +90,8 @@ class BarometerParameters:
                     channels=slice(0, BARO_SIZE),
                     wrong_bias=(500.0, 0.0),
                     drift_per_s=(5.0, 0.0),
-                    garbage_low=(1000.0, -40.0),
-                    garbage_high=(120000.0, 85.0),
+                    low=(1000.0, -40.0),
+                    high=(120000.0, 85.0),
                 ),
             ),
         )

@@ -80,8 +80,8 @@ class BatteryMonitorParameters:
                     channels=slice(0, i.BATTERY_SIZE),
                     wrong_bias=(-2.0, 0.0, 0.0, 0.0),
                     drift_per_s=(-0.02, 0.0, 0.0, 0.0),
-                    garbage_low=(0.0, 0.0, 0.0, 0.0),
-                    garbage_high=(60.0, 120.0, 10.0, 1.0),
+                    low=(0.0, 0.0, 0.0, 0.0),
+                    high=(60.0, 120.0, 10.0, 1.0),
                 ),
             ),
         )

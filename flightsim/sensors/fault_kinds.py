@@ -60,7 +60,8 @@ class FaultTarget:
         channels: where it is in the sample.
         wrong_bias: default constant bias of WRONG, in the units `add_bias` takes.
         drift_per_s: default growth of DRIFT, same units per second.
-        garbage_low, garbage_high: limits GARBAGE draws between; a channel with NaN limits stays as it is.
+        low, high: what the device can put out at all: GARBAGE draws between them, and a biased value stays
+            within them. A channel with NaN limits is not spoiled by GARBAGE, and not limited.
         add_bias: adds a bias in place (GPS: metres onto degrees).
         no_fix: the values of a receiver that runs without a fix; None for units that know no fix.
         blocked: the values of a pitot tube whose opening is blocked; a channel with NaN stays as it is. None
@@ -71,8 +72,8 @@ class FaultTarget:
     channels: slice
     wrong_bias: tuple[float, ...]
     drift_per_s: tuple[float, ...]
-    garbage_low: tuple[float, ...]
-    garbage_high: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
     add_bias: Callable[[Array, Array], None] = add
     no_fix: tuple[float, ...] | None = None
     blocked: tuple[float, ...] | None = None
@@ -122,16 +123,33 @@ class Garbage:
         return True
 
 
+class Bounds:
+    """Adds biases to a unit's values, within what the device can put out: no barometer reads a pressure below
+    zero, whatever its fault. Values that were outside before stay as far outside.
+    """
+
+    def __init__(self, target: FaultTarget) -> None:
+        self._add = target.add_bias
+        self._low = np.nan_to_num(target.low, nan=-np.inf, neginf=-np.inf)
+        self._high = np.nan_to_num(target.high, nan=np.inf, posinf=np.inf)
+
+    def bias(self, values: Array, bias: Array) -> None:
+        """Add a bias in place."""
+        low, high = np.minimum(self._low, values), np.maximum(self._high, values)
+        self._add(values, bias)
+        np.clip(values, low, high, out=values)
+
+
 class Wrong:
     """WRONG: a constant bias from the first moment."""
 
-    def __init__(self, bias: Array, add_bias: Callable[[Array, Array], None]) -> None:
+    def __init__(self, bias: Array, bounds: "Bounds") -> None:
         self._bias = bias
-        self._add_bias = add_bias
+        self._bounds = bounds
 
     def apply(self, values: Array) -> bool:
         """Add the bias."""
-        self._add_bias(values, self._bias)
+        self._bounds.bias(values, self._bias)
         return True
 
 
@@ -220,13 +238,13 @@ class Intermittent:
 class Drift:
     """DRIFT: a bias that grows linearly from zero."""
 
-    def __init__(self, per_sample: Array, add_bias: Callable[[Array, Array], None]) -> None:
+    def __init__(self, per_sample: Array, bounds: "Bounds") -> None:
         self._per_sample = per_sample
-        self._add_bias = add_bias
+        self._bounds = bounds
         self._count = 0
 
     def apply(self, values: Array) -> bool:
         """Add the bias reached so far."""
         self._count += 1
-        self._add_bias(values, self._count * self._per_sample)
+        self._bounds.bias(values, self._count * self._per_sample)
         return True

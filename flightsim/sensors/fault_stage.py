@@ -79,7 +79,7 @@ class FaultPoint:
                 started = self._reading.time_us >= 0
                 fault = kinds.Stuck(self._reading.values[target.channels] if started else None)
             case FaultType.GARBAGE:
-                fault = kinds.Garbage(np.array(target.garbage_low), np.array(target.garbage_high), self._rng)
+                fault = kinds.Garbage(np.array(target.low), np.array(target.high), self._rng)
             case FaultType.WRONG if no_fix:
                 if target.no_fix is None:
                     raise ValueError(f"option no_fix is for GPS, not for {target.unit.name}")
@@ -89,7 +89,7 @@ class FaultPoint:
                     raise ValueError(f"option blocked is for AIRSPEED, not for {target.unit.name}")
                 fault = kinds.Blocked(np.array(target.blocked))
             case FaultType.WRONG:
-                fault = kinds.Wrong(self._vector("bias", bias, target.wrong_bias), target.add_bias)
+                fault = kinds.Wrong(self._vector("bias", bias, target.wrong_bias), kinds.Bounds(target))
             case FaultType.SLOW:
                 factor = DEFAULT_SLOW_FACTOR if slow_factor is None else slow_factor
                 if not isinstance(factor, int) or factor < 2:
@@ -104,7 +104,7 @@ class FaultPoint:
                 fault = kinds.Intermittent(self._interval_s / down, self._interval_s / up, self._rng)
             case FaultType.DRIFT:
                 per_s = self._vector("drift_per_s", drift_per_s, target.drift_per_s)
-                fault = kinds.Drift(per_s * self._interval_s, target.add_bias)
+                fault = kinds.Drift(per_s * self._interval_s, kinds.Bounds(target))
         self.fault = fault
         self.failure = failure
         if fault is None:

@@ -69,8 +69,8 @@ class MagnetometerParameters:
                     channels=slice(0, MAG_SIZE),
                     wrong_bias=(0.2, 0.2, 0.0),
                     drift_per_s=(0.005, 0.005, 0.0),
-                    garbage_low=(-self.range_gauss,) * MAG_SIZE,
-                    garbage_high=(self.range_gauss,) * MAG_SIZE,
+                    low=(-self.range_gauss,) * MAG_SIZE,
+                    high=(self.range_gauss,) * MAG_SIZE,
                 ),
             ),
         )

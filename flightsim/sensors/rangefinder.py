@@ -97,8 +97,8 @@ class RangefinderParameters:
                     channels=slice(0, RANGE_SIZE),
                     wrong_bias=(3.0, 0.0, 0.0),
                     drift_per_s=(0.1, 0.0, 0.0),
-                    garbage_low=(self.min_range_m, nan, nan),
-                    garbage_high=(self.max_range_m, nan, nan),
+                    low=(self.min_range_m, nan, nan),
+                    high=(self.max_range_m, nan, nan),
                 ),
             ),
         )

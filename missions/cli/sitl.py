@@ -232,15 +232,14 @@ def sitl(
 
     Opens the ports that clients of the firmware use by default, prints them, and runs until Ctrl-C.
 
-    Exit codes: 0 stopped, 1 the log, a picture or the signing keys could not be written, 2 usage,
-    130 interrupted while it started.
+    Exit codes: 0 stopped, 1 a vehicle failed, or the log, a picture or the signing keys could not be
+    written, 2 usage, 130 interrupted while it started.
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.firmware.simulator import simulator_defaults
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
-    from flightsim.vehicle import VehicleDivergedError
     from missions.mission import WorldDefaults
     from missions.options import parameters_from_file
 
@@ -266,7 +265,9 @@ def sitl(
             click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
             simulated = Sitl(spec, signing=signing, cards=memory.cards)
             compile_flight_code(spec.vehicles)
-            server = SitlServer(simulated, speedup=speedup or None, monotonic=wall_time_s)
+            server = SitlServer(
+                simulated, speedup=speedup or None, monotonic=wall_time_s, on_failure=losses.vehicle_failed
+            )
             pictured = start_video(simulated, video, video_rate, pictures, losses.picture_lost)
             if pictured is not None:
                 at_end.callback(pictured.close)
@@ -299,14 +300,11 @@ def sitl(
         if simulator_defaults(spec.vehicles[0].autopilot).waits_for_client and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
             server.wait_for_client(lambda: ending.requested)
-        try:
-            server.run(
-                lambda: ending.requested,
-                report=report if line.terminal else None,
-                until_us=None if duration is None else round(duration * 1e6),
-            )
-        except VehicleDivergedError as error:
-            raise click.ClickException(f"the simulation ended: {error}") from error
+        server.run(
+            lambda: ending.requested,
+            report=report if line.terminal else None,
+            until_us=None if duration is None else round(duration * 1e6),
+        )
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {simulated.time_us * 1e-6:.1f} s of vehicle time{lost}")
     return _FAILED if losses.any else 0

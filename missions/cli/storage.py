@@ -2,11 +2,14 @@
 
 import tempfile
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from missions.cli.options import report
+
+if TYPE_CHECKING:
+    from autopilot_bridge.sitl import VehicleFailure
 
 NONE: Final = "none"
 
@@ -89,6 +92,10 @@ class Losses:
     def picture_lost(self, why: str) -> None:
         """A photo, or the rest of a video, could not be written."""
         self._warn(why)
+
+    def vehicle_failed(self, failure: "VehicleFailure") -> None:
+        """A vehicle could not be simulated on."""
+        self._warn(str(failure))
 
     def _warn(self, text: str) -> None:
         self.any = True

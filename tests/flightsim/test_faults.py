@@ -235,7 +235,10 @@ def test_wrong_and_drift_add_a_bias(
 ) -> None:
     name, channels = UNITS[unit]
     good = healthy[name]
-    wrong, drift = fly(unit, FaultType.WRONG, bias=bias), fly(unit, FaultType.DRIFT, drift_per_s=bias)
+    wrong, drift = (
+        fly(unit, FaultType.WRONG, bias=bias),
+        fly(unit, FaultType.DRIFT, drift_per_s=[0.1 * value for value in bias]),
+    )
     during = wrong.during()
     np.testing.assert_array_equal(during, drift.during())
     width = good.values[:, channels].shape[1]
@@ -245,7 +248,18 @@ def test_wrong_and_drift_add_a_bias(
     np.testing.assert_allclose(offset, np.tile(expected, (during.sum(), 1)), atol=1e-10)
     elapsed_s = np.arange(1, during.sum() + 1) / rate_hz(unit)
     grown = (drift.values - good.values)[during][:, channels]
-    np.testing.assert_allclose(grown, elapsed_s[:, None] * expected, atol=1e-9)
+    np.testing.assert_allclose(grown, elapsed_s[:, None] * 0.1 * expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("bias", [-3.4e38, 3.4e38])
+@pytest.mark.parametrize(
+    "unit", [SensorUnit.BARO, SensorUnit.GPS, SensorUnit.DISTANCE_SENSOR], ids=lambda u: u.name
+)
+def test_a_biased_value_stays_within_what_the_device_can_put_out(unit: SensorUnit, bias: float) -> None:
+    name, channels = UNITS[unit]
+    values = fly(unit, FaultType.WRONG, bias=(bias,)).values[BEGIN_STEP + 100 : END_STEP, channels]
+    low, high = {"barometer": (1000.0, 120_000.0), "gps": (-90.0, 90.0), "rangefinder": (0.1, 40.0)}[name]
+    assert np.all((values[:, 0] >= low) & (values[:, 0] <= high))
 
 
 def test_positions_of_the_world_and_biased_ones_stay_within_180_degrees() -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
+from flightsim import truth as t
 from flightsim.airframe import load_airframe
-from flightsim.environment import Environment
+from flightsim.environment import Environment, Turbulence
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
@@ -160,3 +161,16 @@ def test_turbulence_turns_the_air_around_an_aircraft() -> None:
         seed_sequence=np.random.SeedSequence(4),
     )
     assert rolling._air._rotary.constants[0] == 0.0  # a rotor span is small against every scale length
+
+
+def test_gusts_that_begin_around_an_aircraft_at_rest_in_calm_air() -> None:
+    """It has no airspeed to divide the rates by."""
+    vehicle = Vehicle(
+        "aerosonde",
+        home=Home(),
+        environment=Environment(turbulence=Turbulence.SEVERE),
+        seed_sequence=np.random.SeedSequence(1),
+    )
+    for _ in range(100):
+        vehicle.step(np.zeros(MAX_ACTUATORS))
+    assert np.linalg.norm(vehicle.truth[t.RATES_FRD_RAD_S]) < 1.0

@@ -242,8 +242,8 @@ class Thermometer:
                     channels=slice(0, 1),
                     wrong_bias=(5.0,),
                     drift_per_s=(1.0,),
-                    garbage_low=(0.0,),
-                    garbage_high=(400.0,),
+                    low=(0.0,),
+                    high=(400.0,),
                 ),
             ),
         )

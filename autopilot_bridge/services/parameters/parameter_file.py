@@ -1,7 +1,7 @@
 """The file of stored parameters on a vehicle's memory card."""
 
 import contextlib
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 
 from autopilot_bridge.parameter_files import QGC_SUFFIX, format_mavproxy, format_qgc, parse_untyped_parameters
@@ -22,7 +22,8 @@ class StoredParameters:
         system_id: written to the file.
 
     Attributes:
-        damaged: why the file could not be read; None: it could be read, or there is none.
+        initial: the values without the file.
+        damaged: why the file could not be used; None: it could be, or there is none.
     """
 
     def __init__(
@@ -32,8 +33,8 @@ class StoredParameters:
         self._files = files
         self._path = layout.parameters
         self._system_id = system_id
-        self._initial: Mapping[str, float] = MappingProxyType(store.as_dict())
-        self._reference = self._initial  # values that equal these are not stored
+        self.initial: Mapping[str, float] = MappingProxyType(store.as_dict())
+        self._reference = self.initial  # values that equal these are not stored
         self.damaged: str | None = None
 
     def load(self, *, without: Collection[str] = ()) -> None:
@@ -44,14 +45,19 @@ class StoredParameters:
             text = read_whole(self._files, self._path).decode("utf-8")
             values = parse_untyped_parameters(text, source=self._path[-1])
         except (OSError, UnicodeDecodeError, ParameterError) as failure:
-            self.damaged = str(failure)
-            with contextlib.suppress(OSError):  # kept, so that a user can repair it
-                self._files.rename(self._path, (*self._path[:-1], f"{self._path[-1]}.damaged"))
+            self.set_aside(str(failure))
             return
         for name, value in values.items():
             if name in self._store and name not in without:
                 with contextlib.suppress(ParameterError):
                     self._store.set(name, value, check_range=False)
+
+    def set_aside(self, reason: str) -> None:
+        """Use none of the stored values: rename the file, so that a user can repair it."""
+        self.damaged = reason
+        with contextlib.suppress(OSError):
+            self._files.rename(self._path, (*self._path[:-1], f"{self._path[-1]}.damaged"))
+        self.reset()
 
     def save(self) -> None:
         """Store the values that differ from those at the start.
@@ -80,20 +86,39 @@ class StoredParameters:
 
     def reset(self, prefixes: tuple[str, ...] = ("",)) -> None:
         """Set parameters to the values without a card: those of the airframe and the command line."""
-        for name, value in self._initial.items():
+        for name, value in self.initial.items():
             if name.startswith(prefixes):
                 self._store.set(name, value, check_range=False)
 
 
 def boot_parameters(
-    store: ParameterStore, card: MemoryCard, layout: CardLayout, *, system_id: int, given: Collection[str]
+    store: ParameterStore,
+    card: MemoryCard,
+    layout: CardLayout,
+    *,
+    system_id: int,
+    given: Collection[str],
+    check: Callable[[], object],
 ) -> StoredParameters:
     """Load the values on a card into the parameters of an autopilot that boots.
 
     At the first boot of a run, the `given` values (from the command line) take precedence over the stored
     ones; at a reboot the stored values take precedence over all, because clients may have changed them since.
+    Stored values with which the vehicle failed, or that no vehicle can be made of, are set aside.
+
+    Args:
+        check: raises ValueError or ArithmeticError if no vehicle can be made of the parameters.
     """
     stored = StoredParameters(store, card.files, layout, system_id=system_id)
-    stored.load(without=() if card.boots else given)
+    if card.parameters_trusted:
+        stored.load(without=() if card.boots else given)
+    else:
+        stored.set_aside("the vehicle failed with these values")
+        card.parameters_trusted = True
+    if store.as_dict() != stored.initial:
+        try:
+            check()
+        except (ValueError, ArithmeticError) as failure:
+            stored.set_aside(str(failure))
     card.boots += 1
     return stored
