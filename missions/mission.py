@@ -119,6 +119,10 @@ class Mission(Generic[AnyOptions]):
         """The path that one vehicle, which is ready to arm, would fly; None: it is not known in advance."""
         return None
 
+    async def remarks(self, vehicle: "Vehicle", options: AnyOptions) -> Sequence[str]:
+        """What the user should know before the flight of one vehicle, which is ready to arm."""
+        return ()
+
     async def plan_items(self, vehicle: "Vehicle", options: AnyOptions) -> "Sequence[MissionItem]":
         """The mission items that would be uploaded to one vehicle, which is ready to arm; for mission files.
 

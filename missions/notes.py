@@ -66,6 +66,8 @@ class FlightNotes:
         options: as the vehicle flies them.
         left: state in which the vehicle was left when the flight failed or was interrupted; "": neither
             happened.
+        aloft: where and how the vehicle stays in the air after its return, by its parameters; "": it does
+            not.
         warnings: warnings for the user, without repetitions.
         link_losses: times at which the link was lost and regained.
         lost_link: the autopilot's reaction to the loss of its ground station, as text; "": not known.
@@ -82,6 +84,7 @@ class FlightNotes:
     kind: str = ""
     options: MissionOptions | None = None
     left: str = ""
+    aloft: str = ""
     warnings: list[str] = field(default_factory=list)
     link_losses: list[LinkLoss] = field(default_factory=list)
     lost_link: str = ""

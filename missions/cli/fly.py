@@ -257,6 +257,7 @@ def _fly(given: dict[str, Any]) -> int:
         request = replace(
             request,
             confirm=confirm,
+            on_remark=line.say,
             confirm_simulations=given["check"],
             on_open=lambda: warn_if_open(given["connect"], key),
             command=" ".join(["flightstack", *sys.argv[1:]]),

@@ -74,6 +74,11 @@ class ProgressLine:
         finally:
             self._held = False
 
+    def say(self, text: str) -> None:
+        """Print a line about the flight, on stderr; the progress continues below it."""
+        self._line.erase()
+        report(text)
+
     def end(self) -> None:
         """End the progress line."""
         self._line.end()

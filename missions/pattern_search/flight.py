@@ -403,7 +403,7 @@ async def _fly_waypoints(
         )  # the way home may pass others
         await vehicle.return_to_launch(wait=False)
     notes.begin("return", clock.stamp_us)
-    await vehicle.link.wait_disarmed(300.0 + 2.0 * reach_m)
+    await vehicle.return_end.wait(300.0 + 2.0 * reach_m)
     notes.end(clock.stamp_us)
 
 

@@ -88,7 +88,13 @@ class MissionDocument:
             raise PlanError(f"{self.path}: {error}") from None
 
     @property
+    def returns(self) -> bool:
+        """Whether the mission ends with a return, and not with a landing."""
+        commands = [item.command for item in self.items]
+        return NAV_RETURN_TO_LAUNCH in commands and NAV_LAND not in commands
+
+    @property
     def lands(self) -> bool:
-        """Whether the mission itself lands the vehicle: by a landing, or by a return as its last item."""
+        """Whether the mission itself ends the flight: by a landing, or by a return."""
         commands = [item.command for item in self.items]
         return NAV_LAND in commands or NAV_RETURN_TO_LAUNCH in commands

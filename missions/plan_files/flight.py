@@ -83,12 +83,14 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
         ended, notes.cut_short = False, CutShort.TIME
     if notes.current != "return":
         notes.begin("return", clock.stamp_us)
-    if not (ended and watch.lands):
-        if options.then is Then.LAND:
-            await (vehicle.wing.land_along(wait=False) if wings else vehicle.land(wait=False))
-        else:
-            await vehicle.return_to_launch(wait=False)
-    await vehicle.link.wait_disarmed(_LANDING_S + 2.0 * expected_s)
+    over = ended and watch.lands
+    if over and document.returns and options.then is Then.LAND:
+        over = not await vehicle.return_end.stays_because()
+    if not over and options.then is Then.LAND:
+        await (vehicle.wing.land_along(wait=False) if wings else vehicle.land(wait=False))
+    elif not over:
+        await vehicle.return_to_launch(wait=False)
+    await vehicle.return_end.wait(_LANDING_S + 2.0 * expected_s)
     notes.end(clock.stamp_us)
 
 

@@ -18,7 +18,7 @@ from missions.notes import PATTERN, Phase
 from missions.plan_files.document import NAV_LAND, MissionDocument
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
-from missions.plan_files.options import FileOptions
+from missions.plan_files.options import FileOptions, Then
 from missions.plan_files.progress import CURVED
 from missions.plan_files.route import Stop, route_of, scored_stops, straight
 from missions.planning.limits import FixedWingLimits, Limits
@@ -76,7 +76,8 @@ class FileMission(Mission[FileOptions]):
         if wings and not self.document.lands and options.then is None:
             raise PlanError(
                 f"{self.document.path} does not land; add a landing, or say what comes after it: `then=land` "
-                "(along the runway, at home) or `then=return`"
+                "(along the runway, at home) or `then=return` (by its parameters an aircraft may circle over "
+                "home then; PX4 asks for a landing in the plan, unless MIS_TKO_LAND_REQ is 0 or 1)"
             )
         if options.time_limit_s is None and route_of(self.document, self._plan_home).endless:
             raise PlanError(
@@ -89,6 +90,17 @@ class FileMission(Mission[FileOptions]):
 
     async def fly(self, vehicle: "Vehicle", options: FileOptions) -> None:
         await fly_document(vehicle, options, self.document)
+
+    async def remarks(self, vehicle: "Vehicle", options: FileOptions) -> Sequence[str]:
+        if options.then is Then.LAND or (self.document.lands and not self.document.returns):
+            return ()
+        reason = await vehicle.return_end.stays_because()
+        if not reason:
+            return ()
+        return (
+            f"the flight ends in the air: after its return it {vehicle.return_end.stay} over home "
+            f"({reason}); `then=land` lands it",
+        )
 
     async def plan_items(self, vehicle: "Vehicle", options: FileOptions) -> Sequence[MissionItem]:
         return self.document.items
@@ -105,6 +117,12 @@ class FileMission(Mission[FileOptions]):
             plan_home=self.document.home,
             fence=self.document.fence,
         )
+
+    @property
+    def _places(self) -> set[int]:
+        """Indices of the items with a place to fly to, without landings."""
+        items = enumerate(self.document.items)
+        return {k for k, item in items if item.command in FLOWN_TO and item.command != NAV_LAND}
 
     @property
     def _plan_home(self) -> GeodeticPosition:
@@ -128,12 +146,14 @@ class FileMission(Mission[FileOptions]):
             route_of(self.document, commanded.origin), with_takeoff=kind is VehicleKind.MULTICOPTER
         )
         waypoints = [stop for stop in stops if stop.command in THROUGH]
-        reached = next((p for p in notes.phases if p.name in (PATTERN, CURVED)), None)
+        reached_us = [time_us for index, time_us in notes.reached if index in self._places]
+        if self._places and not reached_us:
+            return "no place of the mission was reached"
         if not waypoints:
             return ""
-        if reached is None:
-            return "no place of the mission was reached"
-        track = flown_track(score, Phase(name="", start_us=notes.phases[0].start_us, end_us=reached.end_us))
+        scored = next((p for p in notes.phases if p.name in (PATTERN, CURVED)), None)
+        end_us = reached_us[-1] if scored is None else scored.end_us  # one place makes no phase
+        track = flown_track(score, Phase(name="", start_us=notes.phases[0].start_us, end_us=end_us))
         if track is None:
             return NO_TRACK
         return waypoint_verdict(
@@ -192,13 +212,8 @@ class FileMission(Mission[FileOptions]):
 
     def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
         block = summary["mission_file"]
-        reached = {entry["item"] for entry in block["reached"]}
-        places = {
-            k + 1
-            for k, i in enumerate(self.document.items)
-            if i.command in FLOWN_TO and i.command != NAV_LAND
-        }
-        lines = [f"places reached: {len(reached & places)} of {len(places)}"]
+        reached = {entry["item"] - 1 for entry in block["reached"]}
+        lines = [f"places reached: {len(reached & self._places)} of {len(self._places)}"]
         if block["cross_track_rms_m"] is not None:
             lines.append(
                 f"cross-track {block['cross_track_rms_m']:.2f} m RMS, {block['cross_track_max_m']:.2f} m at "

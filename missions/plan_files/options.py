@@ -19,8 +19,8 @@ class FileOptions(MissionOptions):
     """Options with which a mission file is flown.
 
     Attributes:
-        then: action after a mission that doesn't land; None: a multicopter returns, and the mission of a
-            fixed wing is refused.
+        then: action after a mission that doesn't land, or whose return stays in the air; None: a multicopter
+            returns, and the mission of a fixed wing that neither lands nor returns is refused.
         time_limit_s: a longer mission is ended with `then`; None: a mission that takes more than twice the
             planned time has failed.
     """

@@ -48,6 +48,7 @@ class RunRequest:
             whether to continue; None: the vehicles are not checked.
         confirm_simulations: whether vehicles that prove to be simulations are checked and confirmed, too.
         on_open: called once the links or the world are open.
+        on_remark: receives what a user should know before the flight, one sentence each.
         regain_s: longest time for which a lost link may stay lost before the mission fails, in seconds of
             this machine's clock.
         command: the command line, for the summary.
@@ -71,6 +72,7 @@ class RunRequest:
     confirm: "Confirm | None" = None
     confirm_simulations: bool = True
     on_open: Callable[[], object] = lambda: None
+    on_remark: Callable[[str], object] = lambda _text: None
     regain_s: float = REGAIN_S
     command: str = ""
     signing_key: SigningKey | None = None

@@ -343,6 +343,9 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         vehicle.allow_below_home = own.allow_below_home
         if request.connect:  # before a question is asked and before anything is uploaded
             mission.check_place(own, own_limits, home)
+    for vehicle, own in zip(vehicles, options, strict=True):
+        for text in await mission.remarks(vehicle, own):
+            request.on_remark(f"vehicle {vehicle.system_id}: {text}")
     if request.confirm is not None:
         await _confirm(mission, vehicles, options, request.confirm, simulations=request.confirm_simulations)
     if not mission.commands:
@@ -390,7 +393,7 @@ async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request:
     vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission begins its own phase
     async with vehicle.safe_on_exit(request.on_failure):
         await flying
-        if vehicle.armed:
+        if vehicle.armed and not vehicle.notes.aloft:
             raise MissionError(
                 f"the mission ended with the vehicle armed; it was commanded to {request.on_failure}. "
                 "End a mission with return_to_launch() or land()"

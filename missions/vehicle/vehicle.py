@@ -25,6 +25,7 @@ from missions.vehicle.payload import Payload
 from missions.vehicle.plans import VehiclePlans
 from missions.vehicle.point_flight import PointFlight
 from missions.vehicle.readiness import Readiness
+from missions.vehicle.returning import ReturnEnd
 from missions.vehicle.telemetry import Position
 from missions.vehicle.wing import FixedWing
 
@@ -52,6 +53,7 @@ class Vehicle:
         parameters: its stored parameters.
         plans: its stored mission, geofence and rally points, and the progress of the mission.
         payload: camera, gimbal and survey magnetometer.
+        return_end: whether its returns end on the ground, and the wait for their end.
         local_origin: origin of the autopilot's local frame.
         forecast_wind_m_s: wind that turns are planned for: the user's forecast, not the measured wind.
     """
@@ -62,6 +64,7 @@ class Vehicle:
         self.parameters = VehicleParameters(self.link)
         self.plans = VehiclePlans(self.link, self.parameters, self.commands.heights)
         self.payload = Payload(self.link)
+        self.return_end = ReturnEnd(self.link, self.parameters)
         self.forecast_wind_m_s: float = FORECAST_WIND_M_S
         self.local_origin = LocalOrigin(self.commands)
         self._adapter: Adapter | None = None
@@ -345,10 +348,13 @@ class Vehicle:
         await self.adapter.start_mission()
 
     async def return_to_launch(self, *, wait: bool = True, timeout_s: float = 600.0) -> None:
-        """Return, land and (with `wait`) wait until the vehicle is disarmed."""
+        """Return and (with `wait`) wait for its end: until the vehicle is disarmed or, if its parameters keep
+        it in the air (ArduPlane's RTL_AUTOLAND 0), until it circles or hovers over home. The notes then have
+        `aloft`.
+        """
         await self.commands.set_mode(Mode.RETURN)
         if wait:
-            await self.link.wait_disarmed(timeout_s)
+            await self.return_end.wait(timeout_s)
 
     async def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
         """Land here and (with `wait`) wait until the vehicle is disarmed."""

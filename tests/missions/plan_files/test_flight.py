@@ -173,3 +173,26 @@ def test_a_mission_without_waypoints_has_no_file(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match="there is no folder"):
         export_plan(find_mission("lissajous"), RunRequest(), tmp_path / "none" / "a.plan")
     assert not (tmp_path / "a.plan").exists()
+
+
+@pytest.mark.parametrize("returns", [True, False])
+@pytest.mark.sampled(1)
+def test_a_return_of_arduplane_ends_in_the_air_and_that_is_said_before(returns: bool, tmp_path: Path) -> None:
+    plan = changed("mission", "vehicleType", to=1)
+    plan["geoFence"] = {"version": 2, "circles": [], "polygons": []}
+    plan["mission"]["items"] = [
+        simple(1, 22, [12, 0, 0, None, LAT + 0.003, LON, 60]),
+        waypoint(2, 0.006, 0.0, 80),
+        *([simple(3, 20, [0] * 7, 2)] if returns else []),
+    ]
+    path = write(tmp_path, plan)
+    remarks: list[str] = []
+    options = FileOptions() if returns else FileOptions(then=Then.RETURN)
+    result = fly(
+        find_mission(str(path)), request(path, "ardupilot", options=options, on_remark=remarks.append)
+    )
+    assert (result.outcome, result.reason) == ("completed", "")
+    assert "ends in the air: after its return it circles over home (RTL_AUTOLAND 0)" in remarks[0]
+    warning = result.summary["vehicles"][0]["warnings"][-1]
+    assert "its return has ended in the air: it circles over home in mode RTL" in warning
+    assert result.summary["sim_time_s"] < 300.0
