@@ -13,8 +13,13 @@ _WINDOW_S: Final = 4.0  # wall seconds over which the rate is measured
 _MIN_WINDOW_S: Final = 0.25  # a shorter base is too short to measure the rate
 _MIN_SPACING_S: Final = 0.02  # observations kept for the rate are no closer than this
 _MAX_STEP_BACK_US: Final = 1_000_000  # messages overtake each other by less; more is a new time base
+_MAX_STEP_AHEAD_US: Final = 2_000_000  # a longer step, unexplained by ten times the rate, is a new time base
+_QUICKER: Final = 10.0
+_WRAP_US: Final = (1 << 32) * 1000  # time_boot_ms has 32 bits
 _BACKLOG_S: Final = 0.25  # wall seconds in which messages that waited in the queue are read
-_RATE_LIMITS: Final = (0.01, 1000.0)
+_RATE_LIMITS: Final = (0.05, 1000.0)
+_SLOW_S: Final = 2.0  # wall seconds for which a slower vehicle is waited for, before its time is left behind
+_STOOD_STILL_S: Final = 1.0  # vehicle seconds; for a shorter time any vehicle repeats a time stamp
 _PACED_US: Final = (
     2_000_000.0  # vehicle time assumed between two messages; autopilots send theirs every second
 )
@@ -33,11 +38,16 @@ class TelemetryClock:
     seconds of the vehicle's time, then at most at real time: deadlines expire on a dead link too, and a
     simulator that is stopped for a moment delays them by that moment only, however fast it was.
 
+    A vehicle can't delay a deadline by its time stamps: a stamp that repeats the last one counts as nothing
+    received, a step ahead that its rate does not explain is a new time base, and time advances by at least
+    0.05 s per wall second while messages are received.
+
     Args:
         monotonic: wall clock in seconds.
 
     Attributes:
         reboots: number of backward jumps of the vehicle's own time.
+        jumps: number of steps ahead that the vehicle's rate did not explain.
     """
 
     def __init__(self, monotonic: Callable[[], float] = wall_time_s) -> None:
@@ -52,7 +62,11 @@ class TelemetryClock:
         self._reported_us = 0
         self._deadlines: list[_Deadline] = []
         self._timer: asyncio.TimerHandle | None = None
+        self._pace = (self._wall_s, 0.0)  # wall s and clock time when the vehicle was last at the lowest rate
+        self._repeated_s = 0.0  # wall seconds for which the newest time stamp has been repeated
         self.reboots = 0
+        self.jumps = 0
+        self._stood_still_s = 0.0
 
     @property
     def rate(self) -> float:
@@ -97,35 +111,76 @@ class TelemetryClock:
         paced_us = min(due_us, _PACED_US) + max(0.0, due_us - _PACED_US) / self._slower_in_silence
         return max(0.0, paced_us * 1e-6 / self._rate - self.silence_s)
 
+    @property
+    def stood_still_s(self) -> float:
+        """Wall seconds in which stamped messages were received whose time did not advance."""
+        usual_s = _STOOD_STILL_S / min(1.0, self._rate)
+        return self._stood_still_s + (self._repeated_s if self._repeated_s > usual_s else 0.0)
+
     def observe(self, vehicle_time_us: int) -> None:
         """Process the timestamp of a message that has just arrived."""
         now_us = self.time_us
         wall_s = self._monotonic()
-        previous_us = self._vehicle_us
-        if previous_us is None:
+        if self._vehicle_us is None:
             self._set_first(vehicle_time_us, now_us)
-        elif vehicle_time_us < previous_us:
-            if previous_us - vehicle_time_us <= _MAX_STEP_BACK_US:
-                return  # overtaken by a later message
-            self.reboots += 1
-            self._history.clear()
-            self._offset_us = now_us - vehicle_time_us
-        elif now_us - (vehicle_time_us + self._offset_us) > _MAX_STEP_BACK_US:
-            if self._behind is None:
-                self._behind = (wall_s, now_us - vehicle_time_us)
-            if wall_s - self._behind[0] >= _BACKLOG_S:
-                # The vehicle was paused (paused simulator, suspended machine) while deadlines advanced.
-                self._history.clear()
-                self._offset_us = self._behind[1]
-                self._behind = None
-            # Otherwise this process may have been busy, and these messages have waited in the queue.
+            self._pace = (wall_s, vehicle_time_us)
         else:
-            self._behind = None
+            step_us = self._step_us(vehicle_time_us)
+            if step_us == 0:
+                self._repeated_s = wall_s - self._wall_s
+            if -_MAX_STEP_BACK_US <= step_us <= 0:
+                return  # no news, or overtaken by a later message
+            self._stood_still_s, self._repeated_s = self.stood_still_s, 0.0
+            self._follow(step_us, vehicle_time_us, now_us, wall_s)
         self._vehicle_us = vehicle_time_us
         self._wall_s = wall_s
         self._base_us = vehicle_time_us + self._offset_us
         self._update_rate(wall_s, vehicle_time_us)
         self._fire_due()
+
+    def _step_us(self, vehicle_time_us: int) -> int:
+        """Time since the newest stamp; the stamps wrap after 49.7 days."""
+        assert self._vehicle_us is not None
+        return (vehicle_time_us - self._vehicle_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
+
+    def _follow(self, step_us: int, vehicle_time_us: int, now_us: int, wall_s: float) -> None:
+        """Set the offset for a new stamp."""
+        assert self._vehicle_us is not None
+        quickest_us = (wall_s - self._wall_s) * 1e6 * max(1.0, self._rate) * _QUICKER
+        if step_us < 0 or step_us > _MAX_STEP_AHEAD_US + quickest_us:
+            self.reboots += step_us < 0
+            self.jumps += step_us > 0
+            self._history.clear()
+            self._behind = None
+            self._offset_us = now_us - vehicle_time_us
+            self._pace = (wall_s, now_us)
+            return
+        self._offset_us += self._vehicle_us + step_us - vehicle_time_us  # 0, unless the stamps wrapped
+        due_us = vehicle_time_us + self._offset_us
+        if now_us - due_us <= _MAX_STEP_BACK_US:
+            self._behind = None
+            self._keep_pace(due_us, vehicle_time_us, wall_s)
+            return
+        if self._behind is None:
+            self._behind = (wall_s, now_us - vehicle_time_us)
+        if wall_s - self._behind[0] >= _BACKLOG_S:
+            # The vehicle was paused (paused simulator, suspended machine) while deadlines advanced.
+            self._history.clear()
+            self._offset_us = self._behind[1]
+            self._behind = None
+            self._pace = (wall_s, vehicle_time_us + self._offset_us)
+        # Otherwise this process may have been busy, and these messages have waited in the queue.
+
+    def _keep_pace(self, due_us: float, vehicle_time_us: int, wall_s: float) -> None:
+        """Leave the time of a vehicle behind that is slower than the lowest rate, so that it delays no
+        deadline for ever.
+        """
+        since_s, since_us = self._pace
+        least_us = since_us + (wall_s - since_s) * 1e6 * _RATE_LIMITS[0]
+        if due_us < least_us and wall_s - since_s < _SLOW_S:
+            return  # messages that waited in the queue come in a burst
+        self._offset_us = max(due_us, least_us) - vehicle_time_us
+        self._pace = (wall_s, max(due_us, least_us))
 
     async def sleep_until(self, time_us: int) -> None:
         """Wait until the vehicle's time has come."""

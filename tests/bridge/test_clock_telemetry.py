@@ -249,3 +249,109 @@ def test_messages_that_waited_for_a_busy_process_are_no_pause():
         assert clock.time_us == pytest.approx(150_000_000, abs=1_000_000)
 
     telemetry_run(main)
+
+
+STAMPS = {
+    "standing still": lambda t_s: 20_000_000,
+    "always 0": lambda t_s: 0,
+    "creeping": lambda t_s: 20_000_000 + round(1_000 * t_s),
+    "ever earlier": lambda t_s: 400_000_000 - round(3_000_000 * t_s),
+    "to and fro": lambda t_s: 20_000_000 + (round(t_s * 10) % 2) * 4_000_000,
+    "the last one there is": lambda t_s: 0xFFFFFFFF * 1000,
+}
+
+
+@pytest.mark.parametrize("stamps", STAMPS)
+def test_no_time_stamps_delay_a_deadline_for_ever(stamps):
+    """Received are ten stamps a second, and never one that means a second of vehicle time in a second."""
+
+    async def main(clock, world):
+        async def tell():
+            while True:
+                clock.observe(STAMPS[stamps](world.now_us * 1e-6))
+                await asyncio.sleep(0.1)
+
+        telling = asyncio.create_task(stream(clock, world, start_us=20_000_000, rate=1.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        telling = asyncio.create_task(tell())
+        await asyncio.sleep(10.0)
+        begun_us = world.now_us
+        with pytest.raises(TimeoutError):
+            async with clock.timeout(30.0):
+                await asyncio.Event().wait()
+        telling.cancel()
+        return (world.now_us - begun_us) * 1e-6, clock
+
+    took_s, clock = telemetry_run(main)
+    # at real time; a vehicle that seems slow may be a slow simulator, and is waited for 20 times as long
+    assert took_s == pytest.approx(600.0 if stamps == "creeping" else 30.0, rel=0.04)
+    assert (clock.stood_still_s > 30.0) == (stamps in ("standing still", "always 0", "the last one there is"))
+
+
+def test_a_time_that_stood_still_and_goes_on_is_followed_again():
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=10_000_000, rate=1.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        telling = asyncio.create_task(stream(clock, world, start_us=15_000_000, rate=0.0))
+        await asyncio.sleep(20.0)
+        telling.cancel()
+        telling = asyncio.create_task(stream(clock, world, start_us=15_000_000, rate=1.0))
+        await asyncio.sleep(2.0)
+        assert clock.time_us == pytest.approx(37_000_000, abs=400_000)
+        assert clock.stamp_us == pytest.approx(17_000_000, abs=400_000)
+        assert clock.rate == pytest.approx(1.0, rel=0.01)
+        assert clock.stood_still_s == pytest.approx(20.0, abs=0.3)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+@pytest.mark.parametrize("ahead_us", [4_000_000, 10_000_000_000])
+def test_a_step_ahead_does_not_end_waits(ahead_us):
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=10_000_000, rate=1.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        before_us = clock.time_us
+        telling = asyncio.create_task(stream(clock, world, start_us=15_000_000 + ahead_us, rate=1.0))
+        await asyncio.sleep(3.0)
+        assert clock.time_us == pytest.approx(before_us + 3_000_000, abs=20_000)
+        assert clock.stamp_us == pytest.approx(18_000_000 + ahead_us, abs=120_000)
+        assert (clock.jumps, clock.reboots) == (1, 0)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_time_stamps_that_wrap_are_no_reboot():
+    """time_boot_ms begins again after 49.7 days."""
+
+    async def main(clock, world):
+        wrap_us = (1 << 32) * 1000
+
+        async def tell():
+            while True:
+                clock.observe((wrap_us - 5_000_000 + world.now_us) // 1000 * 1000 % wrap_us)
+                await asyncio.sleep(0.1)
+
+        telling = asyncio.create_task(tell())
+        await asyncio.sleep(10.0)
+        assert clock.time_us == pytest.approx(wrap_us + 5_000_000, abs=20_000)
+        assert clock.stamp_us == pytest.approx(5_000_000, abs=20_000)
+        assert (clock.jumps, clock.reboots) == (0, 0)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_a_simulator_is_not_hurried_down_to_a_twentieth_of_real_time():
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=0, rate=0.06))
+        await asyncio.sleep(100.0)
+        assert clock.stamp_us == clock.time_us == pytest.approx(6_000_000, abs=20_000)
+        assert clock.stood_still_s == 0.0
+        telling.cancel()
+
+    telemetry_run(main)
