@@ -50,6 +50,7 @@ class Firmware:
         goto_mode: the mode after DO_REPOSITION.
         resting_mode: a mode in which the vehicle may stand on the ground and be armed.
         unset: value of a command or item parameter that is not set.
+        system_id_parameter: name of the parameter that sets the vehicle's system id.
         roll_alone: whether a roll command in the guided mode may leave pitch and throttle to the autopilot.
         takeoff_pitch_deg: lowest pitch of a takeoff item.
         limiting_parameters: the parameters that limit a planner, with the firmware's defaults.
@@ -68,6 +69,7 @@ class Firmware:
     goto_mode: Mode
     resting_mode: Mode
     unset: float
+    system_id_parameter: str
     roll_alone: bool = False
     takeoff_pitch_deg: float = 0.0
     limiting_parameters: Mapping[str, float]

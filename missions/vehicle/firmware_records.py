@@ -68,6 +68,7 @@ PX4_COPTER: Final = Firmware(
     goto_mode=Mode.HOLD,
     resting_mode=Mode.HOLD,
     unset=math.nan,
+    system_id_parameter="MAV_SYS_ID",
     limits_from=_px4_copter_limits,
 )
 
@@ -117,6 +118,7 @@ ARDUCOPTER: Final = Firmware(
     goto_mode=Mode.GUIDED,
     resting_mode=Mode.GUIDED,
     unset=0.0,  # NaN is refused
+    system_id_parameter="SYSID_THISMAV",
     limits_from=_arducopter_limits,
 )
 

@@ -18,6 +18,7 @@ from autopilot_bridge.mavlink import (
     definition,
     dialect,
     enum_name,
+    field_reader,
 )
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, VehicleTimeout
@@ -26,16 +27,21 @@ from missions.notes import FlightNotes, LinkLoss
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
-from missions.vehicle.link_watch import LinkWatch
+from missions.vehicle.link_watch import LOST_AFTER_S, LinkWatch
+from missions.vehicle.system_id_check import SystemIdCheck
 from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 
 T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
 _HEARTBEAT: Final = definition("HEARTBEAT").message_id
+_read_heartbeat: Final = field_reader("HEARTBEAT", "custom_mode", "type", "autopilot", "base_mode")
+_ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+_CONFIRMED_US: Final = 900_000  # heartbeats come once a second: so much later, a second one confirms the first
 _USABLE_FOR_US: Final = 1_000_000
 _SILENT_AFTER_US: Final = 3_000_000
 _SILENT_CHECK_S: Final = 0.5
+_SHOWN_AFTER_US: Final = 3_000_000  # most waits are shorter: they need not be shown
 
 
 class VehicleLink:
@@ -51,6 +57,7 @@ class VehicleLink:
         status_texts: the newest texts from the autopilot, oldest first.
         first_heartbeat_us: vehicle time of the first heartbeat that was received when vehicle time was known.
         heartbeat_us: vehicle time of the newest heartbeat; None before the first.
+        contradiction: why what is received can't come from one vehicle; "": nothing was found.
         on_regained: called when a link that counted as lost is back.
     """
 
@@ -68,7 +75,15 @@ class VehicleLink:
         self.first_heartbeat_us = 0
         self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
-        self._watch = LinkWatch(connection.clock, lambda: self.last_received(silence=False))
+        self._check: SystemIdCheck | None = None
+        self.contradiction = ""
+        self._reported: tuple[int, int] | None = None  # base mode and custom mode of the newest heartbeat
+        # when the heartbeats began to report disarmed after armed; None: they report armed, or always disarmed
+        self._disarmed_us: int | None = None
+        self._waits: list[tuple[int, Callable[[], str]]] = []  # since when, and for what
+        self._at_silence: dict[int, Frame] = {}  # the newest messages when the heartbeats stopped
+        self._watch = LinkWatch(connection.clock, self._received_at_loss)
+        self._watch.on_quiet = self._note_silence
         self._watch.on_lost = self._note_loss
         self._watch.on_regained = self._note_regained
         connection.listen("STATUSTEXT", self._on_status_text)
@@ -111,21 +126,45 @@ class VehicleLink:
             return
         if self._system_id is not None and frame.system_id != self._system_id:
             return
+        custom_mode, type_, autopilot, base_mode = _read_heartbeat(frame)
+        name, kind = FIRMWARE_NAMES.get(autopilot), KIND_OF_TYPE.get(type_)
+        sender = f"{name or f'autopilot {autopilot}'} {kind or f'of type {type_}'}"
         if self._firmware is None:
-            heartbeat = decode(frame)
-            name = FIRMWARE_NAMES.get(heartbeat.autopilot)
-            kind = KIND_OF_TYPE.get(heartbeat.type)
             if name is None or kind is None:
                 return
             self._firmware = FIRMWARES[name, kind]
             self._system_id = frame.system_id
+            self._check = SystemIdCheck(sender)
             self.connection.keep(frame.system_id)
+        armed = bool(base_mode & _ARMED)
+        assert self._check is not None
+        self._contradict(self._check.on_heartbeat(sender, armed=armed))
+        if (name, kind) != (self._firmware.name, self._firmware.kind):
+            return  # of another vehicle
+        if isinstance(self.clock, TelemetryClock):
+            steps = self.clock.reboots + self.clock.jumps
+            self._contradict(self._check.on_time_steps(steps, asyncio.get_running_loop().time()))
+        if armed:
+            self._disarmed_us = None
+        elif self._reported is not None and self._reported[0] & _ARMED:
+            self._disarmed_us = self.clock.time_us
+        self._reported = (base_mode, custom_mode)
         if not self._timed:
             clock = self.clock
             self._timed = not isinstance(clock, TelemetryClock) or clock.vehicle_time_us is not None
             self.first_heartbeat_us = clock.time_us
         self.heartbeat_us = self.clock.time_us
         self._watch.on_heartbeat()
+
+    def _contradict(self, found: str) -> None:
+        """End the waits for the first contradiction in the messages of the vehicle."""
+        if not found or self.contradiction:
+            return
+        self.contradiction = (
+            f"the messages of system {self.system_id} are not those of one vehicle: {found}; give each vehicle "
+            f"its own system id ({self.firmware.system_id_parameter})"
+        )
+        self._watch.end_waits(self.contradiction)
 
     @property
     def signs(self) -> bool:
@@ -163,6 +202,19 @@ class VehicleLink:
     def just_back(self) -> bool:
         """Whether a silence of the vehicle ended a moment ago."""
         return self._watch.just_back
+
+    def _note_silence(self) -> None:
+        self._at_silence = {} if self._system_id is None else dict(self.connection.newest(self._system_id))
+
+    def _received_at_loss(self) -> str:
+        """What was received, for the error of a wait that ends without heartbeats."""
+        text = self.last_received(silence=False)
+        now = {} if self._system_id is None else self.connection.newest(self._system_id)
+        others = [number for number, frame in now.items() if self._at_silence.get(number) is not frame]
+        if not self._watch.quiet or not others:
+            return text
+        names = ", ".join(sorted(definition(number).name for number in others)[:3])
+        return f"{text}; other messages of it are still received ({names})"
 
     def _note_loss(self) -> None:
         since_us = self.clock.time_us if self.heartbeat_us is None else self.heartbeat_us
@@ -265,13 +317,30 @@ class VehicleLink:
 
     @property
     def armed(self) -> bool:
-        """Whether the newest heartbeat reports armed."""
-        heartbeat = self.message("HEARTBEAT")
-        return heartbeat is not None and bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+        """Whether the vehicle is armed: by the newest heartbeat, where that reports armed.
+
+        One heartbeat that reports disarmed after others reported armed may be wrong. It counts when the
+        vehicle reports that it is on the ground, and else with a heartbeat that confirms it.
+        """
+        if self._reported is None:
+            heartbeat = self.message("HEARTBEAT")
+            return heartbeat is not None and bool(heartbeat.base_mode & _ARMED)
+        if self._reported[0] & _ARMED:
+            return True
+        return self.disarming and self.landed_state != dialect.MAV_LANDED_STATE_ON_GROUND
+
+    @property
+    def disarming(self) -> bool:
+        """Whether a heartbeat reports disarmed after others reported armed, and none has confirmed it yet."""
+        if self._disarmed_us is None or self.heartbeat_us is None:
+            return False
+        return self.heartbeat_us - self._disarmed_us < _CONFIRMED_US
 
     @property
     def custom_mode(self) -> int:
         """HEARTBEAT.custom_mode, in the firmware's numbering."""
+        if self._reported is not None:
+            return self._reported[1]
         heartbeat = self.message("HEARTBEAT")
         return 0 if heartbeat is None else int(heartbeat.custom_mode)
 
@@ -325,29 +394,50 @@ class VehicleLink:
     async def deadline(self, seconds: float, awaited: str | Callable[[], str]) -> AsyncIterator[None]:
         """`async with`: TimeoutError after `seconds` of vehicle time, LinkClosed when the link is lost.
 
-        When a lost link may come back, the time without received messages does not count.
+        When a lost link may come back, a silence at the end of that time, and as much time after it, does not
+        count: in all, as long as one link may be lost.
         """
-        if not self.regain_s:
-            async with self.guard(awaited), self.clock.timeout(seconds):
-                yield
-            return
-        async with self.guard(awaited), asyncio.timeout(None) as scope:
-            running_out = asyncio.ensure_future(self._run_out(scope, seconds))
-            try:
-                yield
-            finally:
-                running_out.cancel()
+        wait = (self.clock.time_us, awaited if callable(awaited) else lambda: awaited)
+        self._waits.append(wait)
+        try:
+            if not self.regain_s:
+                async with self.guard(awaited), self.clock.timeout(seconds):
+                    yield
+                return
+            async with self.guard(awaited), asyncio.timeout(None) as scope:
+                running_out = asyncio.ensure_future(self._run_out(scope, seconds))
+                try:
+                    yield
+                finally:
+                    running_out.cancel()
+        finally:
+            self._waits.remove(wait)
 
     async def _run_out(self, scope: asyncio.Timeout, seconds: float) -> None:
-        """Let a deadline pass. If the link was silent then, the full time starts again when the vehicle is
-        received.
+        """Let a deadline pass, and the silence at its end, but no more silence than one link may be lost: a
+        vehicle that is received now and then can't delay it for ever.
         """
-        await self.clock.sleep(seconds)
-        while self._silent:
-            while self._silent:
-                await self.clock.sleep(_SILENT_CHECK_S)
-            await self.clock.sleep(seconds)
+        clock = self.clock
+        allowed_us = round((LOST_AFTER_S + self.regain_s) * 1e6)
+        await clock.sleep(seconds)
+        while self._silent and allowed_us > 0:
+            assert self.heartbeat_us is not None
+            since_us = self.heartbeat_us
+            while self._silent and clock.time_us - since_us < allowed_us:
+                await clock.sleep(_SILENT_CHECK_S)
+            silent_us = clock.time_us - since_us
+            allowed_us -= silent_us
+            await clock.sleep(min(seconds, silent_us * 1e-6))
         scope.reschedule(asyncio.get_running_loop().time())
+
+    @property
+    def awaited(self) -> str:
+        """What a task has been waiting for, for three seconds or more, and what was received last; "": no
+        task has.
+        """
+        now_us = self.clock.time_us
+        shown = next((what for since_us, what in self._waits if now_us - since_us >= _SHOWN_AFTER_US), None)
+        return "" if shown is None else f"waiting for {shown()}; {self.last_received()}"
 
     @property
     def _silent(self) -> bool:

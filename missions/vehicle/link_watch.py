@@ -1,4 +1,6 @@
-"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time."""
+"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time, and when what is
+received can't be trusted.
+"""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -6,7 +8,7 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 from autopilot_bridge.clock import Clock, TelemetryClock
-from missions.errors import LinkClosed
+from missions.errors import LinkClosed, MissionError
 
 LOST_AFTER_S: Final = 10.0
 QUIET_AFTER_S: Final = 3.0
@@ -30,6 +32,7 @@ class LinkWatch:
         regain_s: longest time for which a lost link may stay lost.
         quiet: no heartbeat for 3 s, while a task waits.
         lost: the link counts as lost.
+        on_quiet: called when no heartbeat was received for 3 s.
         on_lost, on_regained: called when the link is lost, and when it is back.
     """
 
@@ -37,6 +40,7 @@ class LinkWatch:
         self.regain_s = 0.0
         self.quiet = False
         self.lost = False
+        self.on_quiet: Callable[[], None] = lambda: None
         self.on_lost: Callable[[], None] = lambda: None
         self.on_regained: Callable[[], None] = lambda: None
         self._clock = clock
@@ -44,6 +48,8 @@ class LinkWatch:
         self._received_s: float | None = None
         self._back_s: float | None = None
         self._scopes: list[asyncio.Timeout] = []
+        self._reasons: dict[asyncio.Timeout, str] = {}  # why waits end, other than by silence
+        self._reason_pending = ""  # of the next wait
         self._timer: asyncio.TimerHandle | None = None
 
     def on_heartbeat(self) -> None:
@@ -61,14 +67,26 @@ class LinkWatch:
         """Whether a silence ended a moment ago, so that the autopilot may not have noticed it yet."""
         return self._back_s is not None and asyncio.get_running_loop().time() - self._back_s < _JUST_BACK_S
 
+    def end_waits(self, reason: str) -> None:
+        """End the present waits, or the next one, with a MissionError for this reason.
+
+        Later waits are not ended: the vehicle is to be left safe.
+        """
+        self._reasons = dict.fromkeys(self._scopes, reason)
+        self._reason_pending = "" if self._scopes else reason
+        self._expire()
+
     @asynccontextmanager
     async def guard(self, awaited: Callable[[], str]) -> AsyncIterator[None]:
         """Context that raises LinkClosed when the heartbeats stop, and don't come back in time, while the
-        block waits.
+        block waits, and MissionError for the reason of `end_waits`.
 
         Args:
             awaited: returns the description of what the block waits for, for the error.
         """
+        reason, self._reason_pending = self._reason_pending, ""
+        if reason:
+            raise MissionError(f"{reason}; {self._last_received()}")
         scope = asyncio.timeout(None)
         try:
             async with scope:
@@ -78,13 +96,21 @@ class LinkWatch:
                     yield
                 finally:
                     self._scopes.remove(scope)
+                    reason = self._reasons.pop(scope, "")
         except TimeoutError:
             if not scope.expired():
                 raise
+            if reason:
+                raise MissionError(f"{reason}; {self._last_received()}") from None
             raise LinkClosed(
                 f"link lost: no heartbeat for {self._silence_s():.0f} s while waiting for {awaited()}; "
                 f"{self._last_received()}"
             ) from None
+
+    def _expire(self) -> None:
+        for scope in self._scopes:
+            if not scope.expired():
+                scope.reschedule(asyncio.get_running_loop().time())
 
     def _silence_s(self) -> float:
         return 0.0 if self._received_s is None else asyncio.get_running_loop().time() - self._received_s
@@ -108,12 +134,12 @@ class LinkWatch:
         if self._received_s is not None:
             self._received_s = min(now_s, self._received_s + max(0.0, now_s - due_s))
         silence_s, slowness = self._silence_s(), self._slowness()
-        self.quiet = self.quiet or silence_s >= QUIET_AFTER_S * slowness
+        if silence_s >= QUIET_AFTER_S * slowness and not self.quiet:
+            self.quiet = True
+            self.on_quiet()
         if silence_s >= LOST_AFTER_S * slowness and not self.lost:
             self.lost = True
             self.on_lost()
         if silence_s >= LOST_AFTER_S * slowness + self.regain_s:
-            for scope in self._scopes:
-                if not scope.expired():
-                    scope.reschedule(now_s)
+            self._expire()
         self._start()
