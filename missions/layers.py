@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from missions.errors import MissionError
 from missions.kind import VehicleKind
 
 if TYPE_CHECKING:
@@ -109,11 +108,7 @@ class Layers:
         vehicle.notes.begin("return", vehicle.clock.stamp_us)
 
         def below_empty() -> bool:
-            if not vehicle.armed:
-                raise MissionError(
-                    "the vehicle disarmed while it waited for the layers below to be empty; "
-                    f"{vehicle.link.last_received()}"
-                )
+            vehicle.link.require_armed("while it waited for the layers below to be empty")
             return traffic.may_land(index)
 
         if not traffic.may_land(index):

@@ -40,6 +40,7 @@ _SLOWEST_SHARE: Final = 0.2  # of the speed: a step that takes longer is given u
 _LEAST_STEP_S: Final = 15.0
 _SAME_RAD: Final = math.radians(3.0)  # smaller changes of heading are not commanded
 _MODE_AGE_US: Final = 2_500_000
+_POSITION_S: Final = 10.0  # longest time without a position, where headings are commanded from it
 
 
 @dataclass(slots=True, kw_only=True)
@@ -319,20 +320,22 @@ class SearchTeam(Generic[Options]):
             self._begin(index)
             commanded: float | None = None
             with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
-                async with vehicle.link.guard("the end of the search"):
-                    while True:
-                        await stream.frame()
-                        settled = vehicle.clock.time_us - searcher.began_us > _MODE_AGE_US
-                        if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
-                            raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
-                        p = vehicle.latest(Position)
-                        if p is None:
-                            continue
-                        north_m, east_m, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
-                        self._advance(index, (north_m, east_m))
-                        if self.search.over:
-                            break
-                        bearing = math.atan2(searcher.goal[1] - east_m, searcher.goal[0] - north_m)
-                        if commanded is None or abs(wrap_pi(bearing - commanded)) > _SAME_RAD:
-                            commanded = bearing % math.tau
-                            await flight.turn_to(commanded)
+                while True:
+                    await vehicle.link.next_frame(
+                        stream, what="position during the search", timeout_s=_POSITION_S
+                    )
+                    settled = vehicle.clock.time_us - searcher.began_us > _MODE_AGE_US
+                    vehicle.link.require_armed("during the search")
+                    if settled and vehicle.link.custom_mode != guided:
+                        raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
+                    p = vehicle.latest(Position)
+                    if p is None:
+                        continue
+                    north_m, east_m, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+                    self._advance(index, (north_m, east_m))
+                    if self.search.over:
+                        break
+                    bearing = math.atan2(searcher.goal[1] - east_m, searcher.goal[0] - north_m)
+                    if commanded is None or abs(wrap_pi(bearing - commanded)) > _SAME_RAD:
+                        commanded = bearing % math.tau
+                        await flight.turn_to(commanded)

@@ -169,10 +169,7 @@ class HandoffAircraft(ABC):
         """
 
         def look() -> bool:
-            if not self.vehicle.armed:
-                raise MissionError(
-                    f"the vehicle disarmed while it waited for {what}; {self.vehicle.link.last_received()}"
-                )
+            self.vehicle.link.require_armed(f"while it waited for {what}")
             return ready()
 
         await self.vehicle.link.wait_until(
@@ -374,8 +371,7 @@ class TakeoverFlight(HandoffAircraft):
         attitude = vehicle.latest(Attitude)
         if attitude is None:
             raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {vehicle.link.last_received()}")
-        if not vehicle.armed:
-            raise MissionError(f"the vehicle disarmed in flight; {vehicle.link.last_received()}")
+        vehicle.link.require_armed("in flight")
         place, roll_rad = self.estimator.target(), -_SEARCH_ROLL_RAD
         if place is not None:
             assert self._guidance is not None

@@ -35,6 +35,7 @@ SEARCH: Final = "search"
 _FIELD_YEAR: Final = 2026.0  # of the main field, whose direction changes little
 
 _MODE_AGE_US: Final = 2_500_000  # within this time heartbeats report a change of mode
+_POSITION_S: Final = 10.0  # longest time without a position, where headings are commanded from it
 _RING: Final = 0.25  # of the area: distance from its centre at which the searchers of a team start
 
 
@@ -159,19 +160,21 @@ class SearchTeam:
         watch.start()
         try:
             with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
-                async with vehicle.link.guard("the end of the search"):
-                    while True:
-                        await stream.frame()
-                        if self.over:
-                            self.search.finish(self._vehicles[0].clock.time_us)
-                            break
-                        settled = clock.time_us - searcher.began_us > _MODE_AGE_US
-                        if not vehicle.armed or (settled and vehicle.link.custom_mode != guided):
-                            raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
-                        command = searcher.pilot.update(self._motion(vehicle))
-                        if command is not None:
-                            await flight.turn_to(command.heading_rad)
-                        self._note_progress(vehicle)
+                while True:
+                    await vehicle.link.next_frame(
+                        stream, what="position during the search", timeout_s=_POSITION_S
+                    )
+                    if self.over:
+                        self.search.finish(self._vehicles[0].clock.time_us)
+                        break
+                    settled = clock.time_us - searcher.began_us > _MODE_AGE_US
+                    vehicle.link.require_armed("during the search")
+                    if settled and vehicle.link.custom_mode != guided:
+                        raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
+                    command = searcher.pilot.update(self._motion(vehicle))
+                    if command is not None:
+                        await flight.turn_to(command.heading_rad)
+                    self._note_progress(vehicle)
         finally:
             watch.stop()
             searcher.ended_us = clock.time_us

@@ -166,8 +166,7 @@ class OrbitFlight:
         return attitude
 
     def _require_flying(self) -> None:
-        if not self._vehicle.armed:
-            raise MissionError(f"the vehicle disarmed in flight; {self._vehicle.link.last_received()}")
+        self._vehicle.link.require_armed("in flight")
 
     async def _orbit_without_gps(self, looking: "asyncio.Task[None]") -> None:
         vehicle = self._vehicle

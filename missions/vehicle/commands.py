@@ -12,10 +12,14 @@ from missions.vehicle.link import VehicleLink, describe_ack
 
 ACK_S: Final = 1.0
 _SENDINGS: Final = 5
+_NEXT_PROGRESS_S: Final = 10.0
+_IN_PROGRESS_LIMIT_S: Final = 60.0
+"""Longest time for which a command may be in progress, where its timeout is not longer."""
 _MODE_AGAIN_S: Final = 1.5
 HEARTBEAT_AGE_US: Final = 500_000
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
+_ALL_DONE: Final = 100  # percent; more means that the progress is not known
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
@@ -81,9 +85,13 @@ class VehicleCommands:
     async def command(self, command: int, *params: float, timeout_s: float = ACK_S) -> None:
         """Send a COMMAND_LONG repeatedly until it is answered.
 
+        Args:
+            timeout_s: time limit for the answer to each attempt. A command in progress (IN_PROGRESS) is
+                waited for until it is finished, for this time or a minute, whichever is longer.
+
         Raises:
             CommandRejected: the answer was not ACCEPTED.
-            VehicleTimeout: none of the attempts was answered.
+            VehicleTimeout: none of the attempts was answered, or the command was not finished.
         """
         result = await self.try_command(command, *params, timeout_s=timeout_s)
         self.require(command, result)
@@ -128,6 +136,8 @@ class VehicleCommands:
     async def _send_command(
         self, command: int, message: Callable[[int], MAVLinkMessage], timeout_s: float
     ) -> int:
+        clock, begun_us, progress = self.link.clock, None, ""
+        limit_us = round(max(_IN_PROGRESS_LIMIT_S, timeout_s) * 1e6)
         with self.link.messages("COMMAND_ACK") as acks:
             for attempt in range(_SENDINGS):
                 self.link.send(message(attempt))
@@ -137,11 +147,20 @@ class VehicleCommands:
                         ack = await self._next_ack(acks, command, wait_s)
                         if ack.result != _IN_PROGRESS:
                             return int(ack.result)
-                        wait_s = 10.0
+                        begun_us = clock.time_us if begun_us is None else begun_us
+                        progress = f" ({ack.progress} %)" if ack.progress <= _ALL_DONE else ""
+                        if clock.time_us - begun_us >= limit_us:
+                            raise VehicleTimeout(
+                                f"{command_name(command)} was still in progress{progress} after "
+                                f"{(clock.time_us - begun_us) * 1e-6:.0f} s; {self.link.last_received()}"
+                            )
+                        wait_s = _NEXT_PROGRESS_S
                 except TimeoutError:
                     continue
+        begun = "" if begun_us is None else f" after it was in progress{progress}"
         raise VehicleTimeout(
-            f"no answer to {command_name(command)} after {_SENDINGS} attempts; {self.link.last_received()}"
+            f"no answer to {command_name(command)} after {_SENDINGS} attempts{begun}; "
+            f"{self.link.last_received()}"
         )
 
     async def _next_ack(self, acks: Any, command: int, timeout_s: float) -> Any:

@@ -37,7 +37,7 @@ _TEXTS_KEPT: Final = 50
 _HEARTBEAT: Final = definition("HEARTBEAT").message_id
 _read_heartbeat: Final = field_reader("HEARTBEAT", "custom_mode", "type", "autopilot", "base_mode")
 _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
-_CONFIRMED_US: Final = 900_000  # heartbeats come once a second: so much later, a second one confirms the first
+_CONFIRMED_US: Final = 900_000  # heartbeats come once a second: a second one confirms the first
 _USABLE_FOR_US: Final = 1_000_000
 _SILENT_AFTER_US: Final = 3_000_000
 _SILENT_CHECK_S: Final = 0.5
@@ -78,7 +78,7 @@ class VehicleLink:
         self._check: SystemIdCheck | None = None
         self.contradiction = ""
         self._reported: tuple[int, int] | None = None  # base mode and custom mode of the newest heartbeat
-        # when the heartbeats began to report disarmed after armed; None: they report armed, or always disarmed
+        # when the heartbeats began to report disarmed after armed; None: they did not
         self._disarmed_us: int | None = None
         self._waits: list[tuple[int, Callable[[], str]]] = []  # since when, and for what
         self._at_silence: dict[int, Frame] = {}  # the newest messages when the heartbeats stopped
@@ -161,8 +161,8 @@ class VehicleLink:
         if not found or self.contradiction:
             return
         self.contradiction = (
-            f"the messages of system {self.system_id} are not those of one vehicle: {found}; give each vehicle "
-            f"its own system id ({self.firmware.system_id_parameter})"
+            f"the messages of system {self.system_id} are not those of one vehicle: {found}; give each "
+            f"vehicle its own system id ({self.firmware.system_id_parameter})"
         )
         self._watch.end_waits(self.contradiction)
 
@@ -328,6 +328,15 @@ class VehicleLink:
         if self._reported[0] & _ARMED:
             return True
         return self.disarming and self.landed_state != dialect.MAV_LANDED_STATE_ON_GROUND
+
+    def require_armed(self, where: str) -> None:
+        """Raise MissionError when the vehicle has disarmed.
+
+        Args:
+            where: when this ended the flight, for the error: "before item 7".
+        """
+        if not self.armed:
+            raise MissionError(f"the vehicle disarmed {where}; {self.last_received()}")
 
     @property
     def disarming(self) -> bool:
@@ -514,6 +523,19 @@ class VehicleLink:
         finally:
             for stop in stops:
                 stop()
+
+    async def next_frame(self, stream: MessageStream, *, what: str, timeout_s: float) -> Frame:
+        """The next frame of a stream.
+
+        Raises:
+            VehicleTimeout: none was received in time.
+            LinkClosed: the heartbeats stopped.
+        """
+        try:
+            async with self.deadline(timeout_s, what):
+                return await stream.frame()
+        except TimeoutError:
+            raise VehicleTimeout(f"no {what} within {timeout_s:g} s; {self.last_received()}") from None
 
     async def wait_disarmed(self, timeout_s: float = 300.0) -> None:
         """Wait until the vehicle is disarmed."""

@@ -1,5 +1,5 @@
-"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time, and when what is
-received can't be trusted.
+"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time, and when the
+messages contradict each other.
 """
 
 import asyncio

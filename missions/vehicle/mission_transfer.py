@@ -8,13 +8,14 @@ from autopilot_bridge.mavlink import command_name, dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_from_message, item_message
 from missions.errors import CommandRejected, VehicleTimeout
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
+from missions.vehicle.connection import AUTOPILOT_COMPONENT, MessageStream
 from missions.vehicle.link import VehicleLink
 
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
 _SENDINGS: Final = 3
 _STUCK_S: Final = 6.0  # PX4 cancels a transfer after 5 s
+_REPEATED: Final = 40  # replies without progress; PX4 repeats a request 20 times in 5 s, ArduPilot 8 times
 _ERRORS_BORNE: Final = 10  # an item that ArduPilot requested eight times may arrive there eight times
 _GIVEN_UP: Final = (dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_OPERATION_CANCELLED)
 _DO_JUMP: Final = 177
@@ -39,6 +40,13 @@ def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
 
 def _result_name(result: int) -> str:
     return enum_name("MAV_MISSION_RESULT", result, prefix="MAV_MISSION_") or f"result {result}"
+
+
+def _reply_name(reply: Any) -> str:
+    """A reply of a transfer as text."""
+    if reply.get_type() == "MISSION_ACK":
+        return f"the answer {_result_name(reply.type)}"
+    return f"a request for item {reply.seq}"
 
 
 async def upload(
@@ -81,14 +89,13 @@ async def _send_plan(
         link.send(count)
         attempts = 0
         errors = 0
+        repeated = 0
         while True:
             all_sent = requested + 1 >= len(items)
             try:
-                async with link.deadline(
-                    _RETRY_S if requested < 0 or all_sent else _STUCK_S,
-                    f"a request for an item of the {what}",
-                ):
-                    reply = await anext(replies)
+                reply = await _next_reply(
+                    link, replies, mission_type, _RETRY_S if requested < 0 or all_sent else _STUCK_S
+                )
             except TimeoutError:
                 attempts += 1
                 if attempts > _RETRIES or not (requested < 0 or all_sent):
@@ -101,8 +108,13 @@ async def _send_plan(
                 else:  # the acknowledgement was lost: PX4 repeats it
                     link.send(_item_message(items[-1], len(items) - 1, link.system_id, mission_type))
                 continue
-            if not link.addressed_here(reply) or reply.mission_type != mission_type:
-                continue
+            repeated += 1
+            if repeated > _REPEATED:
+                raise VehicleTimeout(
+                    f"the vehicle requests nothing new of the {what}: {repeated} replies after "
+                    f"{requested + 1} of {len(items)} items, the last one {_reply_name(reply)}; "
+                    f"{link.last_received()}"
+                )
             if reply.get_type() == "MISSION_ACK":
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
                     if all_sent:
@@ -134,8 +146,20 @@ async def _send_plan(
                     reply.type,
                 )
             if reply.seq < len(items):
-                requested = max(requested, reply.seq)
+                if reply.seq > requested:
+                    requested, repeated = reply.seq, 0
                 link.send(_item_message(items[reply.seq], reply.seq, link.system_id, mission_type))
+
+
+async def _next_reply(
+    link: VehicleLink, replies: MessageStream, mission_type: MissionType, seconds: float
+) -> Any:
+    """The next message of this transfer; those of other clients' transfers do not extend the wait."""
+    async with link.deadline(seconds, f"a request for an item of the {_NAMES[mission_type]}"):
+        while True:
+            reply = await anext(replies)
+            if link.addressed_here(reply) and reply.mission_type == mission_type:
+                return reply
 
 
 async def _ask(

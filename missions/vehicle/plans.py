@@ -135,11 +135,12 @@ class VehiclePlans:
             progress: called with the number of each reached item.
 
         Raises:
-            MissionError: the vehicle left the mission before that.
+            MissionError: the vehicle left the mission before that, or disarmed.
         """
         tracker = self._tracker or ItemTracker([MissionStep(index=k) for k in range(sequence + 1)])
         mode = MissionModeWatch(self._link.firmware.modes[Mode.MISSION])
         wanted = tracker.place_of(sequence - tracker.first)
+        flying = self._link.armed
         reported = 0
 
         def there() -> bool:
@@ -152,6 +153,7 @@ class VehiclePlans:
             return tracker.behind > wanted
 
         def handle(frame: Frame) -> bool:
+            nonlocal flying
             if frame.message_id == _POSITION:
                 lat, lon, alt = _read_position(frame)
                 tracker.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self._link.clock.stamp_us)
@@ -159,7 +161,11 @@ class VehiclePlans:
             message = decode(frame)
             if message.get_type() != "HEARTBEAT":
                 tracker.on_message(message, self._link.clock.stamp_us)
-            elif mode.left(message.custom_mode) and not tracker.at_the_last_place:
+                return there()
+            if flying:
+                self._link.require_armed(f"before item {sequence}")
+            flying = self._link.armed
+            if mode.left(message.custom_mode) and not tracker.at_the_last_place:
                 name = self._link.firmware.mode_name(message.custom_mode)
                 raise MissionError(
                     f"the vehicle left the mission for mode {name} before item {sequence}; "

@@ -1,6 +1,7 @@
 """Detects that the messages of one system id do not come from one vehicle."""
 
 from collections import deque
+from itertools import pairwise
 from typing import Final
 
 _FOREIGN: Final = 2  # heartbeats of another kind of vehicle
@@ -36,11 +37,10 @@ class SystemIdCheck:
                 return ""
             return f"heartbeats of a {self._sender} and of a {sender} are received"
         self._armed.append(armed)
-        states = tuple(self._armed)
-        changes = sum(before != after for before, after in zip(states, states[1:], strict=False))
+        changes = sum(before != after for before, after in pairwise(self._armed))
         if changes < _CHANGES:
             return ""
-        return f"the armed state changed {changes} times in {len(states)} heartbeats"
+        return f"the armed state changed {changes} times in {len(self._armed)} heartbeats"
 
     def on_time_steps(self, count: int, now_s: float) -> str:
         """Process the number of steps that the time stamps have made so far, by this machine's time; returns

@@ -131,7 +131,7 @@ class Vehicle:
 
     @property
     def armed(self) -> bool:
-        """Whether the newest heartbeat reports armed."""
+        """Whether the vehicle is armed; see `VehicleLink.armed`."""
         return self.link.armed
 
     @property
@@ -262,8 +262,7 @@ class Vehicle:
 
         def reached() -> bool:
             position = self.latest(Position)
-            if not self.armed:
-                raise MissionError(f"the vehicle disarmed during takeoff; {self.link.last_received()}")
+            self.link.require_armed("during takeoff")
             return (
                 position is not None
                 and position.height_m > altitude_m - slack_m

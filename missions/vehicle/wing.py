@@ -167,8 +167,7 @@ class FixedWing:
         near_m = 1.5 * (radius_m or 120.0) + 20.0
 
         def there() -> bool:
-            if not self._link.armed:
-                raise MissionError(f"the vehicle disarmed on its way; {self._link.last_received()}")
+            self._link.require_armed("on its way")
             p = self._link.latest(Position)
             if p is None:
                 return False

@@ -48,10 +48,7 @@ class PlaceOnPath:
         p = vehicle.latest(telemetry.Position)
         if p is None:
             raise MissionError(f"the vehicle reports no position in flight; {vehicle.link.last_received()}")
-        if not vehicle.armed:
-            raise MissionError(
-                f"the vehicle disarmed before the pattern was flown; {vehicle.link.last_received()}"
-            )
+        vehicle.link.require_armed("before the pattern was flown")
         north, east, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
         late_s = min(_OLDEST_S, max(0.0, (vehicle.clock.stamp_us - p.time_us) * 1e-6))
         self.vel_north_m_s, self.vel_east_m_s = p.vel_ned_m_s[0], p.vel_ned_m_s[1]
