@@ -34,13 +34,19 @@ class Home:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Home from "lat,lon,alt[,heading]", as ArduPilot's SITL writes it.
+        """Home from "lat,lon,alt[,heading]", as ArduPilot's SITL writes it; an empty altitude is the default.
 
         Raises:
             ValueError: the text has another form, or a number is out of range.
         """
         try:
-            numbers = [float(part) for part in text.split(",")]
+            lat, lon, alt, *heading = text.split(",")
+            numbers = [
+                float(lat),
+                float(lon),
+                float(alt) if alt.strip() else cls().alt_m,
+                *map(float, heading),
+            ]
         except ValueError:
             numbers = []
         if len(numbers) not in (3, 4):

@@ -33,6 +33,30 @@ LOITERS: Final = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME,
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedHome:
+    """Home of a mission file.
+
+    Attributes:
+        lat_deg, lon_deg: its place.
+        alt_m: altitude above mean sea level; None: the file does not know it.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    alt_m: float | None
+
+    @classmethod
+    def of(cls, place: GeodeticPosition) -> "PlannedHome":
+        """A home whose altitude is known."""
+        return cls(lat_deg=place.lat_deg, lon_deg=place.lon_deg, alt_m=place.alt_m)
+
+    @property
+    def place(self) -> GeodeticPosition:
+        """The place, at mean sea level where the altitude is not known."""
+        return GeodeticPosition(lat_deg=self.lat_deg, lon_deg=self.lon_deg, alt_m=self.alt_m or 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MissionDocument:
     """The contents of a mission file.
 
@@ -41,6 +65,8 @@ class MissionDocument:
         items: the mission, without a home item; DO_JUMP names its target by the index in this tuple.
         fence, rally: items of the geofence and of the rally points.
         home: planned home; None: not in the file.
+        zero_is_here: items of every command at latitude and longitude 0 stay at the place before them, as
+            ArduPilot has it; otherwise only takeoffs, landings and circles do.
         kind: class of vehicle that the plan is for; None: not in the file.
         firmware: "px4" or "ardupilot"; None: not in the file, or any firmware.
         cruise_speed_m_s, hover_speed_m_s: speeds that the planner assumed in fixed-wing and in hovering
@@ -51,7 +77,8 @@ class MissionDocument:
     items: tuple[MissionItem, ...]
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
-    home: GeodeticPosition | None = None
+    home: PlannedHome | None = None
+    zero_is_here: bool = False
     kind: VehicleKind | None = None
     firmware: str | None = None
     cruise_speed_m_s: float | None = None

@@ -15,7 +15,7 @@ from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.notes import PATTERN, Phase
-from missions.plan_files.document import NAV_LAND, MissionDocument
+from missions.plan_files.document import NAV_LAND, MissionDocument, PlannedHome
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
 from missions.plan_files.options import FileOptions, Then
@@ -114,7 +114,7 @@ class FileMission(Mission[FileOptions]):
             duration_s=options.time_limit_s
             if route.endless
             else route.duration_s(own_speed_m_s(self.document, vehicle.kind)),
-            plan_home=self.document.home,
+            plan_home=None if self.document.home is None else self.document.home.place,
             fence=self.document.fence,
         )
 
@@ -126,7 +126,8 @@ class FileMission(Mission[FileOptions]):
 
     @property
     def _plan_home(self) -> GeodeticPosition:
-        return self.document.home or GeodeticPosition(lat_deg=0.0, lon_deg=0.0, alt_m=0.0)
+        home = self.document.home or PlannedHome(lat_deg=0.0, lon_deg=0.0, alt_m=None)
+        return home.place
 
     def title(self, options: FileOptions) -> str:
         return self.document.path.name
@@ -236,13 +237,17 @@ def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, flo
 
 
 def _home_text(document: MissionDocument) -> str | None:
-    """The file's home for an embedded world, with the heading to the mission's first place."""
+    """The file's home for an embedded world, with the heading to the mission's first place. An altitude that
+    the file does not know is empty.
+    """
     home = document.home
     if home is None:
         return None
-    for stop in route_of(document, home).stops:
+    altitude = "" if home.alt_m is None else f"{home.alt_m:.3f}"
+    place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{altitude}"
+    for stop in route_of(document, home.place).stops:
         north, east, _ = stop.position_ned_m
         if math.hypot(north, east) > 5.0:
             heading_deg = math.degrees(math.atan2(east, north)) % 360.0
-            return f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt_m:.3f},{heading_deg:.3f}"
-    return f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt_m:.3f}"
+            return f"{place},{heading_deg:.3f}"
+    return place

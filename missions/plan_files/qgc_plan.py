@@ -20,11 +20,14 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.plan_files.complex_items import landing_items, simple_items
-from missions.plan_files.document import DO_JUMP, INT_FRAMES, PLAIN_FRAMES, MissionDocument
+from missions.plan_files.document import DO_JUMP, INT_FRAMES, PLAIN_FRAMES, MissionDocument, PlannedHome
 from missions.plan_files.json_values import Refuse, entries, flag, is_number, mapping, number, numbers, whole
 
 _MAX_BYTES: Final = 32 * 1024 * 1024
-_FIRMWARE: Final = {12: "px4", 3: "ardupilot"}
+_PX4: Final = 12
+_ARDUPILOT: Final = 3
+_FIRMWARE: Final = {_PX4: "px4", _ARDUPILOT: "ardupilot"}
+_ABOVE_TERRAIN: Final = 3  # AltitudeMode: the ground station adds the terrain's height to the altitude
 _RALLY: Final = 5100  # NAV_RALLY_POINT
 
 
@@ -46,23 +49,38 @@ def read_plan(path: Path) -> MissionDocument:
     mission = mapping(plan.get("mission"), "mission", refuse)
     if mission.get("version") != 2:
         raise PlanError(f"{path}: version {mission.get('version')!r} of its mission; accepted: 2")
-    home = None
-    if mission.get("plannedHomePosition") is not None:
-        lat, lon, alt = numbers(mission["plannedHomePosition"], 3, "plannedHomePosition", refuse)
-        if not (abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(alt)):
-            raise refuse("plannedHomePosition", f"{lat!r}, {lon!r}, {alt!r} is no place")
-        home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+    firmware_type = mission.get("firmwareType", 0)
     return MissionDocument(
         path=path,
         items=_mission_items(mission, refuse),
         fence=_fence_items(mapping(plan.get("geoFence", {}), "geoFence", refuse), refuse),
         rally=_rally_items(mapping(plan.get("rallyPoints", {}), "rallyPoints", refuse), refuse),
-        home=home,
+        home=_home(mission, refuse),
+        zero_is_here=firmware_type == _ARDUPILOT,
         kind=_kind(mission, path),
-        firmware=_FIRMWARE.get(mission.get("firmwareType", 0)),
+        firmware=_FIRMWARE.get(firmware_type),
         cruise_speed_m_s=_speed(mission, "cruiseSpeed", refuse),
         hover_speed_m_s=_speed(mission, "hoverSpeed", refuse),
     )
+
+
+def _home(mission: Mapping[str, Any], refuse: Refuse) -> PlannedHome | None:
+    """The planned home; None where there is none, or zeros or null stand for an unknown place. The altitude
+    is null where the ground station knows no terrain.
+    """
+    where = "plannedHomePosition"
+    values = mission.get(where)
+    if values is None:
+        return None
+    if isinstance(values, list) and len(values) == 3 and values[2] is None:
+        if values[:2] == [None, None]:
+            return None
+        (lat, lon), alt = numbers(values[:2], 2, where, refuse), None
+    else:
+        lat, lon, alt = numbers(values, 3, where, refuse)
+    if not (abs(lat) <= 90.0 and abs(lon) <= 180.0 and (alt is None or math.isfinite(alt))):
+        raise refuse(where, f"{lat!r}, {lon!r}, {alt!r} is no place")
+    return None if lat == lon == 0.0 else PlannedHome(lat_deg=lat, lon_deg=lon, alt_m=alt)
 
 
 def _load(path: Path) -> Any:
@@ -148,6 +166,8 @@ def _simple(entry: Mapping[str, Any], where: str, refuse: Refuse) -> MissionItem
         if value is not None and not is_number(value):
             raise refuse(where, f"params[{name}] = {value!r} is neither a number nor null")
         values.append(math.nan if value is None else float(value))
+    if params[6] is None:
+        values[6] = _altitude_m(entry, where, refuse)
     frame = whole(entry, "frame", where, refuse)
     command = whole(entry, "command", where, refuse)
     if frame > 255 or command > 65535:
@@ -164,6 +184,23 @@ def _simple(entry: Mapping[str, Any], where: str, refuse: Refuse) -> MissionItem
         z=values[6],
         autocontinue=flag(entry, "autoContinue", True, where, refuse),
     )
+
+
+def _altitude_m(entry: Mapping[str, Any], where: str, refuse: Refuse) -> float:
+    """The altitude of an item without one in its params: what the user has set, in the item's frame; NaN: it
+    has none. An altitude above a terrain that the ground station did not know is refused.
+    """
+    altitude_m = entry.get("Altitude")
+    if not is_number(altitude_m):
+        return math.nan
+    if entry.get("AltitudeMode") == _ABOVE_TERRAIN:
+        raise refuse(
+            where,
+            f"altitude {altitude_m:g} m above a terrain that the ground station did not know (AltitudeMode "
+            f"{_ABOVE_TERRAIN}, params[7] null); open and save the plan where it has terrain data, or choose "
+            "altitudes above home",
+        )
+    return number(entry, "Altitude", where, refuse)
 
 
 def _fence_items(fence: Mapping[str, Any], refuse: Refuse) -> tuple[MissionItem, ...]:

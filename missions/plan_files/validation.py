@@ -13,14 +13,14 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES
 from missions.errors import PlanError
-from missions.plan_files.document import DO_JUMP, NAV_LAND, NAV_TAKEOFF, MissionDocument
+from missions.plan_files.document import DO_JUMP, LOITERS, NAV_LAND, NAV_TAKEOFF, MissionDocument
 from missions.vehicle.items import FLOWN_TO
 
 MAX_ITEMS: Final = 5000
 """More items than any flight controller stores."""
 
 _HIGHEST_M: Final = 50_000.0
-_HERE_IF_UNSET: Final = frozenset({NAV_TAKEOFF, NAV_LAND})
+_HERE_IF_UNSET: Final = frozenset({NAV_TAKEOFF, NAV_LAND}) | LOITERS
 _VTOL: Final = frozenset({84, 85, 3000})
 
 
@@ -82,7 +82,8 @@ def _check_item(document: MissionDocument, index: int) -> None:
             index,
             f"frame {item.frame}; accepted: global ones ({', '.join(map(str, sorted(GEODETIC_FRAMES)))})",
         )
-    if item.command in _HERE_IF_UNSET and not has_place(item):
+    zero_is_here = document.zero_is_here and item.x == item.y == 0.0
+    if (item.command in _HERE_IF_UNSET or zero_is_here) and not has_place(item):
         pass
     elif not has_place(item):
         raise document.refuse(index, "has no position")
@@ -90,6 +91,8 @@ def _check_item(document: MissionDocument, index: int) -> None:
         raise document.refuse(
             index, f"position {item.x!r}, {item.y!r}; accepted: latitude -90..90, longitude -180..180 degrees"
         )
+    if math.isnan(item.z):
+        raise document.refuse(index, "has no altitude")
     if not (math.isfinite(item.z) and abs(item.z) <= _HIGHEST_M):
         raise document.refuse(index, f"altitude {item.z:g} m; accepted: a number up to {_HIGHEST_M:g}")
 

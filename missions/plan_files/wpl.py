@@ -19,6 +19,8 @@ def read_wpl(path: Path) -> document.MissionDocument:
     """Read a waypoint file. If the first row is an absolute waypoint, as ArduPilot's tools write it, it is
     the home.
 
+    Items at 0, 0 stay where the vehicle is.
+
     Raises:
         PlanError: the file can't be read; the message names the item.
     """
@@ -43,19 +45,30 @@ def read_wpl(path: Path) -> document.MissionDocument:
                 f"{path}: row {index}: frame {row.frame}, command {row.command}; accepted: a MAV_FRAME and a "
                 "MAV_CMD"
             )
-    home = _home(rows[0]) if rows else None
-    first = 0 if home is None else 1
+    first = 1 if rows and _is_home(rows[0]) else 0
     return document.MissionDocument(
-        path=path, items=tuple(_item(row, first) for row in rows[first:]), home=home
+        path=path,
+        items=tuple(_item(row, first) for row in rows[first:]),
+        home=_home(rows[0]) if first else None,
+        zero_is_here=True,
     )
 
 
-def _home(row: Any) -> GeodeticPosition | None:
-    if row.command != document.NAV_WAYPOINT or row.frame not in GLOBAL_FRAMES:
+def _is_home(row: Any) -> bool:
+    return (
+        row.command == document.NAV_WAYPOINT
+        and row.frame in GLOBAL_FRAMES
+        and abs(row.x) <= 90.0
+        and abs(row.y) <= 180.0
+        and math.isfinite(row.z)
+    )
+
+
+def _home(row: Any) -> document.PlannedHome | None:
+    """The home in the first row; None: it is all zeros, which ArduPilot's tools write before they know it."""
+    if row.x == row.y == 0.0:
         return None
-    if not (abs(row.x) <= 90.0 and abs(row.y) <= 180.0 and math.isfinite(row.z)) or row.x == row.y == 0.0:
-        return None
-    return GeodeticPosition(lat_deg=row.x, lon_deg=row.y, alt_m=row.z)
+    return document.PlannedHome(lat_deg=row.x, lon_deg=row.y, alt_m=row.z)
 
 
 def _item(row: Any, first: int) -> MissionItem:

@@ -9,16 +9,26 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.home import Home
 from missions.errors import PlanError
 from missions.kind import VehicleKind
+from missions.plan_files.document import PlannedHome
 from missions.plan_files.files import read_mission_file, write_mission_file
+from missions.plan_files.mission import FileMission
 from tests.missions.plan_files.plans import ALT, LANDING, LAT, LON, PLAN, changed, simple, waypoint, write
+
+UNKNOWN_TERRAIN = {
+    **simple(2, 16, [0, 0, 0, None, LAT, LON, None]),
+    "AMSLAltAboveTerrain": None,
+    "Altitude": 12,
+    "AltitudeMode": 1,
+}
 
 
 def test_everything_in_a_plan_is_read(tmp_path: Path) -> None:
     document = read_mission_file(write(tmp_path))
     assert [item.command for item in document.items] == [22, 16, 16, 16, 206, 16, 177, 20]
-    assert document.home == GeodeticPosition(lat_deg=LAT, lon_deg=LON, alt_m=ALT)
+    assert document.home == PlannedHome(lat_deg=LAT, lon_deg=LON, alt_m=ALT)
     assert (document.kind, document.firmware) == (VehicleKind.MULTICOPTER, "px4")
     assert (document.cruise_speed_m_s, document.hover_speed_m_s) == (15.0, 5.0)
     first = document.items[1]
@@ -71,7 +81,7 @@ def test_mavsdk_reads_the_same_items(tmp_path: Path) -> None:
         (changed("mission", "items", 1, "params", 4, to="x"), "params[5] = 'x' is neither a number nor null"),
         (changed("mission", "items", 1, "params", 4, to=91.0), "item 2 (NAV_WAYPOINT): position 91.0"),
         (changed("mission", "items", 1, "params", 4, to=None), "item 2 (NAV_WAYPOINT): has no position"),
-        (changed("mission", "items", 1, "params", 6, to=None), "item 2 (NAV_WAYPOINT): altitude nan m"),
+        (changed("mission", "items", 1, "params", 6, to=None), "item 2 (NAV_WAYPOINT): has no altitude"),
         (changed("mission", "items", 1, "params", 6, to=1e9), "item 2 (NAV_WAYPOINT): altitude 1e+09 m"),
         (changed("mission", "items", 1, "params", 0, to=math.inf), "(NAV_WAYPOINT): param1 is infinite"),
         (changed("mission", "items", 1, "frame", to=1), "(NAV_WAYPOINT): frame 1; accepted"),
@@ -87,6 +97,12 @@ def test_mavsdk_reads_the_same_items(tmp_path: Path) -> None:
         ),
         (changed("mission", "items", 3, "complexItemType", to="vtolLandingPattern"), "VTOL"),
         (changed("mission", "plannedHomePosition", to=[91, 0, 0]), "91.0, 0.0, 0.0 is no place"),
+        (changed("mission", "plannedHomePosition", to=[47.0, None, None]), "[47.0, None] is not an"),
+        (
+            changed("mission", "items", 1, to={**UNKNOWN_TERRAIN, "AltitudeMode": 3}),
+            "item 2 of the plan: altitude 12 m above a terrain that the ground station did not know",
+        ),
+        (changed("rallyPoints", "points", 0, to=[LAT, LON, None]), "is not an array of 3 numbers"),
         (changed("geoFence", "circles", 0, "circle", "radius", to=-1), "circle 4: radius -1 m"),
         (changed("geoFence", "polygons", 0, "polygon", to=[[1, 2]]), "a polygon of 1 points; accepted: 3"),
         (changed("rallyPoints", "points", 0, to=[1, 2]), "rallyPoints, point 1: [1, 2] is not an array of 3"),
@@ -97,6 +113,33 @@ def test_what_is_wrong_is_named(plan: dict, words: str, tmp_path: Path) -> None:
         read_mission_file(write(tmp_path, plan))
     assert words in str(refused.value)
     assert str(tmp_path) in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("planned", "home"),
+    [
+        ([LAT, LON, None], PlannedHome(lat_deg=LAT, lon_deg=LON, alt_m=None)),
+        ([None, None, None], None),
+        ([0, 0, 0], None),
+        (None, None),
+    ],
+)
+def test_a_home_may_be_unknown_or_have_no_altitude(planned, home, tmp_path: Path) -> None:
+    path = write(tmp_path, changed("mission", "plannedHomePosition", to=planned))
+    assert read_mission_file(path).home == home
+    place = FileMission(path).world_defaults.home
+    if home is None:
+        assert place is None
+    else:
+        assert place is not None
+        stands = Home.parse(place)
+        assert (stands.alt_m, stands.lat_deg) == (Home().alt_m, pytest.approx(LAT))
+        assert place.startswith(f"{LAT:.9f},{LON:.9f},,")
+
+
+def test_an_altitude_that_is_null_in_the_params_is_the_one_the_user_has_set(tmp_path: Path) -> None:
+    path = write(tmp_path, changed("mission", "items", 1, to=UNKNOWN_TERRAIN))
+    assert read_mission_file(path).items[1].z == 12.0
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"fileType": "Plan"}', "\x00", "[" * 100_000])
@@ -112,7 +155,12 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     path = tmp_path / "again.plan"
     assert document.home is not None
     write_mission_file(
-        path, document.items, document.home, firmware="ardupilot", kind=VehicleKind.FIXED_WING, speed_m_s=17.0
+        path,
+        document.items,
+        document.home.place,
+        firmware="ardupilot",
+        kind=VehicleKind.FIXED_WING,
+        speed_m_s=17.0,
     )
     again = read_mission_file(path)
     assert str(again.items) == str(document.items)  # NaN is not equal to itself

@@ -11,7 +11,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
+from missions.plan_files.document import PlannedHome
 from missions.plan_files.files import read_mission_file
+from missions.plan_files.route import route_of
 from missions.plan_files.wpl import format_wpl, read_wpl
 
 HOME = GeodeticPosition(lat_deg=-35.3632613, lon_deg=149.1652373, alt_m=584.154)
@@ -34,10 +36,32 @@ def written(folder: Path, text: str, name: str = "a.waypoints") -> Path:
 @pytest.mark.parametrize("name", ["a.waypoints", "a.txt"])
 def test_the_first_row_is_home(name: str, tmp_path: Path) -> None:
     document = read_mission_file(written(tmp_path, ROWS, name))
-    assert document.home == HOME
+    assert document.home == PlannedHome.of(HOME)
     assert [(item.command, item.frame) for item in document.items] == [(22, 6), (16, 6), (177, 6), (20, 6)]
     assert document.items[2].param1 == 1.0  # the row's number counts home, the item's index does not
     assert (document.kind, document.firmware) == (None, None)
+
+
+def test_a_home_row_of_zeros_is_no_place(tmp_path: Path) -> None:
+    home = "\t-35.3632613\t149.1652373\t584.154"
+    assert home in ROWS
+    document = read_mission_file(written(tmp_path, ROWS.replace(home, "\t0\t0\t0")))
+    assert document.home is None
+    assert [item.command for item in document.items] == [22, 16, 177, 20]
+    assert document.items[2].param1 == 1.0
+
+
+@pytest.mark.parametrize("command", [16, 17, 18, 19, 31])
+def test_an_item_at_zero_stays_where_the_vehicle_is(command: int, tmp_path: Path) -> None:
+    place = "3\t16\t3\t0\t0\t0\t-35.3628\t149.1652"
+    jump, circle = "3\t177\t2\t4\t0\t0\t0\t0\t0", f"3\t{command}\t10\t0\t0\t0\t0\t0\t15"
+    rows = ROWS.replace(jump, circle)
+    assert place in rows
+    document = read_mission_file(written(tmp_path, rows))
+    route = route_of(document, HOME)
+    before, stays = route.stops[-2:]
+    assert stays.position_ned_m[:2] == pytest.approx(before.position_ned_m[:2])
+    assert stays.position_ned_m[2] == -15.0
 
 
 def test_a_file_without_home_begins_with_its_first_item(tmp_path: Path) -> None:
@@ -57,7 +81,7 @@ def test_a_file_without_home_begins_with_its_first_item(tmp_path: Path) -> None:
         (ROWS.replace("149.1652\t12", "149.1652\tx"), "could not convert string to float: 'x'"),
         (ROWS.replace("-35.3628", "nan"), "item 2 (NAV_WAYPOINT): has no position"),
         (ROWS.replace("-35.3628", "inf"), "item 2 (NAV_WAYPOINT): position inf"),
-        (ROWS.replace("\t12\t1\n2", "\tnan\t1\n2"), "item 1 (NAV_TAKEOFF): altitude nan m"),
+        (ROWS.replace("\t12\t1\n2", "\tnan\t1\n2"), "item 1 (NAV_TAKEOFF): has no altitude"),
         (ROWS.replace("3\t177\t2", "3\t177\t9"), "item 3 (DO_JUMP): jumps to item 9, which is not in 1..4"),
         (ROWS.replace("2\t0\t3\t16", "2\t0\t999\t16"), "frame 999"),
     ],
