@@ -3,7 +3,7 @@
 import math
 import os
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,6 +14,7 @@ from missions.cli.options import StatusLine, report
 if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.runs.session import Flight, RunResult
+    from missions.vehicle.vehicle import Vehicle
 
 _FAILED: Final = 1
 _PACE_S: Final = 5.0
@@ -62,7 +63,8 @@ class ProgressLine:
             height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
             progress = sum(vehicle.notes.progress for vehicle in known) / len(known)
         speed = "" if factor is None else f"x{factor:.1f}"
-        self._line.show(f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %")
+        line = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
+        self._line.show(line + _awaited(flight.vehicles))
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -82,6 +84,19 @@ class ProgressLine:
     def end(self) -> None:
         """End the progress line."""
         self._line.end()
+
+
+def _awaited(vehicles: Sequence["Vehicle"]) -> str:
+    """What the flight has been waiting for, with the newest text of a vehicle that does not fly yet; "" after
+    a moment only.
+    """
+    for vehicle in vehicles:
+        awaited = vehicle.link.awaited
+        if awaited:
+            texts = vehicle.link.status_texts
+            received = f"; received: {texts[-1].text!r}" if texts and not vehicle.armed else ""
+            return f"  waiting for {awaited}{received}"
+    return ""
 
 
 class Pace:

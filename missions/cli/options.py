@@ -4,6 +4,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from shutil import get_terminal_size
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -154,8 +155,9 @@ class StatusLine:
         self._width = 0
 
     def show(self, text: str) -> None:
-        """Replace the text."""
+        """Replace the text; what does not fit into a line of the terminal is cut off."""
         if self.terminal:
+            text = text[: max(1, get_terminal_size().columns - 1)]
             click.echo(f"\r{text:<{self._width}}", nl=False, err=True)
             self._width = len(text)
 

@@ -327,7 +327,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     if request.connect:
         await require_key(request, vehicle)
         await vehicle.set_parameters(request.parameters)
-    await vehicle.wait_ready(leave_mission=mission.commands)
+    await vehicle.wait_ready(leave_mode=mission.commands)
 
 
 async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:

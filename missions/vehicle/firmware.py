@@ -48,6 +48,7 @@ class Firmware:
         first_mission_item_is_home: whether item 0 of a mission is always home, regardless of the uploaded
             item.
         goto_mode: the mode after DO_REPOSITION.
+        left_before_arming: custom modes in which a vehicle can't be armed, or flies off when it is.
         resting_mode: a mode in which the vehicle may stand on the ground and be armed.
         unset: value of a command or item parameter that is not set.
         system_id_parameter: name of the parameter that sets the vehicle's system id.
@@ -67,6 +68,7 @@ class Firmware:
     setpoints_before_guided: bool
     first_mission_item_is_home: bool
     goto_mode: Mode
+    left_before_arming: frozenset[int]
     resting_mode: Mode
     unset: float
     system_id_parameter: str

@@ -27,7 +27,10 @@ def _tables(name: str) -> dict[str, Any]:
     if "modes" in tables:
         modes = {Mode[mode]: _custom_mode(number) for mode, number in tables["modes"].items()}
         names = {_custom_mode(number): name for number, name in tables["mode_names"].items()}
-        read.update(modes=MappingProxyType(modes), mode_names=MappingProxyType(names))
+        left = frozenset(_custom_mode(number) for number in tables["left_before_arming"])
+        read.update(
+            modes=MappingProxyType(modes), mode_names=MappingProxyType(names), left_before_arming=left
+        )
     return read
 
 

@@ -441,12 +441,10 @@ class VehicleLink:
 
     @property
     def awaited(self) -> str:
-        """What a task has been waiting for, for three seconds or more, and what was received last; "": no
-        task has.
-        """
+        """What a task has been waiting for, for three seconds or more; "": no task has."""
         now_us = self.clock.time_us
         shown = next((what for since_us, what in self._waits if now_us - since_us >= _SHOWN_AFTER_US), None)
-        return "" if shown is None else f"waiting for {shown()}; {self.last_received()}"
+        return "" if shown is None else shown()
 
     @property
     def _silent(self) -> bool:

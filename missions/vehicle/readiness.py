@@ -15,6 +15,11 @@ from missions.vehicle.plans import VehiclePlans
 _REASONS_S: Final = 5.0
 _STREAMS_S: Final = 3.0  # after a request for streams, until it is repeated
 _STREAM_REQUESTS: Final = 5
+_IN_THE_AIR: Final = (
+    dialect.MAV_LANDED_STATE_IN_AIR,
+    dialect.MAV_LANDED_STATE_TAKEOFF,
+    dialect.MAV_LANDED_STATE_LANDING,
+)
 
 
 class Readiness:
@@ -32,17 +37,19 @@ class Readiness:
         self._adapter = adapter
         self._plans = plans
 
-    async def wait(self, timeout_s: float, *, leave_mission: bool) -> None:
+    async def wait(self, timeout_s: float, *, leave_mode: bool) -> None:
         """Start the streams and wait until the vehicle could be armed; see `Vehicle.wait_ready`."""
         await self._adapter.start_streams()
         if self._link.message("HOME_POSITION") is None:
             self._commands.request_once("HOME_POSITION")
         await self._repeat_requests(timeout_s)
-        await self._wait(timeout_s, leave_mission)
-        if leave_mission and self._in_mission:
+        await self._wait(timeout_s, leave_mode)
+        if leave_mode and self._rests_in_flight_mode:
+            in_mission = self._link.custom_mode == self._link.firmware.modes[Mode.MISSION]
             await self._commands.set_mode(self._link.firmware.resting_mode)
-            await self._plans.rewind_mission()
-            await self._wait(timeout_s, leave_mission)
+            if in_mission:
+                await self._plans.rewind_mission()
+            await self._wait(timeout_s, leave_mode)
 
     async def _repeat_requests(self, timeout_s: float) -> None:
         """Request the streams again while no SYS_STATUS is received: ArduPilot does not acknowledge
@@ -61,13 +68,17 @@ class Readiness:
             await self._adapter.start_streams()
 
     @property
-    def _in_mission(self) -> bool:
-        """Whether the vehicle is disarmed, in the mode of a mission."""
+    def _rests_in_flight_mode(self) -> bool:
+        """Whether the vehicle stands disarmed in the mode of its last flight: mission, return, landing."""
         link = self._link
-        return not link.armed and link.custom_mode == link.firmware.modes[Mode.MISSION]
+        return (
+            not link.armed
+            and link.landed_state not in _IN_THE_AIR
+            and link.custom_mode in link.firmware.left_before_arming
+        )
 
-    async def _wait(self, timeout_s: float, leave_mission: bool) -> None:
-        """Wait until the vehicle is ready, or only its mission's mode may prevent it. In the last seconds the
+    async def _wait(self, timeout_s: float, leave_mode: bool) -> None:
+        """Wait until the vehicle is ready, or only its mode may prevent it. In the last seconds the
         autopilot is commanded to run its checks, so that it reports what is missing.
 
         Raises:
@@ -77,7 +88,7 @@ class Readiness:
 
         def ready() -> bool:
             missing = self._adapter.readiness()
-            return not missing or (missing == [PREARM] and leave_mission and self._in_mission)
+            return not missing or (missing == [PREARM] and leave_mode and self._rests_in_flight_mode)
 
         async def wait(seconds: float) -> None:
             await link.wait_until(

@@ -178,17 +178,18 @@ class Vehicle:
             timeout_s=timeout_s,
         )
 
-    async def wait_ready(self, timeout_s: float = 90.0, *, leave_mission: bool = True) -> None:
+    async def wait_ready(self, timeout_s: float = 90.0, *, leave_mode: bool = True) -> None:
         """Wait until the vehicle could be armed: pre-arm checks, home, navigation.
 
         Args:
             timeout_s: time limit of each of its waits.
-            leave_mission: whether a disarmed vehicle in the mode of a mission is switched to another mode. In
-                that mode the checks may fail: ArduPilot's plane waits for another mode or mission after a
+            leave_mode: whether a vehicle that stands disarmed in the mode of its last flight (a mission, a
+                return, a landing) is switched to another mode. In that mode the checks may fail: PX4 is not
+                armed in Return or Land, and ArduPilot's plane waits for another mode or mission after a
                 landing.
         """
         await self.wait_heartbeat(timeout_s)
-        await Readiness(self.commands, self.adapter, self.plans).wait(timeout_s, leave_mission=leave_mission)
+        await Readiness(self.commands, self.adapter, self.plans).wait(timeout_s, leave_mode=leave_mode)
 
     async def limits(self, altitude_m: float = 0.0) -> Limits:
         """The limits for a planner, from the vehicle's parameters.

@@ -85,7 +85,7 @@ class FakeAutopilot:
         self.refuse_modes = set()  # kinds of mode that are refused
         self.base_mode = 0  # further bits of the heartbeat
         self.version = (PX4_SITL_UID, [0] * 18)  # AUTOPILOT_VERSION: uid and uid2; None: it does not answer
-        self.unready_in_mission = False  # the pre-arm checks fail in the mode of a mission
+        self.unready_modes = set()  # kinds of mode in which the pre-arm checks fail
         self.arm_refusals = 0
         self.mission_result = 0
         self.commands = []
@@ -289,7 +289,7 @@ class FakeAutopilot:
                 d.MAVLink_heartbeat_message(2, 12 if px4 else 3, base, self.mode, 4 if self.armed else 3, 3)
             )
         elif name == "SYS_STATUS":
-            unready = self.unready_in_mission and self.kind == "mission"
+            unready = self.kind in self.unready_modes
             ready = 0x10000000 if self.time_us >= self.ready_after_us and not unready else 0
             self.send(d.MAVLink_sys_status_message(ready, ready, ready, 0, 16200, -1, 100, 0, 0, 0, 0, 0, 0))
         elif name == "GLOBAL_POSITION_INT":

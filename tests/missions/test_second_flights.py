@@ -9,6 +9,7 @@ from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.world_spec import WorldSpec
 from missions.embedded import EmbeddedSitl
+from missions.errors import VehicleTimeout
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.runs.limits_before_flight import adapted
@@ -68,25 +69,59 @@ def test_an_aircraft_flies_its_second_mission(flavour: str, via: Via) -> None:
 
 
 @both
-def test_a_vehicle_in_the_mode_of_its_last_mission_leaves_it_before_it_is_ready(flown, flavour) -> None:
-    """ArduPlane 4.6.3 after a landing: "PreArm: In landing sequence" until mode and mission change."""
+@pytest.mark.parametrize("mode", ["mission", "return", "land"])
+def test_a_vehicle_in_the_mode_of_its_last_flight_leaves_it_before_it_is_ready(flown, flavour, mode) -> None:
+    """ArduPlane 4.6.3 after a landing: "PreArm: In landing sequence" until mode and mission change.
+
+    PX4 1.16.1 reports no pre-arm health in Return and Land.
+    """
 
     async def script(vehicle, autopilot):
-        autopilot.mode = next(m for m, n in autopilot.kinds.items() if n == "mission")
+        autopilot.mode = next(m for m, n in autopilot.kinds.items() if n == mode)
         autopilot.items, autopilot.current = [None] * 5, 4
-        autopilot.unready_in_mission = True
+        autopilot.unready_modes = {mode}
         await vehicle.wait_ready(20.0)
         assert vehicle.link.custom_mode == vehicle.firmware.modes[vehicle.firmware.resting_mode]
-        return autopilot.current
+        return autopilot.current, autopilot.time_us * 1e-6
 
-    assert flown(script, flavour, ready=False) == 0
+    current, seconds = flown(script, flavour, ready=False)
+    assert current == (0 if mode == "mission" else 4)
+    assert seconds < 10.0
+
+
+def test_a_vehicle_that_is_in_the_air_keeps_its_mode(flown) -> None:
+    """Disarmed in the air: a wreck, or a wrong message; in any case nothing is switched."""
+
+    async def script(vehicle, autopilot):
+        autopilot.mode = next(m for m, n in autopilot.kinds.items() if n == "return")
+        autopilot.pos[2] = -20.0
+        autopilot.unready_modes = {"return"}
+        with pytest.raises(VehicleTimeout, match="no readiness to fly"):
+            await vehicle.wait_ready(20.0)
+        assert autopilot.kind == "return"
+
+    flown(script, ready=False)
+
+
+def test_what_a_wait_waits_for_is_known_while_it_lasts(flown) -> None:
+    async def script(vehicle, autopilot):
+        waiting = asyncio.ensure_future(vehicle.wait_ready(20.0, leave_mode=False))
+        await vehicle.clock.sleep(1.0)
+        assert vehicle.link.awaited == ""  # most waits are short
+        await vehicle.clock.sleep(8.0)
+        assert vehicle.link.awaited == "readiness to fly (missing: pre-arm checks)"
+        with pytest.raises(VehicleTimeout):
+            await waiting
+        assert vehicle.link.awaited == ""
+
+    flown(script, ready=False, setup=lambda autopilot: autopilot.unready_modes.add("hold"))
 
 
 def test_one_that_only_observes_leaves_the_mode_alone(flown) -> None:
     async def script(vehicle, autopilot):
         await vehicle.wait_ready()
         await vehicle.commands.set_mode(Mode.MISSION)
-        await vehicle.wait_ready(leave_mission=False)
+        await vehicle.wait_ready(leave_mode=False)
         assert vehicle.link.custom_mode == vehicle.firmware.modes[Mode.MISSION]
 
     flown(script)
@@ -97,9 +132,8 @@ def test_an_uploaded_mission_begins_anew(flown, flavour) -> None:
     async def script(vehicle, autopilot):
         autopilot.current = 52
         home = vehicle.home
-        items = [
-            MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=home.lat_deg, y=home.lon_deg, z=10.0)
-        ] * 3
+        commands = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_WAYPOINT)
+        items = [MissionItem(command=c, x=home.lat_deg, y=home.lon_deg, z=10.0) for c in commands]
         await vehicle.plans.upload_mission(items)
         return autopilot.current, vehicle.notes.warnings
 
