@@ -268,7 +268,10 @@ class FailsafeMonitor:
 def failsafe_mode(
     action: FailsafeAction, situation: Situation, policy: CommanderPolicy, *, sticks_valid: bool
 ) -> FlightMode:
-    """The mode of an action, or the next safer one that can be flown now.
+    """The mode of an action, or the next safer one that can be flown now; always one that the vehicle has.
+
+    Without a home a return becomes a landing. ArduPlane, which has no such mode, stays in its return: it circles
+    where it is.
 
     Args:
         sticks_valid: stick input is present: in a stick mode the pilot lands (PX4 COM_POSCTL_NAVL 0).
@@ -278,9 +281,11 @@ def failsafe_mode(
     mode = _ACTION_MODES[action]
     if mode is FlightMode.POSITION and not situation.position:
         mode = FlightMode.ALTITUDE
+    if mode is FlightMode.ALTITUDE and mode not in policy.flown_modes:
+        mode = FlightMode.FBWB  # ArduPlane's mode that holds the height
     if mode in STICK_MODES:
         return mode
-    if mode is FlightMode.RETURN and not situation.home_set:
+    if mode is FlightMode.RETURN and not situation.home_set and FlightMode.LAND in policy.flown_modes:
         mode = FlightMode.LAND
     if situation.position or policy.fallback_land is None:
         return mode
