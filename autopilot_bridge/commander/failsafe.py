@@ -270,7 +270,7 @@ def failsafe_mode(
 ) -> FlightMode:
     """The mode of an action, or the next safer one that can be flown now; always one that the vehicle has.
 
-    Without a home a return becomes a landing. ArduPlane, which has no such mode, stays in its return: it circles
+    Without a home a return becomes a landing. ArduPlane has no such mode and stays in its return: it circles
     where it is.
 
     Args:

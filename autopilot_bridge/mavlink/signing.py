@@ -100,6 +100,8 @@ MINUTE: Final = 6_000_000
 MAX_STREAMS: Final = 256
 SETUP_SIGNING: Final = 256
 """Id of the message that sets a key: never forwarded, never logged."""
+DAY: Final = 24 * 60 * MINUTE
+"""Largest lead of a received timestamp over a calendar clock: more than any wrong time zone."""
 _SAVE_EVERY: Final = MINUTE // 2
 _TIMESTAMP_SIZE: Final = 6
 _DIGEST_SIZE: Final = 6
@@ -118,6 +120,7 @@ class Refusal(StrEnum):
     BAD_SIGNATURE = "bad signature"
     REPLAYED = "replayed"
     OLD = "old"
+    AHEAD = "ahead of the clock"
     TOO_MANY_STREAMS = "too many streams"
 
 
@@ -128,6 +131,9 @@ class SigningState:
         key: None: nothing is signed or checked.
         clock: the device's time as a timestamp (`signing_time`).
         timestamp: lowest timestamp of signed frames, as after a restart.
+        lead: timestamps farther ahead of the clock are refused, and stored ones are not used: time never goes
+            back, so one timestamp of the far future would refuse every later sender. None: all are accepted,
+            as the clock may be far behind.
         on_save: called with the state when key or time must be stored: at a new key, and while frames are
             signed each half minute of timestamps.
     """
@@ -138,9 +144,11 @@ class SigningState:
         *,
         clock: Callable[[], int],
         timestamp: int = 0,
+        lead: int | None = None,
         on_save: "Callable[[SigningState], None] | None" = None,
     ) -> None:
         self._clock = clock
+        self._lead = MAX_TIMESTAMP if lead is None else lead
         self._newest = 0
         self._streams: dict[tuple[int, int, int], int] = {}
         self._on_save: Callable[[SigningState], None] | None = None
@@ -164,12 +172,19 @@ class SigningState:
         return min(max(self._newest, self._clock()), MAX_TIMESTAMP)
 
     def set_key(self, key: SigningKey | None, timestamp: int = 0) -> None:
-        """Set another key, or none; time never goes back, whatever the value of `timestamp`."""
+        """Set another key, or none; time never goes back, whatever the value of `timestamp`.
+
+        A timestamp that is too far ahead of the clock is not used.
+        """
         self._key = key
         self._seed = sha256(b"" if key is None else key.secret)
         self._streams.clear()
-        self._newest = max(self._newest, min(timestamp, MAX_TIMESTAMP))
+        if not self._ahead(timestamp):
+            self._newest = max(self._newest, min(timestamp, MAX_TIMESTAMP))
         self._save()
+
+    def _ahead(self, timestamp: int) -> bool:
+        return timestamp > self._clock() + self._lead
 
     def sign(self, frame: bytes, link_id: int) -> bytes:
         """Add a signature to a MAVLink 2 frame that has none."""
@@ -197,6 +212,8 @@ class SigningState:
         if not hmac.compare_digest(self._digest(raw[:-_DIGEST_SIZE]), raw[-_DIGEST_SIZE:]):
             return Refusal.BAD_SIGNATURE
         timestamp = int.from_bytes(raw[-SIGNATURE_SIZE + 1 : -_DIGEST_SIZE], "little")
+        if self._ahead(timestamp):
+            return Refusal.AHEAD
         stream = (raw[-SIGNATURE_SIZE], frame.system_id, frame.component_id)
         last = self._streams.get(stream)
         if last is not None:

@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.errors import SigningKeyError
 from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import Frame, LinkSigning, LinkSigningPolicy, SigningKey, SigningState, decode
-from autopilot_bridge.mavlink.signing import INTERNAL, MINUTE, RADIO, REQUIRED, TRUSTED, UNSIGNED_TOO
+from autopilot_bridge.mavlink.signing import DAY, INTERNAL, MINUTE, RADIO, REQUIRED, TRUSTED, UNSIGNED_TOO
 
 _KEY_REMOVED: Final = "Signing key removed"
 _KEY_TAKEN: Final = "Signing key set"
@@ -176,6 +176,7 @@ class VehicleSigning:
             key if parameters.key is None else parameters.key,
             clock=parameters.clock or clock,
             timestamp=timestamp,
+            lead=None if parameters.clock is None else DAY,  # the vehicles' own clock may be behind
             on_save=None if store is None else lambda state: store.save(system_id, state),
         )
 

@@ -213,14 +213,19 @@ def make_directories(store: FileStore, path: VehiclePath) -> None:
             store.make_directory(path[:depth])
 
 
-def read_whole(store: FileStore, path: VehiclePath) -> bytes:
+def read_whole(store: FileStore, path: VehiclePath, *, at_most: int) -> bytes:
     """The whole content of a file.
 
+    Args:
+        at_most: bytes that a sound file can have; clients can make files of any size that take no space.
+
     Raises:
-        OSError: it can't be read.
+        OSError: it can't be read, or is larger (EFBIG).
     """
     file = store.open(path, Mode.READ)
     try:
+        if file.size > at_most:
+            raise error(errno.EFBIG, path)
         return file.read(0, file.size)
     finally:
         file.close()

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from autopilot_bridge.mavlink.plain_text import plain_text
 from estimators.logs.log import Log
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
@@ -144,7 +145,7 @@ def _streams(log: Log) -> tuple[StreamReport, ...]:
         if field is not None:
             values = np.unique(log.stream_table(stream)[field])[:_MAX_INSTANCES]
             instances = [
-                item.decode("ascii", "replace") if isinstance(item, bytes) else item
+                plain_text(item.decode("ascii", "replace")) if isinstance(item, bytes) else item
                 for item in values.tolist()
             ]
         found.append(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect, enum_name
+from autopilot_bridge.mavlink.plain_text import plain_text
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names
 from estimators.logs.log import Log
 from estimators.logs.table import Table
@@ -131,7 +132,7 @@ def mode_name(
 def _firmware(log: Log, system_id: int, autopilot: int) -> tuple[str, tuple[int, int] | None]:
     """Name and version of a vehicle's firmware, from its banner, else from AUTOPILOT_VERSION."""
     for table in _of_autopilot(log, _STATUSTEXT, system_id):
-        made_by = firmware_of(text.decode("ascii", "replace") for text in table["text"].tolist())
+        made_by = firmware_of(plain_text(text.decode("ascii", "replace")) for text in table["text"].tolist())
         if made_by.text:
             return made_by.text, made_by.version
     for table in _of_autopilot(log, _AUTOPILOT_VERSION, system_id):

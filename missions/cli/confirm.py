@@ -108,6 +108,7 @@ def confirmation(
         raise click.UsageError(must_ask)
 
     async def confirm(looks: "Sequence[Look]") -> bool:
+        from autopilot_bridge.mavlink.plain_text import plain_text
         from missions.errors import MissionError
 
         problems = sum(len(look.problems) for look in looks)
@@ -115,7 +116,7 @@ def confirmation(
             for look in looks:
                 click.echo(f"vehicle {look.system_id}:", err=True)
                 for finding in look.findings:
-                    click.echo(f"  {finding}", err=True)
+                    click.echo(f"  {plain_text(str(finding))}", err=True)
             if yes:
                 return not problems
             if not can_ask():

@@ -144,7 +144,9 @@ def in_options(message: object, *, own: bool = False) -> str:
 
 def report(message: object) -> None:
     """Print one line about the command on stderr."""
-    click.echo(f"flightstack: {in_options(message)}", err=True)
+    from autopilot_bridge.mavlink.plain_text import plain_text
+
+    click.echo(f"flightstack: {plain_text(in_options(message))}", err=True)
 
 
 class StatusLine:

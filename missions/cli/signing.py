@@ -34,9 +34,12 @@ def key_from(path: Path | None) -> "SigningKey | None":
     """
     if path is None:
         return None
-    from missions.runs.signing import read_key
+    from missions.runs.signing import read_key, readable_by_others
 
-    return read_key(path)
+    key = read_key(path)
+    if readable_by_others(path):
+        report(f"warning: other users can read the signing key in {path}; chmod 600 {path} keeps it secret")
+    return key
 
 
 def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
@@ -69,7 +72,7 @@ def vehicle_signing(
         key=key_from(key),
         unsigned_from=UnsignedFrom(unsigned),
         clock=now,
-        store=None if store is None else SigningStore(store, on_failure),
+        store=None if store is None else SigningStore(store, on_failure),  # its file is always its owner's
     )
 
 

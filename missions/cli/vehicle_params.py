@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.cli.options import in_options, report
 from missions.cli.vehicle_link import FAILED, confirm, connected, print_json, with_client
 
@@ -40,7 +41,7 @@ def _print_values(values: "Mapping[str, Value]", *, as_json: bool) -> None:
         print_json({name: {"value": value.number, "type": value.type} for name, value in values.items()})
         return
     for name, value in values.items():
-        click.echo(f"{name:<16} {value}")
+        click.echo(f"{plain_text(name):<16} {value}")
 
 
 @params.command()
@@ -183,7 +184,9 @@ def _print_differences(found: "list[Difference]") -> None:
         other = "-" if d.other is None else str(Value(number=d.other, type=9))
         if d.other is not None and d.vehicle is not None and isinstance(d.vehicle.number, int):
             other = f"{d.other:.0f}" if d.other == int(d.other) else other
-        click.echo(f"{d.name:<16} {'none' if d.vehicle is None else str(d.vehicle):>16} {other:>16}")
+        click.echo(
+            f"{plain_text(d.name):<16} {'none' if d.vehicle is None else str(d.vehicle):>16} {other:>16}"
+        )
 
 
 def _defaults(client: "VehicleClient") -> dict[str, float]:

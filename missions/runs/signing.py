@@ -1,5 +1,6 @@
 """Signing for a client: the key from a file, the time from the calendar."""
 
+import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,11 @@ def read_key(path: Path) -> SigningKey:
         raise SigningKeyError(f"`signing_key` {path}: {error.strerror}") from error
     except SigningKeyError as error:
         raise SigningKeyError(f"`signing_key` {path}: {error}") from error
+
+
+def readable_by_others(path: Path) -> bool:
+    """Whether other users of this machine can read a file, or replace its content."""
+    return bool(path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO))
 
 
 def client_signing(key: SigningKey | None, *, link_id: int = 0) -> LinkSigning | None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.planning.limits import Limits
 from missions.vehicle.link import VehicleLink
@@ -31,7 +32,7 @@ def value_to_wire(value: float, kind: int, bytewise: bool) -> float:
 
 
 def _name(message: Any) -> str:
-    return str(message.param_id).rstrip("\0")
+    return plain_text(str(message.param_id).rstrip("\0"))
 
 
 class VehicleParameters:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypeVar
 
 from autopilot_bridge.mavlink import Frame, definition, field_reader
+from autopilot_bridge.mavlink.plain_text import plain_text
 from flightsim.foundation.geodesy import GeodeticPosition
 
 T = TypeVar("T")
@@ -252,7 +253,7 @@ class StatusTextAssembler:
         """Add one message; returns the text when it is complete."""
         text = str(m.text)
         if not m.id:
-            return StatusText(severity=m.severity, text=text.rstrip("\t"))
+            return _status_text(m.severity, text)
         parts = self._parts.pop(m.id, {})
         newest = max(parts, default=-1)
         if m.chunk_seq < newest or parts.get(m.chunk_seq, text) != text:
@@ -263,4 +264,9 @@ class StatusTextAssembler:
             if len(self._parts) > _UNFINISHED_TEXTS:
                 del self._parts[next(iter(self._parts))]
             return None
-        return StatusText(severity=m.severity, text="".join(parts[k] for k in sorted(parts)).rstrip("\t"))
+        return _status_text(m.severity, "".join(parts[k] for k in sorted(parts)))
+
+
+def _status_text(severity: int, text: str) -> StatusText:
+    """A whole text, as it may be shown; PX4 ends texts that it also sends as events with a tab."""
+    return StatusText(severity=severity, text=plain_text(text.rstrip("\t")))

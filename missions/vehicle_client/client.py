@@ -27,6 +27,7 @@ from autopilot_bridge.links import (
     UdpServer,
 )
 from autopilot_bridge.mavlink import definition, dialect
+from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
@@ -131,7 +132,7 @@ class VehicleClient:
 
     async def _keep_texts(self) -> None:
         async for text in TelemetryAsync(self.system).subscribe_status_text():
-            self.texts = [*self.texts[-_KEPT_TEXTS:], text.text.strip()]
+            self.texts = [*self.texts[-_KEPT_TEXTS:], plain_text(text.text.strip())]
 
     # identity of the vehicle
 

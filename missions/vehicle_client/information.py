@@ -6,6 +6,7 @@ from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.plugins.info import InfoError
 
 from autopilot_bridge.mavlink import dialect, enum_name
+from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.vehicle_client.client import WANTED, VehicleClient
 
 _WAIT_S: Final = 4.0
@@ -90,7 +91,7 @@ def _git_hash(client: VehicleClient) -> str:
     data = bytes(value & 0xFF for value in raw)
     if client.flavour == "px4":
         return data[::-1].hex().rstrip("0")
-    return data.rstrip(b"\0").decode("ascii", "replace")
+    return plain_text(data.rstrip(b"\0").decode("ascii", "replace"))
 
 
 def _capabilities(bits: int | None) -> list[str] | None:

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as dialect
 from autopilot_bridge.errors import SigningKeyError
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningKey, SigningState
 from autopilot_bridge.mavlink.signing import (
+    DAY,
     INTERNAL,
     MAX_STREAMS,
     MAX_TIMESTAMP,
@@ -316,3 +317,23 @@ def test_no_key_is_reported_without_what_was_read(content):
 
 def test_a_key_does_not_show():
     assert KEY.secret.hex()[:8] not in repr(KEY) and repr(KEY.secret)[2:10] not in repr(KEY)
+
+
+def test_a_timestamp_of_the_far_future_shuts_nobody_out():
+    ours = LinkSigning(SigningState(KEY, clock=lambda: NOW, lead=DAY), link_id=0)
+    assert refused(ours, signed(pymavlink_with(timestamp=MAX_TIMESTAMP - 1))) is Refusal.AHEAD
+    ours.state.set_key(OTHER_KEY, MAX_TIMESTAMP)
+    ours.state.set_key(KEY, NOW + DAY + 1)
+    assert ours.state.timestamp == NOW
+    assert refused(ours, signed(pymavlink_with(timestamp=NOW))) is None
+    assert ours.counters.reasons == "1 ahead of the clock"
+
+
+def test_a_stored_timestamp_of_the_far_future_is_not_used():
+    assert SigningState(KEY, clock=lambda: NOW, timestamp=MAX_TIMESTAMP, lead=DAY).timestamp == NOW
+
+
+def test_a_clock_that_is_a_little_ahead_is_accepted():
+    ours = LinkSigning(SigningState(KEY, clock=lambda: NOW, lead=DAY), link_id=0)
+    assert refused(ours, signed(pymavlink_with(timestamp=NOW + DAY))) is None
+    assert ours.state.timestamp == NOW + DAY

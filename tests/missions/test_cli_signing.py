@@ -146,3 +146,13 @@ def test_a_log_is_played_under_a_key(tmp_path: Path, key_file: Path) -> None:
 
 def test_the_key_is_that_of_other_ground_stations(key_file: Path) -> None:
     assert read_key(key_file).secret == hashlib.sha256(b"pass phrase").digest()
+
+
+def test_a_key_that_other_users_can_read_is_warned_of(key_file: Path) -> None:
+    key_file.chmod(0o644)
+    done = flightstack("sitl", *SHORT, "--link", "udpin:127.0.0.1:0", "--signing-key", str(key_file))
+    (line,) = [line for line in done.output.splitlines() if "warning" in line]
+    assert f"chmod 600 {key_file}" in line
+    key_file.chmod(0o600)
+    done = flightstack("sitl", *SHORT, "--link", "udpin:127.0.0.1:0", "--signing-key", str(key_file))
+    assert "warning" not in done.output

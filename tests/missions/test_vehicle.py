@@ -392,6 +392,10 @@ def test_texts_whose_id_is_used_again_are_not_mixed():
     assert assembler.add(chunk("end", 7, 1)).text == "C" * 50 + "end"
 
 
+def test_a_text_is_shown_without_what_a_terminal_executes():
+    assert StatusTextAssembler().add(chunk("\x1b[2Jready\t", 0, 0)).text == "\\x1b[2Jready"
+
+
 def test_few_unfinished_texts_are_kept():
     assembler = StatusTextAssembler()
     for identity in range(1, 1000):

@@ -108,7 +108,7 @@ def test_a_whole_file_is_replaced_in_one_go(tmp_path: Path) -> None:
     replace_whole(card, path, b"old")
     with pytest.raises(OSError):
         replace_whole(card, path, bytes(200))
-    assert read_whole(card, path) == b"old"
+    assert read_whole(card, path, at_most=1 << 30) == b"old"
     assert [entry.name for entry in card.entries(("a", "b"))] == ["parameters"]
     assert card.usage.size_bytes == 3
     card.close()

@@ -127,7 +127,7 @@ def test_a_flight_is_logged_listed_and_downloaded(
     client.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
     client.run(0.1)
     (entry,) = client.all("LOG_ENTRY")
-    data = read_whole(memory.files, path)
+    data = read_whole(memory.files, path, at_most=1 << 30)
     assert (entry.id, entry.num_logs, entry.last_log_num, entry.size) == (first, 1, first, len(data))
     assert entry.time_utc >= 1_735_689_600
     assert client.download(first, entry.size) == data
@@ -143,7 +143,7 @@ def test_a_flight_is_logged_listed_and_downloaded(
     assert 128 in armed and armed[-1] == 0
     client.fly()
     assert len(memory.files.entries(path[:-1])) == 2  # another log; the first is as it was
-    assert read_whole(memory.files, path) == data
+    assert read_whole(memory.files, path, at_most=1 << 30) == data
     client.send(mavlink.MAVLink_log_erase_message(1, 1))
     client.run(0.1)
     assert not exists(memory.files, path)
@@ -247,10 +247,10 @@ def test_px4_storage_commands() -> None:
     client.set("MPC_XY_CRUISE", 7.5)
     assert client.command(STORAGE, 7) is None
     assert client.command(STORAGE, 1) == 0
-    assert b"MPC_XY_CRUISE\t7.5" in read_whole(memory.files, LAYOUT["px4"])
+    assert b"MPC_XY_CRUISE\t7.5" in read_whole(memory.files, LAYOUT["px4"], at_most=1 << 30)
     assert client.command(STORAGE, 2) == 0
     assert client.get("MPC_XY_CRUISE") == 5.0
-    assert b"MPC_XY_CRUISE" not in read_whole(memory.files, LAYOUT["px4"])
+    assert b"MPC_XY_CRUISE" not in read_whole(memory.files, LAYOUT["px4"], at_most=1 << 30)
     assert client.command(STORAGE, 0) == 0
     client.run(3.0)
     assert client.command(ARM, 1) == 0

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
+from typing import Final
 
 from autopilot_bridge.parameter_files import QGC_SUFFIX, format_mavproxy, format_qgc, parse_untyped_parameters
 from autopilot_bridge.parameters import ParameterError, ParameterStore
@@ -10,6 +11,9 @@ from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.storage import FileStore
 from autopilot_bridge.storage.files import exists, make_directories, read_whole, replace_whole
 from autopilot_bridge.storage.memory import MemoryCard
+
+_LARGEST_FILE_BYTES: Final = 1 << 20
+"""Ten times a file of all parameters of either firmware."""
 
 
 class StoredParameters:
@@ -42,7 +46,7 @@ class StoredParameters:
         if not exists(self._files, self._path):
             return
         try:
-            text = read_whole(self._files, self._path).decode("utf-8")
+            text = read_whole(self._files, self._path, at_most=_LARGEST_FILE_BYTES).decode("utf-8")
             values = parse_untyped_parameters(text, source=self._path[-1])
         except (OSError, UnicodeDecodeError, ParameterError) as failure:
             self.set_aside(str(failure))

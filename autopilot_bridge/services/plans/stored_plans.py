@@ -140,7 +140,8 @@ class StoredPlans(Microservice):
         if not exists(self._files, path):
             return True
         try:
-            items, plan_id = unpack_plan(read_whole(self._files, path), kind)
+            largest = _HEADER.size + self._policy.capacity[kind] * _ITEM.size + _CRC.size
+            items, plan_id = unpack_plan(read_whole(self._files, path, at_most=largest), kind)
             self._judge(items, kind)
         except (OSError, ValueError):
             with contextlib.suppress(OSError):  # kept, so that a user can examine it
