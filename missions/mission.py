@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from missions.outline import Outline
     from missions.runs.records import FlightRecords
     from missions.runs.score import FlightScore
+    from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 
 AnyOptions = TypeVar("AnyOptions", bound=MissionOptions)
@@ -81,6 +82,9 @@ class Mission(Generic[AnyOptions]):
         flies_as_team: one call of `fly_team` flies all vehicles of a team; else `fly` is called for each.
         commands: the mission commands its vehicle. A mission that only observes leaves the vehicle in its
             current state, even in flight.
+        lands_without_sensors: the mission itself ends when one of its sensors stops
+            (`vehicle.sensors.stopped`), so that a team lands in its layers; otherwise the run ends it, and
+            the vehicle returns.
     """
 
     name: str = "mission"
@@ -88,6 +92,7 @@ class Mission(Generic[AnyOptions]):
     kinds: tuple[VehicleKind, ...] = (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
     flies_as_team = False
     commands = True
+    lands_without_sensors = False
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
         """The options as one vehicle flies them: options that were not specified get values that suit the
@@ -114,6 +119,14 @@ class Mission(Generic[AnyOptions]):
         Called for embedded vehicles only.
         """
         return options
+
+    def sensors(self, options: AnyOptions) -> "Sequence[Sensor]":
+        """The sensors that each vehicle must carry.
+
+        The run proves them before the takeoff and watches them, until the mission calls
+        `vehicle.sensors.release` or has ended.
+        """
+        return ()
 
     async def outline(self, vehicle: "Vehicle", options: AnyOptions) -> "Outline | None":
         """The path that one vehicle, which is ready to arm, would fly; None: it is not known in advance."""

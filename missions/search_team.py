@@ -155,11 +155,11 @@ class SearchTeam(Generic[Options]):
         vehicles: the vehicles, each ready to arm.
         options: options of each vehicle, adapted to it.
         check: refuses what a vehicle can't fly.
-        component: id of the sensor's component.
         rates_hz: messages that a vehicle must send, beside GLOBAL_POSITION_INT.
 
     Attributes:
         searchers: one per vehicle.
+        gave_up: why the search was given up; "": it was not.
     """
 
     search: StepSearch
@@ -171,13 +171,13 @@ class SearchTeam(Generic[Options]):
         options: Sequence[Options],
         *,
         check: Callable[[Options, Limits], None],
-        component: int,
         rates_hz: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._vehicles = tuple(vehicles)
         self._options = tuple(options)
-        self._check, self._component, self._rates_hz = check, component, rates_hz
+        self._check, self._rates_hz = check, rates_hz
         self.searchers = [Searcher() for _ in vehicles]
+        self.gave_up = ""
         first = options[0]
         self._layers = Layers(
             vehicles,
@@ -209,7 +209,6 @@ class SearchTeam(Generic[Options]):
         notes.begin("checks", clock.stamp_us)
         limits = await vehicle.limits(own.own_altitude_m)
         self._check(own, limits)
-        await vehicle.payload.require(self._component)
         await vehicle.commands.set_message_rate("GLOBAL_POSITION_INT", _POSITION_HZ[own.law])
         for name, rate_hz in self._rates_hz.items():
             await vehicle.commands.set_message_rate(name, rate_hz)
@@ -227,6 +226,7 @@ class SearchTeam(Generic[Options]):
         self.search.leave(index)
         if self.search.over:
             self.watch.stop()  # the way home is no part of the search
+        vehicle.sensors.release()
         self.searchers[index].ended_us = clock.time_us
         await self._layers.land(index)
 
@@ -249,7 +249,7 @@ class SearchTeam(Generic[Options]):
         if not searcher.track or now_us - searcher.track[-1][0] >= 500_000:
             searcher.track.append((now_us, *here))
         vehicle.notes.progress = search.progress
-        self._check_sensor()
+        self._check_sensors()
         away_m = math.dist(here, searcher.goal)
         if away_m > (own.acceptance_m or 2.0):
             step_m = own.step_length_m
@@ -263,10 +263,19 @@ class SearchTeam(Generic[Options]):
         searcher.goal_us = now_us
         return True
 
-    def _check_sensor(self) -> None:
+    def _check_sensors(self) -> None:
+        """End the search when a sensor has stopped, or no scan could be fused for long: all fly home in
+        their layers.
+        """
+        if self.search.over:
+            return
+        stopped = next(filter(None, (vehicle.sensors.stopped for vehicle in self._vehicles)), "")
+        if stopped:
+            self.search.reason = self.gave_up = stopped
+            return
         silent_s = (self._vehicles[0].clock.time_us - self._scan_us) * 1e-6
-        if silent_s > self._options[0].sensor_limit_s and not self.search.over:
-            self.search.reason = f"no scan was received for {silent_s:.0f} s"
+        if silent_s > self._options[0].sensor_limit_s:
+            self.search.reason = self.gave_up = f"no scan was fused for {silent_s:.0f} s"
 
     async def _search_by_setpoints(self, index: int, limits: MulticopterLimits) -> None:
         """Fly from place to place by streamed setpoints; while no scan arrives, the vehicle holds its

@@ -33,7 +33,7 @@ from flightsim.payload.moving_points import (
     PointReader,
     PointReaderParameters,
 )
-from flightsim.payload.payload import Payload, PayloadParameters
+from flightsim.payload.payload import Device, DeviceOutage, Payload, PayloadParameters
 from flightsim.payload.range_radio import MeasuredRange, RadioOutage, RangeRadio, RangeRadioParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
@@ -71,6 +71,8 @@ __all__ = [
     "DailyVariationParameters",
     "Detection",
     "DetectionModel",
+    "Device",
+    "DeviceOutage",
     "DipoleSignature",
     "FrameReader",
     "FrameReaderParameters",

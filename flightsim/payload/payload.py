@@ -2,12 +2,17 @@
 sensor, range radio, moving-point camera.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.checks import require_not_negative, require_positive
 from flightsim.home import Home
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.detection import CameraFrame
@@ -25,9 +30,51 @@ from flightsim.payload.targets import GroundTargets
 from flightsim.payload.terrain import Terrain
 
 
+class Device(StrEnum):
+    """The devices that a `DeviceOutage` may name; target sensor and range radio have outages of their own."""
+
+    CAMERA = "camera"
+    MAGNETOMETER = "magnetometer"
+    MOVING_POINTS = "moving_points"
+
+
+_READINGS: Final[Mapping[Device, str]] = MappingProxyType(
+    {Device.CAMERA: "frame", Device.MAGNETOMETER: "reading", Device.MOVING_POINTS: "points"}
+)
+"""Attribute of a payload that has what a device delivered on this step."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceOutage:
+    """A time in which a device delivers nothing, while its computer goes on.
+
+    Attributes:
+        device: the device.
+        start_s: vehicle time at which it begins.
+        duration_s: how long it lasts; None: to the end.
+    """
+
+    device: Device
+    start_s: float
+    duration_s: float | None = None
+
+    def __post_init__(self) -> None:
+        require_not_negative(start_s=self.start_s)
+        if self.duration_s is not None:
+            require_positive(duration_s=self.duration_s)
+
+    def covers(self, time_us: int) -> bool:
+        """Whether it lasts at a vehicle time."""
+        end_s = math.inf if self.duration_s is None else self.start_s + self.duration_s
+        return self.start_s <= time_us * 1e-6 < end_s
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PayloadParameters:
-    """What a vehicle carries; None leaves it out. A camera without a gimbal is fixed to the body."""
+    """What a vehicle carries; None leaves it out. A camera without a gimbal is fixed to the body.
+
+    `outages` are scheduled failures of its devices.
+    """
 
     gimbal: GimbalParameters | None = None
     camera: CameraParameters | None = None
@@ -35,6 +82,7 @@ class PayloadParameters:
     target_sensor: TargetSensorParameters | None = None
     range_radio: RangeRadioParameters | None = None
     moving_points: MovingPointParameters | None = None
+    outages: tuple[DeviceOutage, ...] = ()
 
 
 class Payload:
@@ -147,7 +195,8 @@ class Payload:
                 physics_rate_hz=physics_rate_hz,
                 seeds=seeds,
             )
-        alone = replace(parameters, magnetometer=None) == PayloadParameters()
+        self._outages = parameters.outages
+        alone = replace(parameters, magnetometer=None, outages=()) == PayloadParameters()
         self._resting = self.magnetometer if alone else None
 
     @property
@@ -171,6 +220,9 @@ class Payload:
             self.ranges = self.range_radio.step(time_us)
         if self.moving_points is not None:
             self.points = self.moving_points.step(time_us)
+        for outage in self._outages:
+            if outage.covers(time_us):
+                setattr(self, _READINGS[outage.device], None)
 
 
 def _no_seeds(index: int) -> np.random.SeedSequence:

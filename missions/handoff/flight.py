@@ -18,7 +18,6 @@ from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitGuidance, OrbitParameters
 from missions.orbit.roll_flight import follow_rolls
 from missions.planning.limits import FixedWingLimits
-from missions.vehicle.payload import GIMBAL_COMPONENT, MOVING_POINT_COMPONENT, RANGE_RADIO_COMPONENT
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 
@@ -107,7 +106,6 @@ class HandoffAircraft(ABC):
         check_vehicle(options, limits)
         assert isinstance(limits, FixedWingLimits)
         self._limits = limits
-        await vehicle.payload.require(MOVING_POINT_COMPONENT, GIMBAL_COMPONENT, RANGE_RADIO_COMPONENT)
         self._gimbal = GimbalPointing(vehicle)
         self._pilot = await vehicle.wing.prepare_piloting()
         await self._pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
@@ -191,6 +189,7 @@ class HandoffAircraft(ABC):
 
     async def land(self) -> None:
         """Go home and land."""
+        self.vehicle.sensors.release()
         self.begin("landing")
         await self.vehicle.wing.land_along()
         self.vehicle.notes.end(self.vehicle.clock.stamp_us)

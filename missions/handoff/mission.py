@@ -13,6 +13,7 @@ from missions.planning.limits import Limits
 from missions.team_mission import TeamMission
 
 if TYPE_CHECKING:
+    from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -30,6 +31,11 @@ class HandoffMission(TeamMission[HandoffOptions, HandoffTeam]):
     def estimator_settings(self, options: HandoffOptions) -> Mapping[str, float | str]:
         north_m, east_m = options.target_ne_m
         return {"target_north_m": north_m, "target_east_m": east_m}
+
+    def sensors(self, options: HandoffOptions) -> "Sequence[Sensor]":
+        from missions.vehicle.sensors import GIMBAL, MOVING_POINTS, RANGE_RADIO
+
+        return MOVING_POINTS, GIMBAL, RANGE_RADIO
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[HandoffOptions]) -> None:
         await self.flying(vehicles, HandoffTeam(vehicles, options)).fly()

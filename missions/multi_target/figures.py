@@ -175,8 +175,8 @@ def search_verdict(team: "TargetSearchTeam", debriefing: "Debriefing") -> str:
     search = team.search
     if not search.states:
         return "the search ended without any scan"
-    if search.reason.startswith("no scan"):
-        return f"the search was given up: {search.reason} (`sensor_limit_s`)"
+    if team.gave_up:
+        return f"the search was given up: {team.gave_up} (`sensor_limit_s`)"
     late = sum(searcher.late_steps for searcher in team.searchers)
     if late > _LATE_SHARE * max(len(search.steps), 10):
         return f"the vehicle did not reach {late} of the {len(search.steps)} places that were planned"

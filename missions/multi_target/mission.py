@@ -12,6 +12,7 @@ from missions.planning.limits import Limits
 from missions.team_mission import TeamMission
 
 if TYPE_CHECKING:
+    from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -19,6 +20,7 @@ class MultiTargetMission(TeamMission[MultiTargetOptions, TargetSearchTeam]):
     """A team searches an area with target sensors, and plans each step by what it knows."""
 
     name = "multi-target"
+    lands_without_sensors = True
     world_defaults = WorldDefaults(model="iris")
 
     def check(self, options: MultiTargetOptions, limits: Limits) -> None:
@@ -29,6 +31,11 @@ class MultiTargetMission(TeamMission[MultiTargetOptions, TargetSearchTeam]):
         parameters = options.estimator_parameters
         settings = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
         return {**settings, "centre_vehicle": 1 if options.vehicles > 1 else 0}
+
+    def sensors(self, options: MultiTargetOptions) -> "Sequence[Sensor]":
+        from missions.vehicle.sensors import TARGET_SENSOR
+
+        return (TARGET_SENSOR.silent_after(options.sensor_limit_s),)
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[MultiTargetOptions]) -> None:
         await self.flying(vehicles, TargetSearchTeam(vehicles, options)).fly()

@@ -9,7 +9,6 @@ from missions.multi_target.options import MultiTargetOptions, check_vehicle
 from missions.multi_target.search import TargetSearch
 from missions.multi_target.sensor_watch import SensorWatch
 from missions.search_team import SearchTeam
-from missions.vehicle.payload import TARGET_SENSOR_COMPONENT
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -33,7 +32,7 @@ class TargetSearchTeam(SearchTeam[MultiTargetOptions]):
     watch: SensorWatch
 
     def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[MultiTargetOptions]) -> None:
-        super().__init__(vehicles, options, check=check_vehicle, component=TARGET_SENSOR_COMPONENT)
+        super().__init__(vehicles, options, check=check_vehicle)
         centre = vehicles[0].system_id if len(vehicles) > 1 else 0
         parameters = replace(options[0].estimator_parameters, centre_vehicle=centre)
         self.watch = SensorWatch(vehicles, parameters, self._on_scan)

@@ -68,6 +68,8 @@ _LEAST_S: Final = 30.0  # shortest search that is judged, s
 
 def search_verdict(team: "SearchTeam", debriefing: "Debriefing") -> str:
     """The reason, from the vehicles' reports, why a search was not flown; "" if it was."""
+    if team.stopped and team.search.found is None:
+        return f"the search was given up: {team.stopped}"
     for searcher, (notes, score) in zip(team.searchers, debriefing.flights, strict=False):
         if searcher.ended_us - searcher.began_us < _LEAST_S * 1e6:
             continue  # the other searchers had found the target

@@ -14,6 +14,7 @@ from missions.planning.limits import Limits
 from missions.team_mission import TeamMission
 
 if TYPE_CHECKING:
+    from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -21,6 +22,7 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
     """A team shares an occupancy map and flies headings from cell to cell until the target is found."""
 
     name = "occupancy"
+    lands_without_sensors = True
     world_defaults = WorldDefaults(model="aerosonde", wind="5@270", turbulence="light")
 
     def check(self, options: OccupancyOptions, limits: Limits) -> None:
@@ -49,6 +51,11 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
         if options.map_file is not None:
             known["map_file"] = options.map_file
         return known
+
+    def sensors(self, options: OccupancyOptions) -> "Sequence[Sensor]":
+        from missions.vehicle.sensors import SURVEY_MAGNETOMETER
+
+        return (SURVEY_MAGNETOMETER,)
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions]) -> None:
         map_file = options[0].map_file

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
-from estimators import survey_magnetometer
 from estimators.magnetic_identification.estimator import field_direction
 from estimators.magnetic_identification.identifier import Identifier
 from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
@@ -110,9 +109,14 @@ class SearchTeam:
         return self._options[0].map_error(self._map)
 
     @property
+    def stopped(self) -> str:
+        """Which vehicle's magnetometer has stopped; "": none."""
+        return next(filter(None, (vehicle.sensors.stopped for vehicle in self._vehicles)), "")
+
+    @property
     def over(self) -> bool:
-        """Whether the target is found, or the search time is over."""
-        if self.search.found is not None:
+        """Whether the target is found, the search time is over, or a magnetometer has stopped."""
+        if self.search.found is not None or self.stopped:
             return True
         limit_us = self.began_us + round(self._options[0].search_time_s * 1e6)
         return self.began_us >= 0 and self._vehicles[0].clock.time_us >= limit_us
@@ -134,6 +138,7 @@ class SearchTeam:
                 vehicle, altitude_m=own.own_altitude_m, speed_m_s=speed_m_s, rate_hz=own.rate_hz
             ) as flight:
                 await self._search(index, flight)
+        vehicle.sensors.release()
         self.search.leave(index)
         await self._layers.land(index)
 
@@ -142,7 +147,6 @@ class SearchTeam:
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
         check_reach(own, limits, self._frame, vehicle.home)
-        await vehicle.payload.require(survey_magnetometer.COMPONENT)
         await require_quiet(vehicle, threshold_nt=own.threshold_nt)
         if vehicle.kind is VehicleKind.FIXED_WING:
             await vehicle.wing.prepare_piloting()

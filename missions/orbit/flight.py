@@ -18,7 +18,6 @@ from missions.orbit.target_observer import TICK_HZ, TargetObserver
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
-from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.vehicle import Vehicle
 
@@ -73,7 +72,6 @@ class OrbitFlight:
         """
         vehicle, options = self._vehicle, self._options
         self._begin("preparation")
-        await vehicle.payload.require(CAMERA_COMPONENT, GIMBAL_COMPONENT)
         pitch_min, pitch_max, _, _ = await vehicle.payload.request_gimbal_information()
         options.check_camera(self._limits, pitch_min, pitch_max)
         if options.gps_fault:
@@ -99,6 +97,7 @@ class OrbitFlight:
         finally:
             for stop in stops:
                 stop()
+        vehicle.sensors.release()
         self._begin("landing")
         await vehicle.wing.land_along()
         vehicle.notes.end(self._stamp_us)

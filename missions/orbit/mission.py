@@ -11,6 +11,7 @@ from missions.notes import FlightNotes
 from missions.orbit.options import WANDERING_M, OrbitOptions
 from missions.orbit.score import ORBIT
 from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.sensors import CAMERA, GIMBAL, Sensor
 from missions.vehicle.vehicle import Vehicle
 
 RADIUS_SHARE: Final = 0.1
@@ -67,6 +68,9 @@ class OrbitMission(Mission[OrbitOptions]):
             "target_ground_m": options.target_ground_m,
             **({"target_sigma_m": WANDERING_M} if options.target_wanders else {}),
         }
+
+    def sensors(self, options: OrbitOptions) -> Sequence[Sensor]:
+        return CAMERA, GIMBAL
 
     async def fly(self, vehicle: Vehicle, options: OrbitOptions) -> None:
         from missions.orbit.flight import OrbitFlight

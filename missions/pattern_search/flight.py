@@ -203,6 +203,7 @@ async def _fly_setpoints(
             return setpoint
 
         await guided.follow(source)
+        vehicle.sensors.release()
         notes.begin("return", clock.stamp_us)
         assert last.position_ned_m is not None
         await _fly_line(vehicle, guided, last.position_ned_m, above_home, limits)
@@ -395,6 +396,7 @@ async def _fly_waypoints(
         if options.search_time_s is None:
             raise
         over = True  # the search time has ended
+    vehicle.sensors.release()
     if over:
         notes.cut_short = CutShort.TIME if search is None else search.ended_by
         flown = [item.command for item in plan.items[: reached + 1]].count(dialect.MAV_CMD_NAV_WAYPOINT)

@@ -17,6 +17,7 @@ from missions.pattern_search.flight import (
 )
 from missions.patterns import Curve
 from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.sensors import TAG_CAMERA, Sensor
 from missions.vehicle.vehicle import Vehicle
 
 
@@ -77,6 +78,9 @@ class PatternMission(Mission[FlightOptions]):
     async def plan_items(self, vehicle: Vehicle, options: FlightOptions) -> Sequence[MissionItem]:
         return await pattern_items(vehicle, options, self.curve(options))
 
+    def sensors(self, options: FlightOptions) -> Sequence[Sensor]:
+        return (TAG_CAMERA,) if options.search else ()
+
     async def outline(self, vehicle: Vehicle, options: FlightOptions) -> Outline:
         return pattern_outline(vehicle, options, self.curve(options))
 
@@ -101,6 +105,13 @@ class PatternMission(Mission[FlightOptions]):
             return {}  # at constant speed the motion is not harmonic
         x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)
         return {"omega_x_rad_s": x_rad_s, "omega_y_rad_s": y_rad_s}
+
+    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
+        assert isinstance(debriefing.options, FlightOptions)
+        frames = sum(notes.marks.get("search_frames", 0.0) for notes, _ in debriefing.flights)
+        if debriefing.options.search and not frames:
+            return "the search ended without a picture that was searched: look at the camera"
+        return super().verdict(debriefing, max_error_m)
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         assert isinstance(debriefing.options, FlightOptions)

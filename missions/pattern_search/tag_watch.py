@@ -56,7 +56,7 @@ class TagWatch:
     Attributes:
         began_us: vehicle time at which the search began; None: not yet.
         found: the tag; None: not detected.
-        frames: number of searched pictures.
+        frames: number of searched pictures of the search.
         other_tags: numbers of other tags that were detected.
     """
 
@@ -182,11 +182,11 @@ class TagWatch:
         if message.payload_type != CAMERA_SCAN_PAYLOAD:
             return
         scan = read_camera_scan(message.payload_type, message.payload_length, message.payload)
-        if scan is None:
+        if scan is None or self.began_us is None:
             return
         self.frames += 1
         seen = self._seen.get(scan.time_us)
-        if seen is None or self.began_us is None or self.over:
+        if seen is None or self.over:
             return
         self.found = FoundTag(exposed_us=scan.time_us, place=self._place(scan, seen), distance_m=seen[2])
         self._ended.set()

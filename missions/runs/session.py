@@ -5,7 +5,7 @@ This module opens the world or the links, starts the event loop, and reads the w
 
 import asyncio
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, nullcontext
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -327,6 +327,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     if request.connect:
         await require_key(request, vehicle)
         await vehicle.set_parameters(request.parameters)
+    vehicle.sensors.watch(*mission.sensors(request.options))  # its messages while it gets ready count, too
     await vehicle.wait_ready(leave_mode=mission.commands)
 
 
@@ -343,6 +344,7 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         vehicle.allow_below_home = own.allow_below_home
         if request.connect:  # before a question is asked and before anything is uploaded
             mission.check_place(own, own_limits, home)
+    await run_concurrently([vehicle.sensors.prove() for vehicle in vehicles])
     for vehicle, own in zip(vehicles, options, strict=True):
         for text in await mission.remarks(vehicle, own):
             request.on_remark(f"vehicle {vehicle.system_id}: {text}")
@@ -356,14 +358,14 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
     if not mission.flies_as_team:
         await run_concurrently(
             [
-                _fly_one(mission.fly(vehicle, own), vehicle, request)
+                _fly_one(mission.fly(vehicle, own), vehicle, request, watched=True)
                 for vehicle, own in zip(vehicles, options, strict=True)
             ]
         )
         return
     flying = mission.fly_team(vehicles, options)
     for vehicle in vehicles:
-        flying = _fly_one(flying, vehicle, request)
+        flying = _fly_one(flying, vehicle, request, watched=not mission.lands_without_sensors)
     await flying
 
 
@@ -389,10 +391,18 @@ async def _confirm(
     await confirmed(looks, confirm)
 
 
-async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest) -> None:
+async def _fly_one(
+    flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest, *, watched: bool
+) -> None:
+    """Fly one vehicle to its end, and leave it safe.
+
+    Args:
+        watched: whether a sensor that stops ends the flight.
+    """
     vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission begins its own phase
     async with vehicle.safe_on_exit(request.on_failure):
-        await flying
+        async with vehicle.sensors.guard() if watched else nullcontext():
+            await flying
         if vehicle.armed and not vehicle.notes.aloft:
             raise MissionError(
                 f"the mission ended with the vehicle armed; it was commanded to {request.on_failure}. "

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mission_plan import MissionItem
-from estimators import survey_magnetometer
 from estimators.survey.lines import LinePlan, SurveyLine
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
@@ -188,6 +187,7 @@ async def fly_lines(
 
     await vehicle.plans.wait_item_reached(last, 60.0 + path.path.length_m / slow_m_s, progress)
     await _passed(vehicle, survey, lines[-1], lines[-1].length_m)
+    vehicle.sensors.release()
     notes.begin("return", clock.stamp_us)
     await vehicle.link.wait_disarmed(600.0 + 2.0 * away_s)
     notes.end(clock.stamp_us)
@@ -262,6 +262,7 @@ async def fly_manoeuvres(vehicle: Vehicle, options: SurveyOptions, limits: Fixed
         finally:
             following.cancel()
             await asyncio.gather(following, return_exceptions=True)
+    vehicle.sensors.release()
     notes.begin("return", clock.stamp_us)
     radius_m = limits.turn_radius_m(airspeed_m_s(options, limits))
     await vehicle.wing.land_along(runway_approach(vehicle, options.index, radius_m))
@@ -279,7 +280,7 @@ async def _climb(vehicle: Vehicle, altitude_m: float, radius_m: float) -> None:
 
 
 async def _prepare(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLimits) -> None:
-    """Check the payload, and request what readings are placed with."""
+    """Request what readings are placed with."""
     vehicle.notes.begin("checks", vehicle.clock.stamp_us)
     if options.altitude_m > limits.altitude_max_m:
         vehicle.notes.warn(
@@ -288,7 +289,6 @@ async def _prepare(vehicle: Vehicle, options: SurveyOptions, limits: FixedWingLi
         )
     if options.terrain_file is not None:  # the height over its ground was checked, which may be below home
         vehicle.allow_below_home = True
-    await vehicle.payload.require(survey_magnetometer.COMPONENT)
     for name, rate_hz in _RATES_HZ.items():
         await vehicle.commands.set_message_rate(name, rate_hz)
     await vehicle.link.wait_until(

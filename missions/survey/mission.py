@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from missions.notes import FlightNotes
     from missions.outline import Outline
     from missions.survey.outcome import Outcome
+    from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -82,6 +83,11 @@ class SurveyMission(Mission[SurveyOptions]):
             return {}
         # the turns of the aircraft change the order of the lines, not their places
         return {"lines_file": (LINES, line_plan(options, turn_radius_m=0.0).to_csv().encode())}
+
+    def sensors(self, options: SurveyOptions) -> "Sequence[Sensor]":
+        from missions.vehicle.sensors import SURVEY_MAGNETOMETER
+
+        return (SURVEY_MAGNETOMETER,)
 
     async def outline(self, vehicle: "Vehicle", options: SurveyOptions) -> "Outline | None":
         from missions.survey.flight import outline_of, planned_survey

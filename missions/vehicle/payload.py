@@ -11,7 +11,6 @@ from typing import Any, Final
 from autopilot_bridge.mavlink import decode, dialect
 from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
-from missions.errors import VehicleTimeout
 from missions.vehicle.link import VehicleLink
 
 CAMERA_COMPONENT: Final = 100
@@ -73,38 +72,6 @@ class Payload:
                     listener(value)
 
         return self._link.connection.listen(name, look)
-
-    async def require(self, *components: int, timeout_s: float = 5.0) -> None:
-        """Wait until a message of each of these components was received.
-
-        Raises:
-            VehicleTimeout: a component was not received; the message names it.
-        """
-        link = self._link
-        names = {
-            CAMERA_COMPONENT: "camera",
-            GIMBAL_COMPONENT: "gimbal",
-            survey_magnetometer.COMPONENT: "survey magnetometer",
-            TARGET_SENSOR_COMPONENT: "target sensor",
-            RANGE_RADIO_COMPONENT: "range radio",
-            MOVING_POINT_COMPONENT: "moving-point camera",
-        }
-
-        def missing() -> list[str]:
-            return [
-                f"{names.get(c, 'component')} ({c})"
-                for c in components
-                if link.connection.latest("HEARTBEAT", link.system_id, c) is None
-            ]
-
-        try:
-            await link.wait_until(
-                lambda: not missing(), what="payload", on=("HEARTBEAT",), timeout_s=timeout_s
-            )
-        except VehicleTimeout:
-            raise VehicleTimeout(
-                f"the vehicle has no {', no '.join(missing())}: no heartbeat of it within {timeout_s:g} s"
-            ) from None
 
     # gimbal
 

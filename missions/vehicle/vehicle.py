@@ -26,6 +26,7 @@ from missions.vehicle.plans import VehiclePlans
 from missions.vehicle.point_flight import PointFlight
 from missions.vehicle.readiness import Readiness
 from missions.vehicle.returning import ReturnEnd
+from missions.vehicle.sensors import SensorWatch
 from missions.vehicle.telemetry import Position
 from missions.vehicle.wing import FixedWing
 
@@ -54,6 +55,7 @@ class Vehicle:
         plans: its stored mission, geofence and rally points, and the progress of the mission.
         payload: camera, gimbal and survey magnetometer.
         return_end: whether its returns end on the ground, and the wait for their end.
+        sensors: the sensors that the present mission needs, and whether they work.
         local_origin: origin of the autopilot's local frame.
         forecast_wind_m_s: wind that turns are planned for: the user's forecast, not the measured wind.
     """
@@ -65,6 +67,7 @@ class Vehicle:
         self.plans = VehiclePlans(self.link, self.parameters, self.commands.heights)
         self.payload = Payload(self.link)
         self.return_end = ReturnEnd(self.link, self.parameters)
+        self.sensors = SensorWatch(self.link)
         self.forecast_wind_m_s: float = FORECAST_WIND_M_S
         self.local_origin = LocalOrigin(self.commands)
         self._adapter: Adapter | None = None

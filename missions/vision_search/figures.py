@@ -122,8 +122,8 @@ def search_verdict(team: "VisionSearchTeam", debriefing: "Debriefing") -> str:
     search = team.search
     if not any(search.states):
         return _why_no_frame([team.watch.remarks(index) for index in range(len(team.searchers))])
-    if search.reason.startswith("no scan"):
-        return f"the search was given up: {search.reason} (`sensor_limit_s`)"
+    if team.gave_up:
+        return f"the search was given up: {team.gave_up} (`sensor_limit_s`)"
     late = sum(searcher.late_steps for searcher in team.searchers)
     if late > _LATE_SHARE * max(sum(search.steps), 10):
         return f"the vehicles did not reach {late} of the {sum(search.steps)} places that were planned"

@@ -12,6 +12,7 @@ from missions.vision_search.options import VisionSearchOptions, check_vehicle
 from missions.vision_search.team import VisionSearchTeam
 
 if TYPE_CHECKING:
+    from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -19,6 +20,7 @@ class VisionSearchMission(TeamMission[VisionSearchOptions, VisionSearchTeam]):
     """A team searches an area with cameras for one tag, and localizes it."""
 
     name = "vision-search"
+    lands_without_sensors = True
     world_defaults = WorldDefaults(model="iris")
 
     def check(self, options: VisionSearchOptions, limits: Limits) -> None:
@@ -29,6 +31,11 @@ class VisionSearchMission(TeamMission[VisionSearchOptions, VisionSearchTeam]):
         parameters = options.estimator_parameters
         settings = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
         return {**settings, "centre_vehicle": 1 if options.vehicles > 1 else 0}
+
+    def sensors(self, options: VisionSearchOptions) -> "Sequence[Sensor]":
+        from missions.vehicle.sensors import TAG_CAMERA
+
+        return (TAG_CAMERA.silent_after(options.sensor_limit_s),)
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[VisionSearchOptions]) -> None:
         await self.flying(vehicles, VisionSearchTeam(vehicles, options)).fly()

@@ -8,7 +8,6 @@ from estimators.vision_search import AreaEstimate
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.random_streams import RandomStreams
 from missions.search_team import SearchTeam
-from missions.vehicle.payload import CAMERA_COMPONENT
 from missions.vehicle.telemetry import Attitude, Position
 from missions.vision_search.options import VisionSearchOptions, check_vehicle
 from missions.vision_search.search import VisionSearch
@@ -39,13 +38,7 @@ class VisionSearchTeam(SearchTeam[VisionSearchOptions]):
     watch: CameraWatch
 
     def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[VisionSearchOptions]) -> None:
-        super().__init__(
-            vehicles,
-            options,
-            check=check_vehicle,
-            component=CAMERA_COMPONENT,
-            rates_hz={"ATTITUDE": _ATTITUDE_HZ},
-        )
+        super().__init__(vehicles, options, check=check_vehicle, rates_hz={"ATTITUDE": _ATTITUDE_HZ})
         alone = len(vehicles) == 1
         own = options[0]
         parameters = [

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from autopilot_bridge.mavlink import FrameParser, decode, dialect
-from missions.errors import PlanError, VehicleTimeout
+from missions.errors import PlanError
 from missions.notes import FlightNotes
 from missions.vehicle import AttitudeSetpoint
 from missions.vehicle.payload import GIMBAL_COMPONENT, Payload, detection, gimbal_attitude
@@ -170,14 +170,6 @@ def test_pointing_speaks_gimbal_protocol(flown):
     assert (commands[0].param1, commands[0].param2) == (255.0, 190.0)
     roi = next(m for m in received if m.get_type() == "COMMAND_INT")
     assert (roi.command, roi.x) == (d.MAV_CMD_DO_SET_ROI_LOCATION, 474_000_000)
-
-
-def test_what_is_not_on_board_is_named(flown):
-    async def mission(vehicle, _autopilot):
-        with pytest.raises(VehicleTimeout, match=r"no camera \(100\), no gimbal \(154\)"):
-            await vehicle.payload.require(100, 154, timeout_s=2.0)
-
-    flown(mission)
 
 
 def test_wings_are_required_of_wings_only(flown):
