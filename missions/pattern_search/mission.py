@@ -108,7 +108,7 @@ class PatternMission(Mission[FlightOptions]):
 
     def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
         assert isinstance(debriefing.options, FlightOptions)
-        frames = sum(notes.marks.get("search_frames", 0.0) for notes, _ in debriefing.flights)
+        frames = sum(notes.marks.get("search_frames_at_altitude", 0.0) for notes, _ in debriefing.flights)
         if debriefing.options.search and not frames:
             return "the search ended without a picture that was searched: look at the camera"
         return super().verdict(debriefing, max_error_m)

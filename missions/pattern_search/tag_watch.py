@@ -56,7 +56,8 @@ class TagWatch:
     Attributes:
         began_us: vehicle time at which the search began; None: not yet.
         found: the tag; None: not detected.
-        frames: number of searched pictures of the search.
+        frames: number of searched pictures.
+        frames_at_altitude: number of those since the search began.
         other_tags: numbers of other tags that were detected.
     """
 
@@ -73,7 +74,7 @@ class TagWatch:
         self._now_us = 0  # time since boot of the newest position
         self.began_us: int | None = None
         self.found: FoundTag | None = None
-        self.frames = 0
+        self.frames = self.frames_at_altitude = 0
         self.other_tags: set[int] = set()
 
     def start(self) -> None:
@@ -134,6 +135,7 @@ class TagWatch:
         marks["search_found"] = float(self.found is not None)
         marks["search_s"] = max(0.0, (end_us - began_us) * 1e-6)
         marks["search_frames"] = float(self.frames)
+        marks["search_frames_at_altitude"] = float(self.frames_at_altitude)
         if self.found is not None:
             marks["search_exposed_us"] = float(self.found.exposed_us)
             marks["search_distance_m"] = self.found.distance_m
@@ -182,9 +184,12 @@ class TagWatch:
         if message.payload_type != CAMERA_SCAN_PAYLOAD:
             return
         scan = read_camera_scan(message.payload_type, message.payload_length, message.payload)
-        if scan is None or self.began_us is None:
+        if scan is None:
             return
         self.frames += 1
+        if self.began_us is None:
+            return
+        self.frames_at_altitude += 1
         seen = self._seen.get(scan.time_us)
         if seen is None or self.over:
             return
