@@ -1,4 +1,4 @@
-"""`flightstack vehicle`: what is connected, its parameters, its logs, its health."""
+"""`flightstack vehicle`: what is connected, its parameters, its logs, its health; and acting on it."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli.options import StatusLine
+from missions.cli.vehicle_actions import disarm, hold, land, return_, watch
 from missions.cli.vehicle_link import FAILED, address, confirm, connected, print_json, run, with_client
 from missions.cli.vehicle_params import params
 
@@ -20,10 +21,15 @@ _SHOWN_EVERY_S: Final = 0.2
 
 @click.group()
 def vehicle() -> None:
-    """Talk to a vehicle: what it is, its parameters, its logs, its health (through MAVSDK)."""
+    """Talk to a vehicle: what it is, its parameters, its logs, its health (through MAVSDK).
+
+    Act on it, as after a crash of a flight's program: return, land, hold, disarm, watch.
+    """
 
 
 vehicle.add_command(params)
+for action in (return_, land, hold, disarm, watch):
+    vehicle.add_command(action)
 
 
 # info

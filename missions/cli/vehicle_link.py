@@ -95,9 +95,9 @@ def with_client(
     return run(whole())
 
 
-def print_json(value: Any) -> None:
+def print_json(value: Any, *, one_line: bool = False) -> None:
     """Print plain values as JSON; NaN and infinity become null."""
-    click.echo(json.dumps(_finite(value), indent=2, allow_nan=False))
+    click.echo(json.dumps(_finite(value), indent=None if one_line else 2, allow_nan=False))
 
 
 def _finite(value: Any) -> Any:
