@@ -65,9 +65,9 @@ def load_airframe(model: str | Path) -> Airframe:
 
     Args:
         model: name of a model that comes with the package; path of a folder with a `vehicle.toml`, of such a
-            file by any name, or of a JSBSim aircraft (`.xml`); or name of an aircraft of the `jsbsim`
-            package. The last two need no description: the standard pilot's commands are taken, and the
-            limits are worked out.
+            file by any name, or of a JSBSim aircraft (`.xml`, or its folder `NAME` with `NAME.xml`); or name
+            of an aircraft of the `jsbsim` package. The last two need no description: the standard pilot's
+            commands are taken, and the limits are worked out.
 
     Raises:
         AirframeError: unknown model, or a description that cannot be used.
@@ -79,7 +79,8 @@ def load_airframe(model: str | Path) -> Airframe:
             return _bare(_package_root() / "aircraft" / model / f"{model}.xml")
     path = Path(model)
     if path.is_dir():
-        path = path / _DESCRIPTION
+        description, xml = path / _DESCRIPTION, path / f"{path.resolve().name}.xml"
+        path = description if description.is_file() or not xml.is_file() else xml
     if not path.is_file():
         raise AirframeError(
             f"vehicle model '{model}' is unknown; accepted are {listed(known_models())}, the path of a "

@@ -14,6 +14,7 @@ import jsbsim
 import numpy as np
 
 from flightsim.airframe import Airframe, AirframeError, FlightLimits, Role, load_airframe
+from flightsim.control_effects import LEAST_EFFECT, control_effects, dead_controls
 from flightsim.environment import Environment
 from flightsim.flight_figures import FlightEnvelope
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
@@ -30,7 +31,6 @@ _STALL_STEP: Final = 0.93
 _STALL_RESOLUTION: Final = 0.01
 # Default speeds of an aircraft, as multiples of its stall speed.
 _SLOWEST, _CRUISE, _FASTEST = 1.2, 1.6, 2.2
-_LEAST_ACCELERATION_RAD_S2: Final = 0.02
 
 
 def flight_envelope(
@@ -136,6 +136,7 @@ class _Survey:
         try:
             return self.level(speed_m_s)
         except TrimError as error:
+            self.require_controls(speed_m_s)
             raise AirframeError(f"{error} ({speed_m_s:.1f} m/s equivalent, its cruise)") from None
 
     def level_throttle(self, speed_m_s: float, near: FlightTrim) -> float:
@@ -176,6 +177,7 @@ class _Survey:
         try:
             flies = self.glide(speed)
         except TrimError as error:
+            self.require_controls(speed)
             raise AirframeError(f"{error}, power off ({speed:.1f} m/s equivalent)") from None
         stalled = 0.0
         while speed - stalled > _STALL_RESOLUTION * speed:
@@ -208,6 +210,12 @@ class _Survey:
             )
         return speed, best
 
+    def require_controls(self, speed_m_s: float) -> None:
+        """Raise the reason of a failed trim where a control moves nothing at this equivalent airspeed."""
+        airspeed_m_s = speed_m_s * self.to_true
+        if dead := dead_controls(control_effects(self.tunnel, airspeed_m_s), airspeed_m_s):
+            raise AirframeError(f"vehicle '{self.tunnel.airframe.name}' can't be trimmed: {dead}")
+
     def check_controls(self, model: LinearModel) -> None:
         """Every control must do something, and in the right direction."""
         checks = (
@@ -222,7 +230,7 @@ class _Survey:
                 if role in (Role.AILERON, Role.ELEVATOR):
                     raise AirframeError(f"vehicle '{name}' has no {role}: [actuators] must name its property")
                 continue
-            if abs(effect) < _LEAST_ACCELERATION_RAD_S2:
+            if abs(effect) < LEAST_EFFECT:
                 raise AirframeError(
                     f"vehicle '{name}': its {role} does nothing at cruise; its property in [actuators] may "
                     "be the wrong one"

@@ -1,7 +1,7 @@
 """A typed interface to JSBSim: load a model, find its properties. Its messages go to `logging`."""
 
 import logging
-import shutil
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import jsbsim
 
 from flightsim.airframe import Airframe, AirframeError, AirframeKind
+from flightsim.model_files import refusal, write_copy
 
 _LOG: Final = logging.getLogger("flightsim.jsbsim")
 _LOG.addHandler(logging.NullHandler())
@@ -75,12 +76,13 @@ class _Messages(jsbsim.FGLogger):
 def load_fdm(
     airframe: Airframe, physics_rate_hz: int, *, launcher: bool = False
 ) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
-    """A new, independent JSBSim instance with the model loaded. Prints nothing.
+    """A new, independent JSBSim instance with the model loaded. It prints nothing, opens no port and writes
+    no file, whatever the model names.
 
     JSBSim keeps its logger per thread; this leaves ours installed in the calling thread.
 
     Args:
-        airframe: which model. Its engines and systems may lie in its folder or in the `jsbsim` package.
+        airframe: which model; `model_files` says where its engines and systems are searched.
         physics_rate_hz: steps per second.
         launcher: add a force and a moment for a `Launcher` to a copy of the model.
 
@@ -90,19 +92,15 @@ def load_fdm(
     Raises:
         AirframeError: JSBSim refuses the model; the message carries its reasons.
     """
-    tree = _parsed(airframe)
-    if tree is None:
-        return _load(airframe, airframe.folder, physics_rate_hz)
-    _add_rotary_gusts(tree.getroot())
-    for output in tree.getroot().findall(
-        "output"
-    ):  # files that some aircraft of the jsbsim package would write to their folders
-        tree.getroot().remove(output)
-    if launcher:
-        _add_launcher(tree.getroot())
+
+    def prepare(root: ElementTree.Element) -> None:
+        if airframe.kind is AirframeKind.FIXED_WING:
+            _add_rotary_gusts(root)
+        if launcher:
+            _add_launcher(root)
+
     with TemporaryDirectory(prefix="flightsim-") as folder:
-        shutil.copytree(airframe.folder, folder, ignore=_not_xml, dirs_exist_ok=True)
-        tree.write(Path(folder, airframe.xml_path.name))
+        write_copy(airframe, Path(folder), prepare)
         return _load(airframe, Path(folder), physics_rate_hz)
 
 
@@ -111,38 +109,32 @@ def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsi
     jsbsim.set_logger(messages)
     fdm = jsbsim.FGFDMExec(str(folder))
     fdm.set_debug_level(0)
-    fdm.set_aircraft_path(".")
-    package = Path(jsbsim.get_default_root_dir())
-    fdm.set_engine_path(str(package / "engine"))
-    fdm.set_systems_path(str(package / "systems"))
+    for set_path in (fdm.set_aircraft_path, fdm.set_engine_path, fdm.set_systems_path):
+        set_path(".")  # all files of the model lie in one folder
     fdm.set_dt(1.0 / physics_rate_hz)  # filters and actuators take it when they are made
     try:
         if not fdm.load_model(airframe.jsbsim, False):
-            raise AirframeError(_refusal(airframe, messages.warnings))
+            raise AirframeError(refusal(airframe, _in_the_model(messages.warnings, folder)))
         if airframe.kind is AirframeKind.FIXED_WING:
             # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
             fdm.set_property_value("ic/h-agl-ft", 1000.0)
             fdm.run_ic()
             fdm.reset_to_initial_conditions(0)
     except jsbsim.BaseError as error:
-        raise AirframeError(_refusal(airframe, [*messages.warnings, str(error)])) from None
+        reasons = _in_the_model([*messages.warnings, str(error)], folder)
+        raise AirframeError(refusal(airframe, reasons)) from None
     fdm.set_dt(1.0 / physics_rate_hz)
     hold_motion(fdm, False)
     return fdm, tuple(messages.warnings)
 
 
-def _parsed(airframe: Airframe) -> "ElementTree.ElementTree[ElementTree.Element] | None":
-    """A fixed-wing model's XML; other models are loaded as they are."""
-    if airframe.kind is not AirframeKind.FIXED_WING:
-        return None
-    try:
-        return ElementTree.parse(airframe.xml_path)
-    except (OSError, ElementTree.ParseError) as error:
-        raise AirframeError(_refusal(airframe, [str(error)])) from None
+def _in_the_model(messages: list[str], folder: Path) -> list[str]:
+    """Messages about the copy in a folder, as messages about the model's own files.
 
-
-def _not_xml(directory: str, names: list[str]) -> list[str]:
-    return [name for name in names if not name.endswith(".xml") and not Path(directory, name).is_dir()]
+    Their line numbers are left out: the copy has other lines.
+    """
+    place = re.compile(rf"{re.escape(str(folder))}/(?:\./)?(.+?\.xml):\d+")
+    return [place.sub(r"\1", text) for text in messages]
 
 
 def _add_launcher(root: ElementTree.Element) -> None:
@@ -209,8 +201,3 @@ def find_property(fdm: jsbsim.FGFDMExec, name: str, *, needed_by: str) -> Any:
     if node is None:
         raise AirframeError(f"the JSBSim model has no property '{name}', which {needed_by} needs")
     return node
-
-
-def _refusal(airframe: Airframe, reasons: list[str]) -> str:
-    detail = "; ".join(" ".join(reason.split()) for reason in reasons) or "no reason given"
-    return f"JSBSim cannot load {airframe.xml_path}: {detail}"

@@ -24,6 +24,8 @@ _TOLERANCE: Final = 2e-4  # m/s2 and rad/s2
 _DELTAS: Final = (1e-3, 1e-3, 1e-2, 1e-2, 1e-2, 1e-2)
 _SLOW_CONVERGENCE: Final = 0.3  # a new Jacobian when an iteration leaves more than that of the residual
 _STEP_LIMIT: Final = 0.15
+_FIRST_ALPHAS_RAD: Final = (0.05, 0.15, -0.05)
+"""Angles of attack at which the iteration begins without a flight nearby, in the order of the tries."""
 _ALPHA_MIN_RAD: Final = math.radians(-20.0)
 _ALPHA_MAX_RAD: Final = math.radians(40.0)
 
@@ -104,7 +106,16 @@ def trim_in_tunnel(
         bank_rad,
         throttle if throttle is not None else None,
     )
-    return problem.solve(near, iterations)
+    if near is not None:
+        return problem.solve(problem.first_guess(near), iterations)
+    refused: TrimError | None = None
+    for alpha_rad in _FIRST_ALPHAS_RAD:
+        try:
+            return problem.solve(problem.first_guess(None, alpha_rad), iterations)
+        except TrimError as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
 
 
 class _Problem:
@@ -133,7 +144,8 @@ class _Problem:
         self.low = np.array([_ALPHA_MIN_RAD, -1.5, -1.0, -1.0, -1.0, 0.0 if throttle is None else -1.2])
         self.high = np.array([_ALPHA_MAX_RAD, 1.5, 1.0, 1.0, 1.0, 1.0 if throttle is None else 1.2])
 
-    def first_guess(self, near: FlightTrim | None) -> Array:
+    def first_guess(self, near: FlightTrim | None, alpha: float = 0.0) -> Array:
+        """Where the iteration begins: a flight that is known, or level at an angle of attack."""
         rate = 0.0
         bank = self.bank_rad or 0.0
         if self.turn_radius_m is not None:
@@ -141,7 +153,7 @@ class _Problem:
             bank = math.atan(rate * self.airspeed_m_s / _G_M_S2)
         elif bank:
             rate = _G_M_S2 * math.tan(bank) / self.airspeed_m_s
-        alpha, aileron, elevator, rudder = 0.05, 0.0, 0.0, 0.0
+        aileron, elevator, rudder = 0.0, 0.0, 0.0
         last = 0.5 if self.throttle is None else -0.05
         if near is not None:
             alpha, aileron, elevator = near.angle_of_attack_rad, near.aileron, near.elevator
@@ -180,8 +192,8 @@ class _Problem:
             matrix[:, i] = (self.read(shifted, engines=throttle) - left) / shift
         return matrix
 
-    def solve(self, near: FlightTrim | None, iterations: int) -> FlightTrim:
-        unknowns = np.clip(self.first_guess(near), self.low, self.high)
+    def solve(self, guess: Array, iterations: int) -> FlightTrim:
+        unknowns = np.clip(guess, self.low, self.high)
         left = self.read(unknowns)
         jacobian = self.jacobian(unknowns, left)
         fresh = True
@@ -222,11 +234,12 @@ class _Problem:
         for i, control in ((3, "elevator"), (2, "aileron"), (4, "rudder")):
             if abs(unknowns[i]) >= 1.0:
                 return f"{what}: full {control} is not enough (it needs {wanted[i]:.2f} of it)"
-        if unknowns[0] >= _ALPHA_MAX_RAD or left[2] > 0.1:
-            return f"{what}: the wing stalls"
+        alpha_deg = math.degrees(unknowns[0])
+        if jacobian[2, 0] >= 0.0:  # downward acceleration by angle of attack
+            return f"{what}: at an angle of attack of {alpha_deg:.1f} degrees a larger one gives less lift"
         return (
-            f"{what}: accelerations of {np.max(np.abs(left[:3])):.3f} m/s2 and "
-            f"{np.max(np.abs(left[3:])):.3f} rad/s2 are left over"
+            f"{what}: at an angle of attack of {alpha_deg:.1f} degrees, accelerations of "
+            f"{np.max(np.abs(left[:3])):.3f} m/s2 and {np.max(np.abs(left[3:])):.3f} rad/s2 are left over"
         )
 
     def result(self, unknowns: Array, left: Array) -> FlightTrim:

@@ -239,5 +239,5 @@ def test_a_model_has_changed_when_its_engine_or_propeller_has(name: str, tmp_pat
 
 
 def test_the_files_of_a_packaged_aircraft_are_found() -> None:
-    names = {path.name for path in model_files(load_airframe("c172x"))}
+    names = {file.path.name for file in model_files(load_airframe("c172x"))}
     assert names >= {"c172x.xml", "eng_io320.xml", "prop_75in2f.xml"}
