@@ -6,7 +6,7 @@ identifies the format.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -53,6 +53,40 @@ def read_untyped_parameter_file(path: Path) -> dict[str, float]:
         ParameterError: the file can't be read, or its content is not acceptable.
     """
     return parse_untyped_parameters(_read(path), source=f"parameter file {path}")
+
+
+def known_parameters(
+    values: Mapping[str, float], definitions: Iterable[ParameterDefinition]
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """The values of parameters that a vehicle has, and the names that it does not have, in the file's order.
+
+    Raises:
+        ParameterError: values that the vehicle does not accept, all in one message.
+    """
+    by_name = {definition.name: definition for definition in definitions}
+    known = {name: value for name, value in values.items() if name in by_name}
+    refused = []
+    for name, value in known.items():
+        try:
+            by_name[name].check_range(by_name[name].convert(value))
+        except ParameterError as error:
+            refused.append(str(error))
+    if refused:
+        raise ParameterError("; ".join(refused))
+    return known, tuple(name for name in values if name not in known)
+
+
+def left_out(names: Sequence[str], shown: int | None = None) -> str:
+    """The names of a file that were not set, in one sentence.
+
+    Args:
+        names: the names.
+        shown: number of names that are listed; None: all.
+    """
+    listed = ", ".join(names if shown is None else names[:shown])
+    more = "" if shown is None or len(names) <= shown else f" and {len(names) - shown} more"
+    what = "1 parameter is" if len(names) == 1 else f"{len(names)} parameters are"
+    return f"{what} not set, because the vehicle has none of that name: {listed}{more}"
 
 
 def format_mavproxy(values: Mapping[str, float]) -> str:

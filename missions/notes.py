@@ -68,6 +68,7 @@ class FlightNotes:
             happened.
         aloft: where and how the vehicle stays in the air after its return, by its parameters; "": it does
             not.
+        left_out_parameters: parameters that were to be set, and that the vehicle does not have.
         warnings: warnings for the user, without repetitions.
         link_losses: times at which the link was lost and regained.
         lost_link: the autopilot's reaction to the loss of its ground station, as text; "": not known.
@@ -85,6 +86,7 @@ class FlightNotes:
     options: MissionOptions | None = None
     left: str = ""
     aloft: str = ""
+    left_out_parameters: tuple[str, ...] = ()
     warnings: list[str] = field(default_factory=list)
     link_losses: list[LinkLoss] = field(default_factory=list)
     lost_link: str = ""

@@ -12,7 +12,8 @@ from missions.cli.confirm import confirmation
 from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
 from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
 from missions.cli.mission_command import FlightOption, Scope
-from missions.cli.options import SECONDS, SPEEDUP, in_options
+from missions.cli.options import SECONDS, SPEEDUP, in_options, report
+from missions.cli.params import STRICT_HELP, known_to_all
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.world import WORLD_HELP, world_of
 
@@ -29,6 +30,7 @@ _flight = partial(flight_option, group="The flight")
 _estimator = partial(flight_option, group="An estimator beside it")
 _results = partial(flight_option, group="Results")
 
+_NAMES_SHOWN: Final = 20  # names of parameters that were left out; the summary has all
 _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
 
 
@@ -94,6 +96,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 )
 @_embedded("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @_flight("--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params).")
+@_flight("--strict-params", is_flag=True, needs=("params", ()), help=STRICT_HELP)
 @_results("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
 @_flight(
     "--on-failure",
@@ -204,6 +207,9 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
         height_m = max(options.altitude_m, _FORECAST_HEIGHT_M)
         forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
+    left_out_parameters: tuple[str, ...] = ()
+    if parameters and world is not None:
+        parameters, left_out_parameters = known_to_all(parameters, world, strict=given["strict_params"])
     from missions.runs.request import REGAIN_S, RunRequest
     from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
     from missions.vehicle.firmware import Mode
@@ -216,6 +222,8 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
         speedup=given["speedup"],
         expected_wind_m_s=forecast_m_s,
         parameters=parameters,
+        strict_parameters=given["strict_params"],
+        left_out_parameters=left_out_parameters,
         out=given["out"],
         picture=not given["no_picture"],
         identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
@@ -235,6 +243,10 @@ def _fly(given: dict[str, Any]) -> int:
             f"{given['out']} is not empty, and nothing is overwritten; choose another --out"
         )
 
+    if request.left_out_parameters:
+        from autopilot_bridge.parameter_files import left_out
+
+        report(f"--params: {left_out(request.left_out_parameters, _NAMES_SHOWN)}")
     terminal = sys.stderr.isatty()
     if terminal and not given["connect"]:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)

@@ -10,7 +10,8 @@ import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from missions.cli.fly_command import chosen_names
-from missions.cli.options import SLOWEST, FiniteRange, StatusLine, in_options
+from missions.cli.options import SLOWEST, FiniteRange, StatusLine, in_options, report
+from missions.cli.params import STRICT_HELP, known_to_all
 from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
@@ -201,6 +202,7 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
 @video_options
 @storage_option
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
+@click.option("--strict-params", is_flag=True, help=STRICT_HELP)
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
 @click.option(
@@ -223,6 +225,7 @@ def sitl(
     signing_store: Path | None,
     storage: str | None,
     params: str | None,
+    strict_params: bool,
     log: str | None,
     no_wait: bool,
     duration: float | None,
@@ -239,6 +242,7 @@ def sitl(
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.firmware.simulator import simulator_defaults
+    from autopilot_bridge.parameter_files import left_out
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
     from missions.mission import WorldDefaults
     from missions.options import parameters_from_file
@@ -253,11 +257,13 @@ def sitl(
             spec = world_of(
                 context.params, chosen, count=count if "count" in chosen else None, defaults=WorldDefaults()
             )
+            parameters: dict[str, float] = {}
+            if params is not None:
+                parameters, names = known_to_all(parameters_from_file(params), spec, strict=strict_params)
+                if names:
+                    report(f"--params: {left_out(names)}")
             spec = _for_clients(
-                equipped(spec, camera, targets, map_file, map_target),
-                speedup,
-                {} if params is None else parameters_from_file(params),
-                unix_time_us(),
+                equipped(spec, camera, targets, map_file, map_target), speedup, parameters, unix_time_us()
             )
             count = len(spec.vehicles)
             memory = VehicleCards(storage, count)
@@ -294,7 +300,7 @@ def sitl(
 
         line = StatusLine()
 
-        def report(pace: PaceReport) -> None:
+        def show(pace: PaceReport) -> None:
             line.show(f"{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}")
 
         if simulator_defaults(spec.vehicles[0].autopilot).waits_for_client and not ports and not no_wait:
@@ -302,7 +308,7 @@ def sitl(
             server.wait_for_client(lambda: ending.requested)
         server.run(
             lambda: ending.requested,
-            report=report if line.terminal else None,
+            report=show if line.terminal else None,
             until_us=None if duration is None else round(duration * 1e6),
         )
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""

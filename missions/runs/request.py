@@ -36,6 +36,9 @@ class RunRequest:
         expected_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
             is not used: a mission plans in the same way for embedded and for other vehicles.
         parameters: autopilot parameters to set before the flight.
+        strict_parameters: a parameter that a vehicle at `connect` does not have ends the run; otherwise it is
+            left out. An embedded vehicle must have all of them.
+        left_out_parameters: names that were left out of `parameters` already, for the summary.
         out: run folder; None: the next `runs/<mission>-<n>`.
         picture: whether to draw `track.png`.
         identity: MAVLink system and component id that the mission sends with.
@@ -62,6 +65,8 @@ class RunRequest:
     speedup: float | None = None
     expected_wind_m_s: float | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    strict_parameters: bool = True
+    left_out_parameters: Sequence[str] = ()
     out: Path | None = None
     picture: bool = True
     identity: tuple[int, int] = GROUND_STATION

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
+from autopilot_bridge.parameter_files import left_out
 from missions.errors import MissionError, PlanError
 from missions.estimation.in_flight import estimators_of, refused_in_plan
 from missions.library import find_mission
@@ -53,6 +54,7 @@ __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunRes
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
 INTERRUPTED: Final = "interrupted"
+_NAMES_SHOWN: Final = 20  # names of parameters in a remark; the summary has all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -326,9 +328,18 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
         await require_key(request, vehicle)
-        await vehicle.set_parameters(request.parameters)
+        await _set_parameters(vehicle, request)
     vehicle.sensors.watch(*mission.sensors(request.options))  # its messages while it gets ready count, too
     await vehicle.wait_ready(leave_mode=mission.commands)
+
+
+async def _set_parameters(vehicle: Vehicle, request: RunRequest) -> None:
+    if request.strict_parameters:
+        await vehicle.set_parameters(request.parameters)
+        return
+    vehicle.notes.left_out_parameters = names = await vehicle.parameters.write_known(request.parameters)
+    if names:
+        request.on_remark(f"vehicle {vehicle.system_id}: {left_out(names, _NAMES_SHOWN)}")
 
 
 async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:
@@ -466,6 +477,9 @@ def _summary(
         for key, value in asdict(replace(debriefing.options, arguments={}, centre=None, given=None)).items()
         if value is not None
     }
+    left_out_names = list(
+        dict.fromkeys((*request.left_out_parameters, *(p for n in notes for p in n.left_out_parameters)))
+    )
     world = None if request.connect else request.embedded_world
     vehicles = () if world is None else world.vehicles
     summary: dict[str, Any] = {
@@ -486,7 +500,8 @@ def _summary(
         "message_counts": debriefing.records.message_counts,
         "versions": versions(),
         "options": options | {"arguments": dict(request.options.arguments)},
-        "parameters": dict(request.parameters),
+        "parameters": {n: value for n, value in request.parameters.items() if n not in left_out_names},
+        "parameters_left_out": left_out_names,
         "connect": list(request.connect),
         "command": request.command,
     }

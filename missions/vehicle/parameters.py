@@ -9,11 +9,18 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.planning.limits import Limits
+from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.link import VehicleLink
 
 _TRIES: Final = 4
 _WAIT_S: Final = 0.8
+_LIST_PAUSE_S: Final = 3.0  # without another parameter the list has ended, or the rest was lost
+_WORTH_A_LIST: Final = 8  # values; fewer are requested one by one
 _INTEGER_CODES: Final = {1: "<B3x", 2: "<b3x", 3: "<H2x", 4: "<h2x", 5: "<I", 6: "<i"}
+
+
+class UnknownParameter(VehicleTimeout):
+    """A vehicle did not answer for a parameter: autopilots don't answer requests for unknown names."""
 
 
 def value_from_wire(value: float, kind: int, bytewise: bool) -> float:
@@ -71,13 +78,13 @@ class VehicleParameters:
             }
         )
 
-    async def _read(self, name: str) -> tuple[float, int]:
+    async def _read(self, name: str, *, tries: int = _TRIES) -> tuple[float, int]:
         """Read value and MAV_PARAM_TYPE of a parameter."""
         message = dialect.MAVLink_param_request_read_message(
             self._link.system_id, 1, name.encode("ascii", "replace")[:16], -1
         )
         with self._link.messages("PARAM_VALUE") as replies:
-            for _ in range(_TRIES):
+            for _ in range(tries):
                 self._link.send(message)
                 try:
                     async with self._link.deadline(_WAIT_S, f"parameter {name}"):
@@ -88,7 +95,7 @@ class VehicleParameters:
                                 return value, reply.param_type
                 except TimeoutError:
                     continue
-        raise VehicleTimeout(f"the vehicle did not answer for parameter {name}: it may not have it")
+        raise UnknownParameter(f"the vehicle did not answer for parameter {name}: it may not have it")
 
     async def write(self, name: str, value: float) -> None:
         """Set a parameter and wait for the confirmation.
@@ -121,6 +128,48 @@ class VehicleParameters:
         if math.isnan(kept):
             raise VehicleTimeout(f"setting parameter {name} was not answered; {self._link.last_received()}")
         raise CommandRejected(f"the vehicle kept {name} = {kept:g} instead of {value:g}", 0)
+
+    async def write_known(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Set the parameters that the vehicle has, in order; returns the names that it does not have.
+
+        Raises:
+            CommandRejected: the vehicle kept other values, all in one message.
+        """
+        listed = await self._names() if len(values) >= _WORTH_A_LIST else frozenset(values)
+        unknown, kept = [], []
+        for name, value in values.items():
+            if name not in listed:  # PX4 lists only the parameters that something uses
+                try:
+                    await self._read(name, tries=1)
+                except VehicleTimeout:
+                    unknown.append(name)
+                    continue
+            try:
+                await self.write(name, value)
+            except UnknownParameter:
+                unknown.append(name)
+            except CommandRejected as error:
+                kept.append(str(error))
+        if kept:
+            raise CommandRejected("; ".join(kept), 0)
+        return tuple(unknown)
+
+    async def _names(self) -> frozenset[str]:
+        """Names in the vehicle's list of parameters, as far as they were received."""
+        names: set[str] = set()
+        with self._link.messages("PARAM_VALUE") as replies:
+            self._link.send(
+                dialect.MAVLink_param_request_list_message(self._link.system_id, AUTOPILOT_COMPONENT)
+            )
+            while True:
+                try:
+                    async with self._link.deadline(_LIST_PAUSE_S, "the list of parameters"):
+                        reply = await anext(replies)
+                except TimeoutError:
+                    return frozenset(names)
+                names.add(_name(reply))
+                if len(names) >= reply.param_count:
+                    return frozenset(names)
 
     async def write_all(self, values: Mapping[str, float]) -> None:
         """Set several parameters in order."""
