@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import received_positions
 from estimators.tracking.metrics import mean_square
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
@@ -239,7 +240,7 @@ def _from_hil_state(table: "Table", frame: LocalFrame | None) -> dict[str, Serie
 def _from_simstate(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
     angles = {f"{axis}_rad": _floats(table[axis]) for axis in ("roll", "pitch", "yaw")}
     lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lng"])
-    return _series(table, angles | _placed(lat, lon, frame))
+    return _series(table, angles | _placed(table.time_us, lat, lon, frame))
 
 
 def _from_sim_state(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
@@ -249,7 +250,7 @@ def _from_sim_state(table: "Table", frame: LocalFrame | None) -> dict[str, Serie
     lat = 1e-7 * _floats(table["lat_int"]) if whole else _floats(table["lat"])
     lon = 1e-7 * _floats(table["lon_int"]) if whole else _floats(table["lon"])
     moving = _moving(_floats(table["vn"]), _floats(table["ve"]))
-    return _series(table, angles | _placed(lat, lon, frame) | moving)
+    return _series(table, angles | _placed(table.time_us, lat, lon, frame) | moving)
 
 
 _TRUTHS: Final[Mapping[str, Callable[["Table", LocalFrame | None], dict[str, Series]]]] = {
@@ -264,14 +265,25 @@ def _places(table: "Table", frame: LocalFrame | None) -> dict[str, Column]:
     """Position and velocity from GLOBAL_POSITION_INT and HIL_STATE_QUATERNION."""
     lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lon"])
     north, east = 1e-2 * _floats(table["vx"]), 1e-2 * _floats(table["vy"])
-    places = _placed(lat, lon, frame) | {"alt_m": 1e-3 * _floats(table["alt"])}
+    places = _placed(table.time_us, lat, lon, frame, 1e-3 * _floats(table["alt"]))
     return places | _moving(north, east) | {"down_m_s": 1e-2 * _floats(table["vz"])}
 
 
-def _placed(lat_deg: Column, lon_deg: Column, frame: LocalFrame | None) -> dict[str, Column]:
-    known = np.isfinite(lat_deg) & np.isfinite(lon_deg)
+def _placed(
+    time_us: NDArray[np.int64],
+    lat_deg: Column,
+    lon_deg: Column,
+    frame: LocalFrame | None,
+    alt_m: Column | None = None,
+) -> dict[str, Column]:
+    """Places; NaN where no vehicle can have been (`estimators.received`)."""
+    height_m = np.zeros_like(lat_deg) if alt_m is None else alt_m
+    known = np.zeros(len(lat_deg), dtype=np.bool_)
+    known[received_positions(time_us, lat_deg, lon_deg, height_m).rows] = True
     lat_deg, lon_deg = np.where(known, lat_deg, np.nan), np.where(known, lon_deg, np.nan)
     places = {"lat_deg": lat_deg, "lon_deg": lon_deg}
+    if alt_m is not None:
+        places["alt_m"] = np.where(known, alt_m, np.nan)
     if frame is None:
         return places
     north_m, east_m, _ = frame.ned_from_geodetic(lat_deg, lon_deg, np.zeros_like(lat_deg))

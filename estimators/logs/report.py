@@ -9,12 +9,12 @@ from autopilot_bridge.mavlink.plain_text import plain_text
 from estimators.logs.log import Log
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
+from estimators.received import GAP_US, received_positions, together
 from estimators.vehicle_time import AUTOPILOT
 
-GAP_US: Final = 2_000_000
-"""A longer silence of a system is a gap."""
-
 _MAX_INSTANCES: Final = 32
+_POSITIONS: Final = {"GLOBAL_POSITION_INT": ("time_boot_ms", 1000), "HIL_STATE_QUATERNION": ("time_usec", 1)}
+"""Messages whose places and times are checked, with their stamp and its unit in microseconds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +65,16 @@ class BootReport:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOut:
+    """Messages of one component with positions or times that no vehicle can have: their number by reason."""
+
+    name: str
+    system_id: int
+    component_id: int
+    count_by_reason: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LogReport:
     """Figures of a log.
 
@@ -79,6 +89,7 @@ class LogReport:
         losses: losses from sequence numbers, for each component.
         unknown: messages that the dialect does not know.
         boots, gaps: for each system.
+        left_out: positions and times that no vehicle can have, which comparisons leave out.
         vehicles: their types, modes and flights.
         streams: rates, by system, component and name.
         clock: origin of the times of gaps, modes and flights.
@@ -98,6 +109,7 @@ class LogReport:
     unknown: tuple[UnknownMessage, ...]
     boots: tuple[BootReport, ...]
     gaps: tuple[Gap, ...]
+    left_out: tuple[LeftOut, ...]
     vehicles: tuple[VehicleReport, ...]
     streams: tuple[StreamReport, ...]
     clock: str
@@ -130,6 +142,7 @@ def report_of(log: Log) -> LogReport:
             for boot in log.boots
         ),
         gaps=_gaps(log),
+        left_out=_left_out(log),
         vehicles=vehicles(log),
         streams=_streams(log),
         clock=log.clock.text,
@@ -160,6 +173,34 @@ def _streams(log: Log) -> tuple[StreamReport, ...]:
             )
         )
     return tuple(sorted(found, key=lambda item: (item.system_id, item.component_id, item.name)))
+
+
+def _left_out(log: Log) -> tuple[LeftOut, ...]:
+    found = []
+    for stream in log.source.streams:
+        stamp = _POSITIONS.get(stream.name)
+        if stamp is None:
+            continue
+        counts: dict[str, int] = {}
+        for boot in (boot.number for boot in log.boots if boot.system_id == stream.system_id):
+            table = log.table(
+                stream.name, system_id=stream.system_id, component_id=stream.component_id, boot=boot
+            )
+            lat_deg, lon_deg, alt_m = table["lat"] * 1e-7, table["lon"] * 1e-7, table["alt"] * 1e-3
+            placed = (lat_deg != 0.0) | (lon_deg != 0.0)  # ArduPilot sends 0, 0 until it has a position
+            time_us = table[stamp[0]].astype(np.int64) * stamp[1]
+            own = received_positions(time_us[placed], lat_deg[placed], lon_deg[placed], alt_m[placed])
+            counts = together(counts, own.left_out)
+        if counts:
+            found.append(
+                LeftOut(
+                    name=stream.name,
+                    system_id=stream.system_id,
+                    component_id=stream.component_id,
+                    count_by_reason=counts,
+                )
+            )
+    return tuple(found)
 
 
 def _gaps(log: Log) -> tuple[Gap, ...]:

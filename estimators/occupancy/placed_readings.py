@@ -9,11 +9,11 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
+from estimators.received import GAP_US
 from estimators.survey_magnetometer import STRONGEST_NT, STUCK_READINGS
 from flightsim.foundation.geodesy import LocalFrame
 
 _WAITING: Final = 100  # largest number of waiting readings: ten seconds of an ordinary magnetometer
-_GAP_US: Final = 2_000_000  # longest time between two positions; longer gaps are not interpolated
 _KEPT_US: Final = 2_000_000  # positions are kept so long, for readings that arrive late
 
 _Position = tuple[int, float, float, float]  # vehicle time in us; north, east, height in m
@@ -122,6 +122,6 @@ class ReadingPlacer:
         new = None
         for position in reversed(self._positions):
             if new is not None and position[0] <= taken_us:
-                return None if new[0] - position[0] > _GAP_US else (position, new)
+                return None if new[0] - position[0] > GAP_US else (position, new)
             new = position
         return None

@@ -7,16 +7,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import not_in_gaps
 from estimators.survey_magnetometer import STRONGEST_NT, STUCK_READINGS
 from flightsim.foundation.geodesy import LocalFrame
 
-__all__ = ["GAP_S", "SurveyReadings", "joined", "placed_readings"]
+__all__ = ["SurveyReadings", "joined", "placed_readings"]
 
 Array = NDArray[np.float64]
-
-GAP_S: Final = 2.0
-"""Longest time between two readings, positions or attitudes that leaves no gap: across longer ones nothing is
-interpolated, and nothing counts as measured."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,10 +73,10 @@ def placed_readings(
     implausible = len(values) - int(sound.sum())
     times, values = times[sound], values[sound]
     positions = positions[_increasing(positions[:, 0])]
-    kept = _covered(times, positions[:, 0])
+    kept = not_in_gaps(times, positions[:, 0])
     if attitudes is not None:
         attitudes = attitudes[_increasing(attitudes[:, 0])]
-        kept &= _covered(times, attitudes[:, 0])
+        kept &= not_in_gaps(times, attitudes[:, 0])
     unplaced = len(times) - int(kept.sum())
     times, values = times[kept], values[kept]
     if not len(times):
@@ -126,12 +123,3 @@ def _increasing(times: Array) -> NDArray[np.int64]:
     newer = np.concatenate(([True], np.diff(times[order]) > 0.0))
     found: NDArray[np.int64] = order[newer]
     return found
-
-
-def _covered(times: Array, at: Array) -> NDArray[np.bool_]:
-    """Whether each time is between two of `at` that are close together."""
-    if len(at) < 2:
-        return np.zeros(len(times), dtype=bool)
-    after = np.clip(np.searchsorted(at, times), 1, len(at) - 1)
-    inside: NDArray[np.bool_] = (times >= at[0]) & (times <= at[-1])
-    return inside & (at[after] - at[after - 1] <= GAP_S)

@@ -130,12 +130,12 @@ def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
     if result.outcome == "interrupted":
         report(f"{result.reason}; the log is in {result.folder}")
         return KILLED + result.signal
+    _warn(summary)
+    report_left_out(summary)
     if result.outcome == "failed":
-        _warn(summary)
         report(f"mission {summary['mission']} failed: {result.reason}")
         click.echo(f"failed: see {result.folder}")
         return _FAILED
-    _warn(summary)
     click.echo(
         f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
         f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
@@ -152,9 +152,10 @@ def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
     for block in summary["vehicles"]:
         if "waypoints" in block:
             w = block["waypoints"]
-            whose = f"vehicle {block['system_id']}: " if len(summary["vehicles"]) > 1 else ""
+            unseen = f", {w['not_received']} perhaps while nothing was received" if w["not_received"] else ""
             click.echo(
-                f"{whose}waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}"
+                f"{_whose(block, summary)}waypoints passed within {w['acceptance_m']:g} m: "
+                f"{w['passed']} of {w['count']}{unseen}"
             )
     for line in mission.report_lines(summary):
         click.echo(line)
@@ -191,6 +192,27 @@ def _print_estimator(summary: Mapping[str, Any]) -> int:
         return 0
     report(f"{name}: {summary['reason']}; results are partial")
     return _FAILED
+
+
+def _whose(block: Mapping[str, Any], summary: Mapping[str, Any]) -> str:
+    return f"vehicle {block['system_id']}: " if len(summary["vehicles"]) > 1 else ""
+
+
+def report_left_out(summary: Mapping[str, Any]) -> None:
+    """Print what the figures leave out: gaps, and positions and times that no vehicle can have."""
+    from estimators.received import counted_words
+
+    for block in summary["vehicles"]:
+        whose = _whose(block, summary)
+        if block["gaps"]:
+            count = len(block["gaps"])
+            click.echo(
+                f"{whose}no position was received for {block['not_received_s']:.1f} s of the flight, in "
+                f"{count} gap{'s' if count > 1 else ''}: distances and errors leave them out",
+                err=True,
+            )
+        if block["left_out"]:
+            click.echo(f"{whose}messages left out: {counted_words(block['left_out'])}", err=True)
 
 
 def _warn(summary: Mapping[str, Any]) -> None:

@@ -42,6 +42,12 @@ def report_lines(report: LogReport) -> Iterator[str]:
         for gap in report.gaps[:_GAPS_SHOWN]:
             boot = f"boot {gap.boot}, " if several else ""
             yield f"  system {gap.system_id}: nothing received {boot}{_span(gap.start_us, gap.end_us)}"
+    if report.left_out:
+        yield ""
+    for left in report.left_out:
+        sender = f"{left.system_id}/{left.component_id}"
+        counts = _counts(left.count_by_reason)
+        yield f"{left.name} of {sender}: places and times that no vehicle can have: {counts}"
     if report.losses:
         yield ""
         yield f"{'component':>9} {'frames':>9} {'lost':>8} {'loss %':>7} {'late':>6}"

@@ -53,9 +53,6 @@ class SearchScore:
 
 def true_targets(records: "FlightRecords", frame: LocalFrame) -> list[tuple[Array, Array]]:
     """Times (us) and places (n, 2) of each true target, from the truth in the log; empty: there is none."""
-    table = records.truth(TARGET_SYSTEM)
-    if not len(table):
-        return []
     found, component = [], 1
     while len(own := records.truth(TARGET_SYSTEM, component)):
         found.append((own["time_usec"].astype(np.float64), positions_ned_m(own, frame)[:, :2]))

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from estimators.received import broken_at_gaps
 from missions.multi_target.figures import CUTOFF_M, SearchScore, search_score
 
 if TYPE_CHECKING:
@@ -83,11 +84,12 @@ def _draw_way(figure: Figure, axes: Any, team: "TargetSearchTeam", score: Search
         alpha=0.75,
     )
     for k, searcher in enumerate(team.searchers):
-        track = np.array([(n, e) for _, n, e in searcher.track]).reshape(-1, 2)
+        track = np.array(searcher.track, dtype=np.float64).reshape(-1, 3)
+        _, north_m, east_m = broken_at_gaps(*(track * (1e-6, 1.0, 1.0)).T)
         colour = _COLOURS[(k + 1) % len(_COLOURS)]
-        axes.plot(track[:, 1], track[:, 0], "-", color=colour, linewidth=1.2, label=f"vehicle {k + 1}")
+        axes.plot(east_m, north_m, "-", color=colour, linewidth=1.2, label=f"vehicle {k + 1}")
         if len(track):
-            axes.plot(track[0, 1], track[0, 0], "o", color=colour, markersize=5)
+            axes.plot(east_m[0], north_m[0], "o", color=colour, markersize=5)
     _mark_targets(axes, team, score, size=7)
     _limits(axes, team)
     axes.set_title("way over the exploration map", fontsize=10, color=_INK, loc="left")

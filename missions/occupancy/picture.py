@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from estimators.received import broken_at_gaps
 from missions.occupancy.suspect import Suspect, Verdict
 
 if TYPE_CHECKING:
@@ -101,14 +102,15 @@ def _draw_moment(
         zorder=1,
     )
     for k, searcher in enumerate(team.searchers):
-        track = np.array([(n, e) for t, n, e in searcher.track if t <= moment.time_us])
+        track = np.array([flown for flown in searcher.track if flown[0] <= moment.time_us])
         colour = _COLOURS[k % len(_COLOURS)]
         if len(track):
-            axes.plot(track[:, 1], track[:, 0], color="white", linewidth=2.2, alpha=0.7, zorder=3)
-            axes.plot(track[:, 1], track[:, 0], color=colour, linewidth=1.2, zorder=4)
-        north_m, east_m = moment.places_ne_m[k]
-        if math.isfinite(north_m):
-            axes.plot(east_m, north_m, "x", color=colour, markersize=9, markeredgewidth=2.4, zorder=6)
+            _, track_north_m, track_east_m = broken_at_gaps(*(track * (1e-6, 1.0, 1.0)).T)
+            axes.plot(track_east_m, track_north_m, color="white", linewidth=2.2, alpha=0.7, zorder=3)
+            axes.plot(track_east_m, track_north_m, color=colour, linewidth=1.2, zorder=4)
+        place_ne_m = moment.places_ne_m[k]
+        if math.isfinite(place_ne_m[0]):
+            axes.plot(*reversed(place_ne_m), "x", color=colour, markersize=9, markeredgewidth=2.4, zorder=6)
         for anomaly in searcher.anomalies:
             if anomaly.time_us <= moment.time_us:
                 axes.plot(

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import not_in_gaps
 from flightsim.foundation.geodesy import LocalFrame
 from missions.runs.records import place_of, positions_ned_m
 
@@ -32,6 +33,10 @@ def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float
         return None
     start_s, end_s = max(time[0] for time, _ in tracks), min(time[-1] for time, _ in tracks)
     at_s = np.arange(start_s, end_s, _STEP_S)
+    for time, _ in tracks:
+        at_s = at_s[not_in_gaps(at_s, time)]
+    if not len(at_s):
+        return None
     least = np.inf
     even = [np.column_stack([np.interp(at_s, time, axis) for axis in places.T]) for time, places in tracks]
     for k, own in enumerate(even):

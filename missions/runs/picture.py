@@ -11,6 +11,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar  # type: ignore[import-untyped]
 
+from estimators.received import broken_at_gaps
 from estimators.reports.picture import tidy
 from flightsim.foundation.geodesy import LocalFrame
 from missions.notes import PATTERN, FlightNotes
@@ -57,10 +58,7 @@ def _shown(track: Track, notes: FlightNotes) -> Track:
     """The part of a track in flight, reduced to the points that a picture can show."""
     if notes.phases:
         track = track.between(notes.phases[0].start_us, notes.phases[-1].end_us)
-    stride = max(1, len(track.time_s) // 6000)
-    return Track(
-        time_s=track.time_s[::stride], pos_ned_m=track.pos_ned_m[::stride], yaw_rad=track.yaw_rad[::stride]
-    )
+    return track.thinned(len(track.time_s) // 6000)
 
 
 def _offset(notes: FlightNotes, first: FlightNotes) -> tuple[float, float]:
@@ -93,7 +91,7 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
             )  # fmt: skip
         for track, is_truth in ((score.estimate, False), (score.truth, True)):
             if track is not None:
-                shown = _shown(track, notes).pos_ned_m
+                _, shown = _shown(track, notes).drawn()
                 style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
                 axes.plot(shown[:, 1] + east, shown[:, 0] + north, zorder=3 if is_truth else 2, **style)
         main = score.truth if score.truth is not None else score.estimate
@@ -205,9 +203,9 @@ def _draw_altitude(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) ->
         team = len(flights) > 1
         for track, is_truth in ((score.estimate, False), (score.truth, True)):
             if track is not None:
-                shown = _shown(track, notes)
+                times, shown = _shown(track, notes).drawn()
                 style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
-                axes.plot(shown.time_s, -shown.pos_ned_m[:, 2], **style)
+                axes.plot(times, -shown[:, 2], **style)
     axes.set_ylabel("height above\nhome, m", fontsize=9, color=_INK)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
@@ -219,7 +217,7 @@ def _draw_error(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> No
         if not len(score.error_m):
             continue
         colour = _COLOURS[k % len(_COLOURS)]
-        axes.plot(score.error_time_s, score.error_m, color=colour, linewidth=1.1)
+        axes.plot(*broken_at_gaps(score.error_time_s, score.error_m), color=colour, linewidth=1.1)
         rms = score.path_rms_error_m or 0.0
         axes.axhline(rms, color=colour, linewidth=0.8, linestyle="--")
         axes.annotate(

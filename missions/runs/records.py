@@ -1,6 +1,6 @@
 """The frames of a flight: its log while it is flown, and columns of it afterwards."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Final, Self
@@ -14,6 +14,8 @@ from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs.columns import decode_records, record_dtype
 from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, message_table, scan
+from estimators.received import received_positions, together
+from estimators.vehicle_time import AUTOPILOT
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 UnixTime = Callable[[], int]
@@ -33,6 +35,7 @@ class FlightRecords:
         self._data = data
         self._messages: MessageTable = message_table(DEFINITIONS)
         self._index: FrameIndex = scan(data, self._messages, STAMP_SIZE)
+        self._positions: dict[tuple[str, int, int | None], tuple[NDArray[np.void], Mapping[str, int]]] = {}
 
     @classmethod
     def from_tlog(cls, path: Path) -> Self:
@@ -73,15 +76,46 @@ class FlightRecords:
         return np.concatenate(tables) if tables else np.empty(0, dtype=record_dtype(found))
 
     def truth(self, system_id: int, component_id: int | None = None) -> NDArray[np.void]:
-        """HIL_STATE_QUATERNION of a system: what is known of its true state, with its time.
+        """HIL_STATE_QUATERNION of a system: what is known of its true state, in the order of its time.
 
-        PX4's own simulator (SIH) sends these with `time_usec` 0: states without any time are left out.
+        PX4's own simulator (SIH) sends these with `time_usec` 0: states without any time are left out. So are
+        places and times that no vehicle can have (`left_out`).
 
         Args:
             component_id: sender; None: any component of the system, one after the other.
         """
-        table = self.table("HIL_STATE_QUATERNION", system_id, component_id)
-        return table if table["time_usec"].any() else table[:0]
+        return self._sound("HIL_STATE_QUATERNION", system_id, component_id)[0]
+
+    def positions(self, system_id: int) -> NDArray[np.void]:
+        """GLOBAL_POSITION_INT of a vehicle's autopilot, in the order of its time.
+
+        Positions at 0, 0 are left out, which ArduPilot sends until it has one, and places and times that no
+        vehicle can have (`left_out`).
+        """
+        return self._sound("GLOBAL_POSITION_INT", system_id, AUTOPILOT)[0]
+
+    def left_out(self, system_id: int) -> dict[str, int]:
+        """Number of messages that `truth` and `positions` leave out of a vehicle, by reason."""
+        return together(
+            self._sound("HIL_STATE_QUATERNION", system_id, None)[1],
+            self._sound("GLOBAL_POSITION_INT", system_id, AUTOPILOT)[1],
+        )
+
+    def _sound(
+        self, name: str, system_id: int, component_id: int | None
+    ) -> tuple[NDArray[np.void], Mapping[str, int]]:
+        key = name, system_id, component_id
+        if key not in self._positions:
+            table = self.table(name, system_id, component_id)
+            if name == "HIL_STATE_QUATERNION":
+                table = table if table["time_usec"].any() else table[:0]
+                time_us = table["time_usec"].astype(np.int64)
+            else:
+                table = table[(table["lat"] != 0) | (table["lon"] != 0)]
+                time_us = table["time_boot_ms"].astype(np.int64) * 1000
+            found = received_positions(time_us, table["lat"] * 1e-7, table["lon"] * 1e-7, table["alt"] * 1e-3)
+            self._positions[key] = table[found.rows], found.left_out
+        return self._positions[key]
 
 
 def place_of(row: np.void) -> GeodeticPosition:

@@ -131,7 +131,9 @@ def vehicle_summary(notes: "FlightNotes", score: "FlightScore") -> dict[str, Any
             for loss in notes.link_losses
         ],
         "warnings": list(notes.warnings),
-        "messages_not_finite": score.messages_not_finite,
+        "not_received_s": round(sum(end - begin for begin, end in score.gaps_s), 3),
+        "gaps": [{"start_s": round(begin, 3), "end_s": round(end, 3)} for begin, end in score.gaps_s],
+        "left_out": dict(score.left_out),
         "progress": _rounded(notes.progress),
         "phases": [
             {"name": p.name, "start_s": p.start_us / 1e6, "end_s": p.end_us / 1e6} for p in notes.phases
@@ -142,12 +144,13 @@ def vehicle_summary(notes: "FlightNotes", score: "FlightScore") -> dict[str, Any
         block["home"] = {"lat_deg": home.lat_deg, "lon_deg": home.lon_deg, "alt_m": home.alt_m}
     if score.waypoint_misses_m and notes.commanded is not None:
         acceptance_m = notes.commanded.acceptance_m
-        misses = score.waypoint_misses_m
+        misses = [miss for miss in score.waypoint_misses_m if math.isfinite(miss)]
         block["waypoints"] = {
             "count": len(notes.commanded.waypoints_ned_m),
             "acceptance_m": round(acceptance_m, 3),
-            "largest_miss_m": round(max(misses), 3),
+            "largest_miss_m": _rounded(max(misses, default=math.nan), 3),
             "passed": sum(miss <= acceptance_m for miss in misses),
+            "not_received": len(score.waypoint_misses_m) - len(misses),
         }
     return block
 

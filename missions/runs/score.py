@@ -6,12 +6,14 @@ was armed, because that is the user's "home": a constant error of the receiver a
 path by the same amount. The same errors with home as the vehicle reports it are given as `..._absolute_m`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import GAP_S, broken_at_gaps, gaps_of, not_in_gaps, received_times, together
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, quaternions_from_euler
@@ -23,6 +25,7 @@ Array = NDArray[np.float64]
 
 _BACK_M: Final = 3.0  # distance back along the path within which the nearest point is searched
 _AHEAD_M: Final = 15.0
+_RESUMED_S: Final = 5.0  # stretch after a gap by which its place on the path is found
 _IN_FLIGHT_M: Final = 0.5
 _LEVEL_M: Final = 0.01
 _TRUTH_ATTITUDE: Final = ("attitude_quaternion",)
@@ -33,10 +36,10 @@ _SHORTEST_QUATERNION: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
-    """A flown track: vehicle time and NED from a path's origin.
+    """A flown track: vehicle time and NED from a path's origin. In its gaps nothing was received.
 
     Attributes:
-        time_s: (n,).
+        time_s: (n,), strictly increasing.
         pos_ned_m: (n, 3).
         yaw_rad: (n,).
     """
@@ -50,14 +53,35 @@ class Track:
         kept = (self.time_s >= start_us * 1e-6) & (self.time_s <= end_us * 1e-6)
         return Track(time_s=self.time_s[kept], pos_ned_m=self.pos_ned_m[kept], yaw_rad=self.yaw_rad[kept])
 
+    def thinned(self, stride: int) -> "Track":
+        """Each `stride`-th point of each part between two gaps, and the last one of it."""
+        if stride < 2:
+            return self
+        kept = np.concatenate([np.unique(np.append(part[::stride], part[-1:])) for part in self._parts()])
+        return Track(time_s=self.time_s[kept], pos_ned_m=self.pos_ned_m[kept], yaw_rad=self.yaw_rad[kept])
+
+    def drawn(self) -> tuple[Array, Array]:
+        """Times and positions with a row of NaN in each gap, so that no line is drawn there."""
+        time_s, pos_ned_m = broken_at_gaps(self.time_s, self.pos_ned_m)
+        return time_s, pos_ned_m
+
+    def _parts(self) -> list[NDArray[np.int64]]:
+        """Rows of each part between two gaps."""
+        return np.split(np.arange(len(self.time_s)), np.flatnonzero(np.diff(self.time_s) > GAP_S) + 1)
+
     @property
     def length_m(self) -> float:
-        """Distance flown, from at most 10 points a second, so that noise does not increase it."""
+        """Distance flown while positions were received, from at most 10 points a second, so that noise does
+        not increase it.
+        """
         if len(self.time_s) < 2:
             return 0.0
         step_s = float(np.median(np.diff(self.time_s)))
         stride = max(1, round(0.1 / max(step_s, 1e-3)))
-        return float(np.linalg.norm(np.diff(self.pos_ned_m[::stride], axis=0), axis=1).sum())
+        return sum(
+            float(np.linalg.norm(np.diff(self.pos_ned_m[part[::stride]], axis=0), axis=1).sum())
+            for part in self._parts()
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,9 +93,11 @@ class FlightScore:
         error_time_s, error_m: times, and distances of the reference track to the commanded path, during the
             pattern.
         reference: "truth" or "estimate".
+        waypoint_misses_m: nearest approach to each waypoint; NaN: it may have been passed in a gap.
         altitude_rms_error_m: error of the height only, along a level pattern.
-        messages_not_finite: number of messages that were left out because their attitude is invalid: NaN,
-            infinite, or a quaternion of zero length.
+        gaps_s: begin and end of each gap of the reference in the flight: nothing was received.
+        left_out: number of messages that were left out, by reason: attitudes that are not finite (or a
+            quaternion of zero length), and positions and times that no vehicle can have.
     """
 
     truth: Track | None
@@ -88,7 +114,8 @@ class FlightScore:
     max_attitude_tracking_error_deg: float | None
     waypoint_misses_m: tuple[float, ...]
     altitude_rms_error_m: float | None = None
-    messages_not_finite: int = 0
+    gaps_s: tuple[tuple[float, float], ...] = ()
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
 
 def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
@@ -98,11 +125,9 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
     truth_table, truth_bad = _usable(records.truth(system_id), _TRUTH_ATTITUDE)
     attitude, attitude_bad = _usable(records.table("ATTITUDE", system_id, 1), _EULER_ANGLES)
     target, target_bad = _usable(records.table("ATTITUDE_TARGET", system_id, 1), _TARGET_ATTITUDE)
-    truth_table = _in_time_order(truth_table, "time_usec")
-    attitude = _in_time_order(attitude, "time_boot_ms")
-    target = _in_time_order(target, "time_boot_ms")
-    estimate_table = _with_place(records.table("GLOBAL_POSITION_INT", system_id, 1))
-    estimate_table = _in_time_order(estimate_table, "time_boot_ms")
+    attitude, attitude_late = _in_time_order(attitude)
+    target, target_late = _in_time_order(target)
+    estimate_table = records.positions(system_id)
     origin = commanded.origin if commanded else _first_place(truth_table, estimate_table)
     absolute = _track(truth_table, origin, "time_usec", 1e-6) if origin is not None else None
     estimate = _estimate_track(estimate_table, origin, attitude) if origin is not None else None
@@ -122,17 +147,18 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
     if commanded is not None and phase is not None and reference is not None:
         window = (phase.start_us, phase.end_us)
         pattern = reference.between(*window)
-        error_time, error = pattern.time_s, path_errors_m(commanded.points_ned_m, pattern.pos_ned_m)
+        error_time, error = pattern.time_s, path_errors_m(commanded.points_ned_m, pattern)
         down = commanded.points_ned_m[:, 2]
         if len(down) and np.ptp(down) < _LEVEL_M:
             altitude_rms = _rms(pattern.pos_ned_m[:, 2] - down[0])
-        misses = waypoint_misses_m(commanded, pattern.pos_ned_m)
+        misses = waypoint_misses_m(commanded, pattern.time_s, pattern.pos_ned_m)
         if absolute is not None:
-            flat = absolute.between(*window).pos_ned_m - np.array([0.0, 0.0, moved[2]])
+            flat = absolute.between(*window)
+            flat = replace(flat, pos_ned_m=flat.pos_ned_m - np.array([0.0, 0.0, moved[2]]))
             absolute_rms = _rms(path_errors_m(commanded.points_ned_m, flat))
         if estimate is not None:
-            own = estimate.between(*window).pos_ned_m
-            estimate_rms = _rms(path_errors_m(commanded.points_ned_m, own))
+            estimate_rms = _rms(path_errors_m(commanded.points_ned_m, estimate.between(*window)))
+    not_finite = truth_bad + attitude_bad + target_bad
     return FlightScore(
         truth=truth,
         estimate=estimate,
@@ -148,23 +174,34 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
         max_attitude_tracking_error_deg=_tracking_error_deg(target, attitude, reference),
         waypoint_misses_m=misses,
         altitude_rms_error_m=altitude_rms,
-        messages_not_finite=truth_bad + attitude_bad + target_bad,
+        gaps_s=_gaps_s(reference, notes),
+        left_out=together(
+            {"attitude_not_finite": not_finite} if not_finite else {},
+            records.left_out(system_id),
+            attitude_late,
+            target_late,
+        ),
     )
 
 
-def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
+def path_errors_m(path_ned_m: Array, track: Track) -> Array:
     """Distance (n,) from each track point to the path, following the path onwards.
 
     The nearest point is searched near the previous one, from 3 m back to 15 m ahead (more when the error is
-    large), so that at a crossing of the path the other branch is not used.
+    large), so that at a crossing of the path the other branch is not used. After a gap the path is followed
+    from where the next 5 s suit it best: how far the vehicle flew meanwhile is not known.
     """
-    if len(path_ned_m) < 2 or not len(track_ned_m):
+    if len(path_ned_m) < 2 or not len(track.time_s):
         return np.zeros(0)
     from missions.runs.track import follow_path
 
-    errors = np.empty(len(track_ned_m))
-    path, track = np.ascontiguousarray(path_ned_m), np.ascontiguousarray(track_ned_m)
-    follow_path(path, track, _BACK_M, _AHEAD_M, errors)
+    errors = np.empty(len(track.time_s))
+    resumed = np.zeros(len(track.time_s), dtype=np.int64)
+    gaps = np.flatnonzero(np.diff(track.time_s) > GAP_S) + 1
+    ends = np.searchsorted(track.time_s, track.time_s[gaps] + _RESUMED_S)
+    resumed[gaps] = np.minimum(np.maximum(ends, gaps + 1), np.append(gaps[1:], len(track.time_s)))
+    path, points = np.ascontiguousarray(path_ned_m), np.ascontiguousarray(track.pos_ned_m)
+    follow_path(path, points, resumed, _BACK_M, _AHEAD_M, errors)
     return errors
 
 
@@ -181,19 +218,10 @@ def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np
     return table[kept], int(np.count_nonzero(~kept))
 
 
-def _with_place(table: NDArray[np.void]) -> NDArray[np.void]:
-    """Positions, without those at 0, 0: ArduPilot sends these until it has a position."""
-    return table[(table["lat"] != 0) | (table["lon"] != 0)]
-
-
-def _in_time_order(table: NDArray[np.void], field: str) -> NDArray[np.void]:
-    """Rows with strictly increasing time: late and repeated ones are left out."""
-    if not len(table):
-        return table
-    times = table[field].astype(np.int64)
-    newest = np.maximum.accumulate(times)
-    kept = np.concatenate(([True], times[1:] > newest[:-1]))
-    return table[kept]
+def _in_time_order(table: NDArray[np.void]) -> tuple[NDArray[np.void], Mapping[str, int]]:
+    """Rows with strictly increasing time, and the number of the others by reason."""
+    found = received_times(table["time_boot_ms"].astype(np.int64) * 1000)
+    return table[found.rows], found.left_out
 
 
 def _first_place(*tables: NDArray[np.void]) -> GeodeticPosition | None:
@@ -234,6 +262,15 @@ def _distance_m(track: Track | None, notes: FlightNotes) -> float:
     return track.between(notes.phases[0].start_us, notes.phases[-1].end_us).length_m
 
 
+def _gaps_s(track: Track | None, notes: FlightNotes) -> tuple[tuple[float, float], ...]:
+    """Gaps of a track in the flight, also before its first and after its last position."""
+    if track is None or not notes.phases:
+        return ()
+    span_s = notes.phases[0].start_us * 1e-6, notes.phases[-1].end_us * 1e-6
+    inside = track.time_s[(track.time_s > span_s[0]) & (track.time_s < span_s[1])]
+    return tuple(gaps_of(np.concatenate((span_s[:1], inside, span_s[1:]))))
+
+
 def _airborne(times_s: Array, track: Track | None) -> NDArray[np.bool_]:
     if track is None:
         return np.ones(len(times_s), dtype=bool)
@@ -250,7 +287,7 @@ def _largest_angle_deg(
     times_s: Array, q: Array, other_times_s: Array, other_q: Array, track: Track | None
 ) -> float | None:
     """Largest angle between two attitude histories in flight; the second is interpolated."""
-    kept = _airborne(times_s, track) & (times_s >= other_times_s[0]) & (times_s <= other_times_s[-1])
+    kept = _airborne(times_s, track) & not_in_gaps(times_s, other_times_s)
     if not kept.any():
         return None
     signs = np.concatenate(

@@ -4,13 +4,13 @@ A vehicle that reports the end of a mission may have flown something else. The c
 of GLOBAL_POSITION_INT, which a mission receives from every vehicle; the truth is used only for the score.
 """
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import GAP_S
 from missions.kind import VehicleKind
 from missions.notes import PATTERN, CutShort, FlightNotes, Phase
 
@@ -25,7 +25,6 @@ WAYPOINT_SLACK_M: Final = {VehicleKind.MULTICOPTER: 3.0, VehicleKind.FIXED_WING:
 """Distance beyond the acceptance radius at which an approach to a waypoint still counts as a pass."""
 
 _AROUND_US: Final = 1_000_000  # before and after the phase: positions arrive at some Hz
-_GAP_S: Final = 2.0
 _PLACES: Final = 100
 _NAMED: Final = 3
 
@@ -40,6 +39,8 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
         notes, score: notes and score of one vehicle.
         max_error_m: the user's bound in place of `PATH_BOUND_M`; it also applies to waypoints.
     """
+    from missions.runs.score import path_errors_m
+
     commanded = notes.commanded
     if commanded is None:
         return ""
@@ -53,7 +54,7 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
     kind = VehicleKind(notes.kind)
     bound_m = PATH_BOUND_M[kind] if max_error_m is None else max_error_m
     points = commanded.points_ned_m
-    error_m = _largest_error_m(points, track.between(phase.start_us, phase.end_us))
+    error_m = float(path_errors_m(points, track.between(phase.start_us, phase.end_us)).max(initial=0.0))
     if max_error_m is None and error_m > bound_m:  # the user's own bound is checked separately
         return (
             f"the vehicle was up to {error_m:.1f} m off the commanded path by its own position; accepted: "
@@ -83,23 +84,6 @@ def flown_track(score: "FlightScore", phase: Phase) -> "Track | None":
     return track if len(track.time_s) > 1 else None
 
 
-def _largest_error_m(path_ned_m: Array, track: "Track") -> float:
-    """Largest error of the received positions; a gap between two of them is replaced by a straight line."""
-    from missions.runs.score import path_errors_m
-
-    if not len(track.time_s):
-        return 0.0
-    times = [track.time_s]
-    for k in np.nonzero(np.diff(track.time_s) > _GAP_S)[0]:
-        length_m = float(np.linalg.norm(track.pos_ned_m[k + 1] - track.pos_ned_m[k]))
-        times.append(np.linspace(track.time_s[k], track.time_s[k + 1], math.ceil(length_m) + 2)[1:-1])
-    together = np.sort(np.concatenate(times))
-    filled = np.column_stack([np.interp(together, track.time_s, axis) for axis in track.pos_ned_m.T])
-    errors = path_errors_m(path_ned_m, filled)
-    received = np.isin(together, track.time_s)
-    return float(errors[received].max(initial=0.0)) if len(errors) else 0.0
-
-
 def waypoint_verdict(
     track: "Track", waypoints_ned_m: Array, near_m: float, cut_short: CutShort | None
 ) -> str:
@@ -126,7 +110,7 @@ def missed_places(
     """
     distances = [_distances_m(place, track.pos_ned_m) for place in places_ned_m]
     chosen = _passed_in_order([_stays(distance <= near_m) for distance in distances])
-    gaps = np.nonzero(np.diff(track.time_s) > _GAP_S)[0]
+    gaps = np.nonzero(np.diff(track.time_s) > GAP_S)[0]
     excused_after = len(places_ned_m)
     if cut_short is not None and (chosen or cut_short is CutShort.FOUND):
         excused_after = max(chosen, default=-1)

@@ -8,11 +8,11 @@ from typing import Any, Final
 import numpy as np
 
 from estimators.errors import EstimatorError
+from estimators.received import GAP_S
 from estimators.survey.compensation import compensation_bytes
 from estimators.survey.export import MAP, survey_files
 from estimators.survey.lines import LineKind, LinePlan
 from estimators.survey.processing import SurveyResult, process_survey
-from estimators.survey.readings import GAP_S
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
 from missions.mission import Debriefing

@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from estimators.received import broken_at_gaps
 from estimators.survey.lines import LineKind
 from estimators.survey.processing import SurveyResult
 from missions.survey.records import Calibration
@@ -54,7 +55,8 @@ def _draw_lines(
     figure: Figure, axes: Any, result: SurveyResult, targets_ne_m: Sequence[tuple[float, float]]
 ) -> None:
     r, on = result.readings, result.on_lines
-    axes.plot(r.east_m * _KILOMETRE, r.north_m * _KILOMETRE, color="#cbd5e1", linewidth=0.6, zorder=1)
+    _, track_east_m, track_north_m = broken_at_gaps(r.time_s, r.east_m, r.north_m)
+    axes.plot(track_east_m * _KILOMETRE, track_north_m * _KILOMETRE, color="#cbd5e1", linewidth=0.6, zorder=1)
     values = result.differential_nt[on]
     size = max(1.0, float(np.percentile(np.abs(values), 99.0))) if len(values) else 1.0
     shades = axes.scatter(
@@ -127,7 +129,8 @@ def _draw_profiles(axes: Any, result: SurveyResult) -> None:
         if _backwards(line.course_rad):  # all profiles in the same direction
             along = line.length_m - along
         colour = _LINE if line.kind is LineKind.LINE else _TIE
-        axes.plot(along * _KILOMETRE, result.differential_nt[own] - row * step, color=colour, linewidth=0.6)
+        _, along, values = broken_at_gaps(result.readings.time_s[own], along, result.differential_nt[own])
+        axes.plot(along * _KILOMETRE, values - row * step, color=colour, linewidth=0.6)
         axes.text(-0.01, -row * step, line.name, fontsize=7, color=colour, ha="right", va="center",
                   transform=axes.get_yaxis_transform())  # fmt: skip
     axes.set_yticks([])

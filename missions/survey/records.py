@@ -45,7 +45,7 @@ def flight_readings(
     """
     sent = records.table("NAMED_VALUE_FLOAT", system_id, survey_magnetometer.COMPONENT)
     sent = sent[sent["name"] == survey_magnetometer.TOTAL_FIELD_NAME.encode()]
-    positions = records.table("GLOBAL_POSITION_INT", system_id, _AUTOPILOT)
+    positions = records.positions(system_id)
     attitudes = records.table("ATTITUDE", system_id, _AUTOPILOT)
     finite = np.all([np.isfinite(attitudes[name]) for name in ("roll", "pitch", "yaw")], axis=0)
     attitudes = attitudes[finite]

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
 
+from estimators.received import broken_at_gaps
 from estimators.vision_search import AreaEstimate
 from missions.vision_search.figures import ELLIPSE_95, true_place
 
@@ -84,8 +85,9 @@ def _draw_moment(
     )
     for k, searcher in enumerate(team.searchers):
         colour = _COLOURS[k % len(_COLOURS)]
-        track = np.array([(n, e) for t, n, e in searcher.track if t <= moment.time_us]).reshape(-1, 2)
-        axes.plot(track[:, 1], track[:, 0], "-", color=colour, linewidth=1.0, label=f"vehicle {k + 1}")
+        track = np.array([flown for flown in searcher.track if flown[0] <= moment.time_us]).reshape(-1, 3)
+        _, north_m, east_m = broken_at_gaps(*(track * (1e-6, 1.0, 1.0)).T)
+        axes.plot(east_m, north_m, "-", color=colour, linewidth=1.0, label=f"vehicle {k + 1}")
         here = moment.places[k]
         if here is not None:
             axes.add_patch(_footprint(here, team, k, colour))

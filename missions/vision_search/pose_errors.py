@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import not_in_gaps, received_times
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
 from missions.runs.records import positions_ned_m
@@ -43,11 +44,16 @@ def pose_errors(
     """
     truth = records.truth(system_id)
     attitude = records.table("ATTITUDE", system_id, _AUTOPILOT)
-    position = records.table("GLOBAL_POSITION_INT", system_id, _AUTOPILOT)
+    attitude = attitude[received_times(attitude["time_boot_ms"].astype(np.int64) * 1000).rows]
+    position = records.positions(system_id)
     times = np.arange(span_us[0], span_us[1], _STEP_S * 1e6)
-    if len(times) < _LEAST or min(len(truth), len(attitude), len(position)) < _LEAST:
+    if min(len(truth), len(attitude), len(position)) < _LEAST:
         return None
     true_us = truth["time_usec"].astype(np.float64)
+    for known_us in (true_us, attitude["time_boot_ms"] * 1e3, position["time_boot_ms"] * 1e3):
+        times = times[not_in_gaps(times * 1e-6, known_us * 1e-6)]
+    if len(times) < _LEAST:
+        return None
     true_angles = [
         _at(times, true_us, angle, angle=True)
         for angle in euler_from_quaternions(truth["attitude_quaternion"])
@@ -81,9 +87,7 @@ def pose_errors(
 
 
 def _at(times: Array, known_us: Array, values: Array, *, angle: bool = False) -> Array:
-    order = np.argsort(known_us, kind="stable")
-    sorted_values = np.unwrap(values[order]) if angle else values[order]
-    return np.asarray(np.interp(times, known_us[order], sorted_values))
+    return np.asarray(np.interp(times, known_us, np.unwrap(values) if angle else values))
 
 
 def _rms(values: Array) -> float:

@@ -10,8 +10,9 @@ from estimators.airborne import airborne_spans, duration_s, within
 from estimators.comparison import comparisons
 from estimators.library import estimator_class
 from estimators.log_replay import replay
-from estimators.logs import open_log
+from estimators.logs import open_log, report_of
 from estimators.references import Series, error_figures, errors, references
+from missions.cli.log_text import report_lines
 
 
 def us(*seconds):
@@ -118,6 +119,24 @@ def test_positions_are_counted_from_home(make_log):
     assert columns["north_m"].values == pytest.approx([1e-4 * 111_182], rel=1e-3)
     assert columns["east_m"].values == pytest.approx([0.0])
     assert columns["course_rad"].values == pytest.approx([math.atan2(4.0, 3.0)])
+
+
+def test_places_that_no_vehicle_can_have_are_no_reference_and_are_counted(make_log):
+    log = make_log()
+    for k in range(40):
+        log.attitude(0.1 * k)
+        lat = {10: 2_000_000_000, 20: 483977400}.get(k, 473977400)
+        message = dialect.MAVLink_global_position_int_message
+        log.say(message(100 * k, lat, 85455900, 500_000, 300, 0, 0, 0, 0))
+    opened = open_log(log.close())
+    columns = references(opened, 1)["autopilot"].columns
+    assert len(columns["alt_m"].values) == len(columns["lat_deg"].values) == 38
+    assert np.ptp(columns["lat_deg"].values) == 0.0
+    report = report_of(opened)
+    (left,) = report.left_out
+    assert left.count_by_reason == {"no_place_on_earth": 1, "position_jumped": 1}
+    said = "GLOBAL_POSITION_INT of 1/1: places and times that no vehicle can have: no place on earth 1, "
+    assert said + "position jumped 1" in list(report_lines(report))
 
 
 def test_offsets_to_a_target_are_the_short_way_across_180_degrees(make_log):

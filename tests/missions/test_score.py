@@ -9,10 +9,11 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.cli.fly_report import report_left_out
 from missions.notes import PATTERN, CommandedPath, FlightNotes
 from missions.runs.records import FlightRecords
 from missions.runs.run_folder import team_figures, vehicle_summary, versions, write_summary
-from missions.runs.score import path_errors_m, score
+from missions.runs.score import Track, path_errors_m, score
 from missions.runs.track import waypoint_misses_m
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
@@ -23,9 +24,15 @@ def straight_path(length=100.0):
     return np.column_stack((n, np.zeros_like(n), np.full_like(n, -10.0)))
 
 
+def tracked(points, time_s=None):
+    """A track of points, 10 a second unless times are given."""
+    time_s = 0.1 * np.arange(len(points)) if time_s is None else time_s
+    return Track(time_s=time_s, pos_ned_m=points, yaw_rad=np.zeros(len(points)))
+
+
 def test_distance_to_the_path_and_not_to_its_ends():
     track = np.array([(10.0, 0.3, -10.0), (20.0, -0.4, -10.0), (30.0, 0.3, -9.6)])
-    assert path_errors_m(straight_path(), track) == pytest.approx([0.3, 0.4, 0.5], abs=1e-9)
+    assert path_errors_m(straight_path(), tracked(track)) == pytest.approx([0.3, 0.4, 0.5], abs=1e-9)
 
 
 def test_another_branch_of_a_crossing_path_does_not_count():
@@ -33,16 +40,103 @@ def test_another_branch_of_a_crossing_path_does_not_count():
     eight = np.column_stack((50.0 * np.sin(2 * t), 50.0 * np.sin(t), np.full_like(t, -10.0)))
     lost = eight[900:1100].copy()  # through the crossing, then flown along the other branch's direction
     lost[:, 1] *= -1.0
-    errors = path_errors_m(eight, np.vstack((eight[:900], lost)))
+    errors = path_errors_m(eight, tracked(np.vstack((eight[:900], lost))))
     assert errors[:900].max() < 1e-9
     assert errors[-1] > 5.0
 
 
 def test_every_sample_of_a_flight_on_the_path_is_on_it():
     path = straight_path()
-    assert path_errors_m(path, path[::7]).max() < 1e-9
-    assert len(path_errors_m(path[:1], path)) == 0
-    assert len(path_errors_m(path, path[:0])) == 0
+    assert path_errors_m(path, tracked(path[::7])).max() < 1e-9
+    assert len(path_errors_m(path[:1], tracked(path))) == 0
+    assert len(path_errors_m(path, tracked(path[:0]))) == 0
+
+
+@pytest.mark.parametrize("missing_s", [5.0, 12.0, 31.0])
+@pytest.mark.parametrize("from_s", [3.0, 20.0, 44.0])
+def test_a_gap_counts_neither_as_an_error_nor_as_a_way(from_s, missing_s):
+    """A figure of eight, 20 m from its nearest other branch where it does not cross itself."""
+    t = np.linspace(0.0, 2 * math.pi, 4000)
+    eight = np.column_stack((100.0 * np.sin(2 * t), 100.0 * np.sin(t), np.full_like(t, -10.0)))
+    times = np.linspace(0.0, 80.0, 800)
+    flown = eight[::5] + np.array((0.0, 0.0, 0.3))
+    kept = (times < from_s) | (times > from_s + missing_s)
+    track = tracked(flown[kept], times[kept])
+    assert path_errors_m(eight, track) == pytest.approx(np.full(kept.sum(), 0.3), abs=0.05)
+    steps = np.linalg.norm(np.diff(flown, axis=0), axis=1)
+    assert track.length_m == pytest.approx(steps[kept[1:] & kept[:-1]].sum(), rel=0.01)
+    drawn_s, drawn_m = track.drawn()
+    assert np.isnan(drawn_s).sum() == np.isnan(drawn_m).all(axis=1).sum() == 1
+    assert len(track.thinned(10).drawn()[0]) < 90
+    assert np.isnan(track.thinned(10).drawn()[0]).sum() == 1
+
+
+def test_a_waypoint_in_a_gap_is_neither_passed_nor_missed():
+    n = np.arange(0.0, 60.0, 0.5)
+    there = np.column_stack((n, np.zeros_like(n), np.full_like(n, -10.0)))
+    commanded = CommandedPath(
+        origin=HOME,
+        points_ned_m=straight_path(),
+        waypoints_ned_m=np.array([(12.0, 0.0, -10.0), (30.0, 8.0, -10.0), (50.0, 1.0, -10.0)]),
+        acceptance_m=2.0,
+    )
+    kept = (n < 25.0) | (n > 36.0)
+    misses = waypoint_misses_m(commanded, n[kept] / 4.0, there[kept])
+    assert misses == pytest.approx((0.0, math.nan, 1.0), abs=1e-6, nan_ok=True)
+    notes = FlightNotes(system_id=1, autopilot="px4", commanded=commanded)
+    notes.begin(PATTERN, 0)
+    notes.end(15_000_000)
+    result = replace(score(*make_flight()), waypoint_misses_m=misses, gaps_s=((6.0, 9.25),))
+    block = vehicle_summary(notes, result)
+    assert block["waypoints"] | {"acceptance_m": 0} == {
+        "count": 3, "acceptance_m": 0, "largest_miss_m": 1.0, "passed": 2, "not_received": 1
+    }  # fmt: skip
+    assert (block["not_received_s"], block["gaps"]) == (3.25, [{"start_s": 6.0, "end_s": 9.25}])
+
+
+def position(k, *, lat=473977400, lon=85455900, alt=499400, time_ms=None):
+    """The k-th of 10 positions a second."""
+    time_ms = 100 * k if time_ms is None else time_ms
+    message = dialect.MAVLink_global_position_int_message
+    return FrameEncoder(1, 1).encode(message(time_ms, lat, lon, alt, 10_000, 0, 0, 0, 0xFFFF))
+
+
+def test_positions_and_times_that_no_vehicle_can_have_are_left_out_and_counted(capsys):
+    """Places outside the Earth, jumps of 100 km every few seconds, stamps near 2^32 ms."""
+    frames = []
+    for k in range(301):
+        odd = {
+            40: {"lat": 2_000_000_000}, 41: {"lon": -2_147_483_648}, 42: {"alt": 2_147_483_647},
+            70: {"time_ms": 4_294_904_700}, 71: {"time_ms": 0}, 72: {"time_ms": 1_000_000},
+            73: {"lat": 0, "lon": 0},
+        }.get(k, {})  # fmt: skip
+        if 100 <= k < 130 or 150 <= k < 180:
+            odd = {"lat": 473977400 + 9_000_000}
+        frames.append(position(k, **odd))
+    notes = FlightNotes(system_id=1, autopilot="px4")
+    notes.begin("flight", 0)
+    notes.end(30_000_000)
+    result = score(FlightRecords.of_frames(frames), notes)
+    assert result.left_out == {"no_place_on_earth": 3, "position_jumped": 60, "time_jumped": 3}
+    assert len(result.estimate.time_s) == 301 - 67
+    assert result.distance_m == 0.0
+    assert np.array(result.gaps_s) == pytest.approx(np.array([(9.9, 13.0), (14.9, 18.0)]))
+    report_left_out({"vehicles": [vehicle_summary(notes, result)]})
+    said = capsys.readouterr().err.splitlines()
+    assert said == [
+        "no position was received for 6.2 s of the flight, in 2 gaps: distances and errors leave them out",
+        "messages left out: no place on earth 3, position jumped 60, time jumped 3",
+    ]
+
+
+def test_a_gap_lasts_to_the_end_of_the_flight_and_single_late_frames_are_no_jumps():
+    frames = [position(k) for k in (*range(20), 18, 19, 17, *range(20, 51))]
+    notes = FlightNotes(system_id=1, autopilot="px4")
+    notes.begin("flight", 0)
+    notes.end(9_000_000)
+    result = score(FlightRecords.of_frames(frames), notes)
+    assert (result.left_out, len(result.estimate.time_s)) == ({}, 51)
+    assert np.array(result.gaps_s) == pytest.approx(np.array([(5.0, 9.0)]))
 
 
 def test_waypoint_misses_between_samples_and_in_order():
@@ -56,23 +150,25 @@ def test_waypoint_misses_between_samples_and_in_order():
         waypoints_ned_m=np.array([(12.0, 0.0, -10.0), (50.0, 0.0, -10.0), (12.0, 0.0, -10.0)]),
         acceptance_m=2.0,
     )
-    assert waypoint_misses_m(commanded, pos) == pytest.approx((0.7, 0.7, 1.7), abs=1e-6)
+    assert waypoint_misses_m(commanded, 0.1 * np.arange(len(pos)), pos) == pytest.approx(
+        (0.7, 0.7, 1.7), abs=1e-6
+    )
 
 
 def test_a_missed_waypoint_that_is_crossed_later_spoils_no_other():
     """As at the centre of a figure of eight, when the way in was flown wide."""
     t = np.linspace(0.0, 2 * math.pi, 400)
     eight = np.column_stack((100.0 * np.sin(2 * t), 100.0 * np.sin(t), np.full_like(t, -10.0)))
-    track = eight.copy()
+    track, times = eight.copy(), 0.1 * np.arange(len(eight))
     track[:5] += np.array((0.0, 30.0, 0.0))
     commanded = CommandedPath(
         origin=HOME, points_ned_m=eight, waypoints_ned_m=eight[:390:10], acceptance_m=5.0
     )
-    misses = waypoint_misses_m(commanded, track)
+    misses = waypoint_misses_m(commanded, times, track)
     assert misses[0] > 5.0
     assert max(misses[1:]) < 0.1
-    assert waypoint_misses_m(commanded, eight) == pytest.approx(np.zeros(39), abs=1e-6)
-    assert waypoint_misses_m(commanded, eight[:1]) == ()
+    assert waypoint_misses_m(commanded, times, eight) == pytest.approx(np.zeros(39), abs=1e-6)
+    assert waypoint_misses_m(commanded, times[:1], eight[:1]) == ()
 
 
 def make_flight(
@@ -211,11 +307,11 @@ def test_messages_without_a_number_are_left_out_and_counted(tmp_path):
     error_rad = math.radians(2.0)
     records, notes = make_flight(offset_ned=(0.0, 0.3, -0.4), roll_error=error_rad, more=frames)
     result = score(records, notes)
-    assert result.messages_not_finite == 7
+    assert result.left_out == {"attitude_not_finite": 5, "position_jumped": 2}  # states at 0, 0
     assert result.max_attitude_error_deg == pytest.approx(2.0, abs=1e-3)
     assert result.path_rms_error_m == pytest.approx(0.5, abs=0.01)
     block = vehicle_summary(notes, result)
-    assert block["messages_not_finite"] == 7
+    assert block["left_out"] == result.left_out
     write_summary(tmp_path, {"vehicles": [block]})
 
 
