@@ -3,6 +3,7 @@ complete record, and the vehicle does what its failsafe parameters say.
 """
 
 import contextlib
+import json
 import os
 import subprocess
 import sys
@@ -21,6 +22,8 @@ from autopilot_bridge.storage.folder import FolderStore
 from autopilot_bridge.storage.memory import MemoryCard
 from autopilot_bridge.tlog import TlogReader
 from flightsim.world_spec import VehicleSpec, WorldSpec
+from missions.cli.main import run_command_line
+from tests.clients.forked_process import flightstack
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
 from tests.system.logs import counts, mavutil_counts, modes
 from tests.system.runs import SHORT, Run, started, wait_until
@@ -117,6 +120,17 @@ def kill(run: Run) -> None:
     run.process.communicate()
 
 
+def act_on_it(link: str) -> None:
+    """What is left to act with when the program is gone."""
+    for words, code, reported in (
+        (["disarm"], 1, "was not disarmed: it is in the air"),
+        (["hold"], 0, "commanded to hold, accepted; now mode Hold"),
+    ):
+        done = flightstack("vehicle", *words, "--connect", link, merged=True)
+        out, _ = done.communicate(timeout=60.0)
+        assert (done.returncode, reported in out) == (code, True), out
+
+
 def high_up(frame: Frame) -> bool:
     return frame.message_id == POSITION and decode(frame).relative_alt > 3000
 
@@ -145,11 +159,15 @@ def test_mission_and_vehicle_are_killed_in_one_flight(tmp_path: Path) -> None:
             fly_until(run, high_up)
             watcher.sets("MPC_XY_CRUISE", 4.5)
             kill(run)
+        act_on_it(link)
         watcher.sees("return")
         sitl.process.kill()
         sitl.process.wait()
     for written in (run.log, log):
         check_readable(written, by_others=False)
+    os.utime(run.log, (0, 0))  # its run is over
+    assert run_command_line(["report", str(run.log.parent), "--no-picture"]) == 0
+    assert json.loads((run.log.parent / "summary.json").read_text())["outcome"] == "interrupted"
     uploaded = {decode(f).seq for _, f in TlogReader(run.log) if f.message_id == ITEM and f.system_id == 255}
     assert len(uploaded) > 10
     check_card(cards / "vehicle1", "px4", {"MPC_XY_CRUISE": 4.5}, len(uploaded))
