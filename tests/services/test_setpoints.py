@@ -67,7 +67,17 @@ PX4_LOCAL = [
     (1, POSITION_ONLY, {"pos": (NAN, NAN, NAN)}, False),
     (1, VELOCITY_ONLY, {"vel": (math.inf, math.inf, -math.inf)}, False),
     (1, POSITION_ONLY, {"pos": (1e30, 1e30, 1e30)}, False),
-    (1, POSITION_ONLY | 512, {}, False),
+    # bit 9, of forces, counts only where accelerations are used
+    (1, POSITION_ONLY | 512, {}, True),
+    (1, 4088, {}, True),
+    (1, 4039, {}, True),
+    (1, ACCELERATION_ONLY | 512, {}, False),
+    (1, 512, {}, False),
+    (8, 4039, {}, True),
+    (8, ACCELERATION_ONLY | 512, {}, False),
+    # in the body frame a position is not used, and vectors are used whole
+    (8, 0, {}, True),
+    (8, VELOCITY_ONLY | 8, {}, False),
 ]
 
 
@@ -82,6 +92,15 @@ def test_px4_local_setpoints_that_count(frame: int, mask: int, fields: dict, cou
 def test_px4_global_setpoints_that_count(frame: int, counts: bool) -> None:
     rig = ServiceRig("px4")
     assert rig.handle(global_(frame, POSITION_ONLY))
+    assert counted(rig) == counts
+
+
+@pytest.mark.parametrize(
+    ("mask", "counts"), [(VELOCITY_ONLY, True), (POSITION_ONLY | 1, False), (4088, True)]
+)
+def test_px4_frame_of_a_global_setpoint_is_that_of_its_position(mask: int, counts: bool) -> None:
+    rig = ServiceRig("px4")
+    rig.handle(global_(5 if mask == 4088 else 0, mask))
     assert counted(rig) == counts
 
 
@@ -173,6 +192,13 @@ ARDUPILOT_LOCAL = [
     (12, VELOCITY_ONLY, GuidedKind.HOLD),
     (1, NOTHING, GuidedKind.HOLD),
     (1, 0x0DFF, GuidedKind.HOLD),
+    (1, 4088, GuidedKind.POSITION),
+    (1, 4039, GuidedKind.VELOCITY),
+    (
+        1,
+        POSITION_ONLY & ~(64 | 128 | 256),
+        GuidedKind.HOLD,
+    ),  # a position with an acceleration, but no velocity
 ]
 
 
@@ -184,6 +210,23 @@ def test_ardupilot_local_targets(frame: int, mask: int, kind: GuidedKind) -> Non
     assert rig.commander.setpoints.guided.kind is kind
     rig.run(0.5)
     assert rig.commander.airborne
+
+
+@pytest.mark.parametrize("mask", [ACCELERATION_ONLY | 512, 512, POSITION_VELOCITY_ACCELERATION | 512])
+def test_ardupilot_ignores_forces_and_keeps_the_target(mask: int) -> None:
+    rig = ServiceRig("ardupilot").fly()
+    rig.handle(local(1, POSITION_ONLY))
+    rig.handle(local(1, mask))
+    assert rig.commander.setpoints.guided.kind is GuidedKind.POSITION
+
+
+@pytest.mark.parametrize("frame", [1, 8, 9])
+def test_ardupilot_yaw_is_that_of_the_frame(frame: int) -> None:
+    """In both body frames it is relative to the nose."""
+    rig = ServiceRig("ardupilot").fly()
+    rig.context.nav[nav_layout.YAW] = 1.0
+    rig.handle(local(frame, VELOCITY_ONLY & ~1024, yaw=0.5))
+    assert rig.commander.setpoints.guided._yaw_rad == pytest.approx(0.5 if frame == 1 else 1.5)
 
 
 @pytest.mark.parametrize("fields", [{"vel": (NAN, 0.0, 0.0)}, {"vel": (1e9, 0.0, 0.0)}])
@@ -257,6 +300,8 @@ def test_ardupilot_global_targets(frame: int, altitude_m: float, kind: GuidedKin
         (0x47, {}, GuidedKind.HOLD),
         (0x07, {"q": (2.0, 0.0, 0.0, 0.0)}, GuidedKind.HOLD),
         (0x80, {}, GuidedKind.HOLD),
+        (0x03, {}, GuidedKind.HOLD),  # one body rate without the others
+        (0x00, {}, GuidedKind.ATTITUDE),
     ],
 )
 def test_ardupilot_attitude_targets(mask: int, fields: dict, kind: GuidedKind) -> None:

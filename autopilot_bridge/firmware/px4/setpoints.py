@@ -1,4 +1,7 @@
-"""Streamed setpoints as PX4 takes them in OFFBOARD (docs/firmware/px4.md, section 9)."""
+"""Streamed setpoints as PX4 takes them in OFFBOARD (docs/firmware/px4.md, section 9).
+
+Source: `mavlink_receiver.cpp` of PX4 1.16.1.
+"""
 
 import math
 from typing import Final
@@ -25,12 +28,15 @@ class Px4Setpoints:
         position = wire.position_of((message.x, message.y, message.z), mask)
         velocity = wire.velocity_of((message.vx, message.vy, message.vz), mask)
         acceleration = wire.acceleration_of((message.afx, message.afy, message.afz), mask)
-        if message.coordinate_frame == mavlink.MAV_FRAME_BODY_NED:
-            if any(not mask & bit for bit in wire.POSITION_BITS):
-                return
-            heading = wire.heading_of(self.commander.context)
-            velocity = wire.rotated_by_heading(velocity, heading)
-            acceleration = wire.rotated_by_heading(acceleration, heading)
+        if (
+            message.coordinate_frame == mavlink.MAV_FRAME_BODY_NED
+        ):  # a position is not used, whatever its bits
+            context = self.commander.context
+            position = wire.UNSET
+            velocity = wire.whole(velocity, wire.VELOCITY_BITS, mask)
+            velocity = wire.rotated_by_heading(velocity, wire.heading_of(context))
+            acceleration = wire.whole(acceleration, wire.ACCELERATION_BITS, mask)
+            acceleration = wire.rotated_by_attitude(acceleration, context)
         elif message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
             return
         self._take(message, position, velocity, acceleration, time_us)
@@ -38,11 +44,11 @@ class Px4Setpoints:
     def on_global(self, message: MavlinkMessage, time_us: int) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         mask = message.type_mask
-        relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
-        if relative is None:
-            return
         position = wire.UNSET
-        if not all(mask & bit for bit in wire.POSITION_BITS):
+        if not any(mask & bit for bit in wire.POSITION_BITS):  # used whole; the frame is that of the position
+            relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
+            if relative is None:
+                return
             place = wire.local_from_global(
                 self.commander.context, message.lat_int, message.lon_int, message.alt, relative=relative
             )
@@ -61,11 +67,11 @@ class Px4Setpoints:
         acceleration: wire.Triple,
         time_us: int,
     ) -> None:
-        if message.type_mask & wire.FORCE_BIT:
-            return
         target = wire.Target(
             position, velocity, acceleration, *wire.yaw_of(message.yaw, message.yaw_rate, message.type_mask)
         )
+        if target.has_acceleration and message.type_mask & wire.FORCE_BIT:
+            return
         if not (target.has_position or target.has_velocity or target.has_acceleration):
             return
         stream = self.commander.setpoints

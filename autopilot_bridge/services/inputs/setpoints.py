@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver
+from flightsim.foundation.rotations import rotate
 
 Triple = tuple[float, float, float]
 
@@ -30,6 +31,9 @@ POSITION_BITS: Final = (1, 2, 4)
 VELOCITY_BITS: Final = (8, 16, 32)
 ACCELERATION_BITS: Final = (64, 128, 256)
 FORCE_BIT: Final = 512
+"""The accelerations are forces, which no firmware takes. Both look at the bit only where accelerations are
+used; masks that ignore them and have it (4088, 4039) are common.
+"""
 YAW_BIT: Final = 1024
 YAW_RATE_BIT: Final = 2048
 
@@ -114,6 +118,14 @@ def rotated_by_heading(values: Triple, heading_rad: float) -> Triple:
     return c * forward - s * right, s * forward + c * right, down
 
 
+def rotated_by_attitude(values: Triple, context: FlightContext) -> Triple:
+    """A vector given in body axes (FRD), in NED."""
+    ned = np.empty(3)
+    rotate(context.nav[nav.Q_NED_FROM_FRD], np.array(values), ned)
+    north, east, down = ned.tolist()
+    return north, east, down
+
+
 def heading_of(context: FlightContext) -> float:
     """The vehicle's heading."""
     return float(context.nav[nav.EULER_RAD][2])
@@ -152,6 +164,11 @@ def unit_quaternion(values: list[float], tolerance: float) -> np.ndarray | None:
     q = np.array(values, dtype=np.float64)
     length = float(np.sqrt(q @ q)) if all(map(math.isfinite, values)) else math.nan
     return q / length if abs(length - 1.0) <= tolerance else None
+
+
+def whole(values: Triple, bits: tuple[int, int, int], type_mask: int) -> Triple:
+    """A vector that is used whole: not set when the mask has any of its bits."""
+    return UNSET if any(type_mask & bit for bit in bits) else values
 
 
 def rates_of(message: MavlinkMessage) -> Triple:

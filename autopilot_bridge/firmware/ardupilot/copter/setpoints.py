@@ -1,4 +1,7 @@
-"""Streamed setpoints as ArduCopter takes them in GUIDED (docs/firmware/ardupilot.md, sections 6 and 7)."""
+"""Streamed setpoints as ArduCopter takes them in GUIDED (docs/firmware/ardupilot.md, sections 6 and 7).
+
+Source: `ArduCopter/GCS_Mavlink.cpp` of ArduPilot 4.6.3.
+"""
 
 import math
 from typing import Final
@@ -40,23 +43,21 @@ class ArduCopterSetpoints:
             guided.set_hold(context)
             return
         position = _whole(wire.POSITION_BITS, mask, wire.position_of((message.x, message.y, message.z), 0))
-        velocity = _whole(wire.VELOCITY_BITS, mask, wire.velocity_of((message.vx, message.vy, message.vz), 0))
-        acceleration = _whole(
-            wire.ACCELERATION_BITS, mask, wire.acceleration_of((message.afx, message.afy, message.afz), 0)
-        )
-        if position is None or velocity is None or acceleration is None:
+        motion = self._motion(guided, message)
+        if motion is None or position is None:
             return
+        velocity, acceleration = motion
         yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
         if frame in _BODY_FRAMES:
             heading = wire.heading_of(context)
             position = wire.rotated_by_heading(position, heading)
             velocity = wire.rotated_by_heading(velocity, heading)
             acceleration = wire.rotated_by_heading(acceleration, heading)
-            yaw += heading if frame == mavlink.MAV_FRAME_BODY_OFFSET_NED else 0.0
+            yaw += heading
         if frame in _OFFSET_FRAMES:
             north_m, east_m, down_m = wire.place_of(context)
             position = (position[0] + north_m, position[1] + east_m, position[2] + down_m)
-        self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate), mask)
+        self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
     def on_global(self, message: MavlinkMessage, time_us: int) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
@@ -64,30 +65,46 @@ class ArduCopterSetpoints:
         if guided is None:
             return
         context, mask = self.commander.context, message.type_mask
-        relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
-        if relative is None:
-            guided.set_hold(context)
+        motion = self._motion(guided, message)
+        if motion is None:
             return
+        velocity, acceleration = motion
         position: wire.Triple | None = wire.UNSET
-        if not any(mask & bit for bit in wire.POSITION_BITS):
-            position = wire.local_from_global(
-                context, message.lat_int, message.lon_int, message.alt, relative=relative
-            )
-        velocity = _whole(wire.VELOCITY_BITS, mask, wire.velocity_of((message.vx, message.vy, message.vz), 0))
+        if not any(mask & bit for bit in wire.POSITION_BITS):  # the frame is that of the position
+            relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
+            position = None
+            if relative is not None:
+                position = wire.local_from_global(
+                    context, message.lat_int, message.lon_int, message.alt, relative=relative
+                )
+            if position is None:
+                guided.set_hold(context)
+                return
+        yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
+        self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
+
+    def _motion(self, guided: GuidedTask, message: MavlinkMessage) -> tuple[wire.Triple, wire.Triple] | None:
+        """Velocity and acceleration; None: the message is not used further.
+
+        A velocity that is no speed of a vehicle stops it, forces and an impossible acceleration are ignored.
+        """
+        mask = message.type_mask
         acceleration = _whole(
             wire.ACCELERATION_BITS, mask, wire.acceleration_of((message.afx, message.afy, message.afz), 0)
         )
-        if position is None or velocity is None or acceleration is None:
-            return
-        yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
-        self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate), mask)
+        forces = mask & wire.FORCE_BIT and not any(mask & bit for bit in wire.ACCELERATION_BITS)
+        if acceleration is None or forces:
+            return None
+        velocity = _whole(wire.VELOCITY_BITS, mask, wire.velocity_of((message.vx, message.vy, message.vz), 0))
+        if velocity is None:
+            guided.set_hold(self.commander.context)
+            return None
+        return velocity, acceleration
 
-    def _follow(self, guided: GuidedTask, target: wire.Target, type_mask: int) -> None:
+    def _follow(self, guided: GuidedTask, target: wire.Target) -> None:
         context = self.commander.context
         yaw, yaw_rate = target.yaw_rad, target.yaw_rate_rad_s
-        if type_mask & wire.FORCE_BIT:
-            guided.set_hold(context)
-        elif target.has_position and target.has_velocity:
+        if target.has_position and target.has_velocity:
             guided.set_trajectory(
                 context,
                 target.position,
@@ -106,7 +123,7 @@ class ArduCopterSetpoints:
             )
         elif target.has_acceleration and not target.has_position:
             guided.set_acceleration(context, target.acceleration, yaw_rad=yaw, yaw_rate_rad_s=yaw_rate)
-        elif target.has_position:
+        elif target.has_position and not target.has_acceleration:
             self.commander.guidance.go_to(guided, target.position, yaw_rad=yaw, yaw_rate_rad_s=yaw_rate)
         else:
             guided.set_hold(context)
@@ -123,12 +140,12 @@ class ArduCopterSetpoints:
         if q is None:
             return
         rates = wire.rates_of(message)
+        used = [math.isfinite(rate) for rate in rates]
+        if any(used) and not all(used):  # all three or none
+            guided.set_hold(self.commander.context)
+            return
         guided.set_attitude(
-            self.commander.context,
-            q,
-            min(1.0, max(0.0, message.thrust)),
-            rates if all(math.isfinite(rate) for rate in rates) else wire.UNSET,
-            yaw_rate_rad_s=rates[2],
+            self.commander.context, q, min(1.0, max(0.0, message.thrust)), rates, yaw_rate_rad_s=rates[2]
         )
 
     def _guided(self) -> GuidedTask | None:

@@ -54,9 +54,17 @@ class ArduPlaneSetpoints:
         self.commander.emit(AltitudeChanged(time_us=self.commander.time_us, height_m=height_m))
 
     def on_global(self, message: MavlinkMessage, time_us: int) -> None:
-        """SET_POSITION_TARGET_GLOBAL_INT: its altitude."""
+        """SET_POSITION_TARGET_GLOBAL_INT: its altitude.
+
+        As in the firmware (`ArduPlane/GCS_Mavlink.cpp`) it is used when the mask has any bit but that of the
+        altitude, whether the mask ignores the altitude or not.
+        """
         frame, context = message.coordinate_frame, self.commander.context
-        if message.type_mask & _Z_BIT or not abs(message.alt) <= _MAX_ALTITUDE_M or context.frame is None:
+        if (
+            not message.type_mask & ~_Z_BIT
+            or not abs(message.alt) <= _MAX_ALTITUDE_M
+            or context.frame is None
+        ):
             return
         if frame in _RELATIVE:
             reference_down_m = self._home_down_m()
