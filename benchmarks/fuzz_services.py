@@ -1,7 +1,7 @@
 """Malformed and out-of-range messages into vehicles in hold: every message of the dialect and the sequences
 of every service, with absurd fields.
 
-    python -m benchmarks.fuzz_services [--messages 1000000] [--seed 0] [--flavour px4|ardupilot] [--jobs 2]
+    python -m benchmarks.fuzz_services [--messages 1000000] [--seed 0] [--orders] [--jobs 2]
 
 The messages are shared out to both flavours and both classes of vehicle. What is required
 (`tests.fuzz.campaign`): no exception, no batch of messages that takes more than 50 ms, a vehicle that keeps
@@ -32,13 +32,14 @@ class Job:
     model: str
     seed: int
     messages: int
+    orders_only: bool
 
 
 def fire(job: Job) -> tuple[Job, Figures, float]:
     """Run one."""
     start_s = time.perf_counter()
     campaign = Campaign(job.flavour, job.model, job.seed)
-    campaign.run(job.messages, reported=_tell)
+    campaign.run(job.messages, orders_only=job.orders_only, reported=_tell)
     return job, campaign.figures, time.perf_counter() - start_s
 
 
@@ -63,13 +64,17 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--flavour", choices=FLAVOURS, help="one flavour alone")
     parser.add_argument("--model", choices=MODELS, help="one model alone")
+    parser.add_argument("--orders", action="store_true", help="rounds with commands and parameters only")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     arguments = parser.parse_args()
     flavours = (arguments.flavour,) if arguments.flavour else FLAVOURS
     models = (arguments.model,) if arguments.model else MODELS
     kinds = list(itertools.product(flavours, models))
     share = -(-arguments.messages // len(kinds))
-    jobs = [Job(flavour=f, model=m, seed=arguments.seed, messages=share) for f, m in kinds]
+    jobs = [
+        Job(flavour=f, model=m, seed=arguments.seed, messages=share, orders_only=arguments.orders)
+        for f, m in kinds
+    ]
     failed = False
     start_s = time.perf_counter()
     total = 0
@@ -81,7 +86,8 @@ def main() -> int:
             sys.stdout.write(
                 f"{job.flavour:<10} {job.model:<10} {figures.messages:>8} messages in {seconds:5.0f} s, "
                 f"longest batch {1e3 * figures.longest_s:5.1f} ms, "
-                f"farthest {figures.farthest_m:4.2f} m, memory {100 * grown:+.1f} %\n"
+                f"farthest {figures.farthest_m:4.2f} m, {figures.diverged} diverged, "
+                f"memory {100 * grown:+.1f} %\n"
             )
             for complaint in figures.complaints:
                 sys.stdout.write(f"  {complaint}\n")

@@ -23,6 +23,7 @@ from autopilot_bridge.sitl.warm_up import compile_flight_code
 from autopilot_bridge.tlog import TlogWriter
 from flightsim import truth as t
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
+from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import VehicleSpec
 from tests.fuzz.generator import Generator
 from tests.system.flying import Flying
@@ -43,6 +44,7 @@ class Figures:
     Attributes:
         longest_s: of a batch, in this thread's own time; where it was longer than allowed, `slow` tells.
         farthest_m: from where the vehicle held, in harmless rounds (multicopters).
+        diverged: rounds with orders after which the motion was not possible any more.
         complaints: what should not have been.
         memory_bytes: resident after each round.
     """
@@ -51,6 +53,7 @@ class Figures:
     answers_bytes: int = 0
     longest_s: float = 0.0
     farthest_m: float = 0.0
+    diverged: int = 0
     complaints: list[str] = field(default_factory=list)
     memory_bytes: list[int] = field(default_factory=list)
 
@@ -71,19 +74,22 @@ class Campaign:
         self._round = 0
         compile_flight_code((VehicleSpec(model=model),))
 
-    def run(self, count: int, *, reported: Callable[[str], None] = lambda text: None) -> Figures:
-        """Fire so many messages: five of six in rounds that are harmless."""
+    def run(
+        self, count: int, *, orders_only: bool = False, reported: Callable[[str], None] = lambda text: None
+    ) -> Figures:
+        """Fire so many messages: five of six in rounds that are harmless, or all in rounds with orders."""
         with objects_kept():
-            return self._run(count, reported)
+            return self._run(count, orders_only, reported)
 
-    def _run(self, count: int, reported: Callable[[str], None]) -> Figures:
+    def _run(self, count: int, orders_only: bool, reported: Callable[[str], None]) -> Figures:
         figures = self.figures
         while figures.messages < count:
             flying = self._fresh()
             gc.unfreeze()  # the vehicle before is garbage now, and would be kept for good
             gc.collect()
             gc.freeze()
-            self._fire(flying, min(count - figures.messages, HARMLESS_ROUND), orders=False)
+            if not orders_only:
+                self._fire(flying, min(count - figures.messages, HARMLESS_ROUND), orders=False)
             if figures.messages < count:
                 self._fire(flying, min(count - figures.messages, ORDERS_ROUND), orders=True)
             figures.memory_bytes.append(resident_bytes())
@@ -106,8 +112,12 @@ class Campaign:
 
     def _fire(self, flying: Flying, count: int, *, orders: bool) -> None:
         self._round += 1
-        names = [item.name for item in flying.autopilot.parameters.definitions]
-        generator = Generator(self._seed * 1000 + self._round, names, orders=orders)
+        generator = Generator(
+            self._seed * 1000 + self._round,
+            flying.autopilot.parameters.definitions,
+            orders=orders,
+            bytewise=flying.autopilot.flavour.bytewise_parameters,
+        )
         link = flying.sitl.connect(0)
         figures, sitl = self.figures, flying.sitl
 
@@ -124,6 +134,11 @@ class Campaign:
                 for frame in batch:
                     link.send(frame)
                 sitl.advance()
+            except VehicleDivergedError:
+                if not orders:
+                    raise
+                figures.diverged += 1  # no gains suit every vehicle; a server starts it again
+                return
             except Exception as error:  # noqa: BLE001 - whatever it is, it is what is looked for
                 where = traceback.extract_tb(error.__traceback__)[-1]
                 what = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"

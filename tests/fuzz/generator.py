@@ -13,6 +13,7 @@ from typing import Final
 from pymavlink.generator.mavcrc import x25crc
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, MAVLinkMessage, MessageDefinition, dialect
+from autopilot_bridge.parameters import INTEGER_LIMITS, ParameterDefinition
 
 VEHICLE: Final = 1
 ABSENT_SYSTEM: Final = 77
@@ -99,13 +100,18 @@ class Generator:
 
     Args:
         seed: all of it follows from this.
-        parameter_names: of the vehicle.
+        parameters: of the vehicle.
         orders: orders as well; else what is harmless alone.
+        bytewise: whole numbers of parameters travel as bit patterns (PX4).
     """
 
-    def __init__(self, seed: int, parameter_names: Sequence[str], *, orders: bool) -> None:
+    def __init__(
+        self, seed: int, parameters: Sequence[ParameterDefinition], *, orders: bool, bytewise: bool
+    ) -> None:
         self._rng = random.Random(seed)
-        self._names = parameter_names
+        self._parameters = parameters
+        self._names = [parameter.name for parameter in parameters]
+        self._bytewise = bytewise
         self._orders = orders
         self._encoders = [FrameEncoder(*ids) for ids in ((255, 190), (254, 1), (VEHICLE, 191), (51, 68))]
         self._definitions = list(DEFINITIONS.values())
@@ -358,6 +364,24 @@ class Generator:
         for _ in range(rng.randrange(1, 4)):
             kind = rng.choice((1, 2, 6, 6, 9, 9, 9, 255))
             yield dialect.MAVLink_param_set_message(VEHICLE, 1, self._name(), self._float(), kind)
+            yield self._sensible_parameter()
+
+    def _sensible_parameter(self) -> MAVLinkMessage:
+        """A parameter in its own type: within its range, at its ends, somewhat or far beyond them."""
+        rng = self._rng
+        parameter = rng.choice(self._parameters)
+        low = -1000.0 if parameter.minimum is None else parameter.minimum
+        high = 1000.0 if parameter.maximum is None else parameter.maximum
+        span = max(high - low, 1.0)
+        value = rng.choice(
+            (rng.uniform(low, high), low, high, low - rng.random() * span, high + rng.random() * span,
+             low - 1e4 * span, high + 1e4 * span, 0.0, -parameter.default, 1000.0 * parameter.default)
+        )  # fmt: skip
+        if parameter.is_integer:
+            least, greatest = INTEGER_LIMITS[parameter.type]
+            whole = min(max(round(value), least), greatest)
+            value = struct.unpack("<f", struct.pack("<i", whole))[0] if self._bytewise else float(whole)
+        return dialect.MAVLink_param_set_message(VEHICLE, 1, parameter.name.encode(), value, parameter.type)
 
     def _all_commands(self) -> Iterator[MAVLinkMessage]:
         rng = self._rng

@@ -69,17 +69,17 @@ class ArduCopterSetpoints:
         if motion is None:
             return
         velocity, acceleration = motion
-        position: wire.Triple | None = wire.UNSET
+        position = wire.UNSET
         if not any(mask & bit for bit in wire.POSITION_BITS):  # the frame is that of the position
-            relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
-            position = None
+            place, relative = None, _GLOBAL_FRAMES.get(message.coordinate_frame)
             if relative is not None:
-                position = wire.local_from_global(
+                place = wire.local_from_global(
                     context, message.lat_int, message.lon_int, message.alt, relative=relative
                 )
-            if position is None:
+            if place is None:
                 guided.set_hold(context)
                 return
+            position = place
         yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
         self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
