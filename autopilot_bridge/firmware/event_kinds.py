@@ -10,6 +10,7 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 from autopilot_bridge.firmware.texts import Severity
+from autopilot_bridge.mavlink.event_messages import event_sub_id
 
 COMPONENT: Final = 1
 ARGUMENT_BYTES: Final = 40
@@ -87,11 +88,8 @@ class EventKind:
 
     @property
     def sub_id(self) -> int:
-        """Lower 24 bits of the event's number: FNV-1a of its name, as PX4 numbers its events."""
-        number = 0x811C9DC5
-        for byte in self.name.encode():
-            number = (number ^ byte) * 0x01000193 & 0xFFFFFFFF
-        return number & 0xFFFFFF
+        """Lower 24 bits of the event's number."""
+        return event_sub_id(self.name)
 
     @property
     def event_id(self) -> int:

@@ -11,6 +11,8 @@ from missions.vehicle.heights import HeightRule
 from missions.vehicle.link import VehicleLink, describe_ack
 
 ACK_S: Final = 1.0
+REASON_S: Final = 0.5
+"""Time within which the texts about a refusal follow it: 0.1 s, longer on a slow line."""
 _SENDINGS: Final = 5
 _NEXT_PROGRESS_S: Final = 10.0
 _IN_PROGRESS_LIMIT_S: Final = 60.0
@@ -94,7 +96,7 @@ class VehicleCommands:
             VehicleTimeout: none of the attempts was answered, or the command was not finished.
         """
         result = await self.try_command(command, *params, timeout_s=timeout_s)
-        self.require(command, result)
+        await self._require_with_reason(command, result)
 
     async def try_command(self, command: int, *params: float, timeout_s: float = ACK_S) -> int:
         """As `command`, but returns the MAV_RESULT."""
@@ -131,7 +133,8 @@ class VehicleCommands:
         message = dialect.MAVLink_command_int_message(
             self.link.system_id, AUTOPILOT_COMPONENT, frame, command, 0, 0, *params, x, y, z
         )
-        self.require(command, await self._send_command(command, lambda _attempt: message, ACK_S))
+        result = await self._send_command(command, lambda _attempt: message, ACK_S)
+        await self._require_with_reason(command, result)
 
     async def _send_command(
         self, command: int, message: Callable[[int], MAVLinkMessage], timeout_s: float
@@ -169,6 +172,12 @@ class VehicleCommands:
                 ack = await anext(acks)
                 if ack.command == command and self.link.addressed_here(ack):
                     return ack
+
+    async def _require_with_reason(self, command: int, result: int) -> None:
+        """As `require`; waits for the texts about a refusal, which may follow the answer."""
+        if result != _ACCEPTED:
+            await self.link.clock.sleep(REASON_S)
+        self.require(command, result)
 
     def require(self, command: int, result: int) -> None:
         """Raise CommandRejected unless a command's result is ACCEPTED."""
@@ -259,6 +268,7 @@ class VehicleCommands:
             if result == _ACCEPTED:
                 break
             if result not in _MAY_PASS or link.clock.time_us >= end_us:
-                self.require(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
+                self.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the autopilot then sends all reasons
+                await self._require_with_reason(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
             await link.clock.sleep(1.0)
         await link.wait_until(lambda: link.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=5.0)

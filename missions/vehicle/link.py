@@ -7,6 +7,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import replace
 from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock, TelemetryClock
@@ -24,6 +25,7 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes, LinkLoss
+from missions.vehicle import px4_events
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
@@ -34,6 +36,9 @@ from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusText
 T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
+_TEXTS_SHOWN_LEAST: Final = 3
+_TEXTS_SHOWN_MOST: Final = 10
+_TOGETHER_US: Final = 10_000_000
 _HEARTBEAT: Final = definition("HEARTBEAT").message_id
 _read_heartbeat: Final = field_reader("HEARTBEAT", "custom_mode", "type", "autopilot", "base_mode")
 _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
@@ -87,6 +92,7 @@ class VehicleLink:
         self._watch.on_lost = self._note_loss
         self._watch.on_regained = self._note_regained
         connection.listen("STATUSTEXT", self._on_status_text)
+        connection.listen("EVENT", self._on_event)
         connection.listen("COMMAND_ACK", self._on_ack)
         connection.listen("HEARTBEAT", self._on_heartbeat)
 
@@ -233,7 +239,18 @@ class VehicleLink:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
             text = self._assembler.add(decode(frame))
             if text is not None:
-                self.status_texts.append(text)
+                self.status_texts.append(replace(text, received_us=self.clock.time_us))
+
+    def _on_event(self, frame: Any) -> None:
+        """Add the reason that PX4 names by an event without a text."""
+        if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
+            event = decode(frame)
+            found = px4_events.reason(event.id, event.log_levels)
+            if found is not None:
+                severity, words = found
+                self.status_texts.append(
+                    StatusText(severity=severity, text=words, received_us=self.clock.time_us)
+                )
 
     def _on_ack(self, frame: Any) -> None:
         if frame.system_id == self._system_id:
@@ -389,9 +406,22 @@ class VehicleLink:
         if self.notes.link_losses and self.notes.link_losses[-1].end_us is not None:
             loss = self.notes.link_losses[-1]
             parts.append(f"the link had been lost for {((loss.end_us or 0) - loss.start_us) * 1e-6:.0f} s")
-        if self.status_texts:
-            parts.append("texts " + " / ".join(repr(t.text) for t in list(self.status_texts)[-3:]))
+        texts = self._recent_texts()
+        if texts:
+            parts.append("texts " + " / ".join(map(repr, texts)))
         return ", ".join(parts)
+
+    def _recent_texts(self) -> list[str]:
+        """The texts that were received shortly before the newest, without repetitions, oldest first; at least
+        the last three. A refusal's own reason is among them, also where the autopilot goes on to send others.
+        """
+        if not self.status_texts:
+            return []
+        since_us = self.status_texts[-1].received_us - _TOGETHER_US
+        recent = [t.text for t in self.status_texts if t.received_us >= since_us]
+        last = [t.text for t in list(self.status_texts)[-_TEXTS_SHOWN_LEAST:]]
+        newest = list(dict.fromkeys(reversed(recent if len(recent) > len(last) else last)))
+        return newest[_TEXTS_SHOWN_MOST - 1 :: -1]
 
     # waiting
 

@@ -12,6 +12,7 @@ from missions.vehicle.connection import AUTOPILOT_COMPONENT, MessageStream
 from missions.vehicle.link import VehicleLink
 
 _RETRY_S: Final = 1.5
+_REASON_S: Final = 0.5  # the texts about a refusal may follow it
 _RETRIES: Final = 5
 _SENDINGS: Final = 3
 _STUCK_S: Final = 6.0  # PX4 cancels a transfer after 5 s
@@ -140,6 +141,7 @@ async def _send_plan(
                 where = ""
                 if requested >= 0:
                     where = f" at item {requested - before + 1} ({command_name(items[requested].command)})"
+                await link.clock.sleep(_REASON_S)
                 raise CommandRejected(
                     f"the vehicle refused the {what}{where}: {_result_name(reply.type)}; "
                     f"{link.last_received()}",

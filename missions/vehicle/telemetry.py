@@ -107,10 +107,17 @@ class Gps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatusText:
-    """A text for the pilot: severity as MAV_SEVERITY (3 error, 4 warning, 6 information)."""
+    """A text for the pilot.
+
+    Attributes:
+        severity: as MAV_SEVERITY (3 error, 4 warning, 6 information).
+        text: the text, or the words of an event that has none.
+        received_us: vehicle time at which it was complete.
+    """
 
     severity: int
     text: str
+    received_us: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -400,7 +400,7 @@ class Vehicle:
     async def _command_safe(self, action: Mode) -> None:
         if self.link.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
             with suppress(MissionError):  # refused if it has just left the ground
-                await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
+                await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
         # also for a disarmed vehicle: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
             self.notes.left = f"was commanded to {mode} and did not answer"
