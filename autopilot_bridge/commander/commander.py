@@ -42,7 +42,8 @@ from autopilot_bridge.commander.tasks import TaskRunner
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, SetpointStream, VehicleTasks
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.flight.plan_reading import ends_in_landing, in_landing_sequence, starts_with_takeoff
+from autopilot_bridge.flight.plan_reading import ends_in_landing, in_landing_sequence
+from autopilot_bridge.mission_feasibility.ardupilot import starts_with_takeoff
 from autopilot_bridge.mission_plan import MissionStore
 
 # Health, failsafes and arming checks run at 10 Hz, as in PX4's commander; flight tasks at 50 Hz.
@@ -345,7 +346,7 @@ class Commander:
             self.policy.landing_blocks_arming
             and self.commanded_mode is FlightMode.MISSION
             and in_landing_sequence(self.missions)
-            and not starts_with_takeoff(self.missions.items)
+            and not starts_with_takeoff(self.missions.items[1:])
         )
         self._events.extend(self._fence_keeper.update(self.situation))
 

@@ -166,12 +166,6 @@ def in_landing_sequence(missions: MissionStore) -> bool:
     return behind_start or items[current].command == Command.NAV_LAND
 
 
-def starts_with_takeoff(items: Sequence[MissionItem]) -> bool:
-    """The first item that is flown is a take-off; item 0 is home (ArduPilot)."""
-    first = next((item for item in items[1:] if is_navigation(item)), None)
-    return first is not None and first.command in (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF)
-
-
 def ends_in_landing(missions: MissionStore) -> bool:
     """The current item is a landing."""
     items, current = missions.items, missions.current
