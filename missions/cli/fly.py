@@ -12,7 +12,7 @@ from missions.cli.confirm import confirmation
 from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
 from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
 from missions.cli.mission_command import FlightOption, Scope
-from missions.cli.options import SECONDS, SPEEDUP, in_options, report
+from missions.cli.options import SECONDS, SPEEDUP, FiniteRange, in_options, report
 from missions.cli.params import STRICT_HELP, known_to_all
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.world import WORLD_HELP, world_of
@@ -120,6 +120,13 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     type=float,
     metavar="M",
     help="Fail when the path error exceeds it anywhere in a pattern, m.",
+)
+@_flight(
+    "--endurance",
+    type=FiniteRange(min=0.0, max=6000.0, min_open=True),
+    metavar="MIN",
+    help="Time that the battery lasts in flight, min: a longer mission is named before the takeoff, and "
+    "refused on a vehicle that may be real. [default: as the vehicle reports it]",
 )
 @_link("--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS.")
 @_estimator(
@@ -230,6 +237,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
         on_failure=Mode(given["on_failure"]),
         max_error_m=given["max_error"],
         regain_s=REGAIN_S if given["regain"] is None else given["regain"],
+        endurance_s=None if given["endurance"] is None else 60.0 * given["endurance"],
         estimator=given["estimator"],
         estimator_settings=given["settings"],
     )

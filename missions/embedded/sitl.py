@@ -13,6 +13,7 @@ from estimators.errors import LogError, VideoError
 from estimators.logs.new_file import new_file
 from flightsim.airframe import load_airframe
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.hover_endurance import hover_endurance_s
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
@@ -87,6 +88,11 @@ class EmbeddedSitl:
         out.
         """
         return self.sitl.vehicles[index].parameter_values(names)
+
+    def endurance_s(self, index: int) -> float | None:
+        """How long the battery of a vehicle lasts in hover, by its model; None: not known."""
+        vehicle = self.sitl.spec.vehicles[index]
+        return hover_endurance_s(vehicle.model, home=self.sitl.spec.place, battery_ah=vehicle.battery_ah)
 
     @property
     def home(self) -> GeodeticPosition:

@@ -13,6 +13,8 @@ from missions.errors import MissionError
 from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.outline import Outline
+from missions.preflight.endurance import PARAMETERS as ENDURANCE_PARAMETERS
+from missions.preflight.endurance import Endurance, endurance_finding, reported_endurance
 from missions.preflight.finding import Finding, Level, ok, problem, warning
 from missions.preflight.health import health_findings, remote_control_received
 from missions.preflight.lost_link import PARAMETERS, lost_link, lost_link_words
@@ -30,7 +32,6 @@ from missions.vehicle.vehicle import Vehicle
 FARTHEST_M: Final = 10_000.0
 _FAR_M: Final = 1000.0
 _PLAN_HOME_M: Final = 200.0
-_RESERVE: Final = 1.3
 _REQUESTED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
 _SHOWN: Final = (*_REQUESTED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
 _LISTEN_S: Final = 1.5
@@ -81,12 +82,17 @@ meanwhile.
 
 
 async def look(
-    vehicle: Vehicle, mission: Mission[Any], options: MissionOptions, simulation_proof: str = ""
+    vehicle: Vehicle,
+    mission: Mission[Any],
+    options: MissionOptions,
+    simulation_proof: str = "",
+    endurance: Endurance | None = None,
 ) -> Look:
     """Check a vehicle that is ready to arm, and the mission to be flown with it.
 
     Args:
         simulation_proof: what proves that the vehicle is a simulation; "": nothing.
+        endurance: how long its battery lasts; None: as it reports.
     """
     snapshot, fence_items = await _snapshot(vehicle)
     outline = await mission.outline(vehicle, options)
@@ -97,7 +103,7 @@ async def look(
         *health_findings(snapshot),
         fence(snapshot, len(planned)),
         *_way(vehicle, outline, own_fence, snapshot.parameters),
-        _endurance(snapshot, outline),
+        endurance_finding(outline, endurance or reported_endurance(snapshot)),
         *settings_findings(snapshot),
         _lost_link(vehicle, snapshot),
     ]
@@ -156,6 +162,7 @@ async def _parameters(vehicle: Vehicle) -> dict[str, float]:
             *(r.name for r in RULES[vehicle.autopilot] if r.kind in (None, vehicle.kind)),
             *FENCE_PARAMETERS[vehicle.autopilot],
             *PARAMETERS[vehicle.autopilot, vehicle.kind],
+            *ENDURANCE_PARAMETERS[vehicle.autopilot],
         )
     )
     gate = asyncio.Semaphore(_PARAMETERS_AT_ONCE)
@@ -243,21 +250,6 @@ def _way(
 
 def _fence_type(parameters: Mapping[str, float], bit: int) -> bool:
     return bool(parameters.get("FENCE_ENABLE")) and bool(int(parameters.get("FENCE_TYPE", 0.0)) & bit)
-
-
-def _endurance(snapshot: Snapshot, outline: Outline | None) -> Finding:
-    """Finding about the battery's endurance for the mission, as far as both are known."""
-    duration_s = None if outline is None else outline.duration_s
-    if duration_s is None:
-        return warning("duration", "the mission does not state how long it flies", "check it yourself")
-    text = f"about {duration_s / 60.0:.1f} min of mission"
-    left_s = snapshot.whole("BATTERY_STATUS", "time_remaining")
-    if not left_s:
-        return ok("duration", f"{text}; the autopilot does not report how long the battery lasts")
-    text += f", {left_s / 60.0:.1f} min of battery"
-    if left_s < _RESERVE * duration_s:
-        return problem("duration", text, "charge it, or fly less")
-    return ok("duration", text)
 
 
 def _lost_link(vehicle: Vehicle, snapshot: Snapshot) -> Finding:

@@ -54,6 +54,8 @@ class RunRequest:
         on_remark: receives what a user should know before the flight, one sentence each.
         regain_s: longest time for which a lost link may stay lost before the mission fails, in seconds of
             this machine's clock.
+        endurance_s: how long the battery of each vehicle lasts in flight, by the user; None: as the vehicle
+            reports, or by the model of an embedded multicopter.
         command: the command line, for the summary.
         signing_key: signing key, shared with vehicles that are not embedded; None: no signing.
     """
@@ -79,6 +81,7 @@ class RunRequest:
     on_open: Callable[[], object] = lambda: None
     on_remark: Callable[[str], object] = lambda _text: None
     regain_s: float = REGAIN_S
+    endurance_s: float | None = None
     command: str = ""
     signing_key: SigningKey | None = None
 

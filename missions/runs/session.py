@@ -21,6 +21,7 @@ from missions.library import find_mission
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
 from missions.options import MissionOptions
+from missions.preflight.endurance import Endurance, too_long
 from missions.runs.claimed_folder import ClaimedFolder, claim_folder
 from missions.runs.ending import EndingSignals, signal_of
 from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
@@ -46,7 +47,6 @@ from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators
-    from missions.preflight.before_flight import Confirm
     from missions.runs.score import FlightScore
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
@@ -54,6 +54,8 @@ __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunRes
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
 INTERRUPTED: Final = "interrupted"
+
+_LOOKED_AT_S: Final = 90.0  # every battery lasts as long as a shorter mission; a model's figure takes 0.1 s
 _NAMES_SHOWN: Final = 20  # names of parameters in a remark; the summary has all
 
 
@@ -296,7 +298,7 @@ async def _fly(
                 [_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles]
             )
             flight.require_log()
-            await _fly_all(mission, flight.vehicles, request)
+            await _fly_all(mission, flight.vehicles, request, stage)
         finally:
             for vehicle in flight.vehicles:
                 vehicle.notes.end(vehicle.clock.stamp_us)
@@ -342,7 +344,9 @@ async def _set_parameters(vehicle: Vehicle, request: RunRequest) -> None:
         request.on_remark(f"vehicle {vehicle.system_id}: {left_out(names, _NAMES_SHOWN)}")
 
 
-async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:
+async def _fly_all(
+    mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest, stage: Stage
+) -> None:
     centre = vehicles[0].home if len(vehicles) > 1 else request.options.centre
     options: list[MissionOptions] = []
     for index, vehicle in enumerate(vehicles):
@@ -359,8 +363,10 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
     for vehicle, own in zip(vehicles, options, strict=True):
         for text in await mission.remarks(vehicle, own):
             request.on_remark(f"vehicle {vehicle.system_id}: {text}")
+        if mission.commands:
+            await _remark_endurance(mission, vehicle, own, request, stage)
     if request.confirm is not None:
-        await _confirm(mission, vehicles, options, request.confirm, simulations=request.confirm_simulations)
+        await _confirm(mission, vehicles, options, request)
     if not mission.commands:
         await run_concurrently(
             [mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)]
@@ -381,25 +387,41 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
 
 
 async def _confirm(
-    mission: Mission[Any],
-    vehicles: Sequence[Vehicle],
-    options: Sequence[MissionOptions],
-    confirm: "Confirm",
-    *,
-    simulations: bool,
+    mission: Mission[Any], vehicles: Sequence[Vehicle], options: Sequence[MissionOptions], request: RunRequest
 ) -> None:
     """Check the vehicles and ask for confirmation, unless all prove to be simulations."""
     from missions.preflight.before_flight import confirmed, look
     from missions.preflight.simulation import simulation_proof
 
     proofs = [await simulation_proof(vehicle) for vehicle in vehicles]
-    if all(proofs) and not simulations:
+    if request.confirm is None or (all(proofs) and not request.confirm_simulations):
         return
+    endurance = _given_endurance(request)
     looks = [
-        await look(vehicle, mission, own, proof)
+        await look(vehicle, mission, own, proof, endurance)
         for vehicle, own, proof in zip(vehicles, options, proofs, strict=True)
     ]
-    await confirmed(looks, confirm)
+    await confirmed(looks, request.confirm)
+
+
+def _given_endurance(request: RunRequest) -> Endurance | None:
+    """What the user knows of the battery."""
+    return None if request.endurance_s is None else Endurance(seconds=request.endurance_s, source="given")
+
+
+async def _remark_endurance(
+    mission: Mission[Any], vehicle: Vehicle, options: MissionOptions, request: RunRequest, stage: Stage
+) -> None:
+    """Say before the takeoff that the battery does not last as long as the mission, where it is known."""
+    outline = await mission.outline(vehicle, options)
+    if outline is None or (outline.duration_s or 0.0) < _LOOKED_AT_S:
+        return
+    known = _given_endurance(request)
+    if known is None and (seconds := stage.endurance_s(options.index)) is not None:
+        known = Endurance(seconds=seconds, source="by the model, in hover")
+    if text := too_long(outline, known):
+        vehicle.notes.warn(text)
+        request.on_remark(f"vehicle {vehicle.system_id}: {text}")
 
 
 async def _fly_one(

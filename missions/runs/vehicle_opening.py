@@ -38,6 +38,7 @@ class Stage:
             requested.
         home: home of an embedded world; None: the vehicles report theirs.
         close: releases everything; called at the end.
+        endurance_s: how long the battery of one vehicle (index) lasts in flight; None: not known.
         published_map: file of the published magnetic map of an embedded world; None: there is none.
         pictures: pictures of the embedded cameras with what they have detected, by file name.
         pictures_of: those that an embedded moving-point camera has kept.
@@ -52,6 +53,7 @@ class Stage:
     parameters: Callable[[int, Sequence[str]], dict[str, float]] | None
     home: GeodeticPosition | None
     close: Callable[[], None]
+    endurance_s: Callable[[int], float | None] = lambda _index: None
     published_map: Path | None = None
     pictures: Callable[[], Mapping[str, bytes]] = dict
     pictures_of: PicturesOf = lambda _system_id: ()
@@ -69,6 +71,7 @@ def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
         parameters=sitl.parameters,
         home=sitl.home,
         close=sitl.close,
+        endurance_s=sitl.endurance_s,
         published_map=sitl.published_map,
         pictures=sitl.pictures,
         pictures_of=sitl.pictures_of,

@@ -453,6 +453,9 @@ class FakeSitl:
         for autopilot in self.autopilots:
             autopilot.step(self.time_us)
 
+    def endurance_s(self, index):
+        return None
+
     def parameters(self, index, names):
         return {name: self.autopilots[index].parameters[name][0] for name in names}
 
