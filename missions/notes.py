@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import GeodeticPosition
+from missions.how_left import HowLeft, SafetyCommand
 from missions.options import MissionOptions
 
 PATTERN = "pattern"
@@ -64,11 +65,13 @@ class FlightNotes:
         progress: flown share of the pattern, 0..1.
         system_id, autopilot, kind: properties of the vehicle.
         options: as the vehicle flies them.
-        left: state in which the vehicle was left when the flight failed or was interrupted; "": neither
-            happened.
         aloft: where and how the vehicle stays in the air after its return, by its parameters; "": it does
             not.
         left_out_parameters: parameters that were to be set, and that the vehicle does not have.
+        safety_commands: what was commanded to leave the vehicle safe, because the flight failed or was
+            interrupted, and the answers.
+        withheld: why nothing was commanded then; "": it was, or it was not necessary.
+        left: how the vehicle was left; None: the flight has not ended, or no vehicle was received.
         warnings: warnings for the user, without repetitions.
         link_losses: times at which the link was lost and regained.
         lost_link: the autopilot's reaction to the loss of its ground station, as text; "": not known.
@@ -84,9 +87,11 @@ class FlightNotes:
     autopilot: str = ""
     kind: str = ""
     options: MissionOptions | None = None
-    left: str = ""
     aloft: str = ""
     left_out_parameters: tuple[str, ...] = ()
+    safety_commands: list[SafetyCommand] = field(default_factory=list)
+    withheld: str = ""
+    left: HowLeft | None = None
     warnings: list[str] = field(default_factory=list)
     link_losses: list[LinkLoss] = field(default_factory=list)
     lost_link: str = ""

@@ -23,7 +23,6 @@ from missions.multi_target.steps import BacksteppingLaw, StepLaw, TrajectoryLaw
 from missions.planning.limits import Limits, MulticopterLimits
 from missions.steering import steering
 from missions.vehicle.concurrency import run_concurrently
-from missions.vehicle.firmware import Mode
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.telemetry import Position
 
@@ -39,7 +38,6 @@ _POSITION_HZ: Final = {StepLawKind.TRAJECTORY: 10.0, StepLawKind.BACKSTEPPING: 5
 _SLOWEST_SHARE: Final = 0.2  # of the speed: a step that takes longer is given up
 _LEAST_STEP_S: Final = 15.0
 _SAME_RAD: Final = math.radians(3.0)  # smaller changes of heading are not commanded
-_MODE_AGE_US: Final = 2_500_000
 _POSITION_S: Final = 10.0  # longest time without a position, where headings are commanded from it
 
 
@@ -322,7 +320,6 @@ class SearchTeam(Generic[Options]):
     async def _search_by_headings(self, index: int) -> None:
         """Fly an aircraft along headings to one place after the other."""
         vehicle, own, searcher = self._vehicles[index], self._options[index], self.searchers[index]
-        guided = vehicle.firmware.modes[Mode.GUIDED]
         async with steering(
             vehicle, altitude_m=own.own_altitude_m, speed_m_s=own.speed_m_s or 0.0, rate_hz=own.rate_hz
         ) as flight:
@@ -333,10 +330,7 @@ class SearchTeam(Generic[Options]):
                     await vehicle.link.next_frame(
                         stream, what="position during the search", timeout_s=_POSITION_S
                     )
-                    settled = vehicle.clock.time_us - searcher.began_us > _MODE_AGE_US
                     vehicle.link.require_armed("during the search")
-                    if settled and vehicle.link.custom_mode != guided:
-                        raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
                     p = vehicle.latest(Position)
                     if p is None:
                         continue

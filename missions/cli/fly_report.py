@@ -129,11 +129,13 @@ def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
     summary = result.summary
     if result.outcome == "interrupted":
         report(f"{result.reason}; the log is in {result.folder}")
+        _report_how_left(result)
         return KILLED + result.signal
     _warn(summary)
     report_left_out(summary)
     if result.outcome == "failed":
         report(f"mission {summary['mission']} failed: {result.reason}")
+        _report_how_left(result)
         click.echo(f"failed: see {result.folder}")
         return _FAILED
     click.echo(
@@ -167,6 +169,13 @@ def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
             )
     click.echo(f"run: {result.folder}")
     return _print_estimator(summary["estimator"]) if "estimator" in summary else 0
+
+
+def _report_how_left(result: "RunResult") -> None:
+    from missions.how_left import lines
+
+    for line in lines(result.left):
+        report(line)
 
 
 def _print_estimator(summary: Mapping[str, Any]) -> int:

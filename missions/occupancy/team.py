@@ -22,7 +22,6 @@ from missions.occupancy.search import Search
 from missions.occupancy.suspect import Identify
 from missions.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
-from missions.vehicle.firmware import Mode
 from missions.vehicle.telemetry import Attitude, Position
 
 if TYPE_CHECKING:
@@ -33,7 +32,6 @@ SEARCH: Final = "search"
 
 _FIELD_YEAR: Final = 2026.0  # of the main field, whose direction changes little
 
-_MODE_AGE_US: Final = 2_500_000  # within this time heartbeats report a change of mode
 _POSITION_S: Final = 10.0  # longest time without a position, where headings are commanded from it
 _RING: Final = 0.25  # of the area: distance from its centre at which the searchers of a team start
 
@@ -160,7 +158,6 @@ class SearchTeam:
             self.search.begin(self.began_us)
         searcher.began_us = clock.time_us
         watch = searcher.watch = self._watch(index)
-        guided = vehicle.firmware.modes[Mode.GUIDED]
         watch.start()
         try:
             with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
@@ -171,10 +168,7 @@ class SearchTeam:
                     if self.over:
                         self.search.finish(self._vehicles[0].clock.time_us)
                         break
-                    settled = clock.time_us - searcher.began_us > _MODE_AGE_US
                     vehicle.link.require_armed("during the search")
-                    if settled and vehicle.link.custom_mode != guided:
-                        raise MissionError(f"the vehicle left the search; {vehicle.link.last_received()}")
                     command = searcher.pilot.update(self._motion(vehicle))
                     if command is not None:
                         await flight.turn_to(command.heading_rad)

@@ -101,14 +101,6 @@ def tracking(notes: "FlightNotes", score: "FlightScore") -> str | None:
     return WITHIN if score.path_max_error_m <= notes.commanded.acceptance_m else POOR
 
 
-def how_left(blocks: Sequence[Mapping[str, Any]]) -> str:
-    """The action taken with the vehicles of a flight that ended early; "" if no action was needed."""
-    left = {block["system_id"]: block["left"] for block in blocks if block["left"]}
-    if len(blocks) == 1:
-        return f"the vehicle {left[blocks[0]['system_id']]}" if left else ""
-    return ", ".join(f"vehicle {system_id} {words}" for system_id, words in left.items())
-
-
 def vehicle_summary(notes: "FlightNotes", score: "FlightScore") -> dict[str, Any]:
     """The figures of one vehicle's flight."""
     block: dict[str, Any] = {
@@ -125,7 +117,7 @@ def vehicle_summary(notes: "FlightNotes", score: "FlightScore") -> dict[str, Any
         "max_attitude_tracking_error_deg": _rounded(score.max_attitude_tracking_error_deg),
         "acceptance_m": None if notes.commanded is None else round(notes.commanded.acceptance_m, 3),
         "tracking": tracking(notes, score),
-        "left": notes.left,
+        "left": None if notes.left is None else notes.left.record(),
         "link_losses": [
             {"start_s": loss.start_us / 1e6, "end_s": None if loss.end_us is None else loss.end_us / 1e6}
             for loss in notes.link_losses

@@ -15,8 +15,9 @@ from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.parameter_files import left_out
-from missions.errors import MissionError, PlanError
+from missions.errors import MissionError, PlanError, TakenOver
 from missions.estimation.in_flight import estimators_of, refused_in_plan
+from missions.how_left import HowLeft
 from missions.library import find_mission
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
@@ -30,7 +31,6 @@ from missions.runs.request import RunRequest
 from missions.runs.run_folder import (
     LOG_NAME,
     PICTURE_NAME,
-    how_left,
     replace_summary,
     team_figures,
     vehicle_summary,
@@ -69,6 +69,7 @@ class RunResult:
         folder: the run folder.
         summary: contents of `summary.json`.
         signal: the signal that interrupted it; 0: none.
+        left: how each vehicle that was received was left.
     """
 
     outcome: str
@@ -76,6 +77,7 @@ class RunResult:
     folder: Path
     summary: Mapping[str, Any]
     signal: int = 0
+    left: tuple[HowLeft, ...] = ()
 
 
 class Flight:
@@ -107,6 +109,12 @@ class Flight:
             return 0.0
         begun_us = self.vehicles[0].link.first_heartbeat_us if self.elsewhere else self.started_us
         return max(0, self.clock.time_us - begun_us) * 1e-6
+
+    def note_how_left(self) -> None:
+        """Note how the vehicles are left now."""
+        for vehicle in self.vehicles:
+            if vehicle.link.identified:
+                vehicle.notes.left = vehicle.how_left()
 
     def require_log(self) -> None:
         """Make sure that all frames received so far are in the log.
@@ -200,7 +208,10 @@ def _fly_interruptible(
             outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
         except (MissionError, PlanError, BridgeError) as error:
             outcome, reason = FAILED, "; ".join((str(error), *getattr(error, "__notes__", ())))
+            if isinstance(error, TakenOver) and len(flight.vehicles) > 1:
+                reason = f"vehicle {error.take_over.system_id}: {reason}"
         finally:
+            flight.note_how_left()
             recorder.close()
     finally:
         stage.close()
@@ -214,8 +225,6 @@ def _fly_interruptible(
         if recorder.failure:
             reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
         outcome = FAILED if reason else COMPLETED
-    elif outcome == INTERRUPTED and how_left(blocks):
-        reason = f"{INTERRUPTED}; {how_left(blocks)}"
     summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
     if estimators is not None:
         summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
@@ -239,7 +248,14 @@ def _fly_interruptible(
         summary |= {"outcome": outcome, "reason": reason}
         if written:
             replace_summary(folder, summary)
-    return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary, signal=by_signal)
+    return RunResult(
+        outcome=outcome,
+        reason=reason,
+        folder=folder,
+        summary=summary,
+        signal=by_signal,
+        left=tuple(notes.left for notes, _ in debriefing.flights if notes.left is not None),
+    )
 
 
 def _estimator_files(
@@ -438,8 +454,7 @@ async def _fly_one(
             await flying
         if vehicle.armed and not vehicle.notes.aloft:
             raise MissionError(
-                f"the mission ended with the vehicle armed; it was commanded to {request.on_failure}. "
-                "End a mission with return_to_launch() or land()"
+                "the mission ended with the vehicle armed; end a mission with return_to_launch() or land()"
             )
         vehicle.notes.progress = 1.0
 

@@ -1,10 +1,10 @@
 """Commands and modes: the MAVLink command protocol with its confirmations."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
-from missions.errors import CommandRejected, VehicleTimeout
+from missions.errors import CommandRejected, ModeNotEntered, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode, ModeCommand
 from missions.vehicle.heights import HeightRule
@@ -25,6 +25,29 @@ _ALL_DONE: Final = 100  # percent; more means that the progress is not known
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
+class _ModeAnswers:
+    """The answers to one sending of DO_SET_MODE; PX4 may accept it and refuse it later.
+
+    Attributes:
+        refused: the COMMAND_ACK with which it was refused; None: it was not.
+        accepted: whether it was accepted.
+        await_heartbeat: it was accepted, and no heartbeat has shown the mode since. Then the mode of a pilot
+            may have followed unseen, and the command is not repeated yet.
+    """
+
+    def __init__(self) -> None:
+        self.refused: Any = None
+        self.accepted = False
+        self.await_heartbeat = False
+
+    def add(self, ack: Any) -> None:
+        """Note an answer."""
+        if ack.result == _ACCEPTED:
+            self.accepted = self.await_heartbeat = True
+        else:
+            self.refused, self.await_heartbeat = ack, False
+
+
 class VehicleCommands:
     """The command protocol of one vehicle, its modes and its arming.
 
@@ -34,13 +57,13 @@ class VehicleCommands:
     Attributes:
         link: as passed to the constructor.
         heights: whether heights below home may be commanded.
-        modes_requested: custom modes that were requested since this set was cleared.
+        until_safe: what is ended after the vehicle was left safe; None: nothing will leave it safe.
     """
 
     def __init__(self, link: VehicleLink) -> None:
         self.link = link
         self.heights = HeightRule()
-        self.modes_requested: set[int] = set()
+        self.until_safe: list[Callable[[], Awaitable[None]]] | None = None
         self._rates_hz: dict[str, float] = {}  # rates requested by this mission
         self._arming_us: int | None = None  # time at which arming was requested or accepted
 
@@ -194,39 +217,54 @@ class VehicleCommands:
         has switched.
 
         After a refusal it tries again until the deadline, because some causes are temporary (a mission that
-        was just uploaded, an estimator that settles).
+        was just uploaded, an estimator that settles). An accepted command is repeated only after a heartbeat
+        with another mode, and that mode may be a pilot's: then it is a take-over, and nothing is repeated.
+
+        Raises:
+            CommandRejected: the vehicle refused it until the deadline.
+            ModeNotEntered: no heartbeat with the mode was received.
         """
         target = self.link.firmware.modes[mode]
         command = self.link.firmware.mode_command(mode)
-        self.modes_requested.add(target)
-        refused: Any = None
+        answers = _ModeAnswers()
         with self.link.messages("COMMAND_ACK", "HEARTBEAT") as replies:
             try:
                 async with self.link.deadline(timeout_s, f"mode {mode}"):
                     while True:
                         self._send_mode(command)
-                        sent_us = self.link.clock.time_us
-                        refused = None
-                        while True:
-                            left_s = _MODE_AGAIN_S - (self.link.clock.time_us - sent_us) * 1e-6
-                            reply = await self._next_within(replies, left_s)
-                            if reply is None:
-                                break
-                            if reply.get_type() == "HEARTBEAT":
-                                if reply.custom_mode == target:
-                                    return
-                            elif reply.command == dialect.MAV_CMD_DO_SET_MODE:
-                                refused = reply if reply.result != _ACCEPTED else refused
+                        answers = _ModeAnswers()
+                        if await self._entered(target, replies, answers):
+                            return
             except TimeoutError:
                 pass
+        refused = answers.refused
         if refused is not None:
             raise CommandRejected(
                 f"the vehicle refused mode {mode}: {describe_ack(refused)}; {self.link.last_received()}",
                 int(refused.result),
             )
-        raise VehicleTimeout(
-            f"mode {mode} was not entered within {timeout_s:g} s; {self.link.last_received()}"
+        raise ModeNotEntered(
+            f"mode {mode} was not entered within {timeout_s:g} s; {self.link.last_received()}",
+            acknowledged=answers.accepted,
         )
+
+    async def _entered(self, target: int, replies: Any, answers: "_ModeAnswers") -> bool:
+        """Wait for a heartbeat with the mode; returns False when the command is to be sent again."""
+        clock = self.link.clock
+        end_us = clock.time_us + round(_MODE_AGAIN_S * 1e6)
+        while True:
+            reply = await self._next_within(replies, (end_us - clock.time_us) * 1e-6)
+            if reply is None:
+                if not answers.await_heartbeat:
+                    return False
+                answers.await_heartbeat = False
+                end_us += round(_MODE_AGAIN_S * 1e6)
+            elif reply.get_type() == "HEARTBEAT":
+                if reply.custom_mode == target:
+                    return True
+                answers.await_heartbeat = False
+            elif reply.command == dialect.MAV_CMD_DO_SET_MODE:
+                answers.add(reply)
 
     async def _next_within(self, replies: Any, seconds: float) -> Any:
         if seconds <= 0.0:

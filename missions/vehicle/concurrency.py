@@ -22,8 +22,9 @@ async def run_concurrently(coroutines: Iterable[Coroutine[Any, Any, None]]) -> N
                 group.create_task(coroutine)
     except* (MissionError, PlanError, BridgeError) as errors:
         first, *others = _single(errors)
-        for other in others:
-            first.add_note(f"also failed: {other}")
+        for text in dict.fromkeys(map(str, others)):
+            if text != str(first):
+                first.add_note(f"also failed: {text}")
         raise first from None
 
 

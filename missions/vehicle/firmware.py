@@ -49,6 +49,11 @@ class Firmware:
             item.
         goto_mode: the mode after DO_REPOSITION.
         left_before_arming: custom modes in which a vehicle can't be armed, or flies off when it is.
+        modes_of_command: custom modes that the vehicle enters for a command, by MAV_CMD; without DO_SET_MODE.
+        modes_following: custom modes that the autopilot enters by itself when a custom mode has done its
+            task, by that mode.
+        failsafe_status_acts: whether MAV_STATE_CRITICAL says that a failsafe flies the vehicle (PX4), not
+            only that one was triggered (ArduPilot).
         resting_mode: a mode in which the vehicle may stand on the ground and be armed.
         unset: value of a command or item parameter that is not set.
         system_id_parameter: name of the parameter that sets the vehicle's system id.
@@ -63,6 +68,9 @@ class Firmware:
     modes: Mapping[Mode, int]
     mode_names: Mapping[int, str]
     sub_modes: bool
+    modes_of_command: Mapping[int, tuple[int, ...]]
+    modes_following: Mapping[int, tuple[int, ...]]
+    failsafe_status_acts: bool
     stream_rates_hz: Mapping[str, float]
     bytewise_parameters: bool
     setpoints_before_guided: bool
@@ -90,6 +98,12 @@ class Firmware:
         if not self.sub_modes:
             return ModeCommand(main=custom_mode)
         return ModeCommand(main=custom_mode >> 16 & 0xFF, sub=custom_mode >> 24)
+
+    def mode_commanded(self, command: ModeCommand) -> int:
+        """The custom mode that DO_SET_MODE commands: the inverse of `mode_command`."""
+        if not self.sub_modes:
+            return int(command.main)
+        return int(command.main) << 16 | int(command.sub) << 24
 
     def limits(self, parameters: Mapping[str, float]) -> Limits:
         """The limits for a planner.

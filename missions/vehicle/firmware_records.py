@@ -28,8 +28,20 @@ def _tables(name: str) -> dict[str, Any]:
         modes = {Mode[mode]: _custom_mode(number) for mode, number in tables["modes"].items()}
         names = {_custom_mode(number): name for number, name in tables["mode_names"].items()}
         left = frozenset(_custom_mode(number) for number in tables["left_before_arming"])
+        of_command = {
+            getattr(dialect, f"MAV_CMD_{command}"): tuple(map(_custom_mode, numbers))
+            for command, numbers in tables["modes_of_command"].items()
+        }
+        following = {
+            modes[Mode[mode]]: tuple(map(_custom_mode, numbers))
+            for mode, numbers in tables["modes_following"].items()
+        }
         read.update(
-            modes=MappingProxyType(modes), mode_names=MappingProxyType(names), left_before_arming=left
+            modes=MappingProxyType(modes),
+            mode_names=MappingProxyType(names),
+            modes_of_command=MappingProxyType(of_command),
+            modes_following=MappingProxyType(following),
+            left_before_arming=left,
         )
     return read
 
@@ -68,6 +80,7 @@ PX4_COPTER: Final = Firmware(
     bytewise_parameters=True,
     setpoints_before_guided=True,
     first_mission_item_is_home=False,
+    failsafe_status_acts=True,
     goto_mode=Mode.HOLD,
     resting_mode=Mode.HOLD,
     unset=math.nan,
@@ -118,6 +131,7 @@ ARDUCOPTER: Final = Firmware(
     bytewise_parameters=False,
     setpoints_before_guided=False,
     first_mission_item_is_home=True,
+    failsafe_status_acts=False,
     goto_mode=Mode.GUIDED,
     resting_mode=Mode.GUIDED,
     unset=0.0,  # NaN is refused

@@ -1,7 +1,8 @@
 """Streamed setpoints: PX4's OFFBOARD and ArduPilot's GUIDED, with their conditions for entry."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import Final
 
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -47,7 +48,8 @@ class GuidedSession:
         """Follow a source from its time 0 to its end.
 
         Raises:
-            MissionError: the vehicle left the guided mode (a failsafe, a pilot), or its link was lost.
+            TakenOver: the vehicle left the guided mode: a failsafe or a pilot has it.
+            LinkClosed: its link was lost.
             PlanError: the source returned something that is not a setpoint, or a position below home, which
                 is not allowed (`Vehicle.allow_below_home`).
         """
@@ -69,6 +71,17 @@ class GuidedSession:
         """
         if self._entered:
             await self._commands.set_mode(Mode.HOLD)
+            self._entered = False
+
+    def hold(self) -> None:
+        """Stream the setpoint for waiting, also after an error of the source: a vehicle whose setpoints stop
+        is in a failsafe a second later (PX4).
+        """
+        if self._task is None:
+            return
+        self._source, self._last = None, _held(self._last)
+        if self._task.done():
+            self._task = asyncio.get_running_loop().create_task(self._stream())
 
     async def stop(self) -> None:
         """Stop streaming."""
@@ -122,31 +135,53 @@ class GuidedSession:
         )
 
     async def _until_done(self, stream: asyncio.Task[None]) -> None:
-        target = self._link.firmware.modes[Mode.GUIDED]
+        link = self._link
+        target = link.firmware.modes[Mode.GUIDED]
         left = asyncio.get_running_loop().create_future()
 
         def look(_frame: object) -> None:
-            if self._link.just_back:
+            if link.just_back or link.taken_over() is not None:
                 return  # PX4 returns to OFFBOARD by itself when setpoints are received again
-            if not left.done() and self._link.custom_mode != target:
-                left.set_result(self._link.mode)
+            if not left.done() and link.custom_mode != target:
+                left.set_result(link.mode)
 
-        stop = self._link.connection.listen("HEARTBEAT", look)
+        stop = link.connection.listen("HEARTBEAT", look)
         done = asyncio.ensure_future(self._done.wait())
         try:
-            async with self._link.guard("the end of the setpoints"):
+            async with link.guard("the end of the setpoints"):
                 await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
             if stream.done():
                 await stream  # raises the error that ended it
-            if left.done() and not done.done():
+            if left.done() and not done.done():  # disarmed meanwhile, or commanded by this program itself
                 raise MissionError(
-                    f"the vehicle left the guided mode for {left.result()}; {self._link.last_received()}"
+                    f"the vehicle left the guided mode for {left.result()}; {link.last_received()}"
                 )
         finally:
             stop()
             done.cancel()
             left.cancel()
             self._source = None
+
+
+@asynccontextmanager
+async def guided_session(
+    commands: VehicleCommands, rate_hz: float, home_offset_ned_m: Vector
+) -> AsyncIterator[GuidedSession]:
+    """A session that ends with a hold. When the block fails where the vehicle will be left safe, the vehicle
+    is kept in its place by setpoints until that is done.
+    """
+    session = GuidedSession(commands, rate_hz, home_offset_ned_m)
+    try:
+        yield session
+        await session.finish()
+    except BaseException:
+        if commands.until_safe is not None:
+            session.hold()
+            commands.until_safe.append(session.stop)
+        else:
+            await session.stop()
+        raise
+    await session.stop()
 
 
 class LocalOrigin:

@@ -15,7 +15,7 @@ from missions.vehicle.adapters import Adapter
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
-from missions.vehicle.guided import GuidedSession
+from missions.vehicle.guided import guided_session
 from missions.vehicle.parameters import VehicleParameters
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude
@@ -138,23 +138,22 @@ async def open_heading_flight(
             flight.end()
         await commands.set_mode(Mode.HOLD)
         return
-    session = GuidedSession(commands, _RATE_HZ, (0.0, 0.0, 0.0))
-    following = asyncio.ensure_future(session.follow(flight.setpoint))
-    try:
-        await link.wait_until(
-            lambda: following.done() or link.custom_mode == guided,
-            what="guided mode",
-            on=("HEARTBEAT",),
-            timeout_s=10.0,
-        )
-        if following.done():
-            following.result()
-        yield flight
-        if following.done():
-            following.result()
-        await session.finish()
-    finally:
-        flight.end()
-        following.cancel()
-        await asyncio.gather(following, return_exceptions=True)
-        await session.stop()
+    async with guided_session(commands, _RATE_HZ, (0.0, 0.0, 0.0)) as session:
+        following = asyncio.ensure_future(session.follow(flight.setpoint))
+        try:
+            await link.wait_until(
+                lambda: following.done() or link.custom_mode == guided,
+                what="guided mode",
+                on=("HEARTBEAT",),
+                timeout_s=10.0,
+            )
+            if following.done():
+                following.result()
+            yield flight
+            if following.done():
+                following.result()
+            await session.finish()
+        finally:
+            flight.end()
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)

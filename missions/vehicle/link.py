@@ -1,6 +1,6 @@
 """The data that a vehicle's messages contain: identity, newest values, streams, and waits with deadlines.
 
-It receives, and sends only the messages that it is given.
+It receives, and sends only the messages that it is given, and none after another one has taken the vehicle.
 """
 
 import asyncio
@@ -22,14 +22,16 @@ from autopilot_bridge.mavlink import (
     field_reader,
 )
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.errors import MissionError, VehicleTimeout
+from missions.errors import MissionError, TakenOver, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes, LinkLoss
 from missions.vehicle import px4_events
+from missions.vehicle.command_authority import CommandAuthority
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
 from missions.vehicle.link_watch import LOST_AFTER_S, LinkWatch
+from missions.vehicle.mode_tasks import ModeTasks
 from missions.vehicle.system_id_check import SystemIdCheck
 from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 
@@ -41,6 +43,7 @@ _TEXTS_SHOWN_MOST: Final = 10
 _TOGETHER_US: Final = 10_000_000
 _HEARTBEAT: Final = definition("HEARTBEAT").message_id
 _read_heartbeat: Final = field_reader("HEARTBEAT", "custom_mode", "type", "autopilot", "base_mode")
+_read_position: Final = field_reader("GLOBAL_POSITION_INT", "lat", "lon", "alt")
 _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _CONFIRMED_US: Final = 900_000  # heartbeats come once a second: a second one confirms the first
 _USABLE_FOR_US: Final = 1_000_000
@@ -72,6 +75,8 @@ class VehicleLink:
         self.status_texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
         self._system_id = system_id
         self._firmware: Firmware | None = None
+        self._authority: CommandAuthority | None = None
+        self._tasks: ModeTasks | None = None
         self._last_ack: Any = None
         self.heartbeat_us: int | None = None
         self.on_regained: Callable[[], None] = lambda: None
@@ -138,14 +143,12 @@ class VehicleLink:
         if self._firmware is None:
             if name is None or kind is None:
                 return
-            self._firmware = FIRMWARES[name, kind]
-            self._system_id = frame.system_id
+            self._identify(FIRMWARES[name, kind], frame.system_id)
             self._check = SystemIdCheck(sender)
-            self.connection.keep(frame.system_id)
         armed = bool(base_mode & _ARMED)
         assert self._check is not None
         self._contradict(self._check.on_heartbeat(sender, armed=armed))
-        if (name, kind) != (self._firmware.name, self._firmware.kind):
+        if (name, kind) != (self.firmware.name, self.firmware.kind):
             return  # of another vehicle
         if isinstance(self.clock, TelemetryClock):
             steps = self.clock.reboots + self.clock.jumps
@@ -161,6 +164,50 @@ class VehicleLink:
             self.first_heartbeat_us = clock.time_us
         self.heartbeat_us = self.clock.time_us
         self._watch.on_heartbeat()
+        self._judge_mode(decode(frame))
+
+    def _identify(self, firmware: Firmware, system_id: int) -> None:
+        self._firmware, self._system_id = firmware, system_id
+        self.connection.keep(system_id)
+        self._tasks = tasks = ModeTasks(firmware)
+        self._authority = CommandAuthority(firmware, system_id, tasks.done)
+
+        def listen(name: str, take: Callable[[Frame], None]) -> None:
+            def on_frame(frame: Frame) -> None:
+                if frame.system_id == system_id and frame.component_id == AUTOPILOT_COMPONENT:
+                    take(frame)
+
+            self.connection.listen(name, on_frame, in_order=False)
+
+        for name in ("MISSION_CURRENT", "MISSION_ITEM_REACHED"):
+            listen(name, lambda frame: tasks.on_mission_message(decode(frame), self.clock.stamp_us))
+        listen("EXTENDED_SYS_STATE", lambda frame: tasks.on_landed_state(decode(frame).landed_state))
+        listen("GLOBAL_POSITION_INT", self._on_position)
+
+    def _on_position(self, frame: Frame) -> None:
+        lat, lon, alt = _read_position(frame)
+        self.tasks.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self.clock.stamp_us)
+
+    def _judge_mode(self, heartbeat: Any) -> None:
+        """Decide who commands the vehicle. After a take-over all waits end."""
+        authority = self.authority
+        was_ours = authority.take_over is None
+        authority.on_heartbeat(heartbeat, self.clock.time_us, just_back=self.just_back)
+        if authority.mode is not None:
+            self.tasks.on_mode(authority.mode)
+        take_over = authority.take_over
+        if was_ours and take_over is not None:
+            self._watch.end_all(lambda: TakenOver(take_over))
+
+    @property
+    def authority(self) -> CommandAuthority:
+        """Who commands the vehicle, known from its first heartbeat on."""
+        return self._known(self._authority)
+
+    @property
+    def tasks(self) -> ModeTasks:
+        """What the modes of the vehicle have done, known from its first heartbeat on."""
+        return self._known(self._tasks)
 
     def _contradict(self, found: str) -> None:
         """End the waits for the first contradiction in the messages of the vehicle."""
@@ -239,7 +286,7 @@ class VehicleLink:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
             text = self._assembler.add(decode(frame))
             if text is not None:
-                self.status_texts.append(replace(text, received_us=self.clock.time_us))
+                self._add_text(text)
 
     def _on_event(self, frame: Any) -> None:
         """Add the reason that PX4 names by an event without a text."""
@@ -248,16 +295,28 @@ class VehicleLink:
             found = px4_events.reason(event.id, event.log_levels)
             if found is not None:
                 severity, words = found
-                self.status_texts.append(
-                    StatusText(severity=severity, text=words, received_us=self.clock.time_us)
-                )
+                self._add_text(StatusText(severity=severity, text=words))
+
+    def _add_text(self, text: StatusText) -> None:
+        now_us = self.clock.time_us
+        self.status_texts.append(replace(text, received_us=now_us))
+        if self._authority is not None:
+            self._authority.on_text(text.severity, text.text, now_us)
 
     def _on_ack(self, frame: Any) -> None:
         if frame.system_id == self._system_id:
-            self._last_ack = decode(frame)
+            self._last_ack = ack = decode(frame)
+            if self._authority is not None and self.addressed_here(ack):
+                self._authority.on_ack(ack)
 
     def send(self, message: MAVLinkMessage) -> None:
-        """Send any message."""
+        """Send any message, unless another one has the vehicle: then nothing is sent, and `deadline`, `guard`
+        and all that waits raise TakenOver.
+        """
+        if self._authority is not None:
+            if not self._authority.may_send(message):
+                return
+            self.tasks.on_sent(message)
         self.connection.send(message)
 
     # newest values
@@ -425,8 +484,19 @@ class VehicleLink:
 
     # waiting
 
+    def taken_over(self) -> TakenOver | None:
+        """The error of a vehicle that another one has; None: this program commands it."""
+        take_over = None if self._authority is None else self._authority.take_over
+        return None if take_over is None else TakenOver(take_over)
+
+    def until_taken_over(self) -> AbstractAsyncContextManager[None]:
+        """`async with`: raises TakenOver as soon as another one has the vehicle, whatever the block does."""
+        return self._watch.block()
+
     def guard(self, awaited: str | Callable[[], str]) -> AbstractAsyncContextManager[None]:
-        """`async with`: raises LinkClosed when the heartbeats stop while the block waits for `awaited`."""
+        """`async with`: raises LinkClosed when the heartbeats stop while the block waits for `awaited`, and
+        TakenOver when another one has the vehicle.
+        """
         return self._watch.guard(awaited if callable(awaited) else lambda: awaited)
 
     @asynccontextmanager

@@ -1,5 +1,5 @@
-"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time, and when the
-messages contradict each other.
+"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time, when the
+messages contradict each other, and when another one takes the vehicle over.
 """
 
 import asyncio
@@ -12,12 +12,16 @@ from missions.errors import LinkClosed, MissionError
 
 LOST_AFTER_S: Final = 10.0
 QUIET_AFTER_S: Final = 3.0
+MakeError = Callable[[], MissionError]
+"""Makes an error."""
+
 _LOOK_EVERY_S: Final = 1.0
 _JUST_BACK_S: Final = 5.0
 
 
 class LinkWatch:
-    """Ends waits when no heartbeat was received for 10 s plus `regain_s` of the event loop's time.
+    """Ends waits when no heartbeat was received for 10 s plus `regain_s` of the event loop's time, and all at
+    once by `end_all`.
 
     That is wall time for a vehicle that is not embedded, at any simulation speed, and vehicle time in the
     loop of an embedded one. A vehicle slower than real time gets 10 s of its own time. Time in which this
@@ -47,9 +51,11 @@ class LinkWatch:
         self._last_received = last_received
         self._received_s: float | None = None
         self._back_s: float | None = None
-        self._scopes: list[asyncio.Timeout] = []
-        self._reasons: dict[asyncio.Timeout, str] = {}  # why waits end, other than by silence
-        self._reason_pending = ""  # of the next wait
+        self._scopes: list[asyncio.Timeout] = []  # of waits
+        self._blocks: list[asyncio.Timeout] = []  # of blocks that don't wait for the vehicle all the time
+        self._errors: dict[asyncio.Timeout, MakeError] = {}  # with which waits end, other than by silence
+        self._next: MakeError | None = None  # with which the next wait ends
+        self._always: MakeError | None = None  # with which all end
         self._timer: asyncio.TimerHandle | None = None
 
     def on_heartbeat(self) -> None:
@@ -72,21 +78,31 @@ class LinkWatch:
 
         Later waits are not ended: the vehicle is to be left safe.
         """
-        self._reasons = dict.fromkeys(self._scopes, reason)
-        self._reason_pending = "" if self._scopes else reason
-        self._expire()
+
+        def error() -> MissionError:
+            return MissionError(f"{reason}; {self._last_received()}")
+
+        self._errors = dict.fromkeys(self._scopes, error)
+        self._next = None if self._scopes else error
+        self._end(self._scopes)
+
+    def end_all(self, error: MakeError) -> None:
+        """End all present and later waits and blocks, each with an error that this function makes."""
+        self._always = error
+        self._end(self._scopes)
+        self._end(self._blocks)
 
     @asynccontextmanager
     async def guard(self, awaited: Callable[[], str]) -> AsyncIterator[None]:
         """Context that raises LinkClosed when the heartbeats stop, and don't come back in time, while the
-        block waits, and MissionError for the reason of `end_waits`.
+        block waits, and the errors of `end_waits` and `end_all`.
 
         Args:
             awaited: returns the description of what the block waits for, for the error.
         """
-        reason, self._reason_pending = self._reason_pending, ""
-        if reason:
-            raise MissionError(f"{reason}; {self._last_received()}")
+        error, self._next = self._always or self._next, None
+        if error is not None:
+            raise error()
         scope = asyncio.timeout(None)
         try:
             async with scope:
@@ -96,19 +112,37 @@ class LinkWatch:
                     yield
                 finally:
                     self._scopes.remove(scope)
-                    reason = self._reasons.pop(scope, "")
+                    error = self._always or self._errors.pop(scope, None)
         except TimeoutError:
             if not scope.expired():
                 raise
-            if reason:
-                raise MissionError(f"{reason}; {self._last_received()}") from None
+            if error is not None:
+                raise error() from None
             raise LinkClosed(
                 f"link lost: no heartbeat for {self._silence_s():.0f} s while waiting for {awaited()}; "
                 f"{self._last_received()}"
             ) from None
 
-    def _expire(self) -> None:
-        for scope in self._scopes:
+    @asynccontextmanager
+    async def block(self) -> AsyncIterator[None]:
+        """Context that raises the error of `end_all` as soon as that is called, whatever the block does."""
+        if self._always is not None:
+            raise self._always()
+        scope = asyncio.timeout(None)
+        try:
+            async with scope:
+                self._blocks.append(scope)
+                try:
+                    yield
+                finally:
+                    self._blocks.remove(scope)
+        except TimeoutError:
+            if not scope.expired() or self._always is None:
+                raise
+            raise self._always() from None
+
+    def _end(self, scopes: list[asyncio.Timeout]) -> None:
+        for scope in scopes:
             if not scope.expired():
                 scope.reschedule(asyncio.get_running_loop().time())
 
@@ -141,5 +175,5 @@ class LinkWatch:
             self.lost = True
             self.on_lost()
         if silence_s >= LOST_AFTER_S * slowness + self.regain_s:
-            self._expire()
+            self._end(self._scopes)
         self._start()

@@ -19,6 +19,7 @@ from missions.vehicle.item_tracker import (
 from missions.vehicle.link import VehicleLink
 from missions.vehicle.mission_rules import refuse_infeasible
 from missions.vehicle.mission_transfer import clear, download, renumbered, upload
+from missions.vehicle.mode_tasks import StoredPlan
 from missions.vehicle.parameters import VehicleParameters
 
 _REWINDS: Final = 4
@@ -80,10 +81,26 @@ class VehiclePlans:
         own = renumbered(items, first)
         await upload(self._link, [marker, *own] if first else own, before=first)
         await self.rewind_mission()
-        order = FlownOrder.of(items)
-        steps = mission_steps(items, order, home, _ACCEPTANCE_M)
-        self._tracker = ItemTracker(steps, order.again_from, first=first)
+        self._tracker = self.note_stored(items, first).tracker()
         return first
+
+    def note_stored(self, items: Sequence[MissionItem], first: int) -> StoredPlan:
+        """Note the uploaded plan, so that a mode at its end is distinguished from a pilot's.
+
+        Args:
+            items: items of the plan.
+            first: sequence number of the first of them on the link.
+        """
+        order = FlownOrder.of(items)
+        steps = mission_steps(items, order, self._link.home, _ACCEPTANCE_M)
+        plan = StoredPlan(
+            steps=steps,
+            again_from=order.again_from,
+            first=first,
+            commands=frozenset(item.command for item in items),
+        )
+        self._link.tasks.plan = plan
+        return plan
 
     async def rewind_mission(self) -> None:
         """Set the stored mission to its first item, because it may be at the end of its last flight.

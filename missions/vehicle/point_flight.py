@@ -31,9 +31,6 @@ class PointFlight:
         """Command the flight, and wait until the vehicle is within the tolerance and slow."""
         link, target, firmware = self._link, self._target, self._link.firmware
         self._check_target()
-        goto_mode = firmware.modes[firmware.goto_mode]
-        expected = {link.custom_mode, goto_mode}
-        self._commands.modes_requested.clear()
         await self._commands.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,
@@ -46,10 +43,7 @@ class PointFlight:
 
         def there() -> bool:
             if link.heartbeat_us is not None and link.heartbeat_us >= accepted_us + HEARTBEAT_AGE_US:
-                if link.custom_mode == goto_mode:
-                    # from now on a return to the previous mode is a change too
-                    expected.intersection_update((goto_mode,))
-                self._require_flying(expected)
+                self._require_armed()
             p = link.latest(Position)
             return (
                 p is not None and self._distance_m() < tolerance_m and math.hypot(*p.vel_ned_m_s) < _SLOW_M_S
@@ -81,15 +75,12 @@ class PointFlight:
         # altitudes are compared, not the frame's down: far away the horizon is below it
         self._commands.heights.check(target.alt_m - home.alt_m, "goto")
 
-    def _require_flying(self, expected: set[int]) -> None:
-        """Raise an error when the vehicle is disarmed, or in a mode neither expected nor requested."""
+    def _require_armed(self) -> None:
         link = self._link
-        if not link.armed:
-            happened = "is disarmed"
-        elif link.custom_mode not in expected | self._commands.modes_requested:
-            happened = f"changed to mode {link.mode}, which this mission did not ask for,"
-        else:
+        if link.armed:
             return
-        where = f"{self._distance_m():.1f} m before the target"
         reported = f" ({link.status_texts[-1].text!r})" if link.status_texts else ""
-        raise MissionError(f"the vehicle {happened} {where}{reported}; {link.last_received()}")
+        raise MissionError(
+            f"the vehicle is disarmed {self._distance_m():.1f} m before the target{reported}; "
+            f"{link.last_received()}"
+        )

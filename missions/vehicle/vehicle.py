@@ -2,15 +2,16 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.errors import LinkClosed, MissionError, PlanError
+from missions.errors import CommandRejected, MissionError, ModeNotEntered, PlanError, TakenOver
+from missions.how_left import Answer, HowLeft, SafetyCommand
 from missions.kind import VehicleKind
 from missions.notes import FlightNotes
 from missions.planning.limits import FORECAST_WIND_M_S, FixedWingLimits, Limits
@@ -18,8 +19,9 @@ from missions.vehicle.adapters import Adapter, ArduPilot, Px4
 from missions.vehicle.commands import ACK_S, VehicleCommands
 from missions.vehicle.connection import Connection
 from missions.vehicle.firmware import Firmware, Mode
-from missions.vehicle.guided import GuidedSession, LocalOrigin, SetpointSource
+from missions.vehicle.guided import GuidedSession, LocalOrigin, SetpointSource, guided_session
 from missions.vehicle.link import VehicleLink
+from missions.vehicle.link_watch import QUIET_AFTER_S
 from missions.vehicle.parameters import VehicleParameters
 from missions.vehicle.payload import Payload
 from missions.vehicle.plans import VehiclePlans
@@ -31,6 +33,8 @@ from missions.vehicle.telemetry import Position
 from missions.vehicle.wing import FixedWing
 
 T = TypeVar("T")
+
+_FRESH_S: Final = 1.5  # heartbeats come once a second
 
 _ADAPTERS: Final[Mapping[str, Callable[[VehicleCommands, VehicleParameters], Adapter]]] = {
     "px4": Px4,
@@ -328,12 +332,8 @@ class Vehicle:
         PX4 receives setpoints before and continuously in OFFBOARD; between two calls of `follow` the last one
         is repeated. At the end the vehicle holds its position.
         """
-        session = GuidedSession(self.commands, rate_hz, await self.local_origin.home_ned_m())
-        try:
+        async with guided_session(self.commands, rate_hz, await self.local_origin.home_ned_m()) as session:
             yield session
-            await session.finish()
-        finally:
-            await session.stop()
 
     async def follow(self, source: SetpointSource, rate_hz: float = 25.0) -> None:
         """Follow streamed setpoints until the source ends, then hold.
@@ -382,35 +382,125 @@ class Vehicle:
         """Leave the vehicle safe: when the block fails, is cancelled or is interrupted in flight, `action` is
         commanded. A vehicle on the ground is disarmed first.
 
+        A vehicle that a pilot, another ground station or a failsafe has taken is commanded nothing: the block
+        ends at once with TakenOver, whatever it does.
+
         Args:
             action: `Mode.RETURN` (the vehicle then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is
                 refused, the other two are tried.
         """
+        before, self.commands.until_safe = self.commands.until_safe, []
         try:
-            yield self
-        except BaseException:
-            await self._make_safe(action)
+            async with self.link.until_taken_over():
+                yield self
+        except BaseException as error:
+            await asyncio.shield(asyncio.ensure_future(self._make_safe(action)))
+            taken = self.link.taken_over()
+            if taken is not None and isinstance(error, MissionError) and not isinstance(error, TakenOver):
+                raise taken from error  # the mode explains the error that preceded its heartbeat
             raise
+        finally:
+            for end in self.commands.until_safe:
+                await end()
+            self.commands.until_safe = before
 
     async def _make_safe(self, action: Mode) -> None:
+        """Command the action, unless another one has the vehicle or it is disarmed."""
+        link = self.link
         # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
-        if self.link.identified and self.commands.may_be_armed:
-            await asyncio.shield(asyncio.ensure_future(self._command_safe(action)))
+        if not link.identified or not self.commands.may_be_armed:
+            return
+        # What failed may be the effect of a mode that no heartbeat has reported yet.
+        await self._next_heartbeat(_FRESH_S)
+        withheld = self._withheld()
+        if not withheld:
+            with suppress(TakenOver):
+                await self._command_safe(action)
+            withheld = self._withheld()
+        if link.taken_over() is not None:
+            await self._next_heartbeat(_FRESH_S)  # for the autopilot's texts about it
+            withheld = self._withheld()
+        self.notes.withheld = withheld
+
+    def _withheld(self) -> str:
+        """Why nothing is commanded; "": there is no reason against it."""
+        authority = self.link.authority
+        if authority.take_over is not None:
+            return f"{authority.take_over.holder} has it"
+        if authority.failsafe_acts:
+            return "a failsafe has it"
+        if not authority.engaged:
+            return "this program had not armed or commanded it"
+        return ""
+
+    async def _next_heartbeat(self, timeout_s: float) -> None:
+        """Wait for a heartbeat, but not for that of a lost link."""
+        if self.link.quiet:
+            return
+        before_us = self.link.heartbeat_us
+        received = asyncio.Event()
+        stop = self.link.connection.listen("HEARTBEAT", lambda _: received.set())
+        try:
+            async with self.clock.timeout(timeout_s):
+                while self.link.heartbeat_us == before_us:
+                    await received.wait()
+                    received.clear()
+        except TimeoutError:
+            return
+        finally:
+            stop()
 
     async def _command_safe(self, action: Mode) -> None:
         if self.link.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
-            with suppress(MissionError):  # refused if it has just left the ground
-                await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
+            await self._answer("disarm", self._disarm_once())  # refused if it has just left the ground
         # also for a disarmed vehicle: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
-            self.notes.left = f"was commanded to {mode} and did not answer"
-            try:
-                await self.commands.set_mode(mode, 5.0)
-            # the vehicle may still receive our messages: it keeps the first action commanded
-            except LinkClosed:
+            answer = await self._answer(mode, self.commands.set_mode(mode, 5.0))
+            # A vehicle that is not received may still receive: it keeps the first action commanded.
+            if answer is Answer.DONE or self.link.quiet:
                 return
-            except MissionError:
-                continue
-            self.notes.left = f"was commanded to {mode}"
-            return
-        self.notes.left = "refused to return, to land and to hold"
+
+    async def _disarm_once(self) -> None:
+        """Disarm; a refusal is no reason to wait for its cause."""
+        command = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+        self.commands.require(command, await self.try_command(command, 0.0, timeout_s=0.5))
+
+    async def _answer(self, action: str, commanding: Coroutine[Any, Any, None]) -> Answer:
+        """Await the answer to a command that leaves the vehicle safe, and note both.
+
+        Raises:
+            TakenOver: another one has the vehicle.
+        """
+        commands = self.notes.safety_commands
+        commands.append(SafetyCommand(action=str(action), answer=Answer.NONE))
+        answer = Answer.DONE
+        try:
+            await commanding
+        except TakenOver:
+            raise
+        except CommandRejected:
+            answer = Answer.REFUSED
+        except ModeNotEntered as error:
+            answer = Answer.ACCEPTED if error.acknowledged else Answer.NONE
+        except MissionError:
+            answer = Answer.NONE
+        commands[-1] = replace(commands[-1], answer=answer)
+        return answer
+
+    def how_left(self) -> HowLeft:
+        """How the vehicle is left now: what was commanded to leave it safe, the answers, and its state."""
+        link, notes = self.link, self.notes
+        if not link.identified or link.heartbeat_us is None:
+            return HowLeft(system_id=notes.system_id)
+        position, landed = self.latest(Position), link.landed_state
+        silent_s = (link.clock.time_us - link.heartbeat_us) * 1e-6
+        return HowLeft(
+            system_id=link.system_id,
+            commands=tuple(notes.safety_commands),
+            withheld=notes.withheld,
+            mode=link.mode,
+            armed=link.armed,
+            on_ground=landed == dialect.MAV_LANDED_STATE_ON_GROUND if landed else None,
+            height_m=None if position is None else position.height_m,
+            silent_s=silent_s if silent_s > QUIET_AFTER_S else 0.0,
+        )

@@ -253,12 +253,13 @@ class FixedWing:
         """
         if approach is None:
             approach = Approach(place=self._link.home, heading_rad=self.landing_heading_rad())
-        items = approach.items()
+        own = items = approach.items()
         if self._link.firmware.first_mission_item_is_home:
             items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=approach.place.lat_deg,
-                                 y=approach.place.lon_deg, z=approach.place.alt_m), *items]  # fmt: skip
+                                 y=approach.place.lon_deg, z=approach.place.alt_m), *own]  # fmt: skip
         await upload(self._link, items)
         await self._plans.rewind_mission()
+        self._plans.note_stored(own, len(items) - len(own))
         await self._commands.set_mode(Mode.MISSION)
         if wait:
             await self._link.wait_disarmed(timeout_s)

@@ -36,6 +36,7 @@ KIND = {
             PX4_LAND: "land", PX4_OFFBOARD: "guided", PX4_POSITION: "position"},
     "ardupilot": {17: "hold", 3: "mission", 6: "return", 9: "land", 4: "guided", 5: "position", 0: "manual"},
 }  # fmt: skip
+DOWN = (0.0, 0.0, 1.5)  # velocity of a landing, NED
 DEFAULT_STREAMS = {
     "px4": {"HEARTBEAT": 1.0, "SYS_STATUS": 5.0, "GLOBAL_POSITION_INT": 25.0, "LOCAL_POSITION_NED": 10.0,
             "ATTITUDE": 25.0, "EXTENDED_SYS_STATE": 5.0, "HOME_POSITION": 0.5, "MISSION_CURRENT": 1.0},
@@ -368,11 +369,7 @@ class FakeAutopilot:
         elif kind == "mission":
             wanted = self._fly_mission()
         elif kind in ("return", "land"):
-            away = math.hypot(self.pos[0], self.pos[1])
-            if kind == "return" and away > 0.3:
-                wanted = self._towards((0.0, 0.0, min(self.pos[2], -5.0)), 8.0)
-            else:
-                wanted = (0.0, 0.0, 1.5)
+            wanted = self._return() if kind == "return" else DOWN
         elif self.target is not None:
             wanted = self._towards(self.target, 5.0)
         if kind == "takeoff" and self.target and abs(self.pos[2] - self.target[2]) < 0.1:
@@ -381,8 +378,13 @@ class FakeAutopilot:
         self.pos = [p + v * dt for p, v in zip(self.pos, self.vel, strict=True)]
         if self.pos[2] > 0.0:
             self.pos[2], self.vel = 0.0, [0.0, 0.0, 0.0]
-        if kind in ("return", "land") and self.pos[2] >= 0.0:
+        landing = kind in ("return", "land") or (kind == "mission" and wanted is DOWN)
+        if landing and self.pos[2] >= 0.0:
             self.armed = False
+
+    def _return(self):
+        away = math.hypot(self.pos[0], self.pos[1])
+        return self._towards((0.0, 0.0, min(self.pos[2], -5.0)), 8.0) if away > 0.3 else DOWN
 
     def _towards(self, target, speed):
         delta = [a - b for a, b in zip(target, self.pos, strict=True)]
@@ -409,9 +411,11 @@ class FakeAutopilot:
         elif item.command == d.MAV_CMD_DO_CHANGE_SPEED:
             self.speed, done = item.param2, True
         elif item.command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-            self.mode = PX4_RTL if self.flavour == "px4" else 6
+            if self.flavour == "px4":
+                self.mode = PX4_RTL
+            wanted = self._return()  # ArduCopter stays in Auto
         elif item.command == d.MAV_CMD_NAV_LAND:
-            self.mode = PX4_LAND if self.flavour == "px4" else 9
+            wanted = DOWN
         if done:
             # As both firmwares send it: a DO_ item's number takes the place of the one directly before it.
             following = self.items[self.current + 1 : self.current + 2]

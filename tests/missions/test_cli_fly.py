@@ -242,7 +242,8 @@ def test_a_mission_that_ends_in_the_air_has_failed(tmp_path: Path) -> None:
     assert result.return_value == 1
     summary = json.loads((out / "summary.json").read_text())
     assert summary["outcome"] == "failed"
-    assert "commanded to return" in summary["reason"]
+    assert "the mission ended with the vehicle armed" in summary["reason"]
+    assert "was commanded to return and does" in summary["vehicles"][0]["left"]["text"]
 
 
 def test_an_error_in_a_mission_names_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

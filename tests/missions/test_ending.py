@@ -58,7 +58,8 @@ def test_who_asks_a_flight_to_end_leaves_the_vehicle_safe(
     assert elsewhere.kind == "return"
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("interrupted", result.reason)
-    assert "was commanded to return" in result.reason
+    assert result.left[0].text.startswith("was commanded to return and does; it is in Return at ")
+    assert summary["vehicles"][0]["left"] == result.left[0].record()
 
 
 @pytest.mark.parametrize("number", ENDING)
@@ -88,7 +89,9 @@ def test_what_is_sent_twice_at_once_is_sent_once(
     result = flown(tmp_path / "run", send)
     assert (result.outcome, result.signal) == ("interrupted", signal.SIGTERM)
     assert elsewhere.kind == "land"
-    assert "was commanded to land" in result.reason
+    assert result.left[0].text.startswith(
+        "refused to return, was commanded to land and does; it is in Land at "
+    )
 
 
 @pytest.mark.parametrize("second", [*ENDING, signal.SIGINT])
@@ -111,7 +114,7 @@ def test_a_second_one_stops_at_once(
 
     result = flown(tmp_path / "run", deafen_and_send)
     assert (result.outcome, result.signal) == ("interrupted", signal.SIGTERM)
-    assert "did not answer" in result.reason
+    assert result.left[0].text.startswith("did not answer the command to return; it is in ")
     assert (tmp_path / "run" / "summary.json").exists()
 
 
@@ -195,6 +198,6 @@ def test_the_exit_code_tells_the_signal(
     words += ["--export-plan", str(tmp_path / "x.plan")] if export else []
     assert cli.run_command_line(words) == code
     said = capsys.readouterr()
-    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert (said.out, said.err.count("\n")) == ("", 1 if export else 2)  # how the vehicle was left
     assert "interrupted" in said.err
     assert {path.name for path in tmp_path.iterdir()} == (set() if export else {"run"})

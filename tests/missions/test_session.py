@@ -187,8 +187,9 @@ def test_a_mistake_in_a_users_mission_is_one_line_and_the_vehicle_returns(script
     script.write_text("async def fly(vehicle, options):\n    await vehicle.takeoff(8.0)\n    1 / 0\n")
     code, _out, err = command_line(capsys, "fly", str(script), "--out", str(tmp_path / "run"))
     assert code == 1
-    assert len(err.splitlines()) == 1
-    assert "mine.py, line 3: ZeroDivisionError: division by zero" in err
+    reason, left = err.splitlines()
+    assert "mine.py, line 3: ZeroDivisionError: division by zero" in reason
+    assert "vehicle 1: was commanded to return and does; it is in Return at " in left
     assert scripted[0].autopilots[0].kind == "return"
 
 

@@ -10,7 +10,7 @@ from autopilot_bridge.clock import LoopClock, TelemetryClock, run
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.errors import CommandRejected, MissionError, VehicleTimeout
+from missions.errors import CommandRejected, MissionError, TakenOver, VehicleTimeout
 from missions.vehicle import Mode, Setpoint, Vehicle
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection
@@ -184,7 +184,7 @@ def test_leaving_guided_ends_the_following_with_an_error(flown):
             autopilot.mode = 0x00030000
 
         task = asyncio.get_running_loop().create_task(pilot())
-        with pytest.raises(MissionError, match="left the guided mode for Position"):
+        with pytest.raises(TakenOver, match="has the vehicle, mode Position; nothing was commanded"):
             await vehicle.follow(lambda t: Setpoint(position_ned_m=(0.0, 0.0, -10.0)) if t < 60 else None)
         await task
 

@@ -12,6 +12,7 @@ from tests.terminal import at_terminal
 
 LONG = (*SHORT, "--periods", "50", "--speedup", "5")
 """It lasts longer than the tests wait."""
+RETURNED = [{"action": "return", "answer": "done"}]
 
 
 def flies(log: Path) -> bool:
@@ -31,10 +32,11 @@ def test_a_signal_leaves_the_vehicle_safe_and_the_run_whole(
         wait_until(lambda: flies(run.log))
         run.process.send_signal(number)
         said = run.finish(code)
-        assert said.count("\n") == 1
-        assert "interrupted; the vehicle was commanded to return; the log is in" in said
+        assert said.count("\n") == 2
+        assert "interrupted; the log is in" in said
+        assert "vehicle 1: was commanded to return and does; it is in Return at" in said
         assert run.summary["outcome"] == "interrupted"
-        assert run.summary["vehicles"][0]["left"] == "was commanded to return"
+        assert run.summary["vehicles"][0]["left"]["commanded"] == RETURNED
 
 
 @pytest.mark.slow
@@ -47,4 +49,4 @@ def test_a_terminal_that_is_closed_does_so_too(tmp_path: Path) -> None:
         assert terminal.wait_for_end() == 128 + signal.SIGHUP
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["outcome"] == "interrupted"
-    assert summary["vehicles"][0]["left"] == "was commanded to return"
+    assert summary["vehicles"][0]["left"]["commanded"] == RETURNED

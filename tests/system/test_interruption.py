@@ -26,12 +26,13 @@ def fly_into(run: Run, mode: str) -> None:
 def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
     lines = [line for line in text.splitlines() if line]
     summary = run.summary
-    reported = f"was commanded to {on_failure}"
-    assert [block["left"] for block in summary["vehicles"]] == [reported] * len(summary["vehicles"])
-    ids = [block["system_id"] for block in summary["vehicles"]]
-    who = ", ".join(f"vehicle {system_id} {reported}" for system_id in ids)
-    who = who if len(ids) > 1 else f"the vehicle {reported}"
-    assert lines == [f"flightstack: interrupted; {who}; the log is in {run.folder}"]
+    left = {block["system_id"]: block["left"] for block in summary["vehicles"]}
+    for entry in left.values():
+        assert entry["commanded"][-1] == {"action": on_failure, "answer": "done"}
+    assert lines == [
+        f"flightstack: interrupted; the log is in {run.folder}",
+        *(f"flightstack: vehicle {system_id}: {entry['text']}" for system_id, entry in left.items()),
+    ]
     assert summary["outcome"] == "interrupted"
     assert counts(run.log) == summary["message_counts"]
     records(run.log)

@@ -1,0 +1,142 @@
+"""Evidence that a flight mode has done its task, so that the autopilot leaves it by itself. Sans-IO.
+
+A take-off is done at its height; a mission when its last place or its return is reached; a return of
+ArduPlane goes on with the stored landing if there is one.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from missions.kind import VehicleKind
+from missions.vehicle.firmware import Firmware, Mode
+from missions.vehicle.item_tracker import ItemTracker, MissionStep
+
+_SLACK_M: Final[Mapping[VehicleKind, float]] = {VehicleKind.MULTICOPTER: 1.5, VehicleKind.FIXED_WING: 15.0}
+"""Below a take-off's altitude; PX4 ends it within NAV_MC_ALT_RAD, 0.8 m, or NAV_FW_ALT_RAD, 10 m."""
+_TAKEOFFS: Final = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
+_LANDING_PARTS: Final = (dialect.MAV_CMD_DO_LAND_START, dialect.MAV_CMD_DO_RETURN_PATH_START)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredPlan:
+    """The plan that this program uploaded to a vehicle.
+
+    Attributes:
+        steps: its steps in the order in which they are executed.
+        again_from: step from which it repeats for ever; None: it ends.
+        first: sequence number of its first item on the link.
+        commands: MAV_CMDs of its items.
+    """
+
+    steps: tuple[MissionStep, ...]
+    again_from: int | None
+    first: int
+    commands: frozenset[int]
+
+    def tracker(self) -> ItemTracker:
+        """A tracker of a flight along the plan, from its beginning."""
+        return ItemTracker(self.steps, self.again_from, first=self.first)
+
+
+class ModeTasks:
+    """What the modes of one vehicle have to do, and what they have done.
+
+    Args:
+        firmware: of the vehicle.
+
+    Attributes:
+        plan: the stored plan; None: this program has uploaded none.
+    """
+
+    def __init__(self, firmware: Firmware) -> None:
+        self._firmware = firmware
+        self._plan: StoredPlan | None = None
+        self._tracker: ItemTracker | None = None
+        self._in_mission = False
+        self._complete = False
+        self._reached = -1
+        self._total = 0
+        self._takeoff_alt_m: float | None = None
+        self._alt_m: float | None = None
+        self._on_ground = False
+
+    @property
+    def plan(self) -> StoredPlan | None:
+        """The stored plan."""
+        return self._plan
+
+    @plan.setter
+    def plan(self, plan: StoredPlan) -> None:
+        self._plan = plan
+        self._tracker = plan.tracker()
+
+    def on_sent(self, message: MAVLinkMessage) -> None:
+        """Note the altitude of a take-off that is commanded."""
+        if message.get_type() == "COMMAND_LONG" and message.command in _TAKEOFFS:
+            self._takeoff_alt_m = float(message.param7)  # PX4: above mean sea level; NaN: its own default
+
+    def on_mode(self, custom_mode: int) -> None:
+        """Process the newest mode that is commanded or has followed: a mission begins anew when its mode is
+        entered.
+        """
+        in_mission = custom_mode == self._firmware.modes[Mode.MISSION]
+        if in_mission and not self._in_mission:
+            self._complete, self._reached = False, -1
+            self._tracker = None if self._plan is None else self._plan.tracker()
+        self._in_mission = in_mission
+
+    def on_mission_message(self, message: Any, time_us: int) -> None:
+        """Process a MISSION_CURRENT or MISSION_ITEM_REACHED."""
+        if self._tracker is not None:
+            self._tracker.on_message(message, time_us)
+        if message.get_type() == "MISSION_ITEM_REACHED":
+            self._reached = max(self._reached, int(message.seq))
+            return
+        self._total = int(message.total)
+        self._complete = self._in_mission and message.mission_state == dialect.MISSION_STATE_COMPLETE
+
+    def on_position(self, lat_deg: float, lon_deg: float, alt_m: float, time_us: int) -> None:
+        """Process a position."""
+        self._alt_m = alt_m
+        if self._tracker is not None and self._in_mission:
+            self._tracker.on_position(lat_deg, lon_deg, alt_m, time_us)
+
+    def on_landed_state(self, landed_state: int) -> None:
+        """Process an EXTENDED_SYS_STATE."""
+        self._on_ground = landed_state == dialect.MAV_LANDED_STATE_ON_GROUND
+
+    def done(self, before: int, after: int) -> bool:
+        """Whether the autopilot may have gone from one custom mode to the other by itself."""
+        modes = self._firmware.modes
+        if before == modes[Mode.MISSION]:
+            return self._mission_done(after)
+        if before == modes[Mode.TAKEOFF]:
+            return self._risen
+        if before == modes[Mode.RETURN]:
+            return self._plan is None or not self._plan.commands.isdisjoint(_LANDING_PARTS)
+        return False
+
+    @property
+    def _risen(self) -> bool:
+        if self._takeoff_alt_m is None or self._alt_m is None:
+            return False
+        slack_m = _SLACK_M[self._firmware.kind]
+        return not self._alt_m < self._takeoff_alt_m - slack_m  # also with the default altitude, NaN
+
+    def _mission_done(self, after: int) -> bool:
+        tracker = self._tracker
+        if tracker is None:
+            return self._complete or 0 < self._total <= self._reached + 1
+        returns = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH in self._last_commands
+        if after == self._firmware.modes[Mode.RETURN] and returns:
+            return tracker.coming_down or tracker.at_the_last_place
+        if tracker.lands:
+            return tracker.finished or self._on_ground
+        return tracker.over or tracker.at_the_last_place
+
+    @property
+    def _last_commands(self) -> tuple[int, ...]:
+        """Command of the last step; empty: there is none."""
+        return tuple(step.command for step in self._plan.steps[-1:]) if self._plan is not None else ()
