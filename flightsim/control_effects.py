@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightsim.airframe import Role
 from flightsim.flight_trim import flight_state
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.wind_tunnel import WindTunnel
+from flightsim.wind_tunnel import FlightState, WindTunnel
 
 Array = NDArray[np.float64]
 
@@ -61,22 +61,26 @@ def control_effects(tunnel: WindTunnel, airspeed_m_s: float) -> tuple[ControlEff
     for role, commands in _COMMANDS.items():
         if role not in tunnel.actuators.roles:
             continue
-        readings = []
-        for command in commands:
-            actuators = [0.0] * MAX_ACTUATORS
-            actuators[role.command] = command
-            state = flight_state(airspeed_m_s, _ALPHA_RAD, 0.0, 0.0, 0.0, 0.0, tuple(actuators))
-            readings.append(tunnel.measure(state).accelerations)
+        low, high = (
+            tunnel.measure(_level(airspeed_m_s, role, command)).accelerations for command in commands
+        )
         channels = [channel for channel in tunnel.airframe.channels if channel.role is role]
         effects.append(
             ControlEffect(
                 role=role,
                 properties=tuple(name for channel in channels for name in channel.properties),
                 commands=commands,
-                change=readings[1] - readings[0],
+                change=high - low,
             )
         )
     return tuple(effects)
+
+
+def _level(airspeed_m_s: float, role: Role, command: float) -> FlightState:
+    """Level flight with one control at a command."""
+    actuators = [0.0] * MAX_ACTUATORS
+    actuators[role.command] = command
+    return flight_state(airspeed_m_s, _ALPHA_RAD, 0.0, 0.0, 0.0, 0.0, tuple(actuators))
 
 
 def dead_controls(effects: tuple[ControlEffect, ...], airspeed_m_s: float) -> str:
