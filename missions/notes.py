@@ -12,6 +12,8 @@ from missions.options import MissionOptions
 
 PATTERN = "pattern"
 """Name of the phase that is scored against the commanded path."""
+FLIGHT = "flight"
+"""Name of the phase until a mission begins its own; a script begins none."""
 
 
 class CutShort(StrEnum):

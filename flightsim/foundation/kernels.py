@@ -89,12 +89,25 @@ def _keep(dispatcher: Any, file: "_CacheFile") -> None:
     dispatcher.compile = partial(_compile, dispatcher.compile, file)
 
 
+def when_compiling(listener: Callable[[], None]) -> None:
+    """Call a function once, when machine code is not in the cache and this process begins to compile it.
+
+    A later listener replaces one that was not called.
+    """
+    _listeners[:] = [listener]
+
+
+_listeners: Final[list[Callable[[], None]]] = []
+
+
 def _load(load_overload: Callable[..., Any], file: "_CacheFile", *arguments: Any) -> Any:
     """Machine code from the cache, or None; the first thing that Numba does with a kernel that is used."""
     _import_array_functions()
     found = load_overload(*arguments)
     if found is None and file.begin_turn():  # another process may have compiled it in the meantime
         found = load_overload(*arguments)
+    if found is None and _listeners:
+        _listeners.pop()()
     return found
 
 

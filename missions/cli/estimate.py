@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from missions.cli.options import FiniteRange, StatusLine, in_options, report
+from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
+from missions.cli.status_line import StatusLine
 
 if TYPE_CHECKING:
     from missions.estimation.live import LiveProgress

@@ -255,14 +255,13 @@ def _fly(given: dict[str, Any]) -> int:
         from autopilot_bridge.parameter_files import left_out
 
         report(f"--params: {left_out(request.left_out_parameters, _NAMES_SHOWN)}")
-    terminal = sys.stderr.isatty()
-    if terminal and not given["connect"]:
-        click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
     from missions.errors import MissionError
     from missions.runs.session import fly as fly_mission
 
     line = ProgressLine()
+    if given["export_plan"] is None:
+        line.start(mission.name, given["connect"])
     confirm = None
     if given["connect"]:
         try:
@@ -274,18 +273,24 @@ def _fly(given: dict[str, Any]) -> int:
             raise click.UsageError(in_options(error)) from error
     try:
         key = key_from(given["signing_key"])
+
+        def opened() -> None:
+            line.opened()
+            warn_if_open(given["connect"], key)
+
         request = replace(
             request,
             confirm=confirm,
             on_remark=line.say,
             confirm_simulations=given["check"],
-            on_open=lambda: warn_if_open(given["connect"], key),
+            on_open=opened,
             command=" ".join(["flightstack", *sys.argv[1:]]),
             signing_key=key,
         )
         if given["export_plan"] is not None:
             return _export(mission, request, given["export_plan"])
-        result = fly_mission(mission, request, line if terminal else None)
+        with line.running():
+            result = fly_mission(mission, request, line)
     except (AddressError, BridgeError) as error:
         raise click.UsageError(in_options(error)) from error
     except MissionError as error:
@@ -293,4 +298,5 @@ def _fly(given: dict[str, Any]) -> int:
     finally:
         leave_closed_terminal()
         line.end()
+    line.finish(result)
     return print_result(result, mission)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.options import StatusLine, report
+from missions.cli.options import report
+from missions.cli.status_line import StatusLine, announce_compiling
+from missions.notes import FLIGHT
 
 if TYPE_CHECKING:
     from missions.mission import Mission
@@ -35,36 +37,62 @@ def leave_closed_terminal() -> None:
 
 
 class ProgressLine:
-    """The progress line on a terminal. It shows nothing in a pipe, and nothing while it is paused."""
+    """The progress of a flight on stderr: on a terminal a status line, which is not shown while it is held;
+    in a pipe a line of text for each phase (of a script: mode) that a vehicle is the first to begin.
+    """
 
     def __init__(self) -> None:
         self._line = StatusLine()
         self._held = False
         self._last_wall_s = -math.inf
         self._pace = Pace()
+        self._phases: set[str] = set()
+        self._start = ""
+
+    def start(self, mission: str, connect: Sequence[str]) -> None:
+        """Say what starts: on a terminal at once, in a pipe when the world or the links are `opened`, so that
+        the refusal of a request is one line.
+        """
+        where = f" on {', '.join(connect)}" if connect else ""
+        self._start = f"starting {mission}{where}"
+        if self._line.terminal:
+            self.opened()
+
+    def opened(self) -> None:
+        """The world or the links are open."""
+        if self._start:
+            click.echo(self._start, err=True)
+            self._start = ""
 
     def __call__(self, flight: "Flight") -> None:
+        if flight.clock is None:
+            return
+        known = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
+        if self._line.terminal:
+            self._show(flight, known)
+            return
+        for vehicle in known:
+            phase = vehicle.notes.current
+            phase = (
+                f"{phase}, {vehicle.mode}" if phase == FLIGHT else phase
+            )  # a script's phases are its modes
+            if phase and phase not in self._phases:
+                self._phases.add(phase)
+                click.echo(f"{flight.elapsed_s:.1f} s: {phase}, {_state(known)[1]}", err=True)
+
+    def _show(self, flight: "Flight", known: "Sequence[Vehicle]") -> None:
         from autopilot_bridge.clock.pacing import wall_time_s
-        from missions.vehicle.telemetry import Position
 
         now_s = wall_time_s()
-        if self._held or now_s - self._last_wall_s < 0.1 or flight.clock is None:
+        if self._held or now_s - self._last_wall_s < 0.1:
             return
         self._last_wall_s = now_s
         time_s = flight.elapsed_s
         factor = self._pace.factor(now_s, time_s)
-        known = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
-        mode, height, progress = "waiting", "", 0.0
-        if known:
-            mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in known))
-            if any(vehicle.link.lost for vehicle in known):
-                mode = "LINK LOST"
-            positions = [vehicle.latest(Position) for vehicle in known]
-            height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
-            progress = sum(vehicle.notes.progress for vehicle in known) / len(known)
+        mode, height = _state(known)
         speed = "" if factor is None else f"x{factor:.1f}"
-        line = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
-        self._line.show(line + _awaited(flight.vehicles))
+        line = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {_phase(known)}"
+        self._line.show((line + _awaited(flight.vehicles)).rstrip())
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -81,9 +109,47 @@ class ProgressLine:
         self._line.erase()
         report(text)
 
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Context of the flight: what a mission prints stands on lines of its own, above the progress line,
+        and one line says that code is compiled, if it is.
+        """
+        announce_compiling(self._note)
+        with self._line.shared():
+            yield
+
+    def _note(self, text: str) -> None:
+        self._line.erase()
+        click.echo(text, err=True)
+
     def end(self) -> None:
         """End the progress line."""
         self._line.end()
+
+    def finish(self, result: "RunResult") -> None:
+        """In a pipe, the end of a flight as the last line; a failure has its own."""
+        if not self._line.terminal and result.outcome == "completed":
+            click.echo(f"{result.summary['sim_time_s']:.1f} s: {result.outcome}", err=True)
+
+
+def _state(known: "Sequence[Vehicle]") -> tuple[str, str]:
+    """Modes and heights of the vehicles that were received, as text."""
+    from missions.vehicle.telemetry import Position
+
+    if not known:
+        return "waiting", ""
+    mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in known))
+    if any(vehicle.link.lost for vehicle in known):
+        mode = "LINK LOST"
+    positions = [vehicle.latest(Position) for vehicle in known]
+    return mode, "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
+
+
+def _phase(known: "Sequence[Vehicle]") -> str:
+    """The phases of the vehicles, with the flown share where their mission reports one."""
+    phases = "/".join(dict.fromkeys(vehicle.notes.current for vehicle in known if vehicle.notes.current))
+    progress = sum(vehicle.notes.progress for vehicle in known) / max(1, len(known))
+    return f"{phases} {100.0 * progress:.0f} %" if progress > 0.0 else phases
 
 
 def _awaited(vehicles: Sequence["Vehicle"]) -> str:

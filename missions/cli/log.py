@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from autopilot_bridge.errors import BridgeError
-from missions.cli.options import FiniteRange, StatusLine, in_options
+from missions.cli.options import FiniteRange, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
+from missions.cli.status_line import StatusLine
 
 if TYPE_CHECKING:
     from estimators.logs import Log

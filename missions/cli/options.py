@@ -1,10 +1,8 @@
-"""Types of options, messages that name fields by the options that set them, and the status line."""
+"""Types of options, and messages that name fields by the options that set them."""
 
 import math
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
-from shutil import get_terminal_size
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -147,30 +145,3 @@ def report(message: object) -> None:
     from autopilot_bridge.mavlink.plain_text import plain_text
 
     click.echo(f"flightstack: {plain_text(in_options(message))}", err=True)
-
-
-class StatusLine:
-    """A line on a terminal in which each text replaces the last one. In a pipe it shows nothing."""
-
-    def __init__(self) -> None:
-        self.terminal = sys.stderr.isatty()
-        self._width = 0
-
-    def show(self, text: str) -> None:
-        """Replace the text; what does not fit into a line of the terminal is cut off."""
-        if self.terminal:
-            text = text[: max(1, get_terminal_size().columns - 1)]
-            click.echo(f"\r{text:<{self._width}}", nl=False, err=True)
-            self._width = len(text)
-
-    def erase(self) -> None:
-        """Leave the line empty, for other output on it."""
-        if self._width:
-            click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
-            self._width = 0
-
-    def end(self) -> None:
-        """Keep the last text, and continue on the next line."""
-        if self._width:
-            click.echo("", err=True)
-            self._width = 0

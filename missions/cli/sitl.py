@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +11,10 @@ import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from missions.cli.fly_command import chosen_names
-from missions.cli.options import SLOWEST, FiniteRange, StatusLine, in_options, report
+from missions.cli.options import SLOWEST, FiniteRange, in_options, report
 from missions.cli.params import STRICT_HELP, known_to_all
 from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
+from missions.cli.status_line import StatusLine, announce_compiling
 from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
 from missions.cli.world import WORLD_HELP, equipped, world_of
@@ -268,7 +270,8 @@ def sitl(
             count = len(spec.vehicles)
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
-            click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
+            click.echo("starting", err=True)
+            announce_compiling(partial(click.echo, err=True))
             simulated = Sitl(spec, signing=signing, cards=memory.cards)
             compile_flight_code(spec.vehicles)
             server = SitlServer(

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli.mission_command import Given
-from missions.cli.options import FiniteRange, StatusLine, in_options, report
+from missions.cli.options import FiniteRange, in_options, report
+from missions.cli.status_line import StatusLine
 
 if TYPE_CHECKING:
     from missions.studies.engine import Engine, Progress
@@ -312,7 +313,7 @@ class _ProgressLine:
 
     def start(self, name: str) -> None:
         if self._line.terminal:
-            self._line.show(f"{name}: starting (the first start compiles the flight code)")
+            self._line.show(f"{name}: starting")
 
     def __call__(self, progress: "Progress") -> None:
         left = "" if progress.left_s is None else f", {_clock(progress.left_s)} left"

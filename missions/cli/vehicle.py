@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.options import StatusLine
+from missions.cli.status_line import StatusLine
 from missions.cli.vehicle_actions import disarm, hold, land, return_, watch
 from missions.cli.vehicle_link import FAILED, address, confirm, connected, print_json, run, with_client
 from missions.cli.vehicle_params import params

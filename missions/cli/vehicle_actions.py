@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli.confirm import ask, can_ask
-from missions.cli.options import StatusLine
 from missions.cli.signing import key_from, key_option
+from missions.cli.status_line import StatusLine
 from missions.cli.vehicle_link import address, connected, print_json, run
 
 if TYPE_CHECKING:

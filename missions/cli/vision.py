@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from missions.cli.fly_command import chosen_names
-from missions.cli.options import FiniteRange, StatusLine, in_options, report
+from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
+from missions.cli.status_line import StatusLine
 
 if TYPE_CHECKING:
     from estimators.handoff.motion_watch import MotionWatchParameters

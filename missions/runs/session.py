@@ -20,7 +20,7 @@ from missions.estimation.in_flight import estimators_of, refused_in_plan
 from missions.how_left import HowLeft
 from missions.library import find_mission
 from missions.mission import Debriefing, Mission
-from missions.notes import FlightNotes
+from missions.notes import FLIGHT, FlightNotes
 from missions.options import MissionOptions
 from missions.preflight.endurance import Endurance, too_long
 from missions.runs.claimed_folder import ClaimedFolder, claim_folder
@@ -448,7 +448,7 @@ async def _fly_one(
     Args:
         watched: whether a sensor that stops ends the flight.
     """
-    vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission begins its own phase
+    vehicle.notes.begin(FLIGHT, vehicle.clock.stamp_us)  # until the mission begins its own phase
     async with vehicle.safe_on_exit(request.on_failure):
         async with vehicle.sensors.guard() if watched else nullcontext():
             await flying

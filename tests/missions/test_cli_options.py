@@ -10,7 +10,8 @@ import pytest
 
 from missions.cli.fly_command import _FILES, _MISSIONS, _command_of
 from missions.cli.main import command_line
-from missions.cli.options import StatusLine, in_options
+from missions.cli.options import in_options
+from missions.cli.status_line import StatusLine
 
 ROOT = Path(__file__).parents[2]
 FIELD = re.compile(r"`[a-z]\w*(?:, [a-z]\w*)*(?:=[\w:]+)?`")
@@ -63,6 +64,28 @@ def test_every_field_that_an_error_names_has_an_option():
                         missing.append((path.name, field, shown))
     assert count > 50
     assert missing == []
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_what_others_print_stands_on_lines_of_its_own(capsys, monkeypatch, terminal):
+    for stream in (sys.stdout, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: terminal)
+    line, streams = StatusLine(), (sys.stdout, sys.stderr)
+    with line.shared():
+        line.show("42 %")
+        print("own word", file=sys.stderr)  # noqa: T201
+        line.show("43 %")
+        print("begun", end="", file=sys.stderr)  # noqa: T201
+        line.show("44 %")  # not behind a line that is not ended
+        print(" and ended", file=sys.stderr)  # noqa: T201
+        line.show("45 %")
+        print("result")  # noqa: T201
+    line.end()
+    assert (sys.stdout, sys.stderr) == streams
+    captured = capsys.readouterr()
+    assert captured.out == "result\n"
+    on_terminal = "\r42 %\r    \rown word\n\r43 %\r    \rbegun and ended\n\r45 %\r    \r"
+    assert captured.err == (on_terminal if terminal else "own word\nbegun and ended\n")
 
 
 @pytest.mark.parametrize("terminal", [False, True])

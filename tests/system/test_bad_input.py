@@ -134,7 +134,7 @@ def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], exit_code:
     """Run the command line; the one line it says on stderr, without notices (slow start, open link)."""
     assert run_command_line(arguments) == exit_code
     out, err = capsys.readouterr()
-    notices = ("starting (", "flightstack: warning: ")
+    notices = ("starting", "compiling the flight code", "flightstack: warning: ")
     lines = [line for line in err.splitlines() if not line.startswith(notices)]
     assert len(lines) == 1, err
     assert lines[0].startswith("flightstack: ")
@@ -228,7 +228,7 @@ def test_as_a_process(arguments: str) -> None:
     """The same from a real process: one line, exit code 2, nothing on stdout."""
     command = [sys.executable, "-m", "missions", *arguments.split()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=100.0, check=False)
-    lines = [line for line in done.stderr.splitlines() if not line.startswith("starting (")]
+    lines = [line for line in done.stderr.splitlines() if not line.startswith(("starting", "compiling"))]
     assert (done.returncode, done.stdout, len(lines)) == (USAGE, "", 1)
 
 

@@ -167,6 +167,15 @@ def package(tmp_path: Path) -> Package:
     return Package(tmp_path)
 
 
+def test_a_listener_is_called_once_and_only_when_code_is_compiled(package: Package) -> None:
+    program = (
+        "from flightsim.foundation.kernels import when_compiling\n"
+        "when_compiling(lambda: print('compiling'))\n" + PROGRAM
+    )
+    assert package.say(program).splitlines() == ["compiling", "13.0 0"]
+    assert package.say(program).splitlines() == ["13.0 1"]
+
+
 @pytest.mark.slow
 def test_code_is_kept_until_a_constant_of_another_module_changes(package: Package) -> None:
     both = [package.start(), package.start()]  # one of them compiles, the other one waits for the code
