@@ -11,7 +11,6 @@ import click
 
 from missions.cli.options import report
 from missions.cli.status_line import StatusLine, announce_compiling
-from missions.notes import FLIGHT
 
 if TYPE_CHECKING:
     from missions.mission import Mission
