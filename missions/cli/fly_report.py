@@ -70,11 +70,12 @@ class ProgressLine:
         if self._line.terminal:
             self._show(flight, known)
             return
+        from missions.notes import FLIGHT
+
         for vehicle in known:
             phase = vehicle.notes.current
-            phase = (
-                f"{phase}, {vehicle.mode}" if phase == FLIGHT else phase
-            )  # a script's phases are its modes
+            if phase == FLIGHT:
+                phase = f"{phase}, {vehicle.mode}"  # the phases of a script are its modes
             if phase and phase not in self._phases:
                 self._phases.add(phase)
                 click.echo(f"{flight.elapsed_s:.1f} s: {phase}, {_state(known)[1]}", err=True)
