@@ -287,6 +287,8 @@ class VehicleLink:
             text = self._assembler.add(decode(frame))
             if text is not None:
                 self._add_text(text)
+                if self._authority is not None:  # not events: most are checks for modes that changed with it
+                    self._authority.on_text(text.severity, text.text, self.clock.time_us)
 
     def _on_event(self, frame: Any) -> None:
         """Add the reason that PX4 names by an event without a text."""
@@ -298,10 +300,7 @@ class VehicleLink:
                 self._add_text(StatusText(severity=severity, text=words))
 
     def _add_text(self, text: StatusText) -> None:
-        now_us = self.clock.time_us
-        self.status_texts.append(replace(text, received_us=now_us))
-        if self._authority is not None:
-            self._authority.on_text(text.severity, text.text, now_us)
+        self.status_texts.append(replace(text, received_us=self.clock.time_us))
 
     def _on_ack(self, frame: Any) -> None:
         if frame.system_id == self._system_id:
