@@ -1,6 +1,6 @@
 """The take-over matrix on real firmware: what a mission sends after a pilot or a failsafe has the vehicle.
 
-    python -m benchmarks.take_over --out FOLDER [--firmware px4] [--vehicle copter] [--by land] [--kind script]
+    python -m benchmarks.take_over --out FOLDER [--firmware px4] [--vehicle copter] [--kind script] [--by gps]
 
 A mission is flown on PX4 1.16.1 (SIH) or ArduPilot 4.6.3 (SITL). In its pattern a second ground station
 changes the mode by a command, moves sticks or the mode switch, or provokes a failsafe by parameters. The row
@@ -170,12 +170,14 @@ def sent_afterwards(log: Path, system_id: int, before: int) -> tuple[int | None,
     """The mode that a vehicle changed to from the mode `before`, and the names of what a flight sent to it
     after the first heartbeat with it, without heartbeats.
     """
-    in_mode, taken, names = False, None, []
+    taken: int | None = None
+    names: list[str] = []
     for _, frame in TlogReader(log):
         if (frame.system_id, frame.component_id, frame.message_id) == (system_id, 1, HEARTBEAT):
             mode = int(decode(frame).custom_mode)
-            in_mode = in_mode or mode == before
-            if taken is None and in_mode and mode != before:
+            if mode == before:
+                taken, names = None, []  # on the way to the pattern
+            elif taken is None:
                 taken = mode
         elif taken is not None and (frame.system_id, frame.component_id) == GROUND_STATION:
             message = decode(frame)

@@ -179,16 +179,17 @@ class Taken(VehicleOpener):
 
 def sent_afterwards(log: Path, before: int) -> list[str]:
     """Names of what the program sent to vehicle 1 after its first heartbeat with another mode in the air."""
-    engaged = taken = False
-    names = []
+    taken = False
+    names: list[str] = []
     for _, frame in TlogReader(log):
         if (frame.system_id, frame.component_id) == (1, 1) and frame.message_id == HEARTBEAT:
-            mode = decode(frame).custom_mode
-            engaged = engaged or mode == before
-            taken = taken or (engaged and mode != before)
+            if decode(frame).custom_mode == before:
+                taken, names = False, []  # on the way to the pattern
+            else:
+                taken = True
         elif taken and (frame.system_id, frame.component_id) == GROUND_STATION:
             message = decode(frame)
-            if message.get_type() != "HEARTBEAT" and message.target_system == 1:
+            if message.get_type() != "HEARTBEAT" and getattr(message, "target_system", 1) == 1:
                 names.append(message.get_type())
     assert taken
     return names
