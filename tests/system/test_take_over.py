@@ -198,7 +198,7 @@ def sent_afterwards(log: Path, before: int) -> list[str]:
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("by", TAKE_OVERS)
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(5)
 def test_nothing_is_sent_to_a_vehicle_that_another_one_has(
     by: str, kind: str, flavour: str, tmp_path: Path
 ) -> None:
