@@ -48,6 +48,7 @@ class TelemetryClock:
     Attributes:
         reboots: number of backward jumps of the vehicle's own time.
         jumps: number of steps ahead that the vehicle's rate did not explain.
+        wraps: how often the time stamps began again at 0, every 49.7 days.
     """
 
     def __init__(self, monotonic: Callable[[], float] = wall_time_s) -> None:
@@ -66,6 +67,7 @@ class TelemetryClock:
         self._repeated_s = 0.0  # wall seconds for which the newest time stamp has been repeated
         self.reboots = 0
         self.jumps = 0
+        self.wraps = 0
         self._stood_still_s = 0.0
 
     @property
@@ -155,7 +157,9 @@ class TelemetryClock:
             self._offset_us = now_us - vehicle_time_us
             self._pace = (wall_s, now_us)
             return
-        self._offset_us += self._vehicle_us + step_us - vehicle_time_us  # 0, unless the stamps wrapped
+        if vehicle_time_us < self._vehicle_us:
+            self.wraps += 1
+            self._offset_us += _WRAP_US
         due_us = vehicle_time_us + self._offset_us
         if now_us - due_us <= _MAX_STEP_BACK_US:
             self._behind = None

@@ -222,6 +222,7 @@ def _fly_interruptible(
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
         reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)
+        reason = "; ".join(filter(None, (reason, *(_time_stamp_faults(flight) if reason else ()))))
         if recorder.failure:
             reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
         outcome = FAILED if reason else COMPLETED
@@ -479,6 +480,14 @@ def _debrief(request: RunRequest, records: FlightRecords, flight: Flight) -> Deb
         target_ne_m=targets_ne_m[0] if targets_ne_m else None,
         targets_ne_m=targets_ne_m,
     )
+
+
+def _time_stamp_faults(flight: Flight) -> list[str]:
+    """What was wrong with the time stamps that a flight is judged by, one text for each vehicle."""
+    faults = ((v.notes.system_id, v.link.time_stamp_faults()) for v in flight.vehicles)
+    return [
+        f"{text} (system {system_id}), and the flight is judged by them" for system_id, text in faults if text
+    ]
 
 
 def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:

@@ -139,11 +139,12 @@ class VehicleCommands:
 
     @property
     def may_be_armed(self) -> bool:
-        """Whether a heartbeat reports armed, or no later heartbeat has come since arming was requested.
+        """Whether a heartbeat reports armed, or no later heartbeat has come since arming was requested, or
+        the vehicle reports that it is in the air, though heartbeats report disarmed.
 
         A heartbeat received within half a second of the request may have been sent before it.
         """
-        if self.link.armed:
+        if self.link.armed or self.link.disarmed_in_the_air:
             return True
         if self._arming_us is None or self.link.heartbeat_us is None:
             return False

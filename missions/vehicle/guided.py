@@ -50,6 +50,7 @@ class GuidedSession:
         Raises:
             TakenOver: the vehicle left the guided mode: a failsafe or a pilot has it.
             LinkClosed: its link was lost.
+            MissionError: it disarmed.
             PlanError: the source returned something that is not a setpoint, or a position below home, which
                 is not allowed (`Vehicle.allow_below_home`).
         """
@@ -138,8 +139,12 @@ class GuidedSession:
         link = self._link
         target = link.firmware.modes[Mode.GUIDED]
         left = asyncio.get_running_loop().create_future()
+        disarmed = asyncio.get_running_loop().create_future()
+        flying = link.armed
 
         def look(_frame: object) -> None:
+            if flying and not link.armed and not disarmed.done():
+                disarmed.set_result(None)
             if link.just_back or link.taken_over() is not None:
                 return  # PX4 returns to OFFBOARD by itself when setpoints are received again
             if not left.done() and link.custom_mode != target:
@@ -149,10 +154,12 @@ class GuidedSession:
         done = asyncio.ensure_future(self._done.wait())
         try:
             async with link.guard("the end of the setpoints"):
-                await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
+                await asyncio.wait({done, left, disarmed, stream}, return_when=asyncio.FIRST_COMPLETED)
             if stream.done():
                 await stream  # raises the error that ended it
-            if left.done() and not done.done():  # disarmed meanwhile, or commanded by this program itself
+            if disarmed.done() and not done.done():
+                link.require_armed("before the end of the setpoints")
+            if left.done() and not done.done():  # commanded by this program itself
                 raise MissionError(
                     f"the vehicle left the guided mode for {left.result()}; {link.last_received()}"
                 )
@@ -160,6 +167,7 @@ class GuidedSession:
             stop()
             done.cancel()
             left.cancel()
+            disarmed.cancel()
             self._source = None
 
 

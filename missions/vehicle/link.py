@@ -45,10 +45,19 @@ _HEARTBEAT: Final = definition("HEARTBEAT").message_id
 _read_heartbeat: Final = field_reader("HEARTBEAT", "custom_mode", "type", "autopilot", "base_mode")
 _read_position: Final = field_reader("GLOBAL_POSITION_INT", "lat", "lon", "alt")
 _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
-_CONFIRMED_US: Final = 900_000  # heartbeats come once a second: a second one confirms the first
+# heartbeats come once a second: a second one confirms the first, a third one also against EXTENDED_SYS_STATE
+_CONFIRMED_US: Final = 900_000
+_CONFIRMED_IN_THE_AIR_US: Final = 1_900_000
+IN_THE_AIR: Final = (
+    dialect.MAV_LANDED_STATE_IN_AIR,
+    dialect.MAV_LANDED_STATE_TAKEOFF,
+    dialect.MAV_LANDED_STATE_LANDING,
+)
+"""Landed states of a flying vehicle. Both firmwares report the ground as soon as they are disarmed."""
 _USABLE_FOR_US: Final = 1_000_000
 _SILENT_AFTER_US: Final = 3_000_000
 _SILENT_CHECK_S: Final = 0.5
+_STOOD_STILL_S: Final = 3.0
 _SHOWN_AFTER_US: Final = 3_000_000  # most waits are shorter: they need not be shown
 
 
@@ -395,7 +404,8 @@ class VehicleLink:
         """Whether the vehicle is armed: by the newest heartbeat, where that reports armed.
 
         One heartbeat that reports disarmed after others reported armed may be wrong. It counts when the
-        vehicle reports that it is on the ground, and else with a heartbeat that confirms it.
+        vehicle reports that it is on the ground, and else with a heartbeat that confirms it, or two when it
+        reports that it is in the air.
         """
         if self._reported is None:
             heartbeat = self.message("HEARTBEAT")
@@ -418,7 +428,14 @@ class VehicleLink:
         """Whether a heartbeat reports disarmed after others reported armed, and none has confirmed it yet."""
         if self._disarmed_us is None or self.heartbeat_us is None:
             return False
-        return self.heartbeat_us - self._disarmed_us < _CONFIRMED_US
+        in_the_air = self.landed_state in IN_THE_AIR
+        confirmed_us = _CONFIRMED_IN_THE_AIR_US if in_the_air else _CONFIRMED_US
+        return self.heartbeat_us - self._disarmed_us < confirmed_us
+
+    @property
+    def disarmed_in_the_air(self) -> bool:
+        """Whether heartbeats report disarmed after others reported armed, and the vehicle that it flies."""
+        return self._disarmed_us is not None and self.landed_state in IN_THE_AIR
 
     @property
     def custom_mode(self) -> int:
@@ -438,6 +455,20 @@ class VehicleLink:
         """MAV_LANDED_STATE: 0 not known, 1 on the ground, 2 in the air, 3 taking off, 4 landing."""
         message = self.message("EXTENDED_SYS_STATE")
         return 0 if message is None else int(message.landed_state)
+
+    def time_stamp_faults(self) -> str:
+        """What was wrong with the time stamps of a vehicle that is not embedded, as text; "": nothing."""
+        clock = self.clock
+        if not isinstance(clock, TelemetryClock):
+            return ""
+        faults = []
+        if clock.stood_still_s >= _STOOD_STILL_S:
+            faults.append(f"stood still for {clock.stood_still_s:.0f} s")
+        if clock.reboots or clock.jumps:
+            faults.append(f"stepped back {clock.reboots} times and ahead {clock.jumps} times")
+        if clock.wraps:
+            faults.append("began again at 0 after 49.7 days")
+        return f"the vehicle's time stamps {' and '.join(faults)}" if faults else ""
 
     def addressed_here(self, message: MAVLinkMessage) -> bool:
         """Whether a reply is for this mission: addressed to all, or to its own ids."""

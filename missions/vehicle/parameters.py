@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.plain_text import plain_text
-from missions.errors import CommandRejected, VehicleTimeout
+from missions.errors import CommandRejected, MissionError, VehicleTimeout
 from missions.planning.limits import Limits
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.link import VehicleLink
@@ -69,14 +69,19 @@ class VehicleParameters:
             return default
 
     async def limits(self) -> Limits:
-        """The limits for a planner, from the vehicle's parameters."""
+        """The limits for a planner, from the vehicle's parameters.
+
+        Raises:
+            MissionError: one of them is not a number.
+        """
         firmware = self._link.firmware
-        return firmware.limits(
-            {
-                name: await self.read_or(name, default)
-                for name, default in firmware.limiting_parameters.items()
-            }
-        )
+        values = {
+            name: await self.read_or(name, default) for name, default in firmware.limiting_parameters.items()
+        }
+        for name, value in values.items():
+            if not math.isfinite(value):
+                raise MissionError(f"the vehicle reports {name} = {value}; set it to a number")
+        return firmware.limits(values)
 
     async def _read(self, name: str, *, tries: int = _TRIES) -> tuple[float, int]:
         """Read value and MAV_PARAM_TYPE of a parameter."""

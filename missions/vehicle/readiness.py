@@ -9,17 +9,13 @@ from missions.preflight.health import not_ready_because
 from missions.vehicle.adapters import PREARM, Adapter
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
+from missions.vehicle.link import IN_THE_AIR
 from missions.vehicle.plans import VehiclePlans
 
 # at the end of a wait for readiness: time in which the autopilot reports what is missing
 _REASONS_S: Final = 5.0
 _STREAMS_S: Final = 3.0  # after a request for streams, until it is repeated
 _STREAM_REQUESTS: Final = 5
-_IN_THE_AIR: Final = (
-    dialect.MAV_LANDED_STATE_IN_AIR,
-    dialect.MAV_LANDED_STATE_TAKEOFF,
-    dialect.MAV_LANDED_STATE_LANDING,
-)
 
 
 class Readiness:
@@ -73,7 +69,7 @@ class Readiness:
         link = self._link
         return (
             not link.armed
-            and link.landed_state not in _IN_THE_AIR
+            and link.landed_state not in IN_THE_AIR
             and link.custom_mode in link.firmware.left_before_arming
         )
 

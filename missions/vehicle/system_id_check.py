@@ -35,7 +35,7 @@ class SystemIdCheck:
             self._foreign += 1
             if self._foreign != _FOREIGN:
                 return ""
-            return f"heartbeats of a {self._sender} and of a {sender} are received"
+            return f"heartbeats of {self._sender} and {sender} are received"
         self._armed.append(armed)
         changes = sum(before != after for before, after in pairwise(self._armed))
         if changes < _CHANGES:
