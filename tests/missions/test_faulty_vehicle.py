@@ -1,4 +1,4 @@
-"""Flights with vehicles that misbehave: a fault ends the flight in time and with its reason, or is harmless."""
+"""Vehicles that misbehave: a fault ends the flight in time and with its reason, or it is harmless."""
 
 import re
 from dataclasses import replace
