@@ -143,7 +143,7 @@ class GuidedSession:
         flying = link.armed
 
         def look(_frame: object) -> None:
-            if flying and not link.armed and not disarmed.done():
+            if flying and not link.armed and link.custom_mode == target and not disarmed.done():
                 disarmed.set_result(None)
             if link.just_back or link.taken_over() is not None:
                 return  # PX4 returns to OFFBOARD by itself when setpoints are received again
