@@ -171,7 +171,6 @@ PARAMETER_FILES = {
     b"# comment\nMPC_XY_VEL_MAX fast\n": ("line 2", "MPC_XY_VEL_MAX", "fast"),
     b"MPC_XY_VEL_MAX nan\n": ("line 1",),
     b"MPC_XY_VEL_MAX inf\n": ("line 1",),
-    b"NO_SUCH_PARAM 1\n": ("NO_SUCH_PARAM",),
     b"MPC_XY_VEL_MAX -1\n": ("MPC_XY_VEL_MAX", "-1"),
     b"MPC_XY_VEL_MAX 1e30\n": ("MPC_XY_VEL_MAX", "1e+30"),
     b"A_NAME_OF_SEVENTEEN 1\n": ("line 1",),
