@@ -14,7 +14,7 @@ class VehicleTimeout(MissionError):
 
 
 class ModeNotEntered(VehicleTimeout):
-    """A mode was commanded and not reported in time.
+    """A mode, or to disarm, was commanded and not reported in time.
 
     Attributes:
         acknowledged: whether the vehicle accepted the command.

@@ -77,7 +77,7 @@ class HowLeft:
     Attributes:
         system_id: its system id.
         commands: what was commanded to leave it safe, in order.
-        withheld: why nothing was commanded, though it was armed; "": it was commanded, or it was disarmed.
+        withheld: why nothing (more) was commanded, though it was armed; "": it was commanded, or it was disarmed.
         mode: name of its mode; "": not known.
         armed: whether it is armed.
         on_ground: whether it reports that it stands on the ground; None: not reported.
@@ -102,7 +102,9 @@ class HowLeft:
     @property
     def _commanded(self) -> str:
         if self.withheld:
-            return f"nothing was commanded: {self.withheld}"
+            actions = [f"to {c.action}" for c in self.commands]
+            before = f"was commanded {_listed(actions)}, and then nothing more" if actions else ""
+            return f"{before or 'nothing was commanded'}: {self.withheld}"
         parts = []
         for answer, words in _WORDS.items():
             actions = [f"to {c.action}" for c in self.commands if c.answer is answer]

@@ -72,7 +72,7 @@ class FlightNotes:
         left_out_parameters: parameters that were to be set, and that the vehicle does not have.
         safety_commands: what was commanded to leave the vehicle safe, because the flight failed or was
             interrupted, and the answers.
-        withheld: why nothing was commanded then; "": it was, or it was not necessary.
+        withheld: why nothing (more) was commanded then; "": it was, or it was not necessary.
         left: how the vehicle was left; None: the flight has not ended, or no vehicle was received.
         warnings: warnings for the user, without repetitions.
         link_losses: times at which the link was lost and regained.

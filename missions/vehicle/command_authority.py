@@ -23,7 +23,8 @@ from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from missions.how_left import TakeOver
 from missions.vehicle.firmware import Firmware, Mode, ModeCommand
 
-_HEARTBEATS_UNEXPLAINED: Final = 3
+HEARTBEATS_UNEXPLAINED: Final = 3
+"""After so many without evidence, a mode that may have followed by itself is a take-over."""
 _HEARTBEATS_DISARMED: Final = 3
 """In a row: after so many the flight is over. A single one may be a glitch."""
 _HEARTBEATS_PENDING: Final = 5
@@ -226,7 +227,7 @@ class CommandAuthority:
         """Decide about a mode that may have followed by itself."""
         self.state = Command.UNEXPLAINED
         self._unexplained += 1
-        if not self._explain() and self._unexplained >= _HEARTBEATS_UNEXPLAINED:
+        if not self._explain() and self._unexplained >= HEARTBEATS_UNEXPLAINED:
             self._take_over(mode, time_us)
 
     def _explain(self) -> bool:

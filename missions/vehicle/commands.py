@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
-from missions.errors import CommandRejected, ModeNotEntered, VehicleTimeout
+from missions.errors import CommandRejected, MissionError, ModeNotEntered, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode, ModeCommand
 from missions.vehicle.heights import HeightRule
@@ -299,8 +299,13 @@ class VehicleCommands:
     async def arm(self, timeout_s: float = 15.0) -> None:
         """Arm in the present mode and wait for it in a heartbeat; after a temporary refusal it tries again
         until the deadline.
+
+        Raises:
+            MissionError: the mode was changed before the vehicle was armed.
+            CommandRejected: it was refused until the deadline.
         """
         link = self.link
+        mode = link.custom_mode
         end_us = link.clock.time_us + round(timeout_s * 1e6)
         while not link.armed:
             result = await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
@@ -310,4 +315,14 @@ class VehicleCommands:
                 self.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the autopilot then sends all reasons
                 await self._require_with_reason(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
             await link.clock.sleep(1.0)
+            self._require_mode(mode)
         await link.wait_until(lambda: link.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=5.0)
+
+    def _require_mode(self, custom_mode: int) -> None:
+        """Raise MissionError when another one has changed the mode in which the vehicle is to be armed."""
+        link = self.link
+        if link.custom_mode != custom_mode:
+            raise MissionError(
+                f"the mode was changed from {link.firmware.mode_name(custom_mode)} to {link.mode} while the "
+                f"vehicle was to be armed, and this program did not command it; {link.last_received()}"
+            )

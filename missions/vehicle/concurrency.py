@@ -1,4 +1,4 @@
-"""Runs coroutines concurrently on vehicle time."""
+"""Runs coroutines concurrently on vehicle time, and to their end."""
 
 import asyncio
 from collections.abc import Coroutine, Iterable
@@ -26,6 +26,24 @@ async def run_concurrently(coroutines: Iterable[Coroutine[Any, Any, None]]) -> N
             if text != str(first):
                 first.add_note(f"also failed: {text}")
         raise first from None
+
+
+async def run_to_end(coroutine: Coroutine[Any, Any, None]) -> None:
+    """Run a coroutine to its end, also when the present task is cancelled meanwhile: by a signal, or by the
+    failure of another vehicle. That is raised afterwards.
+
+    Raises:
+        CancelledError: the present task was cancelled.
+    """
+    task = asyncio.ensure_future(coroutine)
+    cancelled: asyncio.CancelledError | None = None
+    while not task.done():
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError as error:
+            cancelled = error
+    if cancelled is not None:
+        raise cancelled
 
 
 def _single(error: BaseException) -> list[BaseException]:

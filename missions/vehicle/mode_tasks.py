@@ -129,12 +129,20 @@ class ModeTasks:
         tracker = self._tracker
         if tracker is None:
             return self._complete or 0 < self._total <= self._reached + 1
-        returns = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH in self._last_commands
-        if after == self._firmware.modes[Mode.RETURN] and returns:
-            return tracker.coming_down or tracker.at_the_last_place
+        if after == self._firmware.modes[Mode.RETURN]:
+            if dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH in self._last_commands:
+                return tracker.coming_down or tracker.at_the_last_place
+            if self._ends_in_hold:
+                return False
         if tracker.lands:
             return tracker.finished or self._on_ground
         return tracker.over or tracker.at_the_last_place
+
+    @property
+    def _ends_in_hold(self) -> bool:
+        """Whether the autopilot holds at the end of a mission (PX4), and returns only by an item."""
+        modes = self._firmware.modes
+        return modes[Mode.HOLD] in self._firmware.modes_following.get(modes[Mode.MISSION], ())
 
     @property
     def _last_commands(self) -> tuple[int, ...]:

@@ -10,13 +10,22 @@ from typing import Any, Final, TypeVar
 from autopilot_bridge.clock import Clock
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.errors import CommandRejected, MissionError, ModeNotEntered, PlanError, TakenOver
+from missions.errors import (
+    CommandRejected,
+    MissionError,
+    ModeNotEntered,
+    PlanError,
+    TakenOver,
+    VehicleTimeout,
+)
 from missions.how_left import Answer, HowLeft, SafetyCommand
 from missions.kind import VehicleKind
 from missions.notes import FlightNotes
 from missions.planning.limits import FORECAST_WIND_M_S, FixedWingLimits, Limits
 from missions.vehicle.adapters import Adapter, ArduPilot, Px4
+from missions.vehicle.command_authority import HEARTBEATS_UNEXPLAINED, Command
 from missions.vehicle.commands import ACK_S, VehicleCommands
+from missions.vehicle.concurrency import run_to_end
 from missions.vehicle.connection import Connection
 from missions.vehicle.firmware import Firmware, Mode
 from missions.vehicle.guided import GuidedSession, LocalOrigin, SetpointSource, guided_session
@@ -394,10 +403,12 @@ class Vehicle:
             async with self.link.until_taken_over():
                 yield self
         except BaseException as error:
-            await asyncio.shield(asyncio.ensure_future(self._make_safe(action)))
+            await run_to_end(self._make_safe(action))
             taken = self.link.taken_over()
-            if taken is not None and isinstance(error, MissionError) and not isinstance(error, TakenOver):
-                raise taken from error  # the mode explains the error that preceded its heartbeat
+            # the mode explains an error that preceded its heartbeat, but not one that was acted on before
+            acted = isinstance(error, TakenOver) or self.notes.safety_commands
+            if taken is not None and isinstance(error, MissionError) and not acted:
+                raise taken from error
             raise
         finally:
             for end in self.commands.until_safe:
@@ -410,8 +421,11 @@ class Vehicle:
         # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
         if not link.identified or not self.commands.may_be_armed:
             return
-        # What failed may be the effect of a mode that no heartbeat has reported yet.
+        # What failed may be the effect of a mode that no heartbeat has reported yet, or that is not explained.
         await self._next_heartbeat(_FRESH_S)
+        for _ in range(HEARTBEATS_UNEXPLAINED):
+            if link.authority.state is Command.UNEXPLAINED:
+                await self._next_heartbeat(_FRESH_S)
         withheld = self._withheld()
         if not withheld:
             with suppress(TakenOver):
@@ -431,6 +445,8 @@ class Vehicle:
             return "a failsafe has it"
         if not authority.engaged:
             return "this program had not armed or commanded it"
+        if authority.state is not Command.OURS:
+            return f"this program had not commanded mode {self.link.mode}"
         return ""
 
     async def _next_heartbeat(self, timeout_s: float) -> None:
@@ -455,15 +471,21 @@ class Vehicle:
             await self._answer("disarm", self._disarm_once())  # refused if it has just left the ground
         # also for a disarmed vehicle: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
+            if self.link.authority.state is not Command.OURS:
+                return  # nothing would be sent
             answer = await self._answer(mode, self.commands.set_mode(mode, 5.0))
             # A vehicle that is not received may still receive: it keeps the first action commanded.
             if answer is Answer.DONE or self.link.quiet:
                 return
 
     async def _disarm_once(self) -> None:
-        """Disarm; a refusal is no reason to wait for its cause."""
+        """Disarm and wait for it in a heartbeat; a refusal is no reason to wait for its cause."""
         command = dialect.MAV_CMD_COMPONENT_ARM_DISARM
         self.commands.require(command, await self.try_command(command, 0.0, timeout_s=0.5))
+        try:
+            await self.link.wait_disarmed(_FRESH_S)
+        except VehicleTimeout as error:
+            raise ModeNotEntered(str(error), acknowledged=True) from error
 
     async def _answer(self, action: str, commanding: Coroutine[Any, Any, None]) -> Answer:
         """Await the answer to a command that leaves the vehicle safe, and note both.

@@ -1,13 +1,17 @@
 """Who commands a vehicle: modes of our own, modes that follow by themselves, and those of others."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from missions.how_left import Answer, HowLeft, SafetyCommand
 from missions.vehicle.command_authority import Command, CommandAuthority
 from missions.vehicle.firmware import Mode
 from missions.vehicle.firmware_records import ARDUCOPTER, ARDUPLANE, FIRMWARES, PX4_COPTER
+from missions.vehicle.item_tracker import MissionStep
+from missions.vehicle.mode_tasks import ModeTasks, StoredPlan
 
 every = pytest.mark.parametrize("firmware", FIRMWARES.values(), ids=lambda f: f"{f.name}-{f.kind}")
 
@@ -248,3 +252,30 @@ def test_the_texts_around_a_take_over_are_in_its_sentence():
         "the pilot (or failsafe: 'Battery 1 is low 10.40V' / 'Battery Failsafe') has the vehicle, mode Land; "
         "nothing was commanded"
     )
+
+
+def test_arducopter_leaves_auto_for_no_mode_by_itself():
+    """ArduPilot 4.6.3, ArduCopter/mode_auto.cpp: exit_mission, do_RTL."""
+    for mode in (6, 9, 27):
+        assert Flight(ARDUCOPTER, lambda *_: True).in_flight(Mode.MISSION).heartbeat(mode) is Command.TAKEN
+
+
+def test_px4_returns_at_the_end_of_a_mission_only_by_an_item():
+    for last, returns in ((mavlink.MAV_CMD_NAV_WAYPOINT, False), (mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, True)):
+        tasks = ModeTasks(PX4_COPTER)
+        steps = tuple(MissionStep(index=k, command=c) for k, c in enumerate((16, last)))
+        tasks.plan = StoredPlan(steps=steps, again_from=None, first=0, commands=frozenset((16, last)))
+        modes = PX4_COPTER.modes
+        tasks.on_mode(modes[Mode.MISSION])
+        tasks.on_mission_message(mavlink.MAVLink_mission_item_reached_message(1), 1_000_000)
+        assert tasks.done(modes[Mode.MISSION], modes[Mode.RETURN]) is returns
+        assert tasks.done(modes[Mode.MISSION], modes[Mode.HOLD])
+
+
+def test_what_was_commanded_before_a_take_over_is_said():
+    command = SafetyCommand(action="return", answer=Answer.DONE)
+    left = HowLeft(system_id=1, commands=(command,), withheld="the pilot has it", mode="Loiter", armed=True)
+    assert left.text == (
+        "was commanded to return, and then nothing more: the pilot has it; it is in Loiter, armed"
+    )
+    assert replace(left, commands=()).text.startswith("nothing was commanded: the pilot has it")

@@ -500,3 +500,44 @@ def test_what_else_failed_side_by_side_hangs_on_the_first_error():
     with pytest.raises(MissionError, match="first") as caught:
         asyncio.run(run_concurrently([fails("first"), fails("second")]))
     assert caught.value.__notes__ == ["also failed: second"]
+
+
+def test_a_second_cancellation_does_not_cut_off_what_leaves_the_vehicle_safe(flown):
+    """By a signal, after an own failure or that of another vehicle."""
+
+    async def script(vehicle, autopilot):
+        async def fly():
+            async with vehicle.safe_on_exit():
+                await vehicle.takeoff(8.0)
+                failed.append(True)
+                raise MissionError("own failure")
+
+        failed = []
+        task = asyncio.get_running_loop().create_task(fly())
+        while not failed:
+            await asyncio.sleep(0.02)
+        for _ in range(10):  # before anything is commanded, and after it
+            task.cancel()
+            await asyncio.sleep(0.2)
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        return autopilot.kind, [c.answer for c in vehicle.notes.safety_commands]
+
+    assert flown(script) == ("return", ["done"])
+
+
+@both
+def test_a_mode_that_another_one_sets_while_arming_is_refused_ends_the_arming(flown, flavour):
+    async def script(vehicle, autopilot):
+        autopilot.arm_refusals = 3
+
+        def pilot():
+            autopilot.mode = 2 if flavour == "ardupilot" else 0x00070000
+
+        asyncio.get_running_loop().call_later(1.5, pilot)
+        with pytest.raises(MissionError, match="the mode was changed from .* while the vehicle was to be armed"):
+            async with vehicle.safe_on_exit():
+                await vehicle.takeoff(8.0)
+        return autopilot.armed, vehicle.notes.safety_commands
+
+    assert flown(script, flavour) == (False, [])
