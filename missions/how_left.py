@@ -77,7 +77,7 @@ class HowLeft:
     Attributes:
         system_id: its system id.
         commands: what was commanded to leave it safe, in order.
-        withheld: why nothing (more) was commanded, though it was armed; "": it was commanded, or it was disarmed.
+        withheld: why nothing (more) was commanded, though it was armed; "": it was, or it was disarmed.
         mode: name of its mode; "": not known.
         armed: whether it is armed.
         on_ground: whether it reports that it stands on the ground; None: not reported.

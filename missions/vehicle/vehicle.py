@@ -421,7 +421,7 @@ class Vehicle:
         # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
         if not link.identified or not self.commands.may_be_armed:
             return
-        # What failed may be the effect of a mode that no heartbeat has reported yet, or that is not explained.
+        # What failed may be the effect of a mode that was not reported yet, or that is not explained.
         await self._next_heartbeat(_FRESH_S)
         for _ in range(HEARTBEATS_UNEXPLAINED):
             if link.authority.state is Command.UNEXPLAINED:

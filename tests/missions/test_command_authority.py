@@ -261,7 +261,10 @@ def test_arducopter_leaves_auto_for_no_mode_by_itself():
 
 
 def test_px4_returns_at_the_end_of_a_mission_only_by_an_item():
-    for last, returns in ((mavlink.MAV_CMD_NAV_WAYPOINT, False), (mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, True)):
+    for last, returns in (
+        (mavlink.MAV_CMD_NAV_WAYPOINT, False),
+        (mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, True),
+    ):
         tasks = ModeTasks(PX4_COPTER)
         steps = tuple(MissionStep(index=k, command=c) for k, c in enumerate((16, last)))
         tasks.plan = StoredPlan(steps=steps, again_from=None, first=0, commands=frozenset((16, last)))
