@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.parameters import MAX_NAME_LENGTH, ParameterDefinition, ParameterError
+from flightsim.foundation.file_content import FileError, read_text
 
 QGC_SUFFIX: Final = ".params"
 MAVPROXY_SUFFIXES: Final = (".parm", ".param")
@@ -113,13 +114,9 @@ def format_qgc(
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ParameterError(f"parameter file {path} can't be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ParameterError(
-            f"parameter file {path} can't be read: it is not text (byte {error.start} is not UTF-8)"
-        ) from error
+        return read_text(path, may_be_empty=True)
+    except FileError as error:
+        raise ParameterError(f"parameter file {error}") from None
 
 
 def _entries(text: str, source: str) -> Iterator[tuple[str, str, str]]:

@@ -1,7 +1,6 @@
 """Reading vehicle descriptions: finding the file a user means, and its TOML."""
 
 import math
-import tomllib
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
@@ -20,6 +19,8 @@ from flightsim.airframe_types import (
     LaunchParameters,
     Role,
 )
+from flightsim.foundation.documents import read_toml
+from flightsim.foundation.file_content import FileError
 from flightsim.toml_tables import listed, names_of, number, only, table_of, text
 
 _MODELS_DIR: Final = Path(__file__).parent / "models"
@@ -111,10 +112,9 @@ def _bare(xml: Path) -> Airframe:
 
 def _read(path: Path) -> Airframe:
     try:
-        with path.open("rb") as file:
-            data = tomllib.load(file)
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AirframeError(f"cannot read the vehicle description {path}: {error}") from None
+        data = read_toml(path)
+    except FileError as error:
+        raise AirframeError(f"the vehicle description {error}") from None
     if unknown := [name for name in data if name not in _TABLES]:
         accepted = ", ".join(f"[{name}]" for name in _TABLES)
         raise AirframeError(f"{path}: '{unknown[0]}' is unknown; tables are {accepted}")

@@ -7,7 +7,6 @@ it follows the type hints, so that a new field can be set in files at once. Angl
 
 import inspect
 import math
-import tomllib
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import is_dataclass
@@ -16,6 +15,8 @@ from pathlib import Path
 from typing import Any, Final, Union, get_args, get_origin, get_type_hints
 
 from flightsim.environment import Environment, Turbulence
+from flightsim.foundation import documents
+from flightsim.foundation.file_content import FileError
 from flightsim.home import Home
 from flightsim.payload import (
     Circle,
@@ -83,11 +84,9 @@ def read_toml(path: Path) -> dict[str, Any]:
         WorldFileError: it can't be read.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise WorldFileError(f"can't read world file {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise WorldFileError(f"{path} is not a TOML file: {error}") from error
+        return documents.read_toml(path)
+    except FileError as error:
+        raise WorldFileError(f"world file {error}") from None
 
 
 class _Naming:

@@ -8,12 +8,12 @@ from estimators.logs.dialect import load_dialect
 from estimators.logs.log import Log
 from estimators.logs.source import LogSource
 from estimators.logs.tlog import open_tlog
+from flightsim.foundation.file_content import FileError, file_head
 
 _ULG_MAGIC: Final = bytes.fromhex("554c6f67011235")
 _DATAFLASH_MAGIC: Final = bytes.fromhex("a395")
 _DATAFLASH_FMT: Final = bytes.fromhex("a395808059") + b"FMT"
 """The message that describes the format of formats; some logs have junk bytes before it."""
-_HEAD_BYTES: Final = 8192
 
 
 def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
@@ -59,13 +59,7 @@ def _open_source(path: Path, head: bytes, dialect: str | Path | None) -> LogSour
 
 
 def _read_head(path: Path) -> bytes:
-    if path.is_dir():
-        raise LogError(f"{path} is a directory; give the path of a log")
     try:
-        with open(path, "rb") as file:
-            head = file.read(_HEAD_BYTES)
-    except OSError as error:
-        raise LogError(f"can't read {path}: {error.strerror}; give the path of a log") from error
-    if not head:
-        raise LogError(f"{path} is empty; give the path of a log")
-    return head
+        return file_head(path)
+    except FileError as error:
+        raise LogError(f"{error}; give the path of a log") from None

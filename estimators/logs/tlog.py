@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, MAGIC_V2
 from estimators.errors import LogError
 from estimators.logs.columns import Columns, decode_columns
+from estimators.logs.crc import Int
 from estimators.logs.dialect import Description, Dialect
 from estimators.logs.gaps import GapFigures, find_lead, sort_gaps
 from estimators.logs.scan import (
@@ -27,12 +28,16 @@ from estimators.logs.scan import (
     scan,
 )
 from estimators.logs.source import LogSource, Positions, SourceLoss, Stream, UnknownMessage
+from estimators.logs.time_stamps import plausible
 from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
+from flightsim.foundation.file_content import FileError, open_file
 from flightsim.foundation.kernels import kernel
 
 _FAR_FUTURE_US: Final = 1 << 62
 _STAMP_SAMPLE: Final = 4096
 _MILLISECOND_US: Final = 1000
+_LONGEST_PAUSE_US: Final = 86_400_000_000
+"""A first or last record that is farther than a day from the others has a damaged stamp."""
 
 
 class TlogSource(LogSource):
@@ -117,12 +122,27 @@ class TlogSource(LogSource):
         return self._boot_starts
 
     def log_time_us(self, order: Positions) -> NDArray[np.int64]:
-        """Times of the records; a frame without its own time has that of the previous frame."""
-        times = np.zeros(len(order), dtype=np.int64)
-        if self.index.lead:
-            _log_times(
-                self.data, self.index.starts, np.asarray(order, dtype=np.int64), self._little_endian, times
-            )
+        """Times of the records; a frame without its own time, or with a damaged one, has that of the previous
+        frame with a time, and before the first such frame the time of that one.
+        """
+        if not self.index.lead:
+            return np.zeros(len(order), dtype=np.int64)
+        return self._record_times[0][order]
+
+    @cached_property
+    def _record_times(self) -> tuple[NDArray[np.int64], int]:
+        """Times of all records, and the number of damaged stamps among them."""
+        times = self._stamps_us(self._little_endian, self.count)
+        good = plausible(times, _LONGEST_PAUSE_US)
+        damaged = int(np.count_nonzero(~good & (times >= 0)))
+        _fill(times, good)
+        times.flags.writeable = False
+        return times, damaged
+
+    def _stamps_us(self, little_endian: bool, count: int) -> NDArray[np.int64]:
+        """The stamps of the first frames of the log, as they are; -1: none, or one in the far future."""
+        times = np.empty(count, dtype=np.int64)
+        _read_stamps(self.data, self.index.starts[:count], little_endian, times)
         return times
 
     @cached_property
@@ -130,13 +150,12 @@ class TlogSource(LogSource):
         """Whether the stamps are little-endian, as old ground stations wrote them; read as big-endian they
         are far in the future.
         """
-        sample = np.arange(min(self.count, _STAMP_SAMPLE))
-        times = np.zeros(len(sample), dtype=np.int64)
-        _log_times(self.data, self.index.starts, sample, False, times)
-        swapped = np.zeros(len(sample), dtype=np.int64)
-        _log_times(self.data, self.index.starts, sample, True, swapped)
-        plausible = 4 * UNIX_TIME_US
-        return bool(np.count_nonzero(swapped < plausible) > np.count_nonzero(times < plausible))
+        sample = min(self.count, _STAMP_SAMPLE)
+        past = [
+            np.count_nonzero((times >= 0) & (times < 4 * UNIX_TIME_US))
+            for times in (self._stamps_us(False, sample), self._stamps_us(True, sample))
+        ]
+        return bool(past[1] > past[0])
 
     def columns(self, stream: Stream, rows: slice | NDArray[np.int64]) -> Columns:
         """Fields of some messages of a stream."""
@@ -193,6 +212,7 @@ class TlogSource(LogSource):
             "frames_v2": self.count - self.index.frames_v1,
             "frames_signed": self.index.frames_signed,
             "frames_without_timestamp": self.index.unstamped if self.index.lead else self.count,
+            "timestamps_damaged": self._record_times[1] if self.index.lead else 0,
             "timestamps": self._stamp_kind,
         }
 
@@ -270,11 +290,12 @@ def open_tlog(path: Path, dialect: Dialect) -> TlogSource:
         LogError: it can't be read, or contains no valid frame.
     """
     try:
-        with open(path, "rb") as file:
+        with open_file(path) as file:
             mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise LogError(f"can't read {path}: {reason}; give the path of a log") from error
+    except FileError as error:
+        raise LogError(f"{error}; give the path of a log") from None
+    except (OSError, ValueError) as error:  # of the mapping: the file has become empty, or has no room
+        raise LogError(f"{path} can't be read: {error}; give the path of a log") from None
     return TlogSource(path, np.frombuffer(mapped, dtype=np.uint8), dialect)
 
 
@@ -298,30 +319,36 @@ def _frame_ends(data: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArra
 
 
 @kernel
-def _log_times(
-    data: NDArray[np.uint8],
-    starts: Offsets,
-    order: NDArray[np.int64],
-    little_endian: bool,
-    times: NDArray[np.int64],
+def _read_stamps(
+    data: NDArray[np.uint8], starts: Offsets, little_endian: bool, times: NDArray[np.int64]
 ) -> None:
-    for index in range(len(order)):
-        position = order[index]
-        while position >= 0:
-            start = starts[position]
-            before = frame_end(data, starts[position - 1]) if position > 0 else 0
-            if start - before >= STAMP_SIZE:
-                value = np.uint64(0)
-                for byte in range(STAMP_SIZE):
-                    at = start - 1 - byte if little_endian else start - STAMP_SIZE + byte
-                    value = value << np.uint64(8) | np.uint64(data[at])
-                if value < np.uint64(_FAR_FUTURE_US):
-                    times[index] = np.int64(value)
-                    break
-            if index > 0 and position - 1 == order[index - 1]:
-                times[index] = times[index - 1]
-                break
-            position -= 1
+    before: Int = np.int64(0)
+    for index in range(len(starts)):
+        start = np.int64(starts[index])
+        times[index] = -1
+        if start - before >= STAMP_SIZE:
+            value = np.uint64(0)
+            for byte in range(STAMP_SIZE):
+                at = start - 1 - byte if little_endian else start - STAMP_SIZE + byte
+                value = value << np.uint64(8) | np.uint64(data[at])
+            if value < np.uint64(_FAR_FUTURE_US):
+                times[index] = np.int64(value)
+        before = frame_end(data, start)
+
+
+@kernel
+def _fill(times: NDArray[np.int64], good: NDArray[np.bool_]) -> None:
+    """Give frames without a good time that of the one before; before the first good time, that."""
+    last = np.int64(0)
+    for index in range(len(times)):
+        if good[index]:
+            last = times[index]
+            break
+    for index in range(len(times)):
+        if good[index]:
+            last = times[index]
+        else:
+            times[index] = last
 
 
 @kernel

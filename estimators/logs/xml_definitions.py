@@ -13,6 +13,8 @@ from typing import Final
 from fastcrc.crc16 import mcrf4xx
 
 from estimators.errors import LogError
+from flightsim.foundation.documents import read_xml
+from flightsim.foundation.file_content import FileError
 
 TYPE_SIZES: Final = {
     "char": 1,
@@ -134,11 +136,9 @@ def read_definitions(
 
 def _root(path: Path) -> ElementTree.Element:
     try:
-        root = ElementTree.parse(path).getroot()
-    except OSError as error:
-        raise LogError(f"can't read the dialect {path}: {error.strerror}; give a MAVLink XML file") from error
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise LogError(f"{path} is no MAVLink definition file: {error}; give a MAVLink XML file") from error
+        root = read_xml(path).getroot()
+    except FileError as error:
+        raise LogError(f"the dialect {error}; give a MAVLink XML file") from None
     if root.tag != "mavlink":
         raise LogError(
             f"{path} is no MAVLink definition file: it begins with <{root.tag}>; expected <mavlink>"

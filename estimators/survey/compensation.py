@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from estimators.errors import EstimatorError
+from flightsim.foundation.documents import read_json
+from flightsim.foundation.file_content import FileError
 
 __all__ = [
     "CYCLES",
@@ -216,11 +218,9 @@ def load_compensation(path: Path) -> Compensation:
         EstimatorError: the file can't be read, or holds no coefficients.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise EstimatorError(
-            f"`compensation_file` {path} can't be read: {getattr(error, 'strerror', None) or error}"
-        ) from None
+        found = read_json(path)
+    except FileError as error:
+        raise EstimatorError(f"`compensation_file` {error}") from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         raise EstimatorError(
             f"`compensation_file` {path} is no compensation; accepted is the format {FORMAT}, which "

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
+from flightsim.foundation.file_content import FileError, read_text
 
 __all__ = ["LineKind", "LinePlan", "SurveyLine", "detected_lines", "load_lines"]
 
@@ -149,11 +150,9 @@ def load_lines(path: Path) -> LinePlan:
         EstimatorError: it can't be read, or a row is no line.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise EstimatorError(
-            f"lines_file {path} can't be read: {getattr(error, 'strerror', None) or error}"
-        ) from None
+        text = read_text(path)
+    except FileError as error:
+        raise EstimatorError(f"lines_file {error}") from None
     first = text.partition("\n")[0].strip()
     if first != HEADER:
         raise EstimatorError(f"lines_file {path} begins with {first[:60]!r}; accepted is {HEADER!r}")

@@ -14,13 +14,14 @@ All but the first three have the defaults of `CameraDescription`.
 """
 
 import math
-import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
 from estimators.errors import EstimatorError
 from estimators.vision.camera import CameraGeometry
+from flightsim.foundation.documents import read_toml
+from flightsim.foundation.file_content import FileError
 from flightsim.foundation.vectors import Vector
 
 __all__ = ["CameraDescription", "load_camera"]
@@ -88,11 +89,9 @@ def load_camera(path: Path) -> CameraDescription:
         EstimatorError: the file can't be read, or a value is not possible; the message names it.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise EstimatorError(f"can't read {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise EstimatorError(f"{path} is not a TOML file: {error}") from error
+        data = read_toml(path)
+    except FileError as error:
+        raise EstimatorError(str(error)) from None
     names = (*_GEOMETRY, *(field.name for field in fields(CameraDescription) if field.name != "geometry"))
     for name in data:
         if name not in names:

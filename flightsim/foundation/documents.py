@@ -1,7 +1,7 @@
 """TOML, JSON and XML of files that others have written, within bounds of size, depth and numbers.
 
-The parsers of the standard library raise RecursionError for deep nesting and pass on integers that no float can
-hold. Here each such document is refused with one reason, as a damaged one is.
+The parsers of the standard library raise RecursionError for deep nesting and pass on integers that no float
+can hold. Here each such document is refused with one reason, as a damaged one is.
 """
 
 import json
@@ -21,7 +21,7 @@ _DEEPEST: Final = 100
 
 _TOML_BYTES: Final = 1 << 19
 _LONG_KEY: Final = re.compile(r"""(?<![\w-])(?>(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){16}""")
-"""A dotted key of more than 16 parts: tomllib keeps all beginnings of a key, which are gigabytes for a long one."""
+"""A dotted key of more than 16 parts: tomllib keeps all beginnings of a key, gigabytes for a long one."""
 
 _LARGEST_WHOLE: Final = 1 << 63
 _TOO_DEEP: Final = "it is nested too deep"
@@ -34,7 +34,7 @@ def read_toml(path: Path | str) -> dict[str, Any]:
     Raises:
         FileError: it can't be read, is not TOML, or is nested too deep.
     """
-    text = read_text(path, max_bytes=_TOML_BYTES)
+    text = read_text(path, max_bytes=_TOML_BYTES, may_be_empty=True)
     if _LONG_KEY.search(text):
         raise FileError(path, _TOO_DEEP)
     try:

@@ -1,7 +1,7 @@
 """What a file is, before a reader takes it.
 
 Every reader of the project opens its files here, or looks here first and hands the path to its library. So a
-named pipe, an archive, a web page or a pointer in place of a file is named in the same words everywhere, and no
+pipe, an archive, a web page or a pointer in place of a file is named in the same words everywhere, and no
 reader waits for a pipe or reads without a limit.
 """
 
@@ -83,13 +83,20 @@ class FileError(ValueError):
         self.reason = reason
 
 
-def open_file(path: Path | str, *, max_bytes: int | None = None, accepted: Collection[str] = ()) -> BinaryIO:
+def open_file(
+    path: Path | str,
+    *,
+    max_bytes: int | None = None,
+    accepted: Collection[str] = (),
+    may_be_empty: bool = False,
+) -> BinaryIO:
     """Open a regular file that has content.
 
     Args:
         path: the file.
         max_bytes: limit of its size; None: none, because it is mapped or read in parts.
         accepted: what it may be of the files that are named here: `ZIP`, `XZ`.
+        may_be_empty: whether a file without content is one of its kind.
 
     Raises:
         FileError: it can't be opened, is no regular file, is empty or too large, or is another kind of file
@@ -107,17 +114,15 @@ def open_file(path: Path | str, *, max_bytes: int | None = None, accepted: Colle
         raise FileError(path, kind)
     file = os.fdopen(descriptor, "rb")
     try:
-        _check(path, file, max_bytes, accepted)
+        _check(path, file, max_bytes, accepted, may_be_empty)
     except FileError:
         file.close()
         raise
     return file
 
 
-def file_head(
-    path: Path | str, *, max_bytes: int | None = None, accepted: Collection[str] = ()
-) -> bytes:
-    """The first bytes (up to `HEAD_BYTES`) of a file that a library is going to read; arguments as of `open_file`.
+def file_head(path: Path | str, *, max_bytes: int | None = None, accepted: Collection[str] = ()) -> bytes:
+    """The first `HEAD_BYTES` of a file that a library is going to read; arguments as of `open_file`.
 
     Raises:
         FileError: as `open_file`.
@@ -126,24 +131,23 @@ def file_head(
         return _read(path, file, HEAD_BYTES)
 
 
-def read_file(path: Path | str, *, max_bytes: int, accepted: Collection[str] = ()) -> bytes:
+def read_file(path: Path | str, *, max_bytes: int, may_be_empty: bool = False) -> bytes:
     """The content of a file; arguments as of `open_file`.
 
     Raises:
         FileError: as `open_file`.
     """
-    with open_file(path, max_bytes=max_bytes, accepted=accepted) as file:
+    with open_file(path, max_bytes=max_bytes, may_be_empty=may_be_empty) as file:
         return _read(path, file, max_bytes)
 
 
-def read_text(path: Path | str, *, max_bytes: int = TEXT_BYTES) -> str:
+def read_text(path: Path | str, *, max_bytes: int = TEXT_BYTES, may_be_empty: bool = False) -> str:
     """The content of a file of text in UTF-8; a byte order mark is left out.
 
     Raises:
         FileError: as `open_file`, or it is not text in UTF-8.
     """
-    data = read_file(path, max_bytes=max_bytes)
-    return decoded(path, data)
+    return decoded(path, read_file(path, max_bytes=max_bytes, may_be_empty=may_be_empty))
 
 
 def decoded(path: Path | str, data: bytes) -> str:
@@ -160,9 +164,11 @@ def decoded(path: Path | str, data: bytes) -> str:
         raise FileError(path, f"it is not text (byte {error.start} is not UTF-8)") from None
 
 
-def _check(path: Path | str, file: BinaryIO, max_bytes: int | None, accepted: Collection[str]) -> None:
+def _check(
+    path: Path | str, file: BinaryIO, max_bytes: int | None, accepted: Collection[str], may_be_empty: bool
+) -> None:
     size_bytes = os.fstat(file.fileno()).st_size
-    if not size_bytes:
+    if not (size_bytes or may_be_empty):
         raise FileError(path, "it is empty")
     if max_bytes is not None and size_bytes > max_bytes:
         raise FileError(path, f"it has {size_bytes} bytes; accepted are up to {max_bytes}")
@@ -187,7 +193,9 @@ def _kind_of(path: Path | str) -> str:
 
 
 def _kind(status: os.stat_result) -> str:
-    return next((f"it is {name}; give a regular file" for is_one, name in _KINDS if is_one(status.st_mode)), "")
+    return next(
+        (f"it is {name}; give a regular file" for is_one, name in _KINDS if is_one(status.st_mode)), ""
+    )
 
 
 def _other_content(head: bytes, accepted: Collection[str]) -> str:

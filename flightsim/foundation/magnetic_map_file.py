@@ -28,6 +28,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.file_content import FileError
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.npz_file import NpzFileError, read_npz
 
@@ -136,8 +137,8 @@ def read_map_file(path: Path) -> MapContents:
     """
     try:
         found = read_npz(path)
-    except OSError as error:
-        raise MagneticMapError(f"{path} can't be read: {error.strerror or error}") from None
+    except FileError as error:
+        raise MagneticMapError(str(error)) from None
     except NpzFileError as error:
         raise MagneticMapError(f"{path} is not a magnetic map (a numpy .npz archive): {error}") from None
     missing = [name for name in ("format", *_ARRAYS, *_NUMBERS) if name not in found]

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.file_content import FileError, read_text
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.magnetic_map_file import (
@@ -27,6 +28,8 @@ __all__ = ["MagneticMap", "MagneticMapError", "bilinear"]
 Array = NDArray[np.float64]
 
 _CSV_HEADER: Final = "north_m,east_m,total_field_nt"
+_MAX_CSV_BYTES: Final = 64 << 20
+_MAX_POINTS: Final = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -189,22 +192,23 @@ class MagneticMap:
         """
         rows_of_text: list[tuple[float, float, float]] = []
         try:
-            with path.open(encoding="utf-8") as file:
-                header = file.readline().strip()
-                if header != _CSV_HEADER:
-                    raise MagneticMapError(
-                        f"{path} begins with {header[:60]!r}; accepted is the header {_CSV_HEADER!r}"
-                    )
-                for number, line in enumerate(file, 2):
-                    if line.strip():
-                        rows_of_text.append(_csv_row(line, path, number))
-        except (OSError, UnicodeDecodeError) as error:
-            raise MagneticMapError(f"{path}: {error}") from None
+            header, *lines = read_text(path, max_bytes=_MAX_CSV_BYTES).splitlines()
+        except FileError as error:
+            raise MagneticMapError(str(error)) from None
+        if header.strip() != _CSV_HEADER:
+            raise MagneticMapError(
+                f"{path} begins with {header[:60]!r}; accepted is the header {_CSV_HEADER!r}"
+            )
+        for number, line in enumerate(lines, 2):
+            if line.strip():
+                rows_of_text.append(_csv_row(line, path, number))
         if not rows_of_text:
             raise MagneticMapError(f"{path} has a header and no lines")
         table = np.array(rows_of_text)
         north_m, rows = np.unique(table[:, 0], return_inverse=True)
         east_m, columns = np.unique(table[:, 1], return_inverse=True)
+        if north_m.size * east_m.size > _MAX_POINTS:
+            raise MagneticMapError(f"{path}: its points are no grid; give a row for each point of one")
         total = np.full((north_m.size, east_m.size), np.nan)
         total[rows, columns] = table[:, 2]
         try:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mission_plan import MissionItem
 from missions.plan_files import document as document
-from missions.plan_files.json_values import Refuse, entries, flag, mapping, number, numbers
+from missions.plan_files.json_values import Refuse, entries, flag, mapping, number, numbers, shown
 
 _RELATIVE: Final = 6
 _ABSOLUTE: Final = 5
@@ -28,7 +28,7 @@ def simple_items(
     if not isinstance(inner, Mapping) or "Items" not in inner:
         raise refuse(
             where,
-            f"a {entry.get('complexItemType', 'complex item')} is not stored expanded; use a survey or a "
+            f"a complex item {shown(entry.get('complexItemType'))} is not stored expanded; use a survey or a "
             "corridor scan, or upload the mission with the ground station",
         )
     for number_, item in enumerate(entries(inner["Items"], where, refuse), start=1):

@@ -11,14 +11,14 @@ Refuse = Callable[[str, str], Exception]
 def mapping(value: Any, where: str, refuse: Refuse) -> Mapping[str, Any]:
     """Check that a value is a JSON object, and return it."""
     if not isinstance(value, Mapping):
-        raise refuse(where, f"{_shown(value)} is not a JSON object")
+        raise refuse(where, f"{shown(value)} is not a JSON object")
     return value
 
 
 def entries(value: Any, where: str, refuse: Refuse) -> Sequence[Any]:
     """Check that a value is a JSON array, and return it."""
     if not isinstance(value, list):
-        raise refuse(where, f"{_shown(value)} is not a JSON array")
+        raise refuse(where, f"{shown(value)} is not a JSON array")
     return value
 
 
@@ -31,7 +31,7 @@ def number(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> f
     """A required number."""
     value = entry.get(name)
     if not is_number(value):
-        raise refuse(where, f"{name} = {_shown(value)} is not a number")
+        raise refuse(where, f"{name} = {shown(value)} is not a number")
     return _finite_float(value, f"{where}, {name}", refuse)
 
 
@@ -39,9 +39,9 @@ def whole(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> in
     """A required integer that is not negative."""
     value: Any = entry.get(name)
     if not is_number(value) or (isinstance(value, float) and not math.isfinite(value)) or value != int(value):
-        raise refuse(where, f"{name} = {_shown(value)} is not a whole number")
+        raise refuse(where, f"{name} = {shown(value)} is not a whole number")
     if not 0 <= value < 2**31:
-        raise refuse(where, f"{name} = {_shown(value)} is not in 0..{2**31 - 1}")
+        raise refuse(where, f"{name} = {shown(value)} is not in 0..{2**31 - 1}")
     return int(value)
 
 
@@ -49,14 +49,14 @@ def flag(entry: Mapping[str, Any], name: str, default: bool, where: str, refuse:
     """True or false."""
     value = entry.get(name, default)
     if not isinstance(value, bool):
-        raise refuse(where, f"{name} = {_shown(value)} is not true or false")
+        raise refuse(where, f"{name} = {shown(value)} is not true or false")
     return value
 
 
 def numbers(value: Any, count: int, where: str, refuse: Refuse) -> list[float]:
     """An array of exactly `count` numbers."""
     if not (isinstance(value, list) and len(value) == count and all(is_number(v) for v in value)):
-        raise refuse(where, f"{_shown(value)} is not an array of {count} numbers")
+        raise refuse(where, f"{shown(value)} is not an array of {count} numbers")
     return [_finite_float(v, where, refuse) for v in value]
 
 
@@ -67,6 +67,7 @@ def _finite_float(value: Any, where: str, refuse: Refuse) -> float:
         raise refuse(where, "the number is too large") from None
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as text for a message, cut where it is long."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -16,14 +16,25 @@ from autopilot_bridge.fence_shapes import (
 )
 from autopilot_bridge.mavlink import dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.documents import read_json
+from flightsim.foundation.file_content import FileError
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.plan_files.complex_items import landing_items, simple_items
 from missions.plan_files.document import DO_JUMP, INT_FRAMES, PLAIN_FRAMES, MissionDocument, PlannedHome
-from missions.plan_files.json_values import Refuse, entries, flag, is_number, mapping, number, numbers, whole
+from missions.plan_files.json_values import (
+    Refuse,
+    entries,
+    flag,
+    is_number,
+    mapping,
+    number,
+    numbers,
+    shown,
+    whole,
+)
 
-_MAX_BYTES: Final = 32 * 1024 * 1024
 _PX4: Final = 12
 _ARDUPILOT: Final = 3
 _FIRMWARE: Final = {_PX4: "px4", _ARDUPILOT: "ardupilot"}
@@ -43,13 +54,15 @@ def read_plan(path: Path) -> MissionDocument:
 
     plan = mapping(_load(path), "the file", refuse)
     if plan.get("fileType") != "Plan":
-        raise PlanError(f"{path}: fileType is {plan.get('fileType')!r}; accepted: 'Plan', of QGroundControl")
+        raise PlanError(
+            f"{path}: fileType is {shown(plan.get('fileType'))}; accepted: 'Plan', of QGroundControl"
+        )
     if plan.get("version") != 1:
-        raise PlanError(f"{path}: version {plan.get('version')!r} of the format; accepted: 1")
+        raise PlanError(f"{path}: version {shown(plan.get('version'))} of the format; accepted: 1")
     mission = mapping(plan.get("mission"), "mission", refuse)
     if mission.get("version") != 2:
-        raise PlanError(f"{path}: version {mission.get('version')!r} of its mission; accepted: 2")
-    firmware_type = mission.get("firmwareType", 0)
+        raise PlanError(f"{path}: version {shown(mission.get('version'))} of its mission; accepted: 2")
+    firmware_type = _firmware_type(mission, refuse)
     return MissionDocument(
         path=path,
         items=_mission_items(mission, refuse),
@@ -85,17 +98,16 @@ def _home(mission: Mapping[str, Any], refuse: Refuse) -> PlannedHome | None:
 
 def _load(path: Path) -> Any:
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise PlanError(f"mission file {path} is larger than {_MAX_BYTES >> 20} MB")
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise PlanError(f"mission file {path} can't be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise PlanError(f"mission file {path} is not text (byte {error.start})") from error
-    except json.JSONDecodeError as error:
-        raise PlanError(f"{path}, line {error.lineno}: not JSON: {error.msg}") from error
-    except (RecursionError, ValueError) as error:
-        raise PlanError(f"{path}: not a plan: {error}") from error
+        return read_json(path)
+    except FileError as error:
+        raise PlanError(f"mission file {error}") from None
+
+
+def _firmware_type(mission: Mapping[str, Any], refuse: Refuse) -> int:
+    """MAV_AUTOPILOT; 0: any."""
+    if mission.get("firmwareType") is None:
+        return 0
+    return whole(mission, "firmwareType", "mission", refuse)
 
 
 def _kind(mission: Mapping[str, Any], path: Path) -> VehicleKind | None:
@@ -106,8 +118,8 @@ def _kind(mission: Mapping[str, Any], path: Path) -> VehicleKind | None:
     if kind is None:
         name = enum_name("MAV_TYPE", type_) if isinstance(type_, int) else None
         raise PlanError(
-            f"{path}: vehicleType {type_!r}{f' (MAV_TYPE_{name})' if name else ''} can't be flown; accepted: "
-            "multicopters and fixed wings"
+            f"{path}: vehicleType {shown(type_)}{f' (MAV_TYPE_{name})' if name else ''} can't be flown; "
+            "accepted: multicopters and fixed wings"
         )
     return kind
 
@@ -129,7 +141,7 @@ def _mission_items(mission: Mapping[str, Any], refuse: Refuse) -> tuple[MissionI
             _note_id(entry, len(items), index_of_id)
             items.append(_simple(entry, where, refuse))
         elif entry.get("type") != "ComplexItem":
-            raise refuse(where, f"type {entry.get('type')!r}; accepted: SimpleItem and ComplexItem")
+            raise refuse(where, f"type {shown(entry.get('type'))}; accepted: SimpleItem and ComplexItem")
         elif entry.get("complexItemType") == "fwLandingPattern":
             items += landing_items(entry, where, refuse)
         elif entry.get("complexItemType") == "vtolLandingPattern":
@@ -164,7 +176,7 @@ def _simple(entry: Mapping[str, Any], where: str, refuse: Refuse) -> MissionItem
     values = []
     for name, value in zip(("1", "2", "3", "4", "5", "6", "7"), params, strict=True):
         if value is not None and not is_number(value):
-            raise refuse(where, f"params[{name}] = {value!r} is neither a number nor null")
+            raise refuse(where, f"params[{name}] = {shown(value)} is neither a number nor null")
         values.append(math.nan if value is None else float(value))
     if params[6] is None:
         values[6] = _altitude_m(entry, where, refuse)

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES
+from flightsim.foundation.file_content import FileError, read_text
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.plan_files import document as document
@@ -28,15 +29,15 @@ def read_wpl(path: Path) -> document.MissionDocument:
 
     loader = mavwp.MAVWPLoader()
     try:
+        read_text(path)
+    except FileError as error:
+        raise PlanError(f"mission file {error}") from None
+    try:
         loader.load(str(path))
-    except OSError as error:
-        raise PlanError(f"mission file {path} can't be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise PlanError(f"{path} is not text (byte {error.start})") from error
     except (mavwp.MAVWPError, ValueError, OverflowError) as error:
         raise PlanError(
-            f"{path} is not understood after {loader.count()} rows: {error}; accepted: {HEADER!r}, then rows "
-            "of 12 numbers"
+            f"{path} is not understood after {loader.count()} rows: {str(error)[:100]}; accepted: "
+            f"{HEADER!r}, then rows of 12 numbers"
         ) from error
     rows = [loader.wp(index) for index in range(loader.count())]
     for index, row in enumerate(rows):

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.file_content import FileError, read_text
 from flightsim.foundation.npz_file import NpzFileError, read_npz
 from missions.errors import PlanError
 
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 _NAMES: Final = ("north_m", "east_m", "ground_m")
 _HEADER: Final = ",".join(_NAMES)
 _MAX_POINTS: Final = 4_000_000
+_MAX_BYTES: Final = 128 << 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,8 +134,8 @@ def load_terrain(path: Path) -> TerrainModel:
     """
     try:
         return _terrain_of_arrays(path) if path.suffix == ".npz" else _terrain_of_table(path)
-    except OSError as error:
-        raise PlanError(f"`terrain_file` {path} can't be read: {error.strerror or error}") from None
+    except FileError as error:
+        raise PlanError(f"`terrain_file` {error}") from None
     except PlanError as error:
         raise PlanError(f"`terrain_file` {path}: {error}") from None
 
@@ -156,13 +158,13 @@ def _terrain_of_arrays(path: Path) -> TerrainModel:
 
 def _terrain_of_table(path: Path) -> TerrainModel:
     try:
-        with path.open(encoding="utf-8-sig") as file, warnings.catch_warnings():
+        header, *rows = read_text(path, max_bytes=_MAX_BYTES).splitlines()
+        if header.strip() != _HEADER:
+            raise PlanError(f"it begins with {header[:60]!r}; accepted is the header {_HEADER!r}")
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that there are no rows, which is an error here
-            header = file.readline().strip()
-            if header != _HEADER:
-                raise PlanError(f"it begins with {header[:60]!r}; accepted is the header {_HEADER!r}")
-            table = np.loadtxt(file, delimiter=",", ndmin=2)
-    except PlanError:
+            table = np.loadtxt(rows, delimiter=",", ndmin=2)
+    except (PlanError, FileError):
         raise
     except ValueError as error:
         raise PlanError(f"{error}; accepted are rows of three numbers, {_HEADER}") from None

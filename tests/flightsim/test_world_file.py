@@ -160,7 +160,7 @@ def test_a_model_beside_the_file_is_found_and_a_name_stays_a_name(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("seed = ", "is not a TOML file"),
+        ("seed = ", "it is not TOML"),
         ("sed = 1", "sed is unknown; accepted are air, faults, home"),
         ("seed = 1.5", "seed is 1.5; accepted: a whole number"),
         ("seed = true", "seed is True; accepted: a whole number"),
@@ -197,7 +197,7 @@ def test_errors_name_file_key_value_and_what_is_accepted(tmp_path, text, words):
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(WorldFileError, match=r"can't read world file .*none\.toml: No such file"):
+    with pytest.raises(WorldFileError, match=r"world file .*none\.toml can't be read: No such file"):
         WorldSpec.load(tmp_path / "none.toml")
 
 

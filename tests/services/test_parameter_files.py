@@ -75,7 +75,7 @@ def test_qgc_files_need_types() -> None:
 def test_unreadable_files(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"parameter file .*missing\.parm can't be read: No such file"):
         read_untyped_parameter_file(tmp_path / "missing.parm")
-    (tmp_path / "binary.parm").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "binary.parm").write_bytes(b"RATE 1\xff")
     with pytest.raises(ParameterError, match="not UTF-8"):
         read_untyped_parameter_file(tmp_path / "binary.parm")
 

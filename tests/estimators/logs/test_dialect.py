@@ -122,12 +122,12 @@ def test_dialects_by_name(tmp_path):
     ("name", "content", "words"),
     [
         ("nosuch", None, "no MAVLink dialect 'nosuch'; accepted: .*ardupilotmega.* path of an .xml"),
-        ("gone.xml", None, "can't read the dialect .*gone.xml: No such file"),
-        ("bad.xml", "<mavlink><messages>", "is no MAVLink definition file"),
-        ("bad.xml", "\0", "is no MAVLink definition file"),
-        ("bad.xml", "<html/>", "begins with <html>"),
+        ("gone.xml", None, "the dialect .*gone.xml can't be read: No such file"),
+        ("bad.xml", "<mavlink><messages>", "is not XML"),
+        ("bad.xml", "\0", "is not XML"),
+        ("bad.xml", "<xhtml/>", "begins with <xhtml>"),
         ("bad.xml", "<mavlink/>", "defines no message"),
-        ("bad.xml", "<mavlink><include>gone.xml</include></mavlink>", "can't read the dialect .*gone.xml"),
+        ("bad.xml", "<mavlink><include>gone.xml</include></mavlink>", "the dialect .*gone.xml can't be read"),
         ("bad.xml", '<mavlink><messages><message name="A" id="x"/></messages></mavlink>', "an id in 0"),
         (
             "bad.xml",
@@ -221,5 +221,5 @@ def test_an_include_that_is_not_there_may_be_one_of_pymavlinks(tmp_path):
     assert list(dialect.messages) == sorted({*load_dialect("common").messages, 8})
     assert dialect.find("MY_LINK").definition.size == 8
     path.write_text(path.read_text().replace("common.xml", "no_such.xml"))
-    with pytest.raises(LogError, match=r"no_such\.xml: No such file"):
+    with pytest.raises(LogError, match=r"no_such\.xml can't be read: No such file"):
         load_dialect(path)

@@ -290,7 +290,7 @@ def test_times_are_reported_on_the_first_vehicles_clock_and_boot(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (None, "can't read .*: No such file or directory"),
+        (None, "can't be read: No such file or directory"),
         (b"", "is empty"),
         (b"hello", "no valid MAVLink frame of dialect 'all' in 5 bytes"),
         (bytes(100_000), "no valid MAVLink frame"),

@@ -139,7 +139,7 @@ def test_a_description_is_read_as_it_was_written(tmp_path):
         ("width_px = 9\nheight_px = 9\nfocal_px = [1, 2, 3]\n", "focal_px = .* give 2 numbers"),
         ("width_px = 9\nheight_px = 9\nfocal_px = -1\n", "focal_px .* give numbers above 0"),
         ("width_px = 9\nheight_px = 9\nfocal_px = 9\nlatency_s = 99\n", "latency_s 99 s is not in 0..10 s"),
-        ("width_px", "is not a TOML file"),
+        ("width_px", "it is not TOML"),
     ],
 )
 def test_descriptions_that_are_none_are_refused(tmp_path, text, message):
@@ -147,7 +147,7 @@ def test_descriptions_that_are_none_are_refused(tmp_path, text, message):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(EstimatorError, match=message):
         load_camera(path)
-    with pytest.raises(EstimatorError, match=r"can't read"):
+    with pytest.raises(EstimatorError, match=r"missing.toml can't be read: No such file"):
         load_camera(tmp_path / "missing.toml")
 
 

@@ -93,7 +93,7 @@ def test_mavsdk_reads_the_same_items(tmp_path: Path) -> None:
         (changed("mission", "items", 4, "params", 1, to=-7), "item 7 (DO_JUMP): repeats -7 times"),
         (
             changed("mission", "items", 3, to={"type": "ComplexItem", "complexItemType": "StructureScan"}),
-            "item 4 of the plan: a StructureScan is not stored expanded",
+            "item 4 of the plan: a complex item 'StructureScan' is not stored expanded",
         ),
         (changed("mission", "items", 3, "complexItemType", to="vtolLandingPattern"), "VTOL"),
         (changed("mission", "plannedHomePosition", to=[91, 0, 0]), "91.0, 0.0, 0.0 is no place"),

@@ -74,7 +74,7 @@ def test_a_file_without_home_begins_with_its_first_item(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "Unsupported waypoint format ''"),
+        ("", "it is empty"),
         ("QGC WPL 120\n", "Unsupported waypoint format"),
         ("QGC WPL 110\n", "has no items"),
         (ROWS + "5\t0\t3\t16\n", "after 5 rows: invalid waypoint line with 4 values"),

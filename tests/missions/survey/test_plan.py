@@ -248,7 +248,7 @@ GRID = npz(north_m=LINES_M, east_m=LINES_M, ground_m=np.ones((2, 2)))
         ("pairs.csv", HEADER + "0,0\n0,100\n", "rows of 2 numbers; accepted are three"),
         ("words.csv", HEADER + "0,0,high\n", "'high' .* accepted are rows of three numbers"),
         ("nan.csv", HEADER + "nan,0,1\n", "accepted are two or more rising numbers"),
-        ("bytes.csv", b"\xff\xfe\x00", "can't decode byte"),
+        ("bytes.csv", b"\xff\xfe\x00", "text in UTF-16"),
         ("torn.npz", GRID[: len(GRID) // 2], "is no numpy .npz archive"),
         ("text.npz", HEADER, "is no numpy .npz archive .* north_m, east_m, ground_m"),
         ("partial.npz", npz(north_m=LINES_M), "has no east_m, ground_m"),
