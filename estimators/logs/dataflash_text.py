@@ -8,7 +8,8 @@ from pymavlink import DFReader
 
 from estimators.errors import LogError
 from estimators.logs.ardupilot_firmware import firmware_of
-from estimators.logs.dataflash import META, dataflash_source
+from estimators.logs.dataflash import dataflash_source
+from estimators.logs.dataflash_scan import META
 from estimators.logs.dataflash_time import RawTable
 from estimators.logs.mapped import Array, MappedSource
 

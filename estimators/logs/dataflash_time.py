@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from estimators.logs.mapped import Array
+from estimators.logs.time_stamps import NEAR_US, first_offset_us, plausible
 
 _OWN: Final = (("TimeUS", 1), ("TimeMS", 1000))
 _GPS: Final = frozenset({"GPS", "GPS2"})
@@ -22,8 +23,7 @@ _LEAP_SECONDS: Final = 18
 _WEEK_S: Final = 7 * 86_400
 _FIRST_DATE_US: Final = 1_000_000_000_000_000
 _MAX_TIME_US: Final = 10**13
-_BLOCK: Final = 64
-_FAR_US: Final = 60_000_000
+_LAST_WEEK: Final = 6000  # of GPS: in 2094
 _ASSUMED_US: Final = 20_000
 """Assumed interval of the most frequent messages in a log without any time: 50 Hz, as in DFReader."""
 
@@ -92,7 +92,7 @@ def stamp(tables: Sequence[RawTable]) -> LogTimes:
     stamps = np.concatenate([times for times in own if times is not None])
     sorting = np.argsort(positions, kind="stable")
     positions, stamps = positions[sorting], stamps[sorting]
-    good = _plausible(stamps)
+    good = plausible(np.where(stamps < _MAX_TIME_US, stamps, -1), NEAR_US)
     known_at, known_us = positions[good], stamps[good]
     made = []
     for table, times in zip(tables, own, strict=True):
@@ -125,29 +125,6 @@ def _whole(column: Array) -> Array:
     if column.dtype.kind == "f":
         column = np.rint(np.nan_to_num(column, nan=-1.0, posinf=-1.0, neginf=-1.0))
     return np.clip(column, -1, 2**53).astype(np.int64)
-
-
-def _plausible(stamps: Array) -> Array:
-    """Mask of the stamps, in the order of the file, that agree with their neighbours; others are damaged."""
-    good = (stamps >= 0) & (stamps < _MAX_TIME_US)
-    if np.count_nonzero(good) < 2 * _BLOCK:
-        return good
-    blocks = np.arange(len(stamps)) // _BLOCK
-    chosen = np.flatnonzero(good)
-    count = int(blocks[-1]) + 1
-    middles = np.full(count, -1, dtype=np.int64)
-    edges = np.searchsorted(blocks[chosen], np.arange(count + 1))
-    for block in range(count):
-        values = stamps[chosen[edges[block] : edges[block + 1]]]
-        if len(values):
-            middles[block] = int(np.partition(values, len(values) // 2)[len(values) // 2])
-    filled = np.where(middles >= 0, middles, np.maximum.accumulate(middles))
-    before = np.concatenate((filled[:1], filled[:-1]))
-    after = np.concatenate((filled[1:], filled[-1:]))
-    low = np.minimum(np.minimum(before, after), filled) - _FAR_US
-    high = np.maximum(np.maximum(before, after), filled) + _FAR_US
-    fits: Array = good & (stamps >= low[blocks]) & (stamps <= high[blocks])
-    return fits
 
 
 def _px4_times(tables: Sequence[RawTable]) -> list[Array | None] | None:
@@ -190,6 +167,7 @@ def _gps_seconds(tables: Sequence[RawTable]) -> tuple[Array, Array] | None:
     for table, week, milliseconds in _dated(tables):
         unix_us = _unix_us(week, milliseconds)
         rows = np.flatnonzero(milliseconds > 0)
+        rows = rows[plausible(unix_us[rows], NEAR_US)]
         rows = (
             rows[np.concatenate(([True], np.diff(np.maximum.accumulate(unix_us[rows])) > 0))]
             if len(rows)
@@ -201,6 +179,7 @@ def _gps_seconds(tables: Sequence[RawTable]) -> tuple[Array, Array] | None:
 
 
 def _unix_us(week: Array, milliseconds: Array) -> Array:
+    week, milliseconds = np.minimum(week, _LAST_WEEK), np.minimum(milliseconds, _WEEK_S * 1000)
     seconds = _GPS_EPOCH_S + week * _WEEK_S - _LEAP_SECONDS
     unix_us: Array = seconds * 1_000_000 + milliseconds * 1000
     return unix_us
@@ -223,12 +202,11 @@ def _unix_offset_us(tables: Sequence[RawTable], times_us: Sequence[Array]) -> in
     """Unix time of time 0, from the first GPS message with a date."""
     of_table = {id(table): times for table, times in zip(tables, times_us, strict=True)}
     for table, week, milliseconds in _dated(tables):
-        rows = np.flatnonzero(week > 0)
-        if len(rows):
-            row = int(rows[0])
-            unix_us = int(_unix_us(week[row : row + 1], milliseconds[row : row + 1])[0])
-            return unix_us - int(of_table[id(table)][row])
+        offset_us = first_offset_us(_unix_us(week, milliseconds), of_table[id(table)], week > 0)
+        if offset_us is not None:
+            return offset_us
     time = next((t for t in tables if t.name in _GPS and "GPSTime" in t.columns), None)
-    if time is not None and (rows := np.flatnonzero(time.columns["GPSTime"] > 0)).size:
-        return int(time.columns["GPSTime"][rows[0]]) - int(of_table[id(time)][rows[0]])
-    return None
+    if time is None:
+        return None
+    gps_us = _whole(time.columns["GPSTime"])
+    return first_offset_us(gps_us, of_table[id(time)], gps_us > 0)

@@ -4,7 +4,7 @@ Every table of the file stays readable under its own name. The data that estimat
 MAVLink messages, in MAVLink's units.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -25,6 +25,7 @@ SYSTEM_ID: Final = 1
 """System id of a flight controller's own log, which contains one vehicle and no id."""
 
 _SECOND_US: Final = 1_000_000
+_PAUSE_S: Final = 10
 
 _TYPES: Final = MappingProxyType(
     {
@@ -82,6 +83,22 @@ class Records:
         return self.where(self.columns[field] == number) if field in self.columns else self
 
 
+def mappable(records: Records, *, texts: Collection[str], widths: Mapping[str, int]) -> Records:
+    """The columns from which messages can be made; others, as a damaged description makes them, are left out.
+
+    Args:
+        records: a table of the file.
+        texts: names of columns that are texts.
+        widths: length of the columns that are arrays, by name; all others are numbers.
+    """
+    fitting = {}
+    for name, column in records.columns.items():
+        length = column.shape[1] if column.ndim == 2 else None
+        if length == widths.get(name) and (column.dtype.kind == "S") == (name in texts):
+            fitting[name] = column
+    return Records(records.time_us, fitting)
+
+
 def value_at(records: Records | None, field: str, at_us: Array, before: float = 0.0) -> Array:
     """The newest value of a field at each time; `before` until the first value, and when the field does not
     exist.
@@ -92,9 +109,16 @@ def value_at(records: Records | None, field: str, at_us: Array, before: float = 
 
 
 def each_second(found: Iterable[Records]) -> Array:
-    """Times from the first message of all records to the last, in steps of a second."""
-    spans = [(int(records.time_us.min()), int(records.time_us.max())) for records in found]
-    return np.arange(min(first for first, _ in spans), max(last for _, last in spans) + 1, _SECOND_US)
+    """Times from the first message of all records to the last, in steps of a second; none in pauses of more
+    than ten seconds without any message, which a damaged time can make as long as months.
+    """
+    times = [records.time_us for records in found if len(records.time_us)]
+    first_us = min(int(times_us.min()) for times_us in times)
+    seconds = [(times_us - first_us) // _SECOND_US for times_us in times]
+    busy = np.unique(np.concatenate([one[np.flatnonzero(np.diff(one, prepend=-1))] for one in seconds]))
+    near = np.unique(busy[:, None] + np.arange(_PAUSE_S + 1))
+    found_us: Array = first_us + near[near <= busy[-1]] * _SECOND_US
+    return found_us
 
 
 def mavlink_part(name: str, time_us: Array, **columns: Any) -> Part:
@@ -239,7 +263,8 @@ def _fitted(values: Any, dtype: np.dtype[Any]) -> Array:
     if dtype.kind not in "iu" or column.dtype.kind == "S":
         return column
     if column.dtype.kind == "f":
-        column = np.rint(np.nan_to_num(column, nan=0.0, posinf=0.0, neginf=0.0))
+        wide = column.astype(np.float64)  # in single precision the limits of int32 are beyond it
+        column = np.rint(np.nan_to_num(wide, nan=0.0, posinf=0.0, neginf=0.0))
     limits = np.iinfo(dtype)
     if column.dtype.kind == "f" and dtype.itemsize == 8:
         return np.clip(column, max(limits.min, -(2.0**62)), 2.0**62).astype(dtype)

@@ -61,3 +61,36 @@ def plausible(stamps_us: NDArray[np.int64], longest_pause_us: int) -> NDArray[np
                 good[index] = True
                 last = stamp
     return good
+
+
+def span_us(stamps_us: NDArray[np.int64]) -> tuple[int, int]:
+    """First and last of some stamps in any order, without the few that are far from all others.
+
+    Args:
+        stamps_us: (n,) at least one.
+    """
+    ordered = np.sort(stamps_us)
+    low, high = 0, len(ordered) - 1
+    for gap in np.flatnonzero(np.diff(ordered) > NEAR_US).tolist():
+        if gap + 1 - low < _VOTERS and len(ordered) - gap - 1 >= _VOTERS:
+            low = gap + 1
+        elif high - gap < _VOTERS <= gap + 1:
+            high = gap
+            break
+    return int(ordered[low]), int(ordered[high])
+
+
+def first_offset_us(
+    unix_us: NDArray[np.int64], times_us: NDArray[np.int64], dated: NDArray[np.bool_]
+) -> int | None:
+    """Unix time of time 0 from the first message whose date agrees with the others; None: no date.
+
+    Args:
+        unix_us, times_us: (n,) date and vehicle time of the messages.
+        dated: (n,) whether each has a date.
+    """
+    offsets = (unix_us - times_us)[dated]
+    if not len(offsets):
+        return None
+    agreeing = np.abs(offsets - np.sort(offsets)[len(offsets) // 2]) <= NEAR_US
+    return int(offsets[np.argmax(agreeing)])

@@ -1,6 +1,5 @@
 """Telemetry logs (.tlog) and raw captures of MAVLink streams."""
 
-import mmap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -16,6 +15,7 @@ from estimators.logs.columns import Columns, decode_columns
 from estimators.logs.crc import Int
 from estimators.logs.dialect import Description, Dialect
 from estimators.logs.gaps import GapFigures, find_lead, sort_gaps
+from estimators.logs.mapped_file import mapped_bytes
 from estimators.logs.scan import (
     FRAMES,
     LATE,
@@ -30,7 +30,6 @@ from estimators.logs.scan import (
 from estimators.logs.source import LogSource, Positions, SourceLoss, Stream, UnknownMessage
 from estimators.logs.time_stamps import plausible
 from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
-from flightsim.foundation.file_content import FileError, open_file
 from flightsim.foundation.kernels import kernel
 
 _FAR_FUTURE_US: Final = 1 << 62
@@ -289,14 +288,7 @@ def open_tlog(path: Path, dialect: Dialect) -> TlogSource:
     Raises:
         LogError: it can't be read, or contains no valid frame.
     """
-    try:
-        with open_file(path) as file:
-            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    except FileError as error:
-        raise LogError(f"{error}; give the path of a log") from None
-    except (OSError, ValueError) as error:  # of the mapping: the file has become empty, or has no room
-        raise LogError(f"{path} can't be read: {error}; give the path of a log") from None
-    return TlogSource(path, np.frombuffer(mapped, dtype=np.uint8), dialect)
+    return TlogSource(path, mapped_bytes(path), dialect)
 
 
 def _message_id(raw: bytes) -> int:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
-from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
+from estimators.logs.mapped import Array, Part, Records, each_second, mappable, mavlink_part, newest, value_at
 from flightsim.foundation.vectors import euler_from_quaternions
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
@@ -44,6 +44,9 @@ _LAST_YAW_ROTATION: Final = 7
 _LANDED, _IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
 
 
+_WIDTHS: Final = {"q": 4, "xyz": 3, "gyro_rad": 3, "accelerometer_m_s2": 3}
+"""Lengths of the arrays that are used here."""
+
 Topics = Mapping[tuple[str, int], Records]
 """Topics by name and instance."""
 
@@ -73,6 +76,7 @@ def map_topics(topics: Topics, facts: UlogFacts, unix_offset_us: int | None) -> 
         facts: data of the log besides its topics.
         unix_offset_us: Unix time of vehicle time 0; None: not known.
     """
+    topics = {key: mappable(records, texts=(), widths=_WIDTHS) for key, records in topics.items()}
     found = [
         *_imu(topics, facts.parameters),
         *_attitude(topics),

@@ -20,8 +20,8 @@ _DEEPEST: Final = 100
 """Levels of nesting; files of ground stations have 8, JSBSim's aircraft 20."""
 
 _TOML_BYTES: Final = 1 << 19
-_LONG_KEY: Final = re.compile(r"""(?<![\w-])(?>(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){16}""")
-"""A dotted key of more than 16 parts: tomllib keeps all beginnings of a key, gigabytes for a long one."""
+_LONG_KEY: Final = re.compile(r"""(?<![\w-])(?>(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){100}""")
+"""A dotted key of more than 100 parts: tomllib keeps all beginnings of a key, gigabytes for a long one."""
 
 _LARGEST_WHOLE: Final = 1 << 63
 _TOO_DEEP: Final = "it is nested too deep"

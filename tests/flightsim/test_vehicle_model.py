@@ -200,7 +200,7 @@ def test_a_model_by_path_flies_like_the_packaged_one(tmp_path: Path) -> None:
         ("battery/voltage-V", "battery/voltage-mV", "battery/voltage-mV"),
         ("fcs/motor-1/command", "fcs/motor-9/command", "fcs/motor-9/command"),
         ('name = "iris"', "name = 5", "name is 5"),
-        ("[vehicle]", "[vehicle", "cannot read"),
+        ("[vehicle]", "[vehicle", "not TOML"),
         ('"fcs/motor-1/effectiveness", ', "", "3 effectiveness"),
         ("cg_height_at_rest_m = 0.0985", 'cg_height_at_rest_m = "low"', "cg_height_at_rest_m is 'low'"),
     ],

@@ -41,7 +41,7 @@ MAP_REFUSALS = {
     "folder": ("--map folder can't be read", "directory"),
     "random.npz": ("--map random.npz is not a magnetic map", ".npz"),
     "text.npz": ("--map text.npz is not a magnetic map", ".npz"),
-    "empty.npz": ("--map empty.npz is not a magnetic map", ".npz"),
+    "empty.npz": ("--map empty.npz", "it is empty"),
     "array.npy": ("--map array.npy is not a magnetic map", ".npz"),
     "torn.npz": ("--map torn.npz is not a magnetic map",),
     "spoiled.npz": ("--map spoiled.npz is not a magnetic map",),
@@ -66,7 +66,7 @@ MAP_REFUSALS = {
 }
 
 MODELS = {
-    "broken.toml": (b"kind = [", ("broken.toml", "cannot read")),
+    "broken.toml": (b"kind = [", ("broken.toml", "not TOML")),
     "empty.toml": (b"", ("empty.toml", "no table [vehicle]")),
     "boat.toml": (
         b'[vehicle]\nname = "b"\nkind = "boat"\njsbsim = "c172x"\n',
@@ -77,7 +77,7 @@ MODELS = {
         ("unknown.toml", "wings"),
     ),
     "missing.toml": (b'[vehicle]\nname = "m"\nkind = "fixed_wing"\njsbsim = "nosuch.xml"\n', ("nosuch",)),
-    "bytes.toml": (b"\xff\xfe\x00\x01", ("bytes.toml", "cannot read")),
+    "bytes.toml": (b"\xff\xfe\x00\x01", ("bytes.toml", "UTF-16")),
     "broken.xml": (b"<fdm_config", ("broken.xml", "JSBSim cannot load")),
 }
 

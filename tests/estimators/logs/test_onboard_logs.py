@@ -12,52 +12,18 @@ from pyulog.core import ULog
 
 from estimators.logs import LogError, open_log, report_of
 from estimators.logs.condition import Condition
-from tests.estimators.logs.onboard_logs import DataflashWriter, UlogWriter
-
-SECONDS = 4
+from tests.estimators.logs.onboard_logs import (
+    SECONDS,
+    DataflashWriter,
+    UlogWriter,
+    ardupilot_plane,
+    px4_plane,
+)
 
 
 @pytest.fixture
-def dataflash(tmp_path):
-    """Four seconds of an ArduPlane with two IMUs; armed from 1 s to 3 s."""
-    writer = DataflashWriter(
-        IMU=("QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"),
-        ATT=("QccccCC", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw"),
-        RATE=("Qfff", "TimeUS,R,P,Y"),
-        ARSP=("QBffc", "TimeUS,I,Airspeed,DiffPress,Temp"),
-        BARO=("QBfffc", "TimeUS,I,Alt,Press,Junk,Temp"),
-        GPS=("QBBIHBcLLeffff", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw"),
-        POS=("QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt"),
-        ORGN=("QBLLe", "TimeUS,Type,Lat,Lng,Alt"),
-        XKF1=("QBffffff", "TimeUS,C,VN,VE,VD,PN,PE,PD"),
-        CTUN=("Qf", "TimeUS,ThO"),
-        MODE=("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
-        ARM=("QBIBB", "TimeUS,ArmState,ArmChecks,Forced,Method"),
-        MSG=("QZ", "TimeUS,Message"),
-        SIM=("QccCfLL", "TimeUS,Roll,Pitch,Yaw,Alt,Lat,Lng"),
-    )
-    writer.add("MSG", 500_000, "ArduPlane V4.6.3 (3fc7011a)")
-    writer.add("MODE", 600_000, 0, 0, 1)
-    writer.add("ORGN", 800_000, 0, -35.0, 149.0, 500.0)  # of the EKF
-    writer.add("ORGN", 900_000, 1, -35.36, 149.16, 584.2)
-    writer.add("GPS", 700_000, 0, 3, 100_000_000, 2300, 11, 0.8, -35.36, 149.16, 584.2, 15.0, 90.0, -0.5, 0.0)
-    for tick in range(50 * SECONDS):
-        time_us = 1_000_000 + tick * 20_000
-        writer.add("IMU", time_us, 0, 0.1, -0.2, 0.3, 0.5, 0.0, -9.8)
-        writer.add("IMU", time_us, 1, 0.11, -0.2, 0.3, 0.5, 0.0, -9.7)
-        writer.add("ATT", time_us, 0.0, 30.0, 0.0, -5.5, 0.0, 350.0)
-        if tick % 5 == 0:
-            writer.add("RATE", time_us, 10.0, -20.0, 5.0)
-            writer.add("ARSP", time_us, 0, 21.5, 270.0, 25.0)
-            writer.add("BARO", time_us, 0, 100.0, 94_500.0, 0.0, 30.25)
-            writer.add("POS", time_us, -35.36, 149.16, 684.2, 100.0, 100.0)
-            writer.add("XKF1", time_us, 0, 1.0, 20.0, -0.5, 10.0, 200.0, -100.0)
-            writer.add("CTUN", time_us, 55.0)
-            writer.add("SIM", time_us, 30.5, -5.25, 350.0, 684.0, -35.36, 149.16)
-    writer.add("ARM", 2_000_000, 1, 0, 0, 0)
-    writer.add("MODE", 3_000_000, 10, 10, 1)
-    writer.add("ARM", 4_000_000, 0, 0, 0, 0)
-    return writer
+def dataflash():
+    return ardupilot_plane()
 
 
 @pytest.fixture
@@ -173,74 +139,8 @@ def test_a_dialect_has_no_effect_on_it(dataflash, tmp_path):
 
 
 @pytest.fixture
-def ulog(tmp_path):
-    """Four seconds of a PX4 aircraft, in AUTO.MISSION from 3 s on."""
-    writer = UlogWriter(
-        sensor_combined="uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;",
-        sensor_gyro="uint64_t timestamp;float x;float y;float z;",
-        sensor_accel="uint64_t timestamp;float x;float y;float z;",
-        vehicle_attitude="uint64_t timestamp;float[4] q;",
-        vehicle_attitude_groundtruth="uint64_t timestamp;float[4] q;",
-        vehicle_angular_velocity="uint64_t timestamp;float[3] xyz;",
-        vehicle_local_position=(
-            "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;float heading;"
-        ),
-        vehicle_global_position="uint64_t timestamp;double lat;double lon;float alt;",
-        home_position=(
-            "uint64_t timestamp;double lat;double lon;float alt;float x;float y;float z;bool valid_hpos;"
-        ),
-        airspeed_validated="uint64_t timestamp;float calibrated_airspeed_m_s;",
-        vehicle_air_data="uint64_t timestamp;float baro_pressure_pa;float baro_temp_celcius;",
-        vehicle_gps_position=(
-            "uint64_t timestamp;uint64_t time_utc_usec;double latitude_deg;double longitude_deg;"
-            "double altitude_msl_m;float vel_m_s;float cog_rad;float hdop;uint8_t fix_type;"
-            "uint8_t satellites_used;"
-        ),
-        vehicle_status="uint64_t timestamp;uint8_t arming_state;uint8_t nav_state;uint8_t system_type;",
-        vehicle_land_detected="uint64_t timestamp;bool landed;",
-    )
-    for name in (
-        "sensor_combined",
-        "vehicle_attitude",
-        "vehicle_attitude_groundtruth",
-        "vehicle_angular_velocity",
-        "vehicle_local_position",
-        "vehicle_global_position",
-        "home_position",
-        "airspeed_validated",
-        "vehicle_air_data",
-        "vehicle_gps_position",
-        "vehicle_status",
-        "vehicle_land_detected",
-    ):
-        writer.subscribe(name)
-    for name in ("sensor_gyro", "sensor_accel"):
-        writer.subscribe(name, 1)
-    half = math.radians(30.0) / 2
-    writer.add("vehicle_status", "QBBB", 1_000_000, 1, 0, 1)
-    writer.add("vehicle_land_detected", "Q?", 1_000_000, True)
-    writer.text(6, 1_100_000, "Ready for takeoff!")
-    writer.add("home_position", "Qdd4f?", 1_100_000, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
-    writer.add("home_position", "Qdd4f?", 1_150_000, 47.39, 8.54, 488.0, 1.0, 2.0, -0.5, True)
-    gps = (1_700_000_000_000_000, 47.39, 8.54, 488.0, 15.0, 1.5, 0.8, 3, 12)
-    writer.add("vehicle_gps_position", "QQdddfffBB", 1_200_000, *gps)
-    for tick in range(100 * SECONDS):
-        time_us = 1_000_000 + tick * 10_000
-        writer.add("sensor_combined", "Q6f", time_us, 0.1, -0.2, 0.3, 0.5, 0.0, -9.8)
-        writer.add("sensor_accel", "Q3f", time_us, 0.4, 0.0, -9.7, instance=1)
-        writer.add("sensor_gyro", "Q3f", time_us + 100, 0.2, 0.0, 0.0, instance=1)
-        writer.add("vehicle_attitude", "Q4f", time_us, math.cos(half), math.sin(half), 0.0, 0.0)
-        writer.add("vehicle_attitude_groundtruth", "Q4f", time_us, 1.0, 0.0, 0.0, 0.0)
-        writer.add("vehicle_angular_velocity", "Q3f", time_us, 0.1, -0.2, 0.3)
-        if tick % 10 == 0:
-            writer.add("vehicle_local_position", "Q7f", time_us, 10.0, 20.0, -100.0, 3.0, 4.0, -0.5, 1.0)
-            writer.add("vehicle_global_position", "Qddf", time_us, 47.39, 8.54, 588.0)
-            writer.add("airspeed_validated", "Qf", time_us, 21.5)
-            writer.add("vehicle_air_data", "Q2f", time_us, 94_500.0, 30.25)
-    writer.add("vehicle_status", "QBBB", 2_000_000, 2, 17, 1)
-    writer.add("vehicle_land_detected", "Q?", 2_500_000, False)
-    writer.add("vehicle_status", "QBBB", 3_000_000, 2, 3, 1)
-    return writer
+def ulog():
+    return px4_plane()
 
 
 @pytest.fixture
@@ -384,3 +284,111 @@ def test_ulog_of_junk_ends(tmp_path):
         path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + choose.randbytes(choose.randrange(3000)))
         with contextlib.suppress(LogError):
             report_of(open_log(path))
+
+
+def test_a_damaged_description_costs_its_own_messages_only(dataflash, tmp_path):
+    """A byte of the name of one format: DFReader then reads nothing of the log."""
+    data = bytearray(dataflash.data)
+    at = data.index(b"ATT\0")
+    data[at + 1] = 0xFF
+    path = tmp_path / "a.bin"
+    path.write_bytes(data)
+    log = open_log(path)
+    assert len(log.table("HIGHRES_IMU")) == 100 * SECONDS and not log.has("ATTITUDE")
+    assert report_of(log).drops["damaged_formats"] == 1
+    data[at + 1] = ord("T")
+    data[at + 4] = ord("?")  # the type of its first field
+    path.write_bytes(data)
+    log = open_log(path)
+    assert len(log.table("HIGHRES_IMU")) == 100 * SECONDS and not log.has("ATTITUDE")
+
+
+@pytest.mark.parametrize("name", ["IMU", "MODE", "MSG", "ARM"])
+def test_a_damaged_time_makes_no_rows_for_months(tmp_path, name):
+    writer = ardupilot_plane(1)
+    at = bytes(writer.data).rindex(bytes((0xA3, 0x95, writer.formats[name][0]))) + 3
+    writer.data[at : at + 8] = (9 * 10**12).to_bytes(8, "little")
+    log = open_log(writer.save(tmp_path / "a.bin"))
+    assert len(log.table("HEARTBEAT")) < 100 and log.duration_s < 4.0
+    assert report_of(log).drops["implausible_times"] == 1
+
+
+def test_a_date_that_a_damaged_message_has_is_not_that_of_the_log(tmp_path):
+    writer = DataflashWriter(GPS=("QBIH", "TimeUS,Status,GMS,GWk"))
+    for second in range(20):
+        writer.add("GPS", 1_000_000 * second, 3, 100_000_000 + 1000 * second, 65535 if not second else 2300)
+    log = open_log(writer.save(tmp_path / "a.bin"))
+    assert log.start_unix_us == (2300 * 7 * 86400 + 100_000 - 18 + 315_964_800) * 1_000_000
+
+
+def _topics(path, formats, subscribed="a"):
+    writer = UlogWriter(good="uint64_t timestamp;float x;", **formats)
+    writer.subscribe("good")
+    for name in subscribed:
+        writer.subscribe(name)
+    for second in range(10):
+        writer.add("good", "Qf", second * 1_000_000, 1.0)
+    return writer, path
+
+
+def test_messages_that_are_too_short_do_not_end_the_log(tmp_path):
+    writer, path = _topics(tmp_path / "a.ulg", {}, subscribed=())
+    for kind in "DILCOPQ":
+        writer._message(kind, b"")
+    writer.add("good", "Qf", 10_000_000, 1.0)
+    assert len(open_log(writer.save(path)).table("good")) == 11
+
+
+@pytest.mark.parametrize(
+    "formats",
+    [
+        {"a": "a inner;"},
+        {"a": "b[65535] inner;", "b": "c[65535] inner;", "c": "float[65535] x;"},
+        {"a": "b[60000] inner;", "b": "c[60000] inner;", "c": ""},
+        {"a": "float[65535] x;float[65535] y;"},
+    ],
+)
+def test_formats_that_no_message_can_have_are_left_out(tmp_path, formats):
+    writer, path = _topics(tmp_path / "a.ulg", formats)
+    log = open_log(writer.save(path))
+    assert len(log.table("good")) == 10
+    assert log.source.remarks["corrupt"] == 1
+
+
+def test_topics_without_a_time_and_texts_in_place_of_numbers(tmp_path):
+    writer, path = _topics(tmp_path / "a.ulg", {"a": "float x;", "vehicle_attitude": "float timestamp;"})
+    writer.subscribe("vehicle_attitude")
+    writer.add("a", "f", 1.0)
+    writer.add("vehicle_attitude", "f", 1.0)
+    for kind, key, value in (("I", "char[3] ver_sw_release", b"abc"), ("P", "char[3] A_GAIN", b"abc")):
+        body = bytes([len(key)]) + key.encode() + value
+        place = writer._header_end
+        writer.data[place:place] = struct.pack("<HB", len(body), ord(kind)) + body
+    for second in range(10, 20):
+        writer.add("good", "Qf", second * 1_000_000, 1.0)
+    log = open_log(writer.save(path))
+    assert len(log.table("good")) == 20 and not log.has("PARAM_VALUE")
+    assert report_of(log).drops["topics_without_time"] == 2
+
+
+def test_topics_of_another_shape_make_no_messages(tmp_path):
+    writer = UlogWriter(
+        vehicle_attitude="uint64_t timestamp;float q;",
+        sensor_combined="uint64_t timestamp;float[2] gyro_rad;float[3] accelerometer_m_s2;",
+        vehicle_status="uint64_t timestamp;uint8_t[2] nav_state;uint8_t arming_state;",
+    )
+    for name in ("vehicle_attitude", "sensor_combined", "vehicle_status"):
+        writer.subscribe(name)
+    writer.add("vehicle_attitude", "Qf", 1_000_000, 1.0)
+    writer.add("sensor_combined", "Q5f", 1_000_000, *[1.0] * 5)
+    writer.add("vehicle_status", "Q3B", 1_000_000, 1, 2, 3)
+    log = open_log(writer.save(tmp_path / "a.ulg"))
+    assert {key.name for key in log.keys} == {"vehicle_attitude", "sensor_combined", "vehicle_status"}
+
+
+def test_a_damaged_time_of_a_topic_is_left_out(tmp_path):
+    writer = px4_plane(1)
+    writer.add("vehicle_status", "QBBB", 9 * 10**12, 2, 3, 1)
+    log = open_log(writer.save(tmp_path / "a.ulg"))
+    assert log.duration_s < 4.0 and len(log.table("HEARTBEAT")) < 20
+    assert report_of(log).drops["implausible_times"] == 1
