@@ -15,6 +15,8 @@ from xml.etree import ElementTree
 import jsbsim
 
 from flightsim.airframe import Airframe, AirframeError
+from flightsim.foundation.documents import read_xml
+from flightsim.foundation.file_content import FileError
 
 _ENGINES: Final = frozenset({"engine", "thruster"})
 _SYSTEMS: Final = frozenset({"system", "autopilot", "flight_control"})
@@ -139,6 +141,6 @@ def _folders(airframe: Airframe, tag: str) -> list[Path]:
 
 def _parsed(airframe: Airframe, path: Path) -> ElementTree.Element:
     try:
-        return ElementTree.parse(path).getroot()
-    except (OSError, ElementTree.ParseError) as error:
-        raise AirframeError(refusal(airframe, [f"{path}: {error}"])) from None
+        return read_xml(path).getroot()
+    except FileError as error:
+        raise AirframeError(refusal(airframe, [str(error)])) from None

@@ -102,7 +102,8 @@ class Table:
         if values.dtype.kind == "S":
             raise LogError(f"{self.name}.{field} is a text and has no SI value; take it as it is")
         factor, _ = to_si(self.units.get(field, ""))
-        converted = values.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # of a signalling NaN, which damage makes
+            converted = values.astype(np.float64)
         if factor != 1.0:
             converted *= factor
         return converted
