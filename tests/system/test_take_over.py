@@ -91,7 +91,7 @@ async def stabilize(pilot: Vehicle) -> None:
 
 async def battery(pilot: Vehicle) -> None:
     if pilot.autopilot == "px4":
-        await pilot.set_parameters({"SIM_BAT_MIN_PCT": 6.0, "SIM_BAT_DRAIN": 2.0})
+        await pilot.set_parameters({"BAT_LOW_THR": 0.995, "BAT_CRIT_THR": 0.99})
     else:
         await pilot.set_parameters({"SIM_BATT_VOLTAGE": 10.0})
 
