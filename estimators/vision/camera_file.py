@@ -10,7 +10,8 @@
     latency_s = 0.1
     start_us = 0
 
-All but the first three have the defaults of `CameraDescription`.
+All but the first three have the defaults of `CameraDescription`. `calibration = "FILE.yaml"`, relative to
+this file, stands for the lines of the geometry (`estimators.vision.calibration_file`).
 """
 
 import math
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from estimators.errors import EstimatorError
+from estimators.vision.calibration_file import SUFFIXES, load_calibration
 from estimators.vision.camera import CameraGeometry
 from flightsim.foundation.documents import read_toml
 from flightsim.foundation.file_content import FileError
@@ -83,15 +85,20 @@ class CameraDescription:
 
 
 def load_camera(path: Path) -> CameraDescription:
-    """Read the description of a camera.
+    """Read the description of a camera, or the calibration of ROS or OpenCV (`.yaml`) of one that looks down.
 
     Raises:
         EstimatorError: the file can't be read, or a value is not possible; the message names it.
     """
+    if path.suffix in SUFFIXES:
+        return CameraDescription(geometry=load_calibration(path))
     try:
         data = read_toml(path)
     except FileError as error:
         raise EstimatorError(str(error)) from None
+    calibration = data.pop("calibration", None)
+    if calibration is not None:
+        return _calibrated(path, calibration, data)
     names = (*_GEOMETRY, *(field.name for field in fields(CameraDescription) if field.name != "geometry"))
     for name in data:
         if name not in names:
@@ -104,6 +111,24 @@ def load_camera(path: Path) -> CameraDescription:
         width_px, height_px = values["width_px"], values["height_px"]
         values.setdefault("centre_px", (0.5 * width_px, 0.5 * height_px))
         geometry = CameraGeometry(**{name: values.pop(name) for name in _GEOMETRY if name in values})
+        return CameraDescription(geometry=geometry, **values)
+    except EstimatorError as error:
+        raise EstimatorError(f"{path}: {error}") from None
+
+
+def _calibrated(path: Path, calibration: Any, data: dict[str, Any]) -> CameraDescription:
+    """A description whose geometry is in a file of its own."""
+    if not isinstance(calibration, str):
+        raise EstimatorError(f"{path}: calibration = {calibration!r} is not the name of a file")
+    names = tuple(field.name for field in fields(CameraDescription) if field.name != "geometry")
+    for name in data:
+        if name not in names:
+            raise EstimatorError(
+                f"{path}: {name} is not known beside `calibration`; there are {', '.join(names)}"
+            )
+    values = {name: _value(path, name, value) for name, value in data.items()}
+    geometry = load_calibration(path.parent / calibration)
+    try:
         return CameraDescription(geometry=geometry, **values)
     except EstimatorError as error:
         raise EstimatorError(f"{path}: {error}") from None

@@ -21,6 +21,7 @@ from autopilot_bridge.mavlink.camera_scan import (
 from estimators.messages import Message
 from estimators.vision.camera_file import CameraDescription
 from estimators.vision.clock_check import ClockCheck
+from estimators.vision.foreign_markers import ForeignMarkers
 from estimators.vision.tag_detector import Picture, TagDetection, TagDetector, TagDetectorParameters
 from estimators.vision.vehicle_track import VehicleTrack, ground_place
 from flightsim.foundation.vectors import rotate
@@ -61,6 +62,7 @@ class PictureWatch:
     def __init__(self, camera: CameraDescription, parameters: TagDetectorParameters | None = None) -> None:
         self.camera = camera
         self._detector = TagDetector(camera.geometry, parameters)
+        self._foreign = ForeignMarkers()
         self._track = VehicleTrack()
         self.clocks = ClockCheck(camera.mount_rad)
         self.frames = 0
@@ -93,6 +95,8 @@ class PictureWatch:
             EstimatorError: it has another size than the camera's pictures.
         """
         found = self._detector.detect(picture)
+        if not found:
+            self._foreign.look(picture)
         self.clocks.take_picture(exposed_us, picture)
         return found
 
@@ -173,6 +177,8 @@ class PictureWatch:
     def warnings(self) -> list[str]:
         """What is wrong with pictures and attitude."""
         found = []
+        if not self.tags and (foreign := self._foreign.warning()):
+            found.append(foreign)
         if self.without_attitude > _WITHOUT_SHARE * self.frames:
             found.append(
                 f"{self.without_attitude} of {self.frames} pictures have no attitude near their exposure, "

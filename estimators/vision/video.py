@@ -54,16 +54,20 @@ def is_stream(source: str) -> bool:
     return source.lower().startswith(_STREAMS)
 
 
-def frames_of(source: str, *, timeout_s: float | None = None) -> Iterator[TimedPicture]:
+def frames_of(
+    source: str, *, timeout_s: float | None = None, rate_hz: float | None = None
+) -> Iterator[TimedPicture]:
     """The frames of a video, as they come.
 
     Args:
         source: a file, or the address of a stream (RTSP over TCP).
         timeout_s: of a stream, to open it and between frames.
+        rate_hz: frames per second of a file without times, such as raw H.264.
 
     Raises:
-        VideoError: it can't be opened or decoded, or has no pictures; a stream was silent for so long. The
-            end of a file, or of a stream by its server, ends the iteration.
+        VideoError: it can't be opened or decoded, or has no pictures; a stream was silent for so long; its
+            frames have no times and no rate is given, or they have times and a rate is given. The end of a
+            file, or of a stream by its server, ends the iteration.
     """
     options = dict(_RTSP) if source.lower().startswith("rtsp") else {}
     try:
@@ -74,13 +78,26 @@ def frames_of(source: str, *, timeout_s: float | None = None) -> Iterator[TimedP
         if not container.streams.video:
             raise VideoError(f"{source} has no video in it")
         stream = container.streams.video[0]
+        timed = untimed = 0
         try:
             for frame in container.decode(stream):
-                if frame.pts is None or frame.time_base is None:
+                if frame.pts is not None and frame.time_base is not None:
+                    time_us = round(frame.pts * frame.time_base * 1_000_000)
+                    timed += 1
+                elif rate_hz is not None:
+                    time_us = round(untimed * 1e6 / rate_hz)
+                    untimed += 1
+                else:
+                    untimed += 1
                     continue
-                yield TimedPicture(
-                    time_us=round(frame.pts * frame.time_base * 1_000_000),
-                    pixels=np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8),
+                if timed and rate_hz is not None:
+                    raise VideoError(f"the frames of {source} have times of their own; leave out the rate")
+                pixels = np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+                yield TimedPicture(time_us=time_us, pixels=pixels)
+            if untimed and not timed and rate_hz is None:
+                raise VideoError(
+                    f"{source} has {untimed} pictures and no times (a raw stream without a container); give "
+                    "its frames per second with `rate`"
                 )
         except av.error.EOFError:
             return

@@ -67,8 +67,9 @@ class _ProgressLine:
 @click.command()
 @click.argument("video", metavar="VIDEO|rtsp://...")
 @click.option(
-    "--camera", required=True, type=click.Path(path_type=Path), metavar="FILE.toml",
-    help="Describes the camera: intrinsics, distortion, mount, latency (docs/vision.md).",
+    "--camera", required=True, type=click.Path(path_type=Path), metavar="FILE",
+    help="Describes the camera: intrinsics, distortion, mount, latency (.toml, docs/vision.md), or a "
+    "calibration of ROS or OpenCV (.yaml).",
 )  # fmt: skip
 @click.option("--connect", metavar="URL", help="Of a stream: the vehicle's link.")
 @click.option("--log", type=click.Path(path_type=Path), metavar="FILE.tlog", help="Of a recording: its log.")
@@ -92,6 +93,10 @@ class _ProgressLine:
 @click.option(
     "--silence", type=_SECONDS, default=10.0, show_default=True, metavar="S",
     help="Wall seconds without the vehicle or a first picture, after which it fails.",
+)  # fmt: skip
+@click.option(
+    "--rate", type=FiniteRange(min=0.0, min_open=True, max=1000.0), metavar="HZ",
+    help="Frames per second of a recording without times (raw H.264).",
 )  # fmt: skip
 @click.option("--film", is_flag=True, help="Keep the searched pictures of a stream as lossless video; large.")
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/vision-N]")
@@ -128,6 +133,7 @@ def vision(**given: Any) -> int:
                 component_id=given["component_id"],
                 duration_s=given["duration"],
                 silence_s=given["silence"],
+                rate_hz=given["rate"],
                 film=given["film"],
                 out=given["out"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),

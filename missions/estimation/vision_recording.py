@@ -33,7 +33,7 @@ def over_log(
     """Copy the log, with the messages of the pictures at the times at which they would have been sent."""
     reader = TlogReader(log)
     system_id = request.system_id or _first_autopilot(reader)
-    film = _Recording(request.video, pictures)
+    film = _Recording(request.video, pictures, request.rate_hz)
     folder = create_run_folder(request.out, "vision")
     own = (system_id, request.component)
     encoder = FrameEncoder(*own)
@@ -77,17 +77,18 @@ class _Recording(Generic[Found]):
         before: number of pictures from before the log's begin.
     """
 
-    def __init__(self, video: str, pictures: PictureProcess[Found]) -> None:
+    def __init__(self, video: str, pictures: PictureProcess[Found], rate_hz: float | None) -> None:
         self._pictures = pictures
-        self._start_us = pictures.camera.start_us
         self._latency_us = round(pictures.camera.latency_s * 1e6)
-        self._frames = frames_of(video)
+        self._frames = frames_of(video, rate_hz=rate_hz)
         first = next(self._frames, None)
         if first is None:
             raise VideoError(f"{video} has no picture in it")
         pictures.camera.geometry.check_size(first.pixels)
         self._next: TimedPicture | None = first
-        self.first_us = self._start_us + first.time_us
+        self.first_us = pictures.camera.start_us
+        # the times of a video may begin anywhere: cut files, and cameras that count from their boot
+        self._offset_us = self.first_us - first.time_us
         self.before = 0
 
     def searched(self, begin_us: int, now_us: int) -> Iterator[tuple[int, Found]]:
@@ -99,7 +100,7 @@ class _Recording(Generic[Found]):
             now_us: the time.
         """
         while self._next is not None:
-            exposed_us = self._start_us + self._next.time_us
+            exposed_us = self._offset_us + self._next.time_us
             received_us = exposed_us + self._latency_us
             if received_us >= now_us:
                 return

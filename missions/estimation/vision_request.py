@@ -89,6 +89,7 @@ class VisionRequest:
         duration_s: vehicle time since the vehicle was first received; None: until it is stopped.
         silence_s: wall time without a message of the vehicle, or without a first picture, after which the run
             fails.
+        rate_hz: frames per second of a recording whose frames have no times; None: they have.
         film: keep the searched pictures of a stream as lossless video in the run folder.
         out: run folder; None: the next `runs/vision-<n>`.
         command: the command line, for the summary.
@@ -108,6 +109,7 @@ class VisionRequest:
     component_id: int | None = None
     duration_s: float | None = None
     silence_s: float = SILENCE_S
+    rate_hz: float | None = None
     film: bool = False
     out: Path | None = None
     command: str = ""
@@ -120,6 +122,8 @@ class VisionRequest:
         if is_stream(self.video) != (self.connect is not None):
             needed = "`connect`, the vehicle's link" if is_stream(self.video) else "`log`, the vehicle's log"
             raise EstimatorError(f"the video {self.video} needs {needed}")
+        if self.rate_hz is not None and self.log is None:
+            raise EstimatorError("`rate` is that of a recording; a stream has times")
         if self.film and self.log is not None:
             raise EstimatorError("`film` keeps the pictures of a stream; a recording is there already")
         if self.component_id is not None and self.component_id not in self._components:
