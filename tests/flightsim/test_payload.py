@@ -128,7 +128,8 @@ def test_only_a_magnetometer_alone_rests_between_its_readings() -> None:
         "range_radio": RangeRadioParameters(),
         "moving_points": MovingPointParameters(),
     }
-    assert {*devices, "magnetometer"} == {field.name for field in fields(PayloadParameters)}
+    others = {"magnetometer", "outages"}
+    assert {*devices, *others} == {field.name for field in fields(PayloadParameters)}
     alone = PayloadParameters(magnetometer=SurveyMagnetometerParameters())
 
     def next_us(parameters: PayloadParameters) -> int:

@@ -144,6 +144,12 @@ def test_px4_lists_by_name() -> None:
     assert {definition.type for definition in PX4_PARAMETERS} == {ParameterType.INT32, ParameterType.REAL32}
 
 
+NOT_LISTED = {"MIS_TKO_LAND_REQ"}
+"""PX4 1.16 lists parameters that were used. This one (src/modules/navigator/mission_params.c) had not been when the
+parameters of the multicopter were recorded.
+"""
+
+
 @pytest.mark.parametrize("flavour", TABLES)
 def test_tables_agree_with_the_observed_firmware(flavour: str) -> None:
     file = DATA / OBSERVED[flavour]
@@ -151,6 +157,8 @@ def test_tables_agree_with_the_observed_firmware(flavour: str) -> None:
         pytest.skip(f"observed parameters {file.name} are not here")
     observed = json.loads(file.read_text())
     for definition in TABLES[flavour]:
+        if definition.name in NOT_LISTED:
+            continue
         if definition.name not in observed:  # ArduPilot hides what is switched off
             switch = SWITCHES.get(definition.name.partition("_")[0])
             assert switch is not None and observed[switch] == 0, definition.name
