@@ -145,8 +145,8 @@ def test_px4_lists_by_name() -> None:
 
 
 NOT_LISTED = {"MIS_TKO_LAND_REQ"}
-"""PX4 1.16 lists parameters that were used. This one (src/modules/navigator/mission_params.c) had not been when
-the parameters of the multicopter were recorded.
+"""PX4 1.16 lists parameters that were used. This one (navigator/mission_params.c) had not been when those
+of the multicopter were recorded.
 """
 
 
