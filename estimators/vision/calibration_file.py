@@ -20,7 +20,7 @@ _MODELS: Final = ("plumb_bob", "rational_polynomial")
 """Distortion models of ROS that are OpenCV's k1, k2, p1, p2, k3, and more of it with further terms of 0."""
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
     """YAML with OpenCV's matrices as mappings."""
 
 
