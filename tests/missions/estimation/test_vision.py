@@ -7,6 +7,9 @@ import threading
 import time
 from dataclasses import replace
 
+import av
+import cv2
+import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
@@ -89,6 +92,50 @@ def test_the_log_gets_the_messages_of_the_pictures_when_they_would_have_come(rec
     summary = json.loads((result.folder / "summary.json").read_text(encoding="utf-8"))
     assert (summary["outcome"], summary["frames"], summary["tags"]) == ("completed", 6, {"5": 6, "11": 6})
     assert summary["frames_without_attitude"] == 0 and summary["warnings"] == []
+
+
+def remuxed(video, path, *, later_s=0.0):
+    """A copy of a video in another container, whose times begin later; H.264 without one has no times."""
+    with av.open(str(video)) as source, av.open(str(path), "w") as copy:
+        stream = copy.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(source.streams.video[0]):
+            if packet.dts is None:
+                continue
+            packet.pts += round(later_s / packet.time_base)
+            packet.dts += round(later_s / packet.time_base)
+            packet.stream = stream
+            copy.mux(packet)
+    return path
+
+
+def test_a_recording_whose_times_begin_later_has_the_same_detections(recording, taken):
+    """Cut files, and cameras that count from their boot."""
+    write_log(recording / "flight.tlog", attitudes())
+    video = remuxed(recording / "film.mp4", recording / "later.mkv", later_s=12.5)
+    result = watch(request(recording, video=str(video)))
+    assert [frame.raw for _, frame in of_camera(result.folder / "flight.tlog")] == messages_of(taken)[0]
+
+
+def test_a_recording_without_times_needs_its_rate(recording):
+    write_log(recording / "flight.tlog", attitudes())
+    video = str(remuxed(recording / "film.mp4", recording / "raw.h264"))
+    with pytest.raises(EstimatorError, match=r"raw\.h264 has 6 pictures and no times.* with `rate`"):
+        watch(request(recording, video=video))
+    summary = watch(request(recording, video=video, rate_hz=20.0)).summary
+    assert summary["tags"] == {"5": 6, "11": 6}
+    with pytest.raises(EstimatorError, match="have times of their own; leave out the rate"):
+        watch(request(recording, rate_hz=20.0, out=recording / "timed"))
+
+
+def test_markers_of_another_dictionary_are_named(recording):
+    write_log(recording / "flight.tlog", attitudes())
+    marker = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), 7, 120)
+    shape = (CAMERA.geometry.height_px, CAMERA.geometry.width_px, 3)
+    picture = np.full(shape, 255, np.uint8)
+    picture[60:180, 80:200] = marker[..., None]
+    video = write_film(recording / "other.mp4", [(CAMERA.start_us + 100_000 * k, picture) for k in range(6)])
+    (warning,) = watch(request(recording, video=str(video))).summary["warnings"]
+    assert "marker 7 of the dictionary 4X4_50 is seen in" in warning
 
 
 def test_pictures_without_attitude_near_them_are_counted_and_reported(recording):
