@@ -1,4 +1,4 @@
-"""Grids of other programs: GeoTIFF and netCDF."""
+"""Grids of other programs: GeoTIFF, Surfer's and Esri's grids (by GDAL), and netCDF."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,10 +14,21 @@ from estimators.survey.map_places import EXAMPLE, WGS84, ReferenceSystem, librar
 from estimators.survey.map_values import LATITUDES, LONGITUDES, chosen
 from flightsim.foundation.geodesy import WGS84_A_M, longitude_near
 
-__all__ = ["GridSource", "geotiff", "netcdf"]
+__all__ = ["GridSource", "netcdf", "raster"]
 
 Array = NDArray[np.float64]
 
+Check = Callable[[Array], Array]
+
+_FORMATS: Final = {
+    "GTiff": "GeoTIFF",
+    "GSAG": "Surfer's ASCII grid",
+    "GSBG": "Surfer's binary grid",
+    "GS7BG": "Surfer's binary grid",
+    "AAIGrid": "Esri's ASCII grid",
+}
+"""What is read through GDAL, by the name of its driver."""
+_MOST_POINTS: Final = 25_000_000
 _EDGE_POINTS: Final = 50
 _SLACK: Final = 1e-6  # of a grid step: places come out of transformations
 _CRS_TEXTS: Final = ("crs_wkt", "spatial_ref", "epsg_code")
@@ -39,13 +50,15 @@ class GridSource:
     sample: Callable[[Array, Array], Array]
 
 
-def geotiff(path: Path, crs: str | None, column: str | None) -> GridSource:
-    """A band of a GeoTIFF.
+def raster(path: Path, driver: str, crs: str | None, column: str | None, check: Check) -> GridSource:
+    """A band of a file that GDAL reads.
 
     Args:
         path: the file.
+        driver: GDAL's name of its format.
         crs: coordinate reference system of its places; None: the one that it declares.
         column: number or description of the band; None: the only one that can be it.
+        check: returns the values with NaN for those that stand for no data, and refuses impossible ones.
 
     Raises:
         EstimatorError: the file can't be read, has no coordinate reference system or several bands without a
@@ -53,18 +66,27 @@ def geotiff(path: Path, crs: str | None, column: str | None) -> GridSource:
     """
     rasterio = library("rasterio", path)
     try:
-        with rasterio.open(path) as dataset:
+        with rasterio.open(path, driver=driver) as dataset:
+            _require_size(path, dataset.width, dataset.height)
             band = dataset.read(_band(path, dataset, column), masked=True).astype(np.float64).filled(np.nan)
             transform, declared = dataset.transform, dataset.crs
     except library("rasterio.errors", path).RasterioError as error:
-        raise EstimatorError(f"{path} can't be read as GeoTIFF: {error}") from None
+        reason = " ".join(str(error).split())
+        raise EstimatorError(f"{path} can't be read as {_FORMATS[driver]}: {reason}") from None
     if crs is None and declared is None:
         raise EstimatorError(f"{path} has no coordinate reference system; give it with `crs`, {EXAMPLE}")
     if transform.b or transform.d:
         raise EstimatorError(f"{path} is a rotated grid; accepted are grids along the axes of their system")
     columns = transform.c + transform.a * (np.arange(band.shape[1]) + 0.5)
     rows = transform.f + transform.e * (np.arange(band.shape[0]) + 0.5)
-    return _regular(path, ReferenceSystem.of(path, crs or declared.to_wkt()), columns, rows, band)
+    return _regular(path, ReferenceSystem.of(path, crs or declared.to_wkt()), columns, rows, check(band))
+
+
+def _require_size(path: Path, columns: int, rows: int) -> None:
+    if columns * rows > _MOST_POINTS:
+        raise EstimatorError(
+            f"{path} is a grid of {columns} x {rows} points; accepted are up to {_MOST_POINTS}, cut it"
+        )
 
 
 def _band(path: Path, dataset: Any, column: str | None) -> int:
@@ -80,7 +102,7 @@ def _band(path: Path, dataset: Any, column: str | None) -> int:
     return int(chosen(path, bands, column))
 
 
-def netcdf(path: Path, crs: str | None, column: str | None) -> GridSource:
+def netcdf(path: Path, crs: str | None, column: str | None, check: Check) -> GridSource:
     """A variable of a netCDF file over two coordinates.
 
     Args:
@@ -88,6 +110,7 @@ def netcdf(path: Path, crs: str | None, column: str | None) -> GridSource:
         crs: coordinate reference system of its places; None: that of the variable's grid mapping, and WGS84
             for degrees without one.
         column: name of the variable; None: the only one that can be it.
+        check: as of `raster`.
 
     Raises:
         EstimatorError: the file can't be read, has no such variable, coordinates that make no grid, or a
@@ -97,6 +120,7 @@ def netcdf(path: Path, crs: str | None, column: str | None) -> GridSource:
     try:
         with library_of_netcdf.Dataset(path) as dataset:
             variable = _variable(path, dataset, column)
+            _require_size(path, *variable.shape)
             axes = [_axis(path, dataset, variable, dimension) for dimension in variable.dimensions]
             values = np.ma.filled(variable[:].astype(np.float64), np.nan)
             text = crs or _declared(path, dataset, variable)
@@ -116,7 +140,7 @@ def netcdf(path: Path, crs: str | None, column: str | None) -> GridSource:
             f"{path}: its coordinates reach {np.abs(rows).max():g}, which is no latitude; give their "
             f"coordinate reference system with `crs`, {EXAMPLE}"
         )
-    return _regular(path, ReferenceSystem.of(path, text or WGS84.text), columns, rows, values)
+    return _regular(path, ReferenceSystem.of(path, text or WGS84.text), columns, rows, check(values))
 
 
 def _variable(path: Path, dataset: Any, column: str | None) -> Any:

@@ -1,4 +1,5 @@
-"""Magnetic maps from other programs' files: grids as GeoTIFF and netCDF, and line data as tables.
+"""Magnetic maps from other programs' files: grids as GeoTIFF, netCDF, of Surfer and of Esri, and line data as
+tables. A file is recognised by its content.
 
 A grid is sampled, and line data are interpolated linearly on the triangles of their points (Delaunay), at the
 points of a regular grid in the local frame of a home. Places in other coordinate reference systems and datums
@@ -6,6 +7,8 @@ than WGS84 are transformed by PROJ. The libraries are an extra: `pip install 'fl
 """
 
 import math
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
-from estimators.survey.map_grids import geotiff, netcdf
+from estimators.survey.map_grids import netcdf, raster
 from estimators.survey.map_lines import gridded, line_data
 from estimators.survey.map_places import WGS84, ReferenceSystem, grid_degrees, transformed
-from estimators.survey.map_values import Values, with_main_field
+from estimators.survey.map_values import Values, checked_values, with_main_field
+from flightsim.foundation.file_content import XZ, FileError, file_head
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame, longitude_near
 from flightsim.foundation.magnetic_map_file import MagneticMapError, MapContents
 from flightsim.foundation.vectors import wrap_180
@@ -26,9 +30,24 @@ __all__ = ["MapImport", "imported_map"]
 
 Array = NDArray[np.float64]
 
-_GEOTIFF: Final = (".tif", ".tiff")
-_NETCDF: Final = (".nc", ".grd")
-_TABLES: Final = (".csv", ".xyz", ".txt", ".csv.xz")
+_DRIVERS: Final = {
+    b"II*\0": "GTiff",
+    b"MM\0*": "GTiff",
+    b"II+\0": "GTiff",
+    b"MM\0+": "GTiff",
+    b"DSAA": "GSAG",
+    b"DSBB": "GSBG",
+    b"DSRB": "GS7BG",
+}
+"""GDAL's drivers by the first bytes of a file."""
+_ESRI: Final = re.compile(
+    rb"\s*(ncols|nrows|xll(corner|center)|yll(corner|center)|cellsize)\s", re.IGNORECASE
+)
+_NETCDF: Final = (b"CDF", b"\x89HDF\r\n\x1a\n")
+_XZ_MAGIC: Final = b"\xfd7zXZ\x00"
+_ACCEPTED: Final = (
+    "GeoTIFF, netCDF, grids of Surfer and Esri, and tables of line data (.csv, .xyz, .txt, also with .xz)"
+)
 _MAX_POINTS: Final = 4_000_000
 _FARTHEST_M: Final = 100_000.0  # of the data from home
 _ON_LINE: Final = 1e-6  # of the spacing: data that end there end on a grid line
@@ -50,6 +69,7 @@ class MapImport:
             one that can be it.
         line_spacing_m: distance of the survey's lines; needed for line data.
         error_nt: standard deviation that the survey states.
+        no_data: value that stands for no data, where the file does not mark it as such.
     """
 
     home: GeodeticPosition | None = None
@@ -61,6 +81,7 @@ class MapImport:
     column: str | None = None
     line_spacing_m: float | None = None
     error_nt: float | None = None
+    no_data: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("spacing_m", "line_spacing_m", "error_nt"):
@@ -78,20 +99,24 @@ def imported_map(path: Path, how: MapImport) -> MapContents:
         EstimatorError: the file can't be read, has no coordinate reference system, no data, or
             values that are no magnetic field; or a library is not installed.
     """
-    name = path.name.lower()
-    if not path.is_file():
-        raise EstimatorError(f"{path} does not exist; give a file")
-    if name.endswith(_TABLES):
-        return _from_lines(path, how)
-    if name.endswith(_GEOTIFF):
-        source = geotiff(path, how.crs, how.column)
-    elif name.endswith(_NETCDF):
-        source = netcdf(path, how.crs, how.column)
+    try:
+        head = file_head(path, accepted=(XZ,))
+    except FileError as error:
+        raise EstimatorError(str(error)) from None
+
+    def check(values: Array) -> Array:
+        return checked_values(path, values, how.values, how.no_data)
+
+    driver = "AAIGrid" if _ESRI.match(head) else _DRIVERS.get(head[:4])
+    if driver is not None:
+        source = raster(path, driver, how.crs, how.column, check)
+    elif head.startswith(_NETCDF):
+        source = netcdf(path, how.crs, how.column, check)
+    elif head.startswith(_XZ_MAGIC) or b"\0" not in head:
+        return _from_lines(path, how, check)
     else:
-        raise EstimatorError(
-            f"{path} is no kind of file that is known; accepted are "
-            f"{', '.join((*_GEOTIFF, *_NETCDF, *_TABLES))}"
-        )
+        geosoft = "; export a grid of Oasis montaj as GeoTIFF" if path.suffix.lower() == ".grd" else ""
+        raise EstimatorError(f"{path} is no kind of file that is known; accepted are {_ACCEPTED}{geosoft}")
     lon, lat = transformed(path, source.crs, WGS84, source.x, source.y)
     home, north_m, east_m = _grid_over(path, lat, lon, how)
     lat_deg, lon_deg = np.meshgrid(*grid_degrees(home, north_m, east_m), indexing="ij")
@@ -99,10 +124,10 @@ def imported_map(path: Path, how: MapImport) -> MapContents:
     return _made(path, how, home, north_m, east_m, source.sample(x, y).reshape(lat_deg.shape))
 
 
-def _from_lines(path: Path, how: MapImport) -> MapContents:
+def _from_lines(path: Path, how: MapImport, check: Callable[[Array], Array]) -> MapContents:
     if how.line_spacing_m is None:
         raise EstimatorError(f"{path} holds line data: give the distance of its lines, `line_spacing_m`")
-    x, y, values = line_data(path, how.column)
+    x, y, values = line_data(path, how.column, check)
     crs = ReferenceSystem.of(path, how.crs or WGS84.text)
     lon, lat = transformed(path, crs, WGS84, x, y)
     home, north_m, east_m = _grid_over(path, lat, lon, how)

@@ -14,7 +14,7 @@ from flightsim.foundation.magnetic_map_file import EARTH_NT
 from flightsim.foundation.magnetics import FieldModel
 from flightsim.foundation.main_field import MainField
 
-__all__ = ["LATITUDES", "LONGITUDES", "Values", "chosen", "with_main_field"]
+__all__ = ["LATITUDES", "LONGITUDES", "Values", "checked_values", "chosen", "with_main_field"]
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ _VALUES: Final = (
 """Usual names of the field, likewise."""
 
 _ANOMALY_NT: Final = 10_000.0
+_SINGLE: Final = 1e-6  # of a value that was stored in single precision
 
 
 class Values(StrEnum):
@@ -67,6 +68,44 @@ def chosen(path: Path, found: Mapping[str, Any], column: str | None) -> Any:
     return next(iter(found.values()))
 
 
+def checked_values(path: Path, values_nt: Array, kind: Values, no_data: float | None) -> Array:
+    """The values of a file, before anything is computed of them; NaN where there is no data.
+
+    A value that stands for no data would otherwise be averaged with its neighbours, and be plausible again.
+
+    Args:
+        path: the file, for errors.
+        values_nt: (...) of the file.
+        kind: what they are.
+        no_data: value that stands for no data; None: none but NaN and infinity.
+
+    Raises:
+        EstimatorError: values are impossible; the message names one, and how many there are.
+    """
+    values = np.where(np.isfinite(values_nt), values_nt, np.nan)
+    if no_data is not None:
+        values[np.isclose(values, no_data, rtol=_SINGLE, atol=0.0)] = np.nan
+    low, high = EARTH_NT if kind is Values.TOTAL else (-_ANOMALY_NT, _ANOMALY_NT)
+    with np.errstate(invalid="ignore"):
+        wrong = values[(values < low) | (values > high)]
+    if not len(wrong):
+        return values
+    kinds, counts = np.unique(wrong, return_counts=True)
+    worst, times = float(kinds[np.argmax(counts)]), int(counts.max())
+    known = int(np.count_nonzero(np.isfinite(values)))
+    count = f"{len(wrong)} of {known} values" + (f", {times} times {worst:g} nT" if len(wrong) > 1 else "")
+    if kind is Values.TOTAL:
+        why = f"no total field of the Earth ({low:g} to {high:g} nT)"
+        other = "anomalies get a main field with `values=anomaly-wmm`"
+    else:
+        why = f"no anomaly (up to {high:g} nT)"
+        other = "total field is read with `values=total`"
+    raise EstimatorError(
+        f"{path} has values such as {worst:g} nT, {why}: {count}. If that value stands for no data, give it "
+        f"with `no_data` {worst:.10g}; {other}"
+    )
+
+
 def with_main_field(
     path: Path,
     values_nt: Array,
@@ -89,25 +128,12 @@ def with_main_field(
         decimal_year: date of the main field.
 
     Raises:
-        EstimatorError: the values are not what they are said to be.
+        EstimatorError: there is no data, or the model has no field at the date.
     """
-    finite = values_nt[np.isfinite(values_nt)]
-    if not len(finite):
+    if not np.isfinite(values_nt).any():
         raise EstimatorError(f"{path} has no data in the map's area; is `home` of another place?")
-    low, high = float(finite.min()), float(finite.max())
     if kind is Values.TOTAL:
-        if not EARTH_NT[0] <= low <= high <= EARTH_NT[1]:
-            raise EstimatorError(
-                f"{path} has values from {low:g} to {high:g} nT, which is no total field of the Earth "
-                f"({EARTH_NT[0]:g} to {EARTH_NT[1]:g} nT); a main field is added to anomalies with "
-                "`values=anomaly-wmm`. Values that stand for no data have to be marked as such in the file"
-            )
         return values_nt
-    if not -_ANOMALY_NT <= low <= high <= _ANOMALY_NT:
-        raise EstimatorError(
-            f"{path} has values from {low:g} to {high:g} nT, which is no anomaly (up to {_ANOMALY_NT:g} nT); "
-            "is it total field (`values=total`), or are values that stand for no data not marked as such?"
-        )
     model = FieldModel.IGRF if kind is Values.ANOMALY_IGRF else FieldModel.WMM
     try:
         main = MainField(home, decimal_year, model=model)

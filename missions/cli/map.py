@@ -32,6 +32,12 @@ def magnetic_map() -> None:
 @click.option("--line-spacing", type=float, help="Of the survey's lines, m; needed for line data.")
 @click.option("--error", type=float, help="Standard deviation that the survey states, nT.")
 @click.option(
+    "--no-data",
+    type=float,
+    metavar="VALUE",
+    help="Value that stands for no data. [default: what the file marks as such]",
+)
+@click.option(
     "--crs",
     help="Coordinate reference system of the places, such as EPSG:32723, in place of the file's. [default: "
     "the file's; WGS84 for tables, and for netCDF in degrees without one]",
@@ -43,7 +49,7 @@ def magnetic_map() -> None:
     "a usual name, such as total_field_nt, or the only one]",
 )
 def make(**given: Any) -> int:
-    """Make a map from SOURCE: GeoTIFF (.tif), netCDF (.nc, .grd), or line data (.csv, .csv.xz, .xyz).
+    """Make a map from SOURCE: GeoTIFF, netCDF, grids of Surfer and Esri, or line data (.csv, .csv.xz, .xyz).
 
     The map is for fly --map, and for the parameter map_file of estimators. Line data need columns with names:
     longitude, latitude, and the field.
@@ -67,6 +73,7 @@ def make(**given: Any) -> int:
                 column=given["column"],
                 line_spacing_m=given["line_spacing"],
                 error_nt=given["error"],
+                no_data=given["no_data"],
             ),
         )
         with new_file(given["out"]) as part:
