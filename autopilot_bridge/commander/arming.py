@@ -13,6 +13,13 @@ from autopilot_bridge.commander.verdict import Reason
 
 MAX_ARMING_TILT_RAD: Final = math.radians(30.0)
 
+_THROTTLE_NEUTRAL: Final = -0.94
+"""Throttle stick, -1..1: the dead zone of ArduPilot's channel (RC3_DZ 30 us) ends here."""
+_CENTRED: Final = 0.04  # RC1_DZ 20 us
+_NOT_CENTRED: Final = (Reason.ROLL_NOT_NEUTRAL, Reason.PITCH_NOT_NEUTRAL, Reason.YAW_NOT_NEUTRAL)
+_AT_ARMING: Final = frozenset({Reason.THROTTLE_HIGH, Reason.THROTTLE_NOT_NEUTRAL, *_NOT_CENTRED})
+"""Looked at only when a client arms."""
+
 _MANDATORY: Final = frozenset(
     {
         Reason.MODE_NOT_ARMABLE,
@@ -62,11 +69,13 @@ def mode_obstacle(
     policy: CommanderPolicy,
     parameters: CommanderParameters,
     *,
+    flown: FlightMode,
     locked: bool,
 ) -> Reason | None:
-    """Why a mode can't be commanded now: on the ground almost any can, in flight its needs must be met.
+    """Why a mode can't be commanded now: disarmed almost any can, armed its needs must be met.
 
     Args:
+        flown: the mode that is flown.
         locked: the vehicle flies the action of a fence breach, in another mode.
     """
     if situation.terminated:
@@ -75,12 +84,22 @@ def mode_obstacle(
         return Reason.MODE_UNAVAILABLE
     if not situation.armed:
         return None if mode in policy.ground_modes else Reason.MODE_UNAVAILABLE
+    if mode in policy.always_commanded or (policy.same_mode_accepted and mode is flown):
+        return None
     if mode not in policy.flown_modes:
         return Reason.MODE_UNAVAILABLE
-    if parameters.fence.locks_mode and locked:
-        return Reason.FENCE_RECOVERY
+    by_hand, was_by_hand = mode in policy.hand_throttle_modes, flown in policy.hand_throttle_modes
+    if by_hand and not was_by_hand and not situation.airborne and situation.throttle_lifts:
+        return Reason.THROTTLE_HIGH
     missing = shortfalls(mode, situation, policy, parameters)
-    return missing[0] if missing else None
+    if policy.hand_throttle_modes and not was_by_hand:
+        missing = tuple(reason for reason in missing if reason is not Reason.ALTITUDE)
+    first = missing[0] if missing else None
+    if parameters.fence.locks_mode and locked and first not in (Reason.POSITION, Reason.ALTITUDE):
+        return Reason.FENCE_RECOVERY
+    if first is None and mode is FlightMode.MISSION and situation.takeoff_missing:
+        return Reason.TAKEOFF_MISSING
+    return first
 
 
 def arming_reasons(
@@ -129,6 +148,8 @@ def arming_reasons(
         reasons.append(problem)
     if situation.landing_sequence:
         reasons.append(Reason.LANDING_SEQUENCE)
+    if parameters.faults:
+        reasons.append(Reason.PARAMETERS)
     if situation.battery_level >= BatteryLevel.CRITICAL:
         reasons.append(Reason.BATTERY_FAILSAFE)
     elif situation.battery_level >= BatteryLevel.LOW:
@@ -136,8 +157,16 @@ def arming_reasons(
     reasons.extend(_fence_reasons(situation, parameters.fence))
     if not situation.tilt_rad < MAX_ARMING_TILT_RAD:  # NaN fails too
         reasons.append(Reason.LEANING)
-    if situation.throttle_high and Need.MANUAL_CONTROL in needs:
+    if situation.throttle > policy.arming_throttle_max.get(mode, math.inf):
         reasons.append(Reason.THROTTLE_HIGH)
+    elif policy.neutral_sticks_to_arm:
+        reasons.extend(
+            reason
+            for reason, stick in zip(_NOT_CENTRED, situation.centred_sticks, strict=True)
+            if abs(stick) > _CENTRED
+        )
+        if situation.throttle > _THROTTLE_NEUTRAL:
+            reasons.append(Reason.THROTTLE_NOT_NEUTRAL)
     expected = policy.gcs_needed_to_arm or math.isfinite(situation.gcs_age_s)
     lost = 0.0 < parameters.gcs_loss_s < situation.gcs_age_s
     if expected and lost and parameters.gcs_loss_action > FailsafeAction.WARN:
@@ -187,8 +216,12 @@ class ArmingChecks:
     def run(
         self, mode: FlightMode, situation: Situation, parameters: CommanderParameters
     ) -> tuple[Reason, ...]:
-        """Run the checks; returns the reasons against arming in a mode."""
-        self.reasons = arming_reasons(mode, situation, self._policy, parameters)
+        """Run the checks that are made all the time; returns the reasons against arming in a mode.
+
+        The throttle stick is looked at only when a client arms.
+        """
+        reasons = arming_reasons(mode, situation, self._policy, parameters)
+        self.reasons = tuple(reason for reason in reasons if reason not in _AT_ARMING)
         return self.reasons
 
     def report_due(self, time_us: int) -> bool:

@@ -34,7 +34,7 @@ from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.link_and_sensor_monitor import LinkAndSensorMonitor
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
-from autopilot_bridge.commander.pilot import ModeMemory, PilotInput, StickOverride
+from autopilot_bridge.commander.pilot import THROTTLE_RAISED, ModeMemory, PilotInput, StickOverride
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.situation import Situation, SituationUpdate
 from autopilot_bridge.commander.task_events import TaskFollower
@@ -195,14 +195,21 @@ class Commander:
         """Add an event of a service that acts for the commander (denied commands, reboot)."""
         self._events.append(event)
 
-    def set_mode(self, mode: FlightMode) -> Verdict:
-        """Command a mode. On the ground almost any is accepted; in flight its requirements must be met."""
+    def set_mode(self, mode: FlightMode, *, announced: bool = True) -> Verdict:
+        """Command a mode. Disarmed almost any is accepted; armed its requirements must be met.
+
+        Args:
+            announced: a refusal is also an event, which becomes a text.
+        """
         self._health.update(self.time_us)
         self._refresh()
         locked = self.failsafes.recovers_from_fence and mode is not self.mode
-        reason = mode_obstacle(mode, self.situation, self.policy, self.parameters, locked=locked)
+        reason = mode_obstacle(
+            mode, self.situation, self.policy, self.parameters, flown=self.mode, locked=locked
+        )
         if reason is not None:
-            self.emit(ModeDenied(time_us=self.time_us, mode=mode, reason=reason))
+            if announced:
+                self.emit(ModeDenied(time_us=self.time_us, mode=mode, reason=reason))
             return Verdict(result=self.policy.mode_denied, reasons=(reason,))
         self.failsafes.override()
         self._memory.forget()
@@ -332,7 +339,12 @@ class Commander:
 
     def _report_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
         mode = self.commanded_mode
-        self.emit(ArmingDenied(time_us=self.time_us, mode=mode, reasons=reasons, check_only=check_only))
+        faults = self.parameters.faults
+        self.emit(
+            ArmingDenied(
+                time_us=self.time_us, mode=mode, reasons=reasons, check_only=check_only, faults=faults
+            )
+        )
 
     def _refresh(self) -> None:
         """Update the situation."""
@@ -342,11 +354,17 @@ class Commander:
             terminated=self.terminated,
             mission_problem=self.mission_problem,
         )
+        items, current = self.missions.items, self.missions.current
         self.situation.landing_sequence = (
             self.policy.landing_blocks_arming
             and self.commanded_mode is FlightMode.MISSION
             and in_landing_sequence(self.missions)
-            and not starts_with_takeoff(self.missions.items[1:])
+            and not starts_with_takeoff(items[1:])
+        )
+        self.situation.takeoff_missing = (
+            self.policy.mission_starts_with_takeoff
+            and self.context.on_ground
+            and not starts_with_takeoff(items[max(current, 1) :])
         )
         self._events.extend(self._fence_keeper.update(self.situation))
 
@@ -426,7 +444,7 @@ class Commander:
 
     def _start_mission_by_throttle(self) -> None:
         """ArduCopter: armed on the ground in AUTO, a raised throttle stick starts the mission."""
-        raised = self.policy.mission_waits_for_start and self.situation.throttle_high
+        raised = self.policy.mission_waits_for_start and self.situation.throttle > THROTTLE_RAISED
         if raised and self.armed and self.landed and self.mode is FlightMode.MISSION:
             self.guidance.start_mission()
 

@@ -122,6 +122,23 @@ class ModeDenied(Event):
     custom_mode: int | None = None
 
 
+class SetpointFault(Enum):
+    """Why a streamed setpoint is not used."""
+
+    FRAME = auto()
+    FORCES = auto()
+    NOTHING = auto()  # to control
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetpointDenied(Event):
+    """A streamed setpoint is not used, and the firmware reports it (PX4)."""
+
+    message: str
+    fault: SetpointFault
+    frame: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Armed(Event):
     """Motors may turn."""
@@ -136,11 +153,16 @@ class Disarmed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmingDenied(Event):
-    """A client or pilot requested arming; these checks failed."""
+    """A client or pilot requested arming; these checks failed.
+
+    Attributes:
+        faults: the parameter values that are meant by `Reason.PARAMETERS`, in the firmware's words.
+    """
 
     mode: FlightMode
     reasons: tuple[Reason, ...]
     check_only: bool = False
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -36,6 +36,7 @@ class CommanderParameters:
         crash_check: a vehicle that has crashed is disarmed (FS_CRASH_CHECK).
         follow_enabled: the mode that follows a target can be selected (FOLL_ENABLE).
         check_arming: False skips the optional arming checks.
+        faults: values with which the firmware does not arm, in its words.
     """
 
     offboard_loss_s: float
@@ -78,6 +79,7 @@ class CommanderParameters:
     attitude_action: FailsafeAction = FailsafeAction.NONE
     crash_check: bool = False
     follow_enabled: bool = True
+    faults: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self, require_finite)

@@ -11,7 +11,21 @@ from autopilot_bridge.flight.context import ManualInput
 
 _NO_INPUT: Final = ManualInput()
 _RADIO_AT_REST: Final = ManualInput(throttle=-1.0, valid=True, simulated=True)
-THROTTLE_HIGH: Final = -0.8  # above this the throttle stick is not down
+THROTTLE_RAISED: Final = -0.8
+"""Throttle stick, -1..1: above this it is not down."""
+_CUBIC_PER_HOVER: Final = 0.375
+_CUBIC: Final = (-0.5, 1.0)
+
+
+def lifts(throttle: float, hover_thrust: float) -> bool:
+    """The throttle stick, -1..1, commands more than half of the thrust of a hover, if it is the thrust.
+
+    Source: ArduCopter 4.6.3, `Mode::get_pilot_desired_throttle` (a cubic with the hover at the middle of the
+    stick) and `Copter::get_non_takeoff_throttle`.
+    """
+    part = 0.5 * (throttle + 1.0)
+    cubic = min(max((0.5 - hover_thrust) / _CUBIC_PER_HOVER, _CUBIC[0]), _CUBIC[1])
+    return part * (1.0 - cubic) + cubic * part**3 > 0.5 * hover_thrust
 
 
 class ModeMemory:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from types import MappingProxyType
 
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
@@ -80,6 +81,18 @@ class CommanderPolicy:
         landing_blocks_arming: a landing sequence that was begun prevents arming until mode or mission
             change, unless the mission starts with a take-off (ArduPlane).
         force_arm_skips_checks: the override number arms without checks, except the mandatory ones.
+        always_commanded: modes that can be commanded in flight whatever they need (PX4's LAND, which then
+            becomes a descent).
+        same_mode_accepted: a command of the mode that is flown is accepted without checks (ArduPilot).
+        mission_starts_with_takeoff: armed on the ground, the mission mode is refused for a mission that does
+            not start with a take-off (ArduCopter).
+        hand_throttle_modes: modes in which the throttle stick is the thrust. Armed on the ground they are
+            refused while the stick would lift the vehicle, and only a change from one of them to another mode
+            needs a height estimate (ArduCopter); empty: neither is looked at.
+        arming_throttle_max: the highest throttle stick, -1..1, at which the vehicle can be armed in a mode;
+            in other modes it does not matter to the mode.
+        neutral_sticks_to_arm: in every mode the throttle stick must be down and the others centred
+            (ArduPilot).
     """
 
     boot_mode: FlightMode
@@ -111,6 +124,12 @@ class CommanderPolicy:
     disarm_in_air_denied: Result
     gcs_needed_to_arm: bool
     force_arm_skips_checks: bool
+    always_commanded: frozenset[FlightMode] = frozenset()
+    same_mode_accepted: bool = False
+    mission_starts_with_takeoff: bool = False
+    hand_throttle_modes: frozenset[FlightMode] = frozenset()
+    neutral_sticks_to_arm: bool = False
+    arming_throttle_max: Mapping[FlightMode, float] = field(default_factory=lambda: MappingProxyType({}))
     mode_needs: Mapping[FlightMode, Need] = field(default_factory=lambda: MODE_NEEDS)
     position_needed_to_arm: bool = False
     initialising_mode: FlightMode | None = None

@@ -10,7 +10,7 @@ from autopilot_bridge.commander.health import VehicleHealth
 from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
-from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput
+from autopilot_bridge.commander.pilot import PilotInput, lifts
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import SetpointStream
 from autopilot_bridge.commander.verdict import Reason
@@ -35,9 +35,13 @@ class Situation:
         gcs_age_s: age of the last heartbeat of a ground station; infinite when none was received.
         sticks_age_s: age of the last stick input; infinite when there is none, 0 for a built-in radio.
         sticks_at_arming: there was stick input when the vehicle was armed.
-        throttle_high: the throttle stick is up.
+        throttle: the throttle stick, -1..1; NaN: there is none.
+        centred_sticks: roll, pitch and yaw, -1..1; NaN: there are none.
+        throttle_lifts: in a mode in which the stick is the thrust, it would lift the vehicle.
         home_set: home is known.
         mission_problem: why the stored mission can't be flown; None when it can.
+        takeoff_missing: the vehicle stands on the ground, and its mission does not start with a take-off
+            where that is required.
         landing_sequence: the mission mode is selected, and a landing that the mission has begun blocks
             arming.
         battery_level: warning level.
@@ -65,9 +69,12 @@ class Situation:
     gcs_age_s: float = math.inf
     sticks_age_s: float = math.inf
     sticks_at_arming: bool = False
-    throttle_high: bool = False
+    throttle: float = math.nan
+    centred_sticks: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    throttle_lifts: bool = False
     home_set: bool = False
     mission_problem: Reason | None = Reason.MISSION_MISSING
+    takeoff_missing: bool = False
     landing_sequence: bool = False
     battery_level: BatteryLevel = BatteryLevel.OK
     outside_fence: bool = False
@@ -148,7 +155,12 @@ class SituationUpdate:
         situation.setpoint_needs_position = self._setpoints.needs_position
         situation.gcs_age_s = self._pilot.gcs_age_s(time_us)
         situation.sticks_age_s = self._pilot.sticks_age_s(time_us, parameters.stick_timeout_s)
-        situation.throttle_high = context.sticks.valid and context.sticks.throttle > THROTTLE_HIGH
+        sticks = context.sticks
+        situation.throttle = sticks.throttle if sticks.valid else math.nan
+        situation.centred_sticks = (
+            (sticks.roll, sticks.pitch, sticks.yaw) if sticks.valid else (math.nan, math.nan, math.nan)
+        )
+        situation.throttle_lifts = sticks.valid and lifts(sticks.throttle, context.hover_thrust)
         situation.home_set = self._home.position is not None
         situation.battery_level = self._battery.level
         roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()

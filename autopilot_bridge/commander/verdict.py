@@ -37,6 +37,7 @@ class Reason(Enum):
     GCS_LOST = auto()
     MISSION_MISSING = auto()
     MISSION_INVALID = auto()
+    TAKEOFF_MISSING = auto()  # a mission that starts on the ground without a take-off
     NO_SETPOINTS = auto()  # offboard without a setpoint stream
     MODE_NOT_ARMABLE = auto()
     MODE_UNKNOWN = auto()
@@ -49,7 +50,12 @@ class Reason(Enum):
     CALIBRATING = auto()
     LEANING = auto()  # tilted too far
     THROTTLE_HIGH = auto()
+    THROTTLE_NOT_NEUTRAL = auto()  # not down, where that does not matter to the mode itself
+    ROLL_NOT_NEUTRAL = auto()  # sticks
+    PITCH_NOT_NEUTRAL = auto()
+    YAW_NOT_NEUTRAL = auto()
     LANDING_SEQUENCE = auto()
+    PARAMETERS = auto()  # values with which the firmware does not arm
     NOT_LANDED = auto()
     NOT_ARMED = auto()
     ALREADY_FLYING = auto()

@@ -74,7 +74,9 @@ def test_px4_armable_modes(mode: FlightMode, reason: Reason | None) -> None:
         (FlightMode.GUIDED, True),
         (FlightMode.TAKEOFF, True),
         (FlightMode.RETURN, False),
-        (FlightMode.HOLD, False),
+        (FlightMode.HOLD, True),
+        (FlightMode.CIRCLE, True),
+        (FlightMode.AVOID, True),
         (FlightMode.MISSION, False),
     ],
 )

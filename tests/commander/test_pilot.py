@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.pilot import PilotInput, stick_travel
 from autopilot_bridge.flight.context import ManualInput
 from tests.commander.rig import Rig
@@ -59,15 +60,29 @@ def test_a_pilot_who_never_was_there_is_infinitely_old() -> None:
 
 
 @pytest.mark.parametrize(
-    ("throttle", "high"), [(-1.0, False), (-0.81, False), (-0.79, True), (-0.5, True), (0.0, True)]
+    ("mode", "throttle", "text"),
+    [
+        (FlightMode.STABILIZED, -0.81, None),
+        (FlightMode.STABILIZED, -0.79, "Arming denied: high throttle"),
+        (FlightMode.ALTITUDE, 0.19, None),
+        (FlightMode.ALTITUDE, 0.21, "Arming denied: throttle above center"),
+        (FlightMode.HOLD, 1.0, None),
+    ],
 )
-def test_the_throttle_is_down_in_its_lowest_tenth(throttle: float, high: bool) -> None:
+def test_px4_arms_by_the_throttle_stick(mode: FlightMode, throttle: float, text: str | None) -> None:
     rig = Rig("px4")
-    rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=throttle, yaw=0.0, time_us=rig.time_us)
+
+    def hold_stick() -> None:
+        rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=throttle, yaw=0.0, time_us=rig.time_us)
+
+    hold_stick()
+    rig.commander.set_mode(mode)
+    for _ in range(20):
+        hold_stick()
+        rig.tick()
+    assert rig.commander.arm().accepted is (text is None)
     rig.tick()
-    rig.tick()
-    rig.run(0.2)
-    assert rig.commander.situation.throttle_high is high
+    assert text is None or rig.texts()[-1] == text
 
 
 @pytest.mark.parametrize(

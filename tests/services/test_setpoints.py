@@ -429,3 +429,22 @@ def test_no_setpoint_ever_reaches_the_control_laws_broken(
         assert np.linalg.norm(setpoint[sp.Q_NED_FROM_FRD]) == pytest.approx(1.0)
     if setpoint[sp.LEVEL] == sp.RATES:
         assert np.isfinite(setpoint[sp.RATES_FRD_RAD_S]).all() and 0.0 <= setpoint[sp.THRUST] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (local(7, POSITION_ONLY), "SET_POSITION_TARGET_LOCAL_NED coordinate frame 7 unsupported"),
+        (local(1, NOTHING), "SET_POSITION_TARGET_LOCAL_NED invalid"),
+        (local(1, ACCELERATION_ONLY | 512), "SET_POSITION_TARGET_LOCAL_NED force not supported"),
+        (global_(0, POSITION_ONLY), "SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame 0"),
+        (global_(5, ACCELERATION_ONLY | 512), "SET_POSITION_TARGET_GLOBAL_INT force not supported"),
+        (global_(5, NOTHING), None),
+        (local(1, 4088), None),
+    ],
+)
+def test_px4_reports_a_setpoint_that_it_does_not_use(message: object, text: str | None) -> None:
+    rig = ServiceRig("px4")
+    rig.handle(message)
+    rig.tick()
+    assert [t.rstrip("\t") for t in rig.texts() if "SET_POSITION" in t] == ([] if text is None else [text])

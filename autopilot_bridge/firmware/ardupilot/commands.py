@@ -51,7 +51,7 @@ class ArduPilotCommands(handlers.CommandHandlers):
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
 
-    def set_mode_message(self, base_mode: int, custom_mode: int) -> None:
+    def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> None:
         """SET_MODE: works, never acknowledged."""
         self._set_mode(base_mode, custom_mode)
 
@@ -146,7 +146,7 @@ class ArduPilotCommands(handlers.CommandHandlers):
         if not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z)):
             return Result.DENIED
         if not handlers.on_earth(command):
-            return Result.DENIED
+            return Result.FAILED
         altitude_m = command.z
         home = self.commander.home.position
         if command.frame in RELATIVE_FRAMES and home is not None:

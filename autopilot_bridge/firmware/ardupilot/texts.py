@@ -10,7 +10,7 @@ from autopilot_bridge.commander.events import BatteryLevel, DisarmReason, Failsa
 from autopilot_bridge.commander.geofence_parameters import FenceType
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
-from autopilot_bridge.firmware.ardupilot.copter.modes import MODE_NAMES, REFUSED_NAMES
+from autopilot_bridge.firmware.ardupilot.copter.modes import MODE_NAMES, REFUSED_NAMES, REFUSED_WHY
 from autopilot_bridge.firmware.ardupilot.plane.modes import MODE_NAMES as PLANE_MODE_NAMES
 from autopilot_bridge.firmware.ardupilot.plane.modes import REFUSED_TEXTS
 from autopilot_bridge.firmware.data import by_member, load_data
@@ -38,6 +38,8 @@ _WALLS: Final = {
     FenceType.HEIGHT_MIN: "Min Alt",
 }
 _TERMINATING: Final = Notice(Severity.EMERGENCY, "Terminating due to GCS request")
+_TAKEOFF_MISSING: Final = Notice(Severity.CRITICAL, "Auto: Missing Takeoff Cmd")
+_FOLLOW_OFF: Final = Notice(Severity.WARNING, "Set FOLL_ENABLE = 1")
 _EKF_MODES: Final = {FailsafeAction.LAND: FlightMode.LAND, FailsafeAction.ALTITUDE: FlightMode.ALTITUDE}
 _COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
     (193, Reason.WRONG_MODE): Notice(Severity.INFO, "Failed to pause")
@@ -61,11 +63,13 @@ _PLANE_LINKS: Final[Mapping[FailsafeKind, str]] = {
 def _arming_denied(event: events.ArmingDenied, mode_names: Mapping[FlightMode, str]) -> tuple[Notice, ...]:
     """A text for each reason."""
     prefix = "PreArm" if event.check_only else "Arm"
-    return tuple(
-        Notice(Severity.CRITICAL, f"{prefix}: {_describe(reason, event.mode, mode_names)}")
-        for reason in event.reasons
-        if not (event.check_only and reason is Reason.MODE_NOT_ARMABLE)
-    )
+    texts: list[str] = []
+    for reason in event.reasons:
+        if reason is Reason.PARAMETERS:
+            texts += event.faults
+        elif not (event.check_only and reason is Reason.MODE_NOT_ARMABLE):
+            texts.append(_describe(reason, event.mode, mode_names))
+    return tuple(Notice(Severity.CRITICAL, f"{prefix}: {text}") for text in texts)
 
 
 def _fence_names(walls: int) -> str:
@@ -116,9 +120,16 @@ def _copter_mode_denied(event: events.ModeDenied) -> tuple[Notice, ...]:
         name = REFUSED_NAMES.get(number) if number is not None else None
         if name is None:
             return (Notice(Severity.WARNING, f"No such mode {number}"),)
-        return (Notice(Severity.WARNING, f"Mode change to {name} failed: init failed"),)
+        before, why = REFUSED_WHY.get(number or 0, ("", "init failed"))
+        refused = Notice(Severity.WARNING, f"Mode change to {name} failed: {why}")
+        return (Notice(Severity.WARNING, before), refused) if before else (refused,)
     why = _MODE_REASONS.get(event.reason, "init failed")
-    return (Notice(Severity.WARNING, f"Mode change to {MODE_NAMES.get(mode, mode.name)} failed: {why}"),)
+    failed = Notice(Severity.WARNING, f"Mode change to {MODE_NAMES.get(mode, mode.name)} failed: {why}")
+    if event.reason is Reason.TAKEOFF_MISSING:
+        return (_TAKEOFF_MISSING, failed)
+    if mode is FlightMode.FOLLOW and event.reason is Reason.MODE_UNAVAILABLE:
+        return (_FOLLOW_OFF, failed)
+    return (failed,)
 
 
 def _plane_mode_denied(event: events.ModeDenied) -> tuple[Notice, ...]:

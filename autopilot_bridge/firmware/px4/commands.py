@@ -5,7 +5,7 @@ import math
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
-from autopilot_bridge.commander.events import CommandDenied
+from autopilot_bridge.commander.events import CommandDenied, ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
@@ -42,22 +42,24 @@ class Px4Commands(handlers.CommandHandlers):
             mavlink.MAV_CMD_SET_CAMERA_MODE: self.silence,
         }
 
-    def set_mode_message(self, base_mode: int, custom_mode: int) -> Result:
+    def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> Result:
         """SET_MODE: acknowledged once, with the actual result."""
-        return self._set_mode(base_mode, custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF)
+        return self._set_mode(base_mode, custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF, source)
 
     def set_mode(self, command: handlers.Command, source: Source) -> Result:
         """DO_SET_MODE: p1 base mode, p2 main mode, p3 sub mode."""
         return self._set_mode(
-            handlers.flags(command.p1), handlers.flags(command.p2), handlers.flags(command.p3)
+            handlers.flags(command.p1), handlers.flags(command.p2), handlers.flags(command.p3), source
         )
 
-    def _set_mode(self, base_mode: int, main: int, sub: int) -> Result:
+    def _set_mode(self, base_mode: int, main: int, sub: int, source: Source) -> Result:
         if not base_mode & _CUSTOM_MODE_FLAG:
             return Result.ACCEPTED  # acknowledged, and nothing changes
         mode = px4_modes.commanded_mode(main, sub)
         if mode is not None:
-            return self.commander.set_mode(mode).result
+            # the text of a refusal is for ground stations; others see the result only
+            announced = source.component_id == mavlink.MAV_COMP_ID_MISSIONPLANNER
+            return self.commander.set_mode(mode, announced=announced).result
         if main != px4_modes.MAIN_AUTO:
             return Result.ACCEPTED  # acknowledged, and nothing changes
         self.commander.emit(
@@ -86,8 +88,8 @@ class Px4Commands(handlers.CommandHandlers):
         return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.radians(command.p4)).result
 
     def reposition(self, command: handlers.Command, source: Source) -> Result:
-        """DO_REPOSITION: p1 speed, p2 bit 0 change mode, p4 yaw rad, altitude over mean sea level."""
-        if not handlers.flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
+        """DO_REPOSITION: p1 speed, p2 = 1 change mode, p4 yaw rad, altitude over mean sea level."""
+        if handlers.flags(command.p2) != mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
             return Result.UNSUPPORTED
         if not handlers.on_earth(command):
             return Result.DENIED
@@ -117,9 +119,11 @@ class Px4Commands(handlers.CommandHandlers):
 
     def set_home(self, command: handlers.Command, source: Source) -> Result:
         """DO_SET_HOME: p1 = 1: the current position, else the given one."""
-        if handlers.whole(command.p1) == 1:
+        if command.p1 > 0.5:
             here = self.commander.set_home_here()
             return Result.ACCEPTED if here else Result.TEMPORARILY_REJECTED
+        if not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z)):
+            return Result.DENIED
         placed = self.commander.home.command(command.x, command.y, command.z)
         return Result.ACCEPTED if placed else Result.TEMPORARILY_REJECTED
 
@@ -133,8 +137,15 @@ class Px4Commands(handlers.CommandHandlers):
         if first > 0 and not self.hooks.set_current_item(first):
             return Result.DENIED
         if not self.commander.set_mode(FlightMode.MISSION).accepted:
-            return Result.DENIED
-        return Result.ACCEPTED if self.commander.arm().accepted else Result.DENIED
+            return Result.TEMPORARILY_REJECTED
+        if self.commander.arm().accepted:
+            return Result.ACCEPTED
+        self.commander.emit(
+            ModeDenied(
+                time_us=self.commander.time_us, mode=FlightMode.MISSION, reason=Reason.MODE_NOT_ARMABLE
+            )
+        )
+        return Result.TEMPORARILY_REJECTED
 
     def land_start(self, command: handlers.Command, source: Source) -> Result:
         """DO_LAND_START: go to the landing sequence of the mission; CANCELLED when it has none."""

@@ -9,6 +9,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.events import SetpointDenied, SetpointFault
 from autopilot_bridge.services.channel import MavlinkMessage
 from autopilot_bridge.services.inputs import setpoints as wire
 
@@ -38,6 +39,7 @@ class Px4Setpoints:
             acceleration = wire.whole(acceleration, wire.ACCELERATION_BITS, mask)
             acceleration = wire.rotated_by_attitude(acceleration, context)
         elif message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
+            self._deny(message, SetpointFault.FRAME)
             return
         self._take(message, position, velocity, acceleration, time_us)
 
@@ -48,6 +50,7 @@ class Px4Setpoints:
         if not any(mask & bit for bit in wire.POSITION_BITS):  # used whole; the frame is that of the position
             relative = _GLOBAL_FRAMES.get(message.coordinate_frame)
             if relative is None:
+                self._deny(message, SetpointFault.FRAME)
                 return
             place = wire.local_from_global(
                 self.commander.context, message.lat_int, message.lon_int, message.alt, relative=relative
@@ -71,12 +74,25 @@ class Px4Setpoints:
             position, velocity, acceleration, *wire.yaw_of(message.yaw, message.yaw_rate, message.type_mask)
         )
         if target.has_acceleration and message.type_mask & wire.FORCE_BIT:
+            self._deny(message, SetpointFault.FORCES)
             return
         if not (target.has_position or target.has_velocity or target.has_acceleration):
+            self._deny(message, SetpointFault.NOTHING)
             return
         stream = self.commander.setpoints
         stream.offboard.set_trajectory(*target)
         stream.note(time_us, needs_position=target.has_position or target.has_velocity)
+
+    def _deny(self, message: MavlinkMessage, fault: SetpointFault) -> None:
+        commander = self.commander
+        commander.emit(
+            SetpointDenied(
+                time_us=commander.time_us,
+                message=message.get_type(),
+                fault=fault,
+                frame=message.coordinate_frame,
+            )
+        )
 
     def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
         """SET_ATTITUDE_TARGET."""

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander import events
-from autopilot_bridge.commander.events import Aid, BatteryLevel, DisarmReason, FailsafeAction
+from autopilot_bridge.commander.events import Aid, BatteryLevel, DisarmReason, FailsafeAction, SetpointFault
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.firmware.data import by_member, load_data
@@ -39,6 +39,10 @@ _BATTERY: Final[Mapping[BatteryLevel, str]] = {
 }
 _ARMED: Final = Notice(Severity.INFO, "Armed by external command")
 _ARMING_DENIED: Final = Notice(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+_ARMING_CALIBRATING: Final = Notice(Severity.CRITICAL, "Arming denied: calibrating")
+_ARMING_CENTER: Final = Notice(Severity.CRITICAL, "Arming denied: throttle above center")
+_ARMING_LOW: Final = Notice(Severity.CRITICAL, "Arming denied: high throttle")
+_LOW_THROTTLE_MODES: Final = frozenset({FlightMode.MANUAL, FlightMode.STABILIZED, FlightMode.ACRO})
 _DISARMING_DENIED: Final = Notice(Severity.CRITICAL, "Disarming denied: not landed")
 _TAKEOFF: Final = Notice(Severity.INFO, "Takeoff detected")
 _LANDING: Final = Notice(Severity.INFO, "Landing detected")
@@ -60,6 +64,9 @@ _LAUNCH_M_S2: Final = 6.0  # no propeller accelerates an aircraft so from rest, 
 FIXED: Final = (
     _ARMED,
     _ARMING_DENIED,
+    _ARMING_CALIBRATING,
+    _ARMING_CENTER,
+    _ARMING_LOW,
     _DISARMING_DENIED,
     _TAKEOFF,
     _LANDING,
@@ -88,7 +95,13 @@ def describe(reason: Reason) -> str:
 
 def _arming_denied(event: events.ArmingDenied) -> tuple[Notice, ...]:
     why = tuple(Notice(Severity.CRITICAL, f"Preflight Fail: {describe(reason)}") for reason in event.reasons)
-    return why if event.check_only else (_ARMING_DENIED, *why)
+    if event.check_only:
+        return why
+    if Reason.CALIBRATING in event.reasons:
+        return (_ARMING_CALIBRATING,)
+    if Reason.THROTTLE_HIGH in event.reasons:
+        return (_ARMING_LOW if event.mode in _LOW_THROTTLE_MODES else _ARMING_CENTER,)
+    return (_ARMING_DENIED, *why)
 
 
 def _mode_denied(event: events.ModeDenied) -> tuple[Notice, ...]:
@@ -99,6 +112,22 @@ def _mode_denied(event: events.ModeDenied) -> tuple[Notice, ...]:
 def _command_denied(event: events.CommandDenied) -> tuple[Notice, ...]:
     known = _COMMANDS.get((event.command, event.reason))
     return () if known is None else (known,)
+
+
+def _setpoint_denied(event: events.SetpointDenied) -> tuple[Notice, ...]:
+    local = event.message == "SET_POSITION_TARGET_LOCAL_NED"
+    match event.fault:
+        case SetpointFault.FORCES:
+            what = "force not supported"
+        case SetpointFault.FRAME if local:
+            what = f"coordinate frame {event.frame} unsupported"
+        case SetpointFault.FRAME:
+            what = f"invalid coordinate frame {event.frame}"
+        case SetpointFault.NOTHING if local:
+            what = "invalid"
+        case _:
+            return ()
+    return (Notice(Severity.CRITICAL, f"{event.message} {what}"),)
 
 
 def _failsafe(event: events.FailsafeActivated) -> tuple[Notice, ...]:
@@ -133,6 +162,7 @@ COPTER: Final[TextTable] = MappingProxyType(
         events.DisarmingDenied: _DISARMING_DENIED,
         events.ModeDenied: _mode_denied,
         events.CommandDenied: _command_denied,
+        events.SetpointDenied: _setpoint_denied,
         events.FailsafeActivated: _failsafe,
         events.BatteryWarning: _battery,
         events.AidChanged: _aid,

@@ -169,7 +169,7 @@ class CommandHandlers(ABC):
         return Result.UNSUPPORTED if handler is None else handler(command, source)
 
     @abstractmethod
-    def set_mode_message(self, base_mode: int, custom_mode: int) -> Result | None:
+    def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> Result | None:
         """The SET_MODE message."""
 
     def deny(self, command: Command, reason: Reason, result: Result) -> Result:

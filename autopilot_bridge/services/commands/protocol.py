@@ -41,7 +41,7 @@ class CommandService:
 
     def _on_set_mode(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if self._address.accepts(message):
-            result = self._handlers.set_mode_message(message.base_mode, message.custom_mode)
+            result = self._handlers.set_mode_message(message.base_mode, message.custom_mode, source)
             if result is not None:
                 _acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
 

@@ -3,7 +3,7 @@
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.verdict import Result
@@ -28,6 +28,10 @@ _MODES: Final = load_data("ardupilot.copter", "modes.toml")
 _FLOWN: Final = modes(_MODES["flown"])
 _GROUND_ONLY: Final = modes(_MODES["ground_only"])
 """Accepted on the ground as the firmware does; not flown here, so not armed in or entered in flight."""
+_BY_HAND: Final = modes(_MODES["hand_throttle"])
+_CLIMBS_BY_STICK: Final = frozenset({FlightMode.ALTITUDE, FlightMode.HOLD, FlightMode.POSHOLD})
+_THROTTLE_DOWN: Final = -0.94  # dead zone of the channel
+_CLIMBS_ABOVE: Final = 0.2  # THR_DZ
 
 POLICY: Final = CommanderPolicy(
     boot_mode=FlightMode.STABILIZED,
@@ -61,6 +65,14 @@ POLICY: Final = CommanderPolicy(
     gcs_needed_to_arm=False,
     mission_restart=MissionRestart.AT_DISARM,
     force_arm_skips_checks=True,
+    same_mode_accepted=True,
+    mission_starts_with_takeoff=True,
+    hand_throttle_modes=_BY_HAND,
+    neutral_sticks_to_arm=True,
+    arming_throttle_max=MappingProxyType(
+        {**dict.fromkeys(_BY_HAND, _THROTTLE_DOWN), **dict.fromkeys(_CLIMBS_BY_STICK, _CLIMBS_ABOVE)}
+    ),
+    mode_needs=MappingProxyType({mode: needs & ~Need.ATTITUDE for mode, needs in MODE_NEEDS.items()}),
     fence_in_status=True,
     plans=ARDUCOPTER_PLANS,
 )

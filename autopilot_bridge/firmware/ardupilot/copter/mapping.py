@@ -9,6 +9,7 @@ from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, AutoEnabl
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from autopilot_bridge.firmware.ardupilot.parameter_checks import copter_faults
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_external, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import build, clamp, integer, load_tables, scaled_values
 from autopilot_bridge.firmware.navigation_noise import ardupilot_noise
@@ -111,6 +112,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         disarm_landed_s=1.0,
         crash_check=integer(store, "FS_CRASH_CHECK") != 0,
         follow_enabled=integer(store, "FOLL_ENABLE") != 0,
+        faults=copter_faults(store),
     )
 
 

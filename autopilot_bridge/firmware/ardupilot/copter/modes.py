@@ -28,6 +28,14 @@ REFUSED_NAMES: Final[Mapping[int, str]] = MappingProxyType(
 )
 """Known numbers that the firmware refuses on a copter: "Mode change to X failed", not "No such mode N"."""
 
+REFUSED_WHY: Final[Mapping[int, tuple[str, str]]] = MappingProxyType(
+    {
+        25: ("No axis selected, SID_AXIS = 0", "init failed"),
+        27: ("Unable to start landing sequence", "No return path or landing sequence found"),
+    }
+)
+"""A text before the refusal, and its reason, where that is not "init failed" alone."""
+
 _MANUAL_MODES: Final = frozenset(
     {FlightMode.STABILIZED, FlightMode.ACRO, FlightMode.ALTITUDE, FlightMode.DRIFT, FlightMode.TERMINATION}
 )

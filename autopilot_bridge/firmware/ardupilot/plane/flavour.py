@@ -26,7 +26,7 @@ from flightsim.airframe import AirframeKind, LaunchKind
 
 _MODES: Final = load_data("ardupilot.plane", "modes.toml")
 _FLOWN: Final = modes(_MODES["flown"])
-_NOT_ARMABLE: Final = frozenset({FlightMode.RETURN, FlightMode.HOLD, FlightMode.CIRCLE, FlightMode.AVOID})
+_NOT_ARMABLE: Final = frozenset({FlightMode.RETURN})
 
 MODE_NEEDS_BY_DEAD_RECKONING: Final[Mapping[FlightMode, Need]] = MappingProxyType(
     {mode: needs & ~(Need.POSITION | Need.MISSION) for mode, needs in MODE_NEEDS.items()}
@@ -43,6 +43,9 @@ POLICY: Final[CommanderPolicy] = replace(
     armable_modes=_FLOWN - _NOT_ARMABLE,
     ground_modes=_FLOWN,
     flown_modes=_FLOWN,
+    mission_starts_with_takeoff=False,
+    hand_throttle_modes=frozenset(),
+    arming_throttle_max=MappingProxyType({}),
     failsafe_disarms_landed=False,
     mission_return_is_mode=True,
     mission_waits_for_start=False,

@@ -15,6 +15,7 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.firmware import mapping
 from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
+from autopilot_bridge.firmware.ardupilot.parameter_checks import plane_faults
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import build, clamp, field_values, integer, load_tables, scaled_values
@@ -92,6 +93,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
     keeps_long = (_AUTOMATIC if long == 0 else frozenset()) | _SAFE
     return CommanderParameters(
         **ardupilot_mapping.shared_commander_values(store),
+        faults=plane_faults(store),
         gcs_loss_s=long_s if gcs else 0.0,
         gcs_loss_action=_LONG.get(long, FailsafeAction.RETURN),
         gcs_loss_exempt=frozenset(set(FlightMode) - {FlightMode.MISSION}) if gcs == 3 else keeps_long,

@@ -27,6 +27,9 @@ _AUTOPILOT_COMPONENT: Final = 1
 _MODES: Final = load_data("px4.copter", "modes.toml")
 _SELECTABLE: Final = modes(_MODES["selectable"])
 _PREVENT_ARMING: Final = modes(_MODES["prevent_arming"])
+_BY_HAND: Final = frozenset({FlightMode.MANUAL, FlightMode.STABILIZED, FlightMode.ACRO})
+_CLIMBS_BY_STICK: Final = frozenset({FlightMode.ALTITUDE, FlightMode.POSITION, FlightMode.POSITION_SLOW})
+_THROTTLE_LOW, _THROTTLE_CENTER = -0.8, 0.2
 
 POLICY: Final = CommanderPolicy(
     boot_mode=FlightMode.HOLD,
@@ -58,6 +61,10 @@ POLICY: Final = CommanderPolicy(
     disarm_in_air_denied=Result.TEMPORARILY_REJECTED,
     gcs_needed_to_arm=True,
     force_arm_skips_checks=False,
+    always_commanded=frozenset({FlightMode.LAND}),
+    arming_throttle_max=MappingProxyType(
+        {**dict.fromkeys(_BY_HAND, _THROTTLE_LOW), **dict.fromkeys(_CLIMBS_BY_STICK, _THROTTLE_CENTER)}
+    ),
     gps_shown_when_used=True,
     mission_end_mode=FlightMode.HOLD,
     mission_restart=MissionRestart.AFTER_LAST_ITEM,
