@@ -33,7 +33,7 @@ class Px4Commands(handlers.CommandHandlers):
             mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
             mavlink.MAV_CMD_MISSION_START: self.start_mission,
             mavlink.MAV_CMD_DO_LAND_START: self.land_start,
-            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.refuse,
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
             mavlink.MAV_CMD_INJECT_FAILURE: self.inject_failure,
             mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self.request_protocol_version,
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self.silence,
@@ -171,9 +171,15 @@ class Px4Commands(handlers.CommandHandlers):
             return Result.DENIED
         return self.hooks.inject_failure(unit, kind, instance)
 
-    def refuse(self, command: handlers.Command, source: Source) -> Result:
-        """DENIED, as the release does (flight termination is off by a circuit breaker)."""
-        return Result.DENIED
+    def terminate(self, command: handlers.Command, source: Source) -> Result:
+        """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors of an armed vehicle permanently.
+
+        The circuit breaker CBRK_FLIGHTTERM keeps failures from doing so, not the command.
+        """
+        if not command.p1 > 0.5 or not self.commander.armed:
+            return Result.DENIED
+        self.commander.terminate()
+        return Result.ACCEPTED
 
 
 class Px4PlaneCommands(Px4Commands):

@@ -91,15 +91,21 @@ class ArduPlaneCommands(ArduPilotCommands):
         if landed_by_mission and result is Result.ACCEPTED and mode not in _NAVIGATING:
             self.hooks.set_current_item(0)
             self.hooks.announce(_INFO, "In landing sequence: mission reset")
+        if mode is FlightMode.MISSION:
+            self._leave_empty_mission(result)
         return result
 
     def start_mission(self, command: handlers.Command, source: Source) -> Result:
-        """MISSION_START: without a mission AUTO is left at once."""
+        """MISSION_START: AUTO from the current item."""
         result = super().start_mission(command, source)
-        if result is Result.ACCEPTED and self.hooks.mission_item_count() <= 1:
+        self._leave_empty_mission(result)
+        return result
+
+    def _leave_empty_mission(self, entered: Result) -> None:
+        """Without a mission AUTO is left at once."""
+        if entered is Result.ACCEPTED and self.hooks.mission_item_count() <= 1:
             self.hooks.announce(_INFO, "Mission complete, changing mode to RTL")
             self.commander.set_mode(FlightMode.RETURN)
-        return result
 
     def land_start(self, command: handlers.Command, source: Source) -> Result:
         """DO_LAND_START: jump to the mission's landing sequence, in AUTO."""
