@@ -240,14 +240,21 @@ class Commander:
         else:
             self._mission_over = stays
 
-    def arm(self, *, forced: bool = False) -> Verdict:
-        """Arm the motors when every check passes."""
+    def arm(self, *, forced: bool = False, by_rudder: bool = False) -> Verdict:
+        """Arm the motors when every check passes.
+
+        Args:
+            forced: the client sent the override number.
+            by_rudder: the pilot holds the yaw stick to the side for it.
+        """
         if self.armed:
             return ACCEPTED
         self._refresh()
         reasons = arming_reasons(
             self.commanded_mode, self.situation, self.policy, self.parameters, forced=forced
         )
+        if by_rudder:
+            reasons = tuple(reason for reason in reasons if reason is not Reason.YAW_NOT_NEUTRAL)
         if reasons:
             self._checks.reasons = reasons
             self._report_reasons(reasons, check_only=False)

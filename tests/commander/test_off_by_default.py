@@ -30,6 +30,8 @@ def test_optional_failsafes_are_off() -> None:
             assert value is FailsafeAction.NONE, name
         elif name.endswith("_exempt"):
             assert value == frozenset(), name
+        elif name == "faults":
+            assert value == (), name
         else:
             assert value == 0.0 and not value, name
 

@@ -167,7 +167,7 @@ class ArmingGesture:
         allowed = self._parameters.get(rules.switch)
         if side > 0 and allowed >= rules.arm_from and not commander.armed:
             if commander.mode in STICK_MODES or not rules.by_hand_only:
-                commander.arm()
+                commander.arm(by_rudder=True)
         elif side < 0 and allowed >= rules.disarm_from and commander.armed and commander.landed:
             commander.disarm()
 
