@@ -29,7 +29,7 @@ class Pilot:
     def set_mode(self, mode: FlightMode) -> None:
         self.modes.append(mode)
 
-    def arm(self) -> None:
+    def arm(self, *, by_rudder: bool = False) -> None:
         self.calls.append("arm")
 
     def disarm(self) -> None:
