@@ -14,6 +14,7 @@ it, and it is final: from then on nothing is sent to the vehicle.
   vehicle is disarmed. Modes before that are the choice of the operator.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -33,6 +34,8 @@ _HEARTBEATS_REFUSED: Final = 2
 """The same, after it was refused."""
 _TEXTS_BEFORE_US: Final = 4_000_000
 _TEXTS_AFTER_US: Final = 3_000_000
+_TEXTS_KEPT: Final = 64
+"""Texts that may be the reason of a take-over; a vehicle may send thousands in a second."""
 _WORST_TEXT: Final = dialect.MAV_SEVERITY_WARNING  # and worse: smaller numbers
 _SETPOINTS: Final = frozenset(
     ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET")
@@ -105,7 +108,7 @@ class CommandAuthority:
         self._pending: list[_Pending] = []
         self._unexplained = 0
         self._disarmed = 0
-        self._texts: list[tuple[int, str]] = []
+        self._texts: deque[tuple[int, str]] = deque(maxlen=_TEXTS_KEPT)
 
     @property
     def failsafe_acts(self) -> bool:
@@ -171,9 +174,12 @@ class CommandAuthority:
             return
         over = self.take_over
         if over is None:
-            self._texts = [(t, s) for t, s in self._texts if t >= time_us - _TEXTS_BEFORE_US]
             self._texts.append((time_us, text))
-        elif time_us <= over.time_us + _TEXTS_AFTER_US and text not in over.texts:
+        elif (
+            len(over.texts) < _TEXTS_KEPT
+            and time_us <= over.time_us + _TEXTS_AFTER_US
+            and text not in over.texts
+        ):
             over.texts.append(text)
 
     def on_heartbeat(self, heartbeat: Any, time_us: int, *, just_back: bool = False) -> None:

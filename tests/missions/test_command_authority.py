@@ -254,6 +254,18 @@ def test_the_texts_around_a_take_over_are_in_its_sentence():
     )
 
 
+def test_a_flood_of_texts_is_bounded():
+    """A vehicle may send thousands of texts in a second; each costs the same, and the newest are kept."""
+    flight = Flight(ARDUCOPTER).in_flight(Mode.GUIDED)
+    for number in range(2000):
+        flight.authority.on_text(4, f"text {number}", flight.time_us)
+    flight.heartbeat(Mode.LAND)
+    for number in range(2000, 4000):
+        flight.authority.on_text(4, f"text {number}", flight.time_us)
+    assert len(flight.authority.take_over.texts) == 64
+    assert flight.authority.take_over.texts[-1] == "text 1999"
+
+
 def test_arducopter_leaves_auto_for_no_mode_by_itself():
     """ArduPilot 4.6.3, ArduCopter/mode_auto.cpp: exit_mission, do_RTL."""
     for mode in (6, 9, 27):
