@@ -124,7 +124,7 @@ def _calibrated(path: Path, calibration: Any, data: dict[str, Any]) -> CameraDes
     for name in data:
         if name not in names:
             raise EstimatorError(
-                f"{path}: {name} is not known beside `calibration`; there are {', '.join(names)}"
+                f"{path}: {name} is not known beside a calibration; there are {', '.join(names)}"
             )
     values = {name: _value(path, name, value) for name, value in data.items()}
     geometry = load_calibration(path.parent / calibration)

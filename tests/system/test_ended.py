@@ -32,7 +32,7 @@ def test_a_signal_leaves_the_vehicle_safe_and_the_run_whole(
         wait_until(lambda: flies(run.log))
         run.process.send_signal(number)
         said = run.finish(code)
-        assert said.count("\n") == 2
+        assert said.count("\nflightstack: ") == 2  # after the phases
         assert "interrupted; the log is in" in said
         assert "vehicle 1: was commanded to return and does; it is in Return at" in said
         assert run.summary["outcome"] == "interrupted"

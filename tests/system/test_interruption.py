@@ -24,7 +24,7 @@ def fly_into(run: Run, mode: str) -> None:
 
 
 def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
-    lines = [line for line in text.splitlines() if line]
+    lines = [line for line in text.splitlines() if line.startswith("flightstack: ")]  # not the phases
     summary = run.summary
     left = {block["system_id"]: block["left"] for block in summary["vehicles"]}
     for entry in left.values():

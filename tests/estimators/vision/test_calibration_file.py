@@ -57,7 +57,7 @@ def test_a_description_names_a_calibration(tmp_path: Path) -> None:
     camera = load_camera(path)
     assert camera.start_us == 7 and camera.latency_s == 0.2 and camera.geometry.focal_px == (914.2, 915.3)
     path.write_text('calibration = "camera.yaml"\nfocal_px = 900\n')
-    with pytest.raises(EstimatorError, match="focal_px is not known beside `calibration`"):
+    with pytest.raises(EstimatorError, match="focal_px is not known beside a calibration"):
         load_camera(path)
 
 
@@ -69,8 +69,8 @@ def test_a_description_names_a_calibration(tmp_path: Path) -> None:
         ("[" * 5000, "is not YAML"),
         ("!!python/object/apply:os.system ['true']", "is not YAML"),
         (ROS.replace("1280", "wide"), "image_width 'wide' is not a whole number"),
-        (ROS.replace("914.2,", ""), "camera_matrix has no `data` with 9 numbers"),
-        (ROS.replace("-0.08", ".nan"), "distortion_coefficients has no `data`"),
+        (ROS.replace("914.2,", ""), "camera_matrix has no entry data with 9 numbers"),
+        (ROS.replace("-0.08", ".nan"), "distortion_coefficients has no entry data"),
         (ROS.replace("plumb_bob", "equidistant"), "distortion_model 'equidistant' is not accepted"),
         (ROS.replace("0.001]", "0.001, 0.5, 0.0, 0.0]"), "has 8 terms"),
         (ROS.replace("914.2, 0.0", "914.2, 3.0"), "skew of 3"),
