@@ -100,5 +100,5 @@ def _numbers(path: Path, data: Mapping[Any, Any], name: str, count: int | None =
         if all(map(math.isfinite, numbers)):
             return numbers
     raise EstimatorError(
-        f"{path}: {name} has no entry data with {count or 'its'} numbers; accepted are files of ROS and OpenCV"
+        f"{path}: {name} has no entry data with {count or 'its'} numbers; accepted: files of ROS and OpenCV"
     )
