@@ -36,14 +36,14 @@ def parse_untyped_parameters(text: str, *, source: str = "parameters") -> dict[s
     for where, name, value_text in _entries(text, source):
         if len(name) > MAX_NAME_LENGTH or not name.isascii():
             raise ParameterError(
-                f"{where}: name {name!r}; accepted: up to {MAX_NAME_LENGTH} ASCII characters"
+                f"{where}: name {name[:60]!r}; accepted: up to {MAX_NAME_LENGTH} ASCII characters"
             )
         try:
             values[name] = float(value_text)
         except ValueError:
             values[name] = math.nan
         if not math.isfinite(values[name]):
-            raise ParameterError(f"{where}: '{name} {value_text}': accepted is a finite number")
+            raise ParameterError(f"{where}: '{name} {value_text[:60]}': accepted is a finite number")
     return values
 
 
@@ -145,7 +145,7 @@ def _split(line: str, where: str) -> tuple[str, str] | None:
         return words[2], words[3]
     if len(words) == 2:
         return words[0], words[1]
-    raise ParameterError(f"{where}: {line.strip()!r} is not understood; accepted: {_FORMS}")
+    raise ParameterError(f"{where}: {line.strip()[:60]!r} is not understood; accepted: {_FORMS}")
 
 
 def _text(value: float) -> str:

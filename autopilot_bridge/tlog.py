@@ -22,6 +22,7 @@ from autopilot_bridge.mavlink.frame import (
 )
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
 from autopilot_bridge.packet_records import packet_records
+from flightsim.foundation.file_content import FileError, open_file
 
 _TIME: Final = struct.Struct(">Q")
 FLUSH_BYTES: Final = 64 * 1024
@@ -210,9 +211,9 @@ class TlogReader:
 
     def _open(self) -> BinaryIO:
         try:
-            return open(self.path, "rb")
-        except OSError as error:
-            raise TlogError(f"can't read {self.path}: {error.strerror}; give the path of a .tlog") from error
+            return open_file(self.path, may_be_empty=True)
+        except FileError as error:
+            raise TlogError(f"{error}; give the path of a .tlog") from None
 
     def _read(self, file: BinaryIO) -> bytes:
         try:

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from estimators.errors import LogError
 from estimators.logs.dataflash_mapping import map_messages
 from estimators.logs.dataflash_scan import META, decoded, scan
@@ -73,7 +75,9 @@ def dataflash_source(
         texts = _TEXTS if table.columns.get("Mode", time_us).dtype.kind == "S" else _TEXTS - {"Mode"}
         tables[table.name] = mappable(Records(time_us, table.columns), texts=texts, widths={})
         own.append(own_part(table.name, -1 - table.number, time_us, table.columns, table.units))
-    mapped = (map_sdlog2 if times.clock == PX4_TIME else map_messages)(tables, times.unix_offset_us, banner)
+    convert = map_sdlog2 if times.clock == PX4_TIME else map_messages
+    with np.errstate(all="ignore"):  # of damaged values, which may be infinite
+        mapped = convert(tables, times.unix_offset_us, banner)
     return MappedSource(
         path,
         size_bytes=sum(bytes_by_kind.values()),

@@ -101,7 +101,12 @@ def _column(texts: list[str], code: str) -> Array:
     if code in _NAMED_CODES and np.isnan(numbers).any():
         return _strings(texts)
     form = DFReader.FORMAT_TO_STRUCT.get(code)
-    if form is not None and form[1] is None and form[0] not in ("f", "d", "e") and np.isfinite(numbers).all():
+    if (
+        form is not None
+        and form[1] is None
+        and form[0] not in ("f", "d", "e")
+        and (np.abs(numbers) < 2.0**63).all()
+    ):
         whole: Array = np.array([int(float(text)) if not _is_whole(text) else int(text) for text in texts])
         return whole.astype(np.int64)
     return numbers

@@ -166,7 +166,8 @@ def open_ulog(path: Path) -> MappedSource:
         parameters=parameters,
         version=version if isinstance(version, int) and 0 <= version < 1 << 32 else 0,
     )
-    mapped = map_topics(topics, facts, offset_us)
+    with np.errstate(all="ignore"):  # of damaged values, which may be infinite
+        mapped = map_topics(topics, facts, offset_us)
     return MappedSource(
         path,
         size_bytes=size_bytes,

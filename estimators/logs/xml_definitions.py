@@ -150,7 +150,7 @@ def _messages(root: ElementTree.Element, path: Path) -> Iterator[MessageText]:
     for element in root.findall("messages/message"):
         name = (element.get("name") or "").strip()
         number = (element.get("id") or "").strip()
-        where = f"{path}: message {name or '?'} ({number or '?'})"
+        where = f"{path}: message {name[:40] or '?'} ({number[:20] or '?'})"
         if not name.isidentifier() or not number.isdecimal() or int(number) > _MAX_ID:
             raise LogError(f"{where} needs a name and an id in 0..{_MAX_ID}")
         fields: list[FieldText] = []
@@ -184,7 +184,7 @@ def _field(element: ElementTree.Element, where: str) -> FieldText:
         base = f"{base}_t"
     if not name.isidentifier() or base not in TYPE_SIZES or not 0 <= length <= _MAX_PAYLOAD:
         raise LogError(
-            f"{where}: field {name or '?'} of type {text!r}; accepted: {', '.join(TYPE_SIZES)}, "
+            f"{where}: field {name[:40] or '?'} of type {text[:40]!r}; accepted: {', '.join(TYPE_SIZES)}, "
             "or an array of them such as float[4]"
         )
     return FieldText(name, base, length, element.get("units") or "", element.get("instance") == "true")

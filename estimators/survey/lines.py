@@ -180,13 +180,13 @@ def _line_of(cells: Sequence[str]) -> SurveyLine:
         raise EstimatorError(f"{len(cells)} values; accepted are {len(columns)}: {HEADER}")
     name, kind, *places = cells
     if kind not in list(LineKind):
-        raise EstimatorError(f"kind {kind!r} is not accepted; there are {', '.join(LineKind)}")
+        raise EstimatorError(f"kind {kind[:40]!r} is not accepted; there are {', '.join(LineKind)}")
     numbers = []
     for column, text in zip(columns[2:], places, strict=True):
         try:
             numbers.append(float(text))
         except ValueError:
-            raise EstimatorError(f"{column} {text!r} is not a number; give metres") from None
+            raise EstimatorError(f"{column} {text[:40]!r} is not a number; give metres") from None
     north_m, east_m, end_north_m, end_east_m = numbers
     return SurveyLine(
         name=name, kind=LineKind(kind), start_ne_m=(north_m, east_m), end_ne_m=(end_north_m, end_east_m)

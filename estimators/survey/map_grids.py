@@ -1,5 +1,6 @@
 """Grids of other programs: GeoTIFF, Surfer's and Esri's grids (by GDAL), and netCDF."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,13 +65,20 @@ def raster(path: Path, driver: str, crs: str | None, column: str | None, check: 
         EstimatorError: the file can't be read, has no coordinate reference system or several bands without a
             choice, or is rotated.
     """
-    rasterio = library("rasterio", path)
+    rasterio, errors = library("rasterio", path), library("rasterio.errors", path)
     try:
-        with rasterio.open(path, driver=driver) as dataset:
+        with (
+            warnings.catch_warnings(action="error", category=errors.NotGeoreferencedWarning),
+            rasterio.open(path, driver=driver) as dataset,
+        ):
             _require_size(path, dataset.width, dataset.height)
             band = dataset.read(_band(path, dataset, column), masked=True).astype(np.float64).filled(np.nan)
             transform, declared = dataset.transform, dataset.crs
-    except library("rasterio.errors", path).RasterioError as error:
+    except errors.NotGeoreferencedWarning:
+        raise EstimatorError(f"{path} does not say where on the Earth its points are") from None
+    except (errors.RasterioError, ValueError, MemoryError) as error:
+        if isinstance(error, EstimatorError):
+            raise
         reason = " ".join(str(error).split())
         raise EstimatorError(f"{path} can't be read as {_FORMATS[driver]}: {reason}") from None
     if crs is None and declared is None:

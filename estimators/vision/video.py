@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import VideoError
+from flightsim.foundation.file_content import FileError, open_file
 
 __all__ = ["Film", "TimedPicture", "frames_of", "is_stream"]
 
@@ -69,9 +70,14 @@ def frames_of(
             frames have no times and no rate is given, or they have times and a rate is given. The end of a
             file, or of a stream by its server, ends the iteration.
     """
+    if not is_stream(source):
+        try:
+            open_file(source).close()  # FFmpeg waits for a pipe, and says less of what is no video
+        except FileError as error:
+            raise VideoError(f"can't open the video {source}: {error.reason}") from None
     options = dict(_RTSP) if source.lower().startswith("rtsp") else {}
     try:
-        container = av.open(source, options=options, timeout=timeout_s)
+        container = av.open(source, options=options, timeout=timeout_s, metadata_errors="ignore")
     except (av.error.FFmpegError, OSError) as error:
         raise VideoError(f"can't open the video {source}: {error.strerror or error}") from error
     with container:
