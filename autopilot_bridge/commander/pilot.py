@@ -132,7 +132,7 @@ def stick_travel(now: ManualInput, before: ManualInput) -> float:
 
 
 class StickOverride:
-    """Compares the sticks with their positions at the last mode command."""
+    """Compares the sticks with their positions at the last mode command, or with the first ones after it."""
 
     def __init__(self) -> None:
         self._at_command = ManualInput()
@@ -149,4 +149,6 @@ class StickOverride:
         allowed = parameters.stick_override_offboard if offboard else parameters.stick_override
         if not allowed or mode in STICK_MODES:
             return False
+        if not self._at_command.valid:  # the first sticks after the command are at rest until they move
+            self._at_command = sticks
         return stick_travel(sticks, self._at_command) > parameters.stick_override_threshold

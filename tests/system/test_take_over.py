@@ -202,10 +202,6 @@ def sent_afterwards(log: Path, before: int) -> list[str]:
 def test_nothing_is_sent_to_a_vehicle_that_another_one_has(
     by: str, kind: str, flavour: str, tmp_path: Path
 ) -> None:
-    if (by, flavour) == ("sticks", "px4") and kind in ("waypoints", "script", "team"):
-        pytest.skip(
-            "the emulated PX4 compares sticks with those when the mission was commanded: there were none"
-        )
     mission, options = KINDS[kind]
     opener = Taken(TAKE_OVERS[by])
     world = RunRequest(options=options).embedded_world
