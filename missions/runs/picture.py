@@ -95,8 +95,9 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
                 style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
                 axes.plot(shown[:, 1] + east, shown[:, 0] + north, zorder=3 if is_truth else 2, **style)
         main = score.truth if score.truth is not None else score.estimate
-        if main is not None and len(main.time_s) > 1:
-            _draw_marks(axes, _shown(main, notes), north, east)
+        shown_track = None if main is None else _shown(main, notes)
+        if shown_track is not None and len(shown_track.time_s) > 1:
+            _draw_marks(axes, shown_track, north, east)
         label = f"vehicle {notes.system_id}" if team else "autopilot's estimate"
         handles.append(Line2D([], [], color=colour, linewidth=1.6, label=label))
     if any(notes.commanded is not None for notes, _ in flights):

@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink import FrameEncoder, dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.cli.fly_report import report_left_out
 from missions.notes import PATTERN, CommandedPath, FlightNotes
+from missions.runs.picture import draw_run
 from missions.runs.records import FlightRecords
 from missions.runs.run_folder import team_figures, vehicle_summary, versions, write_summary
 from missions.runs.score import Track, path_errors_m, score
@@ -227,6 +228,15 @@ def test_a_perfect_flight_scores_zero():
     assert result.distance_m == pytest.approx(110.0, abs=0.5)
     assert result.max_attitude_error_deg == pytest.approx(0.0, abs=1e-6)
     assert result.reference == "truth"
+
+
+def test_a_flight_without_a_position_in_its_phases_has_a_picture(tmp_path):
+    """A vehicle's clock that began again at 0 leaves no positions in the time of the flight."""
+    records, notes = make_flight(truth=False)
+    notes.phases = [replace(phase, start_us=phase.start_us + 10**9, end_us=phase.end_us + 10**9)
+                    for phase in notes.phases]  # fmt: skip
+    draw_run(tmp_path / "track.png", "no position", [(notes, score(records, notes))])
+    assert (tmp_path / "track.png").stat().st_size > 1000
 
 
 def test_a_known_error_is_found():
