@@ -3,19 +3,19 @@
 import importlib
 import importlib.util
 import inspect
-import math
 import re
 import sys
 import types
 from collections.abc import Iterable, Mapping
-from dataclasses import fields, is_dataclass
-from enum import Enum
+from dataclasses import is_dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Final
 
 from estimators.errors import EstimatorError, described
 from estimators.interface import Estimator
+from flightsim.foundation.conversion import Conversion, Refused
+from flightsim.foundation.options import declared
 
 ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -34,8 +34,6 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
 """Module of each estimator that has a name; it is imported only when it is used."""
 
 _NAME: Final = re.compile(r"[\w-]+")
-_TRUE: Final = ("1", "true", "yes", "on")
-_FALSE: Final = ("0", "false", "no", "off")
 
 
 def make_estimator(name: str, settings: Iterable[str] = ()) -> Estimator[Any]:
@@ -142,7 +140,8 @@ def parameters_from(found: type[Estimator[Any]], settings: Iterable[str]) -> Any
         EstimatorError: a text is not NAME=VALUE, the parameter does not exist, or it does not accept the
             value.
     """
-    kinds = _kinds(found.PARAMETERS)
+    kinds = {each.name: each for each in declared(found.PARAMETERS)}
+    texts = Conversion(text=True)
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -152,77 +151,11 @@ def parameters_from(found: type[Estimator[Any]], settings: Iterable[str]) -> Any
         if name not in kinds:
             accepted = ", ".join(kinds) if kinds else "none"
             raise EstimatorError(f"{found.NAME} has no parameter {name!r}; there are: {accepted}")
-        values[name] = _value(text.strip(), kinds[name], name)
+        try:
+            values[name] = texts.value(kinds[name].hint, text.strip())
+        except Refused as error:
+            raise EstimatorError(f"{name}: {error}") from None
     try:
         return found.PARAMETERS(**values)
     except (ValueError, TypeError) as error:
         raise EstimatorError(f"{found.NAME}: {error}") from error
-
-
-def _kinds(parameters: type[Any]) -> dict[str, Any]:
-    hints = get_type_hints(parameters)
-    return {field.name: hints[field.name] for field in fields(parameters) if field.init}
-
-
-def _value(text: str, kind: Any, name: str) -> Any:
-    """Convert a text to a value of an annotated type."""
-    origin = get_origin(kind)
-    if origin in (Union, types.UnionType):
-        return _one_of(text, get_args(kind), name)
-    if origin is Literal:
-        return _choice(text, {str(value): value for value in get_args(kind)}, name)
-    if origin is tuple:
-        return _tuple(text, get_args(kind), name)
-    if kind is bool:
-        if text.lower() in _TRUE or text.lower() in _FALSE:
-            return text.lower() in _TRUE
-        raise EstimatorError(f"{name}: {text!r} is not accepted; give true or false")
-    if kind in (int, float):
-        return _number(text, kind, name)
-    if kind is str:
-        return text
-    if inspect.isclass(kind) and issubclass(kind, Enum):
-        return _choice(text, {str(member.value): member for member in kind}, name)
-    if kind is Path:
-        return Path(text)
-    raise EstimatorError(f"{name} can't be given as text; set it in Python")
-
-
-def _number(text: str, kind: type[Any], name: str) -> Any:
-    try:
-        number = kind(text)
-    except ValueError:
-        accepted = "a whole number" if kind is int else "a number"
-        raise EstimatorError(f"{name}: {text!r} is not {accepted}") from None
-    if math.isnan(number):
-        raise EstimatorError(f"{name}: {text!r} is not a number")
-    return number
-
-
-def _choice(text: str, known: Mapping[str, Any], name: str) -> Any:
-    if text not in known:
-        raise EstimatorError(f"{name}: {text!r} is not accepted; there are {', '.join(known)}")
-    return known[text]
-
-
-def _one_of(text: str, kinds: tuple[Any, ...], name: str) -> Any:
-    if type(None) in kinds and text.lower() in ("none", ""):
-        return None
-    errors: list[str] = []
-    # Every input is valid text, so text is tried last.
-    for kind in sorted((k for k in kinds if k is not type(None)), key=lambda k: k is str):
-        try:
-            return _value(text, kind, name)
-        except EstimatorError as error:
-            errors.append(str(error))
-    accepts_none = ", or none" if type(None) in kinds else ""
-    raise EstimatorError(errors[-1] + accepts_none)
-
-
-def _tuple(text: str, kinds: tuple[Any, ...], name: str) -> tuple[Any, ...]:
-    parts = [part.strip() for part in text.split(",")] if text else []
-    if len(kinds) == 2 and kinds[1] is Ellipsis:
-        return tuple(_value(part, kinds[0], name) for part in parts)
-    if len(parts) != len(kinds):
-        raise EstimatorError(f"{name}: {text!r} is not {len(kinds)} values with commas between")
-    return tuple(_value(part, kind, name) for part, kind in zip(parts, kinds, strict=True))

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Self
 
-from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
+from flightsim.airframe import AirframeError, AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
@@ -27,7 +27,7 @@ from flightsim.payload import (
 from flightsim.sensors import GpsParameters, SensorSuiteParameters
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.world import WorldParameters
-from flightsim.world_file import WorldReader, read_toml
+from flightsim.world_file import WorldFileError, made_from, read_toml
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: the default time of boot, so that equal flights give equal logs."""
@@ -268,11 +268,12 @@ class WorldSpec:
         )
         for number, table in enumerate(tables, 1):
             table.setdefault("system_id", number)
-        reader = WorldReader(path)
-        world: Self = reader.make(cls, data, "")
+        world = made_from(cls, data, path)
         if tables and not any("offset_ne_m" in table for table in tables):
-            with reader.naming("vehicles"):
+            try:
                 placed = in_a_row(world.vehicles, heading_deg=world.place.heading_deg)
+            except AirframeError as error:
+                raise WorldFileError(f"{path}: vehicles: {error}") from error
             world = replace(world, vehicles=placed)
         return world
 

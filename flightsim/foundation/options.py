@@ -1,0 +1,414 @@
+"""Fields that declare themselves once: type, default, unit, bounds and help stand on the field.
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class FilterParameters(Options):
+        yaw_sigma_rad: float = option(0.01, least=0.0, help="Standard deviation of the vehicles' yaw.")
+
+What shows, reads or checks such a field takes it from there (`declared`): the command line, keys of files,
+NAME=VALUE
+(`flightsim.foundation.conversion`), the check of the constructor, the tables of the docs. Importing this
+module, or
+one that declares options with it, costs nothing: neither loads NumPy or compiled code.
+"""
+
+import math
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from enum import Enum
+from functools import cache
+from types import MappingProxyType
+from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin, get_type_hints
+
+T = TypeVar("T")
+
+_OPTION: Final = "option"
+_HELD: Final = "held"
+
+UNITS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "rad": "degrees", "deg": "degrees", "m": "m", "s": "s", "hz": "Hz", "px": "px", "nt": "nT",
+        "pa": "Pa", "m_s": "m/s", "m_s2": "m/s2", "rad_s": "rad/s", "m2": "m2", "a_m2": "A m2", "us": "us",
+    }
+)  # fmt: skip
+"""Unit in which users give a field, by the suffix of its name. Angles in radians are given in degrees."""
+
+_COMPOUND: Final = (
+    "_1_s",
+    "_1_m",
+    "_1_rad",
+    "sqrt_s",
+    "sqrt_hz",
+    "root_s",
+    "root_hz",
+    "per_s",
+    "per_m2",
+    "_s2",
+)
+"""Endings of names whose unit has no short form: they are given in the unit of their name."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """What a field declares besides type and default.
+
+    Attributes:
+        help: what the field is: a sentence that begins with a noun and can be read alone. The unit is shown
+            beside it.
+        unit: unit in which users give it; None: by the suffix of its name (`UNITS`).
+        least, most, above, below: bounds, in the unit of the field, of each number in it. A number must be
+            finite,
+            unless `infinite` is set.
+        infinite: an infinite number is accepted.
+        name: name for users, where it is not that of the field without its unit. Fields of one class with the
+            same
+            name are one option: the sides of an area.
+        metavar: placeholder of the value for users; "": its unit.
+        varies: the default where it is not one value: "aircraft: 60", or for None: "as the map states it".
+        needs: name of another option without which it has no effect, and the values of that option with which
+            it has
+            one; no values: every value.
+        replaces: names of options that have no effect beside it.
+        separators: characters that may separate the numbers of a tuple, or of several fields of one name.
+        lone: what the others are where one number is given; "same": the same number; None: all must be given.
+    """
+
+    help: str = ""
+    unit: str | None = None
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    below: float | None = None
+    infinite: bool = False
+    name: str = ""
+    metavar: str = ""
+    varies: str = ""
+    needs: tuple[str, tuple[str, ...]] | None = None
+    replaces: tuple[str, ...] = ()
+    separators: str = ","
+    lone: float | str | None = None
+
+
+_PLAIN: Final = Option()
+
+
+def option(
+    default: T,
+    *,
+    help: str = "",
+    unit: str | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    above: float | None = None,
+    below: float | None = None,
+    infinite: bool = False,
+    name: str = "",
+    metavar: str = "",
+    varies: str = "",
+    needs: tuple[str, tuple[str, ...]] | None = None,
+    replaces: tuple[str, ...] = (),
+    separators: str = ",",
+    lone: float | str | None = None,
+) -> T:
+    """Declare a field of a dataclass on `Options`: its default, and what `Option` has."""
+    stated = Option(
+        help=help, unit=unit, least=least, most=most, above=above, below=below, infinite=infinite, name=name,
+        metavar=metavar, varies=varies, needs=needs, replaces=replaces, separators=separators, lone=lone,
+    )  # fmt: skip
+    return field(default=default, metadata={_OPTION: stated})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """How a field of held parameters is shown to users.
+
+    Attributes:
+        fields: names of the fields that it sets, all to the same value.
+        help: help where those of the fields do not say what they are together.
+        varies: as of `Option`.
+    """
+
+    fields: tuple[str, ...]
+    help: str = ""
+    varies: str = ""
+
+
+def held(default: T, **shown: "str | Shown") -> T:
+    """Declare a field that holds other options, with their own fields and checks: the parameters of an
+    estimator.
+
+    Args:
+        default: default of the field, an instance of a class on `Options`.
+        shown: fields of it that users set beside those of the holder, by their name for users with _ in place
+            of -.
+    """
+    return field(default=default, metadata={_HELD: MappingProxyType(shown)})
+
+
+class OptionError(ValueError):
+    """A field does not accept its value.
+
+    Attributes:
+        field: name of the field.
+        reason: the value, and what is accepted, in the unit of the field.
+        reason_for_users: the same in the unit in which users give it.
+    """
+
+    def __init__(self, name: str, reason: str, reason_for_users: str) -> None:
+        super().__init__(f"{name} {reason}")
+        self.field = name
+        self.reason = reason
+        self.reason_for_users = reason_for_users
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Declared:
+    """A field with what it declares.
+
+    Attributes:
+        name: name of the field.
+        kind: its type without None.
+        optional: whether it may be None.
+        default: its default; `dataclasses.MISSING`: it has none.
+        option: what it declares; without a help, it is set in Python only.
+        shown: what users see of held options (`held`); None: the field is an option itself.
+    """
+
+    name: str
+    kind: Any
+    optional: bool
+    default: Any
+    option: Option
+    shown: "Mapping[str, str | Shown] | None" = None
+
+    @property
+    def hint(self) -> Any:
+        """Its type, with None if it may be None."""
+        return self.kind | None if self.optional else self.kind
+
+    @property
+    def unit(self) -> str:
+        """Unit in which users give it; "": none, or that of its name."""
+        return unit_of(self.name) if self.option.unit is None else self.option.unit
+
+    def for_users(self, value: Any) -> Any:
+        """A number, or each of a tuple, in the unit in which users give it."""
+        if isinstance(value, tuple):
+            return tuple(self.for_users(part) for part in value)
+        return math.degrees(value) if self.in_degrees and isinstance(value, float) else value
+
+    @property
+    def in_degrees(self) -> bool:
+        """Whether users give it in degrees, and it is in radians."""
+        return self.unit == "degrees" and self.name.endswith("_rad")
+
+    def check(self, value: Any) -> None:
+        """Raise OptionError for a number that is not accepted, or the first such number of a tuple."""
+        for part in value if isinstance(value, tuple) else (value,):
+            if (
+                isinstance(part, int | float)
+                and not isinstance(part, bool | Enum)
+                and not self._accepts(part)
+            ):
+                unit = f" {self.unit}" if self.unit else ""
+                reasons = self._reason(part, lambda x: x, ""), self._reason(part, self.for_users, unit)
+                raise OptionError(self.name, *reasons)
+
+    def _accepts(self, number: float) -> bool:
+        bounds = self.option
+        return (
+            not math.isnan(number)
+            and (bounds.infinite or math.isfinite(number))
+            and (bounds.least is None or number >= bounds.least)
+            and (bounds.most is None or number <= bounds.most)
+            and (bounds.above is None or number > bounds.above)
+            and (bounds.below is None or number < bounds.below)
+        )
+
+    def _reason(self, number: float, shown: Any, unit: str) -> str:
+        o = self.option
+        low, high = o.least if o.above is None else o.above, o.most if o.below is None else o.below
+        value = f"{shown(float(number)):.6g}"
+        if low is None and high is None:
+            return f"{value} is not a finite number"
+        if low is not None and high is not None and o.above is None and o.below is None:
+            return f"{value}{unit} is not in {shown(float(low)):.6g}..{shown(float(high)):.6g}{unit}"
+        ends = []
+        if low is not None:
+            ends.append(
+                f"more than {shown(float(low)):.6g}"
+                if o.least is None
+                else f"{shown(float(low)):.6g} or more"
+            )
+        if high is not None:
+            ends.append(
+                f"less than {shown(float(high)):.6g}" if o.most is None else f"up to {shown(float(high)):.6g}"
+            )
+        elsewhere = unit if high is not None or low else ""
+        return f"{value} is not possible; ask for {', '.join(ends)}{elsewhere}"
+
+
+class Options:
+    """Base of a frozen dataclass whose fields declare themselves: the constructor checks them.
+
+    A class that has rules about several fields together states them in `check_together`; each class in the
+    line of
+    inheritance has its own, and all are checked, the base's first.
+
+    Raises:
+        OptionError: a field does not accept its value.
+        ValueError: values do not go together.
+    """
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for each in declared(type(self)):
+            value = getattr(self, each.name)
+            if isinstance(each.kind, type) and issubclass(each.kind, Enum) and value is not None:
+                object.__setattr__(self, each.name, _member(each, value))
+            elif value is not None:
+                each.check(value)
+        for kind in reversed(type(self).__mro__):
+            if (rules := vars(kind).get("check_together")) is not None:
+                rules(self)
+
+    def check_together(self) -> None:
+        """Raise ValueError if fields do not go together."""
+
+
+def _member(each: Declared, value: Any) -> Enum:
+    """The member of the field's enumeration that a value is, or is the value of."""
+    try:
+        found: Enum = each.kind(value)
+    except ValueError:
+        accepted = ", ".join(str(member.value) for member in each.kind)
+        reason = f"{value!r} is not one of {accepted}"
+        raise OptionError(each.name, reason, reason) from None
+    return found
+
+
+def declared(kind: type) -> Sequence[Declared]:
+    """The fields of a dataclass, in their order, with what they declare, without those of `init=False`."""
+    key: Any = kind
+    return _declared_fields(key)
+
+
+@cache
+def _declared_fields(kind: Any) -> Sequence[Declared]:
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple(_declared(each, hints[each.name]) for each in fields(kind) if each.init)
+
+
+def _declared(each: Any, hint: Any) -> Declared:
+    stated, optional = without_none(hint)
+    if get_origin(stated) is Annotated:
+        stated = get_args(stated)[0]
+    default = each.default if each.default_factory is MISSING else each.default_factory()
+    shown = each.metadata.get(_HELD)
+    return Declared(
+        name=each.name, kind=stated, optional=optional, default=default,
+        option=each.metadata.get(_OPTION, _PLAIN), shown=shown,
+    )  # fmt: skip
+
+
+def without_none(hint: Any) -> tuple[Any, bool]:
+    """A type without the None that it may be, and whether it may be None."""
+    if get_origin(hint) not in (Union, types.UnionType) or types.NoneType not in get_args(hint):
+        return hint, False
+    rest = [kind for kind in get_args(hint) if kind is not types.NoneType]
+    joined = rest[0]
+    for kind in rest[1:]:
+        joined = joined | kind
+    return joined, True
+
+
+def unit_of(name: str) -> str:
+    """Unit in which users give a field of this name; "": none, or one without a short form."""
+    return UNITS.get(_suffix(name), "")
+
+
+def name_for_users(name: str) -> str:
+    """The name of a field without its unit, with - in place of _."""
+    suffix = _suffix(name)
+    return (name.removesuffix(f"_{suffix}") if suffix else name).removesuffix("_ne").replace("_", "-")
+
+
+def _suffix(name: str) -> str:
+    """The unit at the end of a name; "": it has none of `UNITS`."""
+    if name.endswith(_COMPOUND) and not name.endswith("_m_s2"):
+        return ""
+    words = name.split("_")
+    endings = ("_".join(words[-count:]) for count in (2, 1) if len(words) > count)
+    return next((ending for ending in endings if ending in UNITS), "")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UserOption:
+    """One option as users see it: a field, several fields of one name, or fields of held options.
+
+    Attributes:
+        name: name for users, with - between words.
+        path: names of the fields that hold the options that have the fields; (): the class itself has them.
+        fields: the fields that it sets.
+        together: the fields get one part of the value each; otherwise all get the same value.
+        default: its default: a tuple of the fields' defaults if `together`.
+        help, varies: as of `Option`.
+    """
+
+    name: str
+    path: tuple[str, ...]
+    fields: tuple[Declared, ...]
+    together: bool
+    default: Any
+    help: str
+    varies: str
+
+    @property
+    def declared(self) -> Declared:
+        """The first of its fields."""
+        return self.fields[0]
+
+
+def user_options(kind: type) -> Sequence[UserOption]:
+    """The options of a class as users see them, in the order of its fields: those with a help, and what it
+    shows of
+    held options.
+    """
+    return tuple(_user_options(kind))
+
+
+def _user_options(kind: Any) -> Iterator[UserOption]:
+    own = [each for each in declared(kind) if each.option.help]
+    named: dict[str, list[Declared]] = {}
+    for each in own:
+        named.setdefault(each.option.name or name_for_users(each.name), []).append(each)
+    begun: set[str] = set()
+    for each in declared(kind):
+        if each.shown is not None:
+            yield from _held_options(each)
+            continue
+        name = each.option.name or name_for_users(each.name)
+        if not each.option.help or name in begun:
+            continue
+        begun.add(name)
+        members = tuple(named[name])
+        defaults = tuple(member.default for member in members)
+        yield UserOption(
+            name=name, path=(), fields=members, together=len(members) > 1,
+            default=defaults if len(members) > 1 else each.default,
+            help=each.option.help, varies=each.option.varies,
+        )  # fmt: skip
+
+
+def _held_options(holder: Declared) -> Iterator[UserOption]:
+    inner = {each.name: each for each in declared(holder.kind)}
+    assert holder.shown is not None
+    for name, given in holder.shown.items():
+        shown = Shown(fields=(given,)) if isinstance(given, str) else given
+        members = tuple(inner[each] for each in shown.fields)
+        yield UserOption(
+            name=name.replace("_", "-"), path=(holder.name,), fields=members, together=False,
+            default=getattr(holder.default, members[0].name),
+            help=shown.help or members[0].option.help, varies=shown.varies or members[0].option.varies,
+        )  # fmt: skip
