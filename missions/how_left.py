@@ -38,13 +38,14 @@ class SafetyCommand:
 
 @dataclass(slots=True, kw_only=True)
 class TakeOver:
-    """A mode that this program did not command: a pilot, another ground station or a failsafe has the
-    vehicle.
+    """A mode that this program did not command, or an arming: a pilot, another ground station or a failsafe
+    has the vehicle.
 
     Attributes:
         system_id: system id of the vehicle.
         time_us: vehicle time of the first heartbeat with the mode.
         before, mode: names of the modes before and after.
+        armed: another one armed the vehicle before the program commanded it.
         failsafe: the heartbeat reports a failsafe (MAV_STATE_CRITICAL or EMERGENCY).
         texts: warnings and errors that the autopilot sent around that time; those that follow shortly after
             are added.
@@ -55,11 +56,14 @@ class TakeOver:
     before: str
     mode: str
     failsafe: bool
+    armed: bool = False
     texts: list[str] = field(default_factory=list)
 
     @property
     def holder(self) -> str:
         """Who has the vehicle, as far as it was reported."""
+        if self.armed:
+            return "the pilot (or another ground station)"
         if self.texts:
             return f"the pilot (or failsafe: {' / '.join(map(repr, self.texts[:_TEXTS_SHOWN]))})"
         return "a failsafe" if self.failsafe else "the pilot (or a failsafe)"
@@ -67,7 +71,8 @@ class TakeOver:
     @property
     def sentence(self) -> str:
         """The reason why a mission ended, for an error."""
-        return f"{self.holder} has the vehicle, mode {self.mode}; nothing was commanded"
+        has = "armed the vehicle and has it" if self.armed else "has the vehicle"
+        return f"{self.holder} {has}, mode {self.mode}; nothing was commanded"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +87,8 @@ class HowLeft:
         armed: whether it is armed.
         on_ground: whether it reports that it stands on the ground; None: not reported.
         height_m: height above home; None: not reported.
+        height_older_s: how much older the height is than the newest heartbeat, when that is long; 0: it was
+            received with it.
         silent_s: time since its newest heartbeat, when that is long; 0: it was received just now.
     """
 
@@ -92,6 +99,7 @@ class HowLeft:
     armed: bool = False
     on_ground: bool | None = None
     height_m: float | None = None
+    height_older_s: float = 0.0
     silent_s: float = 0.0
 
     @property
@@ -120,7 +128,7 @@ class HowLeft:
         if self.on_ground:
             where += " on the ground"
         elif self.height_m is not None:
-            where += f" at {self.height_m:.1f} m"
+            where += f" at {height_text(self.height_m, self.height_older_s)}"
         state = f"{where}, {'armed' if self.armed else 'disarmed'}"
         if self.silent_s:
             return f"last received {self.silent_s:.0f} s ago: {state}"
@@ -136,6 +144,7 @@ class HowLeft:
             "armed": self.armed if self.mode else None,
             "on_ground": self.on_ground,
             "height_m": None if self.height_m is None else round(self.height_m, 2),
+            "height_older_s": round(self.height_older_s, 1),
             "silent_s": round(self.silent_s, 1),
         }
 
@@ -146,6 +155,12 @@ _WORDS: Final = {
     Answer.ACCEPTED: "accepted the command {} and did not report that it does",
     Answer.DONE: "was commanded {} and does",
 }
+
+
+def height_text(height_m: float, older_s: float, reference: str = "") -> str:
+    """A height with its age, when that is known to be long: "12.0 m (8 s before)"."""
+    age = f" ({older_s:.0f} s before)" if older_s else ""
+    return f"{height_m:.1f} m{reference}{age}"
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -260,6 +260,29 @@ def test_the_test_sees_circles():
     assert in_circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
 
 
+def sendings(source):
+    """Lines that send over the connection of a vehicle: `link.connection.send(...)`."""
+    return [
+        node.lineno
+        for node in ast.walk(parsed(source))
+        if isinstance(node, ast.Attribute)
+        and node.attr == "send"
+        and isinstance(node.value, ast.Attribute)
+        and node.value.attr == "connection"
+    ]
+
+
+def test_messages_to_a_vehicle_pass_its_link():
+    """`VehicleLink.send` sends nothing after a take-over. Estimators command nothing."""
+    shells = ("missions.vehicle.link", "missions.estimation", "missions.studies")
+    assert found_by_module(lambda name: sendings(source_of(name)), ("missions",), shells) == {}
+
+
+def test_the_test_sees_sendings():
+    assert sendings("vehicle.link.connection.send(message)") == [1]
+    assert sendings("vehicle.link.send(message)") == []
+
+
 FLAG = re.compile(r"(?<![\w-])--[a-z]")
 
 

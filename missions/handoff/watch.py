@@ -168,7 +168,7 @@ class HandoffWatch:
     def _arrive(self, to: int, message: MAVLinkMessage) -> None:
         """A message arrives at an aircraft: it goes to its estimator, and over its link into the log."""
         (frame,) = self._parsers[to].feed(self._encoders[to].encode(message))
-        self._vehicles[to].link.connection.send(message)
+        self._vehicles[to].link.send(message)
         self._feed(to, frame)
 
     def _note(self) -> None:

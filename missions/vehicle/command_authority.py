@@ -11,7 +11,10 @@ it, and it is final: from then on nothing is sent to the vehicle.
   because a pilot may command the same mode before. The evidence may arrive shortly after the heartbeat; until
   then nothing is sent, and after three heartbeats without evidence it is a take-over.
 * The program has the command from the time at which it arms the vehicle, or commands an armed one, until the
-  vehicle is disarmed. Modes before that are the choice of the operator.
+  vehicle is disarmed. Modes before that are the choice of the operator, but one that is reported while the
+  program's own mode command is pending is a take-over: a repetition would override it.
+* A vehicle that reported disarmed and is armed without a command of the program is the pilot's: the first
+  message that would move it or change its plan is not sent, and is a take-over (`others_may_arm` allows it).
 """
 
 from collections import deque
@@ -50,7 +53,10 @@ _MOTIONS: Final = frozenset(
     )
 )
 """Commands that move the vehicle without a change of its mode."""
+_PLANS: Final = frozenset(("MISSION_COUNT", "MISSION_CLEAR_ALL", "MISSION_SET_CURRENT"))
 _ARM: Final = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+_ARMING: Final = (_ARM, dialect.MAV_CMD_MISSION_START)
+"""Commands that may arm the vehicle: PX4 arms for MISSION_START too (Commander.cpp)."""
 _SET_MODE: Final = dialect.MAV_CMD_DO_SET_MODE
 _UNANSWERED: Final = (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS)
 _FAILSAFE_STATES: Final = (dialect.MAV_STATE_CRITICAL, dialect.MAV_STATE_EMERGENCY)
@@ -93,6 +99,9 @@ class CommandAuthority:
         state: who commands the vehicle.
         take_over: the take-over; None: there was none.
         engaged: this program has armed the vehicle, or commanded it in flight, since it was disarmed.
+        others_may_arm: whether the program may command a vehicle that a pilot arms.
+        commands: number of commands that were sent to move the vehicle, or to change its mode, or to arm or
+            disarm it.
         mode: the newest custom mode that was commanded or has followed by itself; None: no heartbeat yet.
     """
 
@@ -100,6 +109,8 @@ class CommandAuthority:
         self.state = Command.OURS
         self.take_over: TakeOver | None = None
         self.engaged = False
+        self.others_may_arm = False
+        self.commands = 0
         self._firmware, self._system_id, self._explains = firmware, system_id, explains
         self.mode: int | None = None
         self._reported: int | None = None
@@ -108,6 +119,11 @@ class CommandAuthority:
         self._pending: list[_Pending] = []
         self._unexplained = 0
         self._disarmed = 0
+        self._at_rest = (
+            _HEARTBEATS_DISARMED - 1
+        )  # heartbeats in a row that reported disarmed; the first counts
+        self._armed_by_another = False
+        self._time_us = 0
         self._texts: deque[tuple[int, str]] = deque(maxlen=_TEXTS_KEPT)
 
     @property
@@ -130,38 +146,35 @@ class CommandAuthority:
             return message.get_type() in _SETPOINTS
         if self.state is not Command.OURS:
             return False
-        self._note_sent(message)
+        kind = message.get_type()
+        command = int(message.command) if kind in ("COMMAND_LONG", "COMMAND_INT") else None
+        modes = () if command is None else self._modes_of(command, message)
+        moves = bool(modes) or kind in _SETPOINTS or command in _MOTIONS
+        if self._armed_by_another and not self.others_may_arm and (moves or kind in _PLANS):
+            self._take_over(self._reported or 0, self._time_us, armed=True)
+            return False
+        self.engaged = self.engaged or (moves and self._armed)
+        self.commands += command is not None and (moves or command in _ARMING)
+        if command in _ARMING:
+            self.engaged = self.engaged or command != _ARM or message.param1 > 0.5
+        if command is not None and modes:
+            self._pending = [p for p in self._pending if (p.command, p.modes) != (command, modes)]
+            self._pending.append(_Pending(command, modes))
         return True
 
-    def _note_sent(self, message: MAVLinkMessage) -> None:
-        kind = message.get_type()
-        if kind in _SETPOINTS:
-            self.engaged = self.engaged or self._armed
-        if kind not in ("COMMAND_LONG", "COMMAND_INT"):
-            return
-        command = int(message.command)
-        if command == _ARM:
-            self.engaged = self.engaged or message.param1 > 0.5
-            return
-        if command in _MOTIONS:
-            self.engaged = self.engaged or self._armed
-        if command == _SET_MODE:
-            modes: tuple[int, ...] = (
-                self._firmware.mode_commanded(ModeCommand(main=message.param2, sub=message.param3)),
-            )
-        else:
-            modes = self._firmware.modes_of_command.get(command, ())
-        if not modes:
-            return
-        self.engaged = self.engaged or self._armed
-        self._pending = [p for p in self._pending if (p.command, p.modes) != (command, modes)]
-        self._pending.append(_Pending(command, modes))
+    def _modes_of(self, command: int, message: MAVLinkMessage) -> tuple[int, ...]:
+        """The custom modes that a command leads to; empty: it leads to none."""
+        firmware = self._firmware
+        if command != _SET_MODE:
+            return firmware.modes_of_command.get(command, ())
+        mode = firmware.mode_commanded(ModeCommand(main=message.param2, sub=message.param3))
+        return (mode, *firmware.modes_instead.get(mode, ()))
 
     def on_ack(self, ack: Any) -> None:
         """Process a COMMAND_ACK that is addressed to this program."""
         if ack.result in _UNANSWERED:
             return
-        if ack.command == _ARM and not self._armed:
+        if ack.command in _ARMING and not self._armed:
             self.engaged = False
         for pending in self._pending:
             # not at once: it may answer an earlier sending of a command that is accepted now
@@ -190,8 +203,9 @@ class CommandAuthority:
             just_back: a silence of the link ended a moment ago.
         """
         mode = int(heartbeat.custom_mode)
-        self._reported, self._status = mode, int(heartbeat.system_status)
+        self._reported, self._status, self._time_us = mode, int(heartbeat.system_status), time_us
         was_armed, self._armed = self._armed, bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+        self._note_arming()
         if self.state is Command.TAKEN:
             return
         if self._armed:
@@ -199,9 +213,9 @@ class CommandAuthority:
         elif self.engaged and (was_armed or self._disarmed):
             self._disarmed += 1
             self.engaged = self._disarmed < _HEARTBEATS_DISARMED
-        if not self.engaged:
+        if not self.engaged and (mode == self.mode or not self._pending):
             self._enter(mode)
-        elif self._disarmed:
+        elif self.engaged and self._disarmed:
             pass  # a glitch, or the end of the flight
         elif mode == self.mode:
             self._enter_again()
@@ -216,6 +230,16 @@ class CommandAuthority:
         for pending in self._pending:
             pending.heartbeats += 1
         self._pending = [p for p in self._pending if p.heartbeats < _HEARTBEATS_PENDING]
+
+    def _note_arming(self) -> None:
+        """Note whether another one has armed a vehicle that had reported disarmed."""
+        if not self._armed:
+            self._at_rest += 1
+            self._armed_by_another = self._armed_by_another and self._at_rest < _HEARTBEATS_DISARMED
+            return
+        if self._at_rest >= _HEARTBEATS_DISARMED and not self.engaged:
+            self._armed_by_another = True
+        self._at_rest = 0
 
     def _follows(self, mode: int) -> bool:
         return self.mode is not None and mode in self._firmware.modes_following.get(self.mode, ())
@@ -255,7 +279,7 @@ class CommandAuthority:
         newest = max((k for k, p in enumerate(self._pending) if mode in p.modes), default=-1)
         self._pending = self._pending[newest + 1 :]
 
-    def _take_over(self, mode: int, time_us: int) -> None:
+    def _take_over(self, mode: int, time_us: int, *, armed: bool = False) -> None:
         self.state = Command.TAKEN
         name = self._firmware.mode_name
         recent = [text for t, text in self._texts if t >= time_us - _TEXTS_BEFORE_US]
@@ -264,6 +288,7 @@ class CommandAuthority:
             time_us=time_us,
             before=name(mode if self.mode is None else self.mode),
             mode=name(mode),
+            armed=armed,
             failsafe=self._status in _FAILSAFE_STATES,
             texts=list(dict.fromkeys(recent)),
         )

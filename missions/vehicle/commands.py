@@ -225,8 +225,10 @@ class VehicleCommands:
             CommandRejected: the vehicle refused it until the deadline.
             ModeNotEntered: no heartbeat with the mode was received.
         """
-        target = self.link.firmware.modes[mode]
-        command = self.link.firmware.mode_command(mode)
+        firmware = self.link.firmware
+        target = firmware.modes[mode]
+        targets = (target, *firmware.modes_instead.get(target, ()))
+        command = firmware.mode_command(mode)
         answers = _ModeAnswers()
         with self.link.messages("COMMAND_ACK", "HEARTBEAT") as replies:
             try:
@@ -234,7 +236,7 @@ class VehicleCommands:
                     while True:
                         self._send_mode(command)
                         answers = _ModeAnswers()
-                        if await self._entered(target, replies, answers):
+                        if await self._entered(targets, replies, answers):
                             return
             except TimeoutError:
                 pass
@@ -249,8 +251,8 @@ class VehicleCommands:
             acknowledged=answers.accepted,
         )
 
-    async def _entered(self, target: int, replies: Any, answers: "_ModeAnswers") -> bool:
-        """Wait for a heartbeat with the mode; returns False when the command is to be sent again."""
+    async def _entered(self, targets: tuple[int, ...], replies: Any, answers: "_ModeAnswers") -> bool:
+        """Wait for a heartbeat with one of the modes; returns False when the command is to be sent again."""
         clock = self.link.clock
         end_us = clock.time_us + round(_MODE_AGAIN_S * 1e6)
         while True:
@@ -261,7 +263,7 @@ class VehicleCommands:
                 answers.await_heartbeat = False
                 end_us += round(_MODE_AGAIN_S * 1e6)
             elif reply.get_type() == "HEARTBEAT":
-                if reply.custom_mode == target:
+                if reply.custom_mode in targets:
                     return True
                 answers.await_heartbeat = False
             elif reply.command == dialect.MAV_CMD_DO_SET_MODE:

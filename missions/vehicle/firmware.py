@@ -50,6 +50,7 @@ class Firmware:
         goto_mode: the mode after DO_REPOSITION.
         left_before_arming: custom modes in which a vehicle can't be armed, or flies off when it is.
         modes_of_command: custom modes that the vehicle enters for a command, by MAV_CMD; without DO_SET_MODE.
+        modes_instead: custom modes that the autopilot may enter in place of a commanded one, by that mode.
         modes_following: custom modes that the autopilot enters by itself when a custom mode has done its
             task, by that mode.
         failsafe_status_acts: whether MAV_STATE_CRITICAL says that a failsafe flies the vehicle (PX4), not
@@ -69,6 +70,7 @@ class Firmware:
     mode_names: Mapping[int, str]
     sub_modes: bool
     modes_of_command: Mapping[int, tuple[int, ...]]
+    modes_instead: Mapping[int, tuple[int, ...]]
     modes_following: Mapping[int, tuple[int, ...]]
     failsafe_status_acts: bool
     stream_rates_hz: Mapping[str, float]

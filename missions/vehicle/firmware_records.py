@@ -32,14 +32,15 @@ def _tables(name: str) -> dict[str, Any]:
             getattr(dialect, f"MAV_CMD_{command}"): tuple(map(_custom_mode, numbers))
             for command, numbers in tables["modes_of_command"].items()
         }
-        following = {
-            modes[Mode[mode]]: tuple(map(_custom_mode, numbers))
-            for mode, numbers in tables["modes_following"].items()
-        }
+        instead, following = (
+            {modes[Mode[mode]]: tuple(map(_custom_mode, numbers)) for mode, numbers in tables[key].items()}
+            for key in ("modes_instead", "modes_following")
+        )
         read.update(
             modes=MappingProxyType(modes),
             mode_names=MappingProxyType(names),
             modes_of_command=MappingProxyType(of_command),
+            modes_instead=MappingProxyType(instead),
             modes_following=MappingProxyType(following),
             left_before_arming=left,
         )

@@ -23,6 +23,7 @@ from autopilot_bridge.mavlink import (
 )
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, TakenOver, VehicleTimeout
+from missions.how_left import height_text
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes, LinkLoss
 from missions.vehicle import px4_events
@@ -30,7 +31,7 @@ from missions.vehicle.command_authority import CommandAuthority
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
-from missions.vehicle.link_watch import LOST_AFTER_S, LinkWatch
+from missions.vehicle.link_watch import LOST_AFTER_S, QUIET_AFTER_S, LinkWatch
 from missions.vehicle.mode_tasks import ModeTasks
 from missions.vehicle.system_id_check import SystemIdCheck
 from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
@@ -204,8 +205,12 @@ class VehicleLink:
         authority.on_heartbeat(heartbeat, self.clock.time_us, just_back=self.just_back)
         if authority.mode is not None:
             self.tasks.on_mode(authority.mode)
+        if was_ours:
+            self._end_if_taken(authority)
+
+    def _end_if_taken(self, authority: CommandAuthority) -> None:
         take_over = authority.take_over
-        if was_ours and take_over is not None:
+        if take_over is not None:
             self._watch.end_all(lambda: TakenOver(take_over))
 
     @property
@@ -297,6 +302,7 @@ class VehicleLink:
             if text is not None:
                 self._add_text(text)
                 if self._authority is not None:  # not events: most are checks for modes that changed with it
+                    self.tasks.on_text(text.text)
                     self._authority.on_text(text.severity, text.text, self.clock.time_us)
 
     def _on_event(self, frame: Any) -> None:
@@ -321,8 +327,12 @@ class VehicleLink:
         """Send any message, unless another one has the vehicle: then nothing is sent, and `deadline`, `guard`
         and all that waits raise TakenOver.
         """
-        if self._authority is not None:
-            if not self._authority.may_send(message):
+        authority = self._authority
+        if authority is not None:
+            was_ours = authority.take_over is None
+            if not authority.may_send(message):
+                if was_ours:
+                    self._end_if_taken(authority)
                 return
             self.tasks.on_sent(message)
         self.connection.send(message)
@@ -486,7 +496,8 @@ class VehicleLink:
         parts = [f"last received: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
         position = self.message("GLOBAL_POSITION_INT")
         if position is not None:
-            parts.append(f"{position.relative_alt * 1e-3:.1f} m above home")
+            older_s = self.older_s(position.time_boot_ms * 1000)
+            parts.append(height_text(position.relative_alt * 1e-3, older_s, " above home"))
         silent_s = (self.clock.time_us - self.heartbeat_us) * 1e-6
         if silence and silent_s > 3.0:
             parts.append(f"no heartbeat for {silent_s:.0f} s")
@@ -499,6 +510,13 @@ class VehicleLink:
         if texts:
             parts.append("texts " + " / ".join(map(repr, texts)))
         return ", ".join(parts)
+
+    def older_s(self, time_us: int) -> float:
+        """How much older telemetry of a vehicle time is than the newest heartbeat, when that is long; else 0:
+        a height that was received before others still were must not be stated as the present one.
+        """
+        older_s = 0.0 if self.heartbeat_us is None else (self.heartbeat_us - time_us) * 1e-6
+        return older_s if older_s > QUIET_AFTER_S else 0.0
 
     def _recent_texts(self) -> list[str]:
         """The texts that were received shortly before the newest, without repetitions, oldest first; at least

@@ -1,7 +1,8 @@
 """Evidence that a flight mode has done its task, so that the autopilot leaves it by itself. Sans-IO.
 
-A take-off is done at its height; a mission when its last place or its return is reached; a return of
-ArduPlane goes on with the stored landing if there is one.
+A take-off is done at its height; a mission when its last place or its return is reached. A return of
+ArduPlane goes on with the stored landing if there is one: the autopilot then reports that its mission is at
+the landing, and "Landing sequence start" (ArduPilot 4.6.3, AP_Mission.cpp: jump_to_landing_sequence).
 """
 
 from collections.abc import Mapping
@@ -16,7 +17,13 @@ from missions.vehicle.item_tracker import ItemTracker, MissionStep
 _SLACK_M: Final[Mapping[VehicleKind, float]] = {VehicleKind.MULTICOPTER: 1.5, VehicleKind.FIXED_WING: 15.0}
 """Below a take-off's altitude; PX4 ends it within NAV_MC_ALT_RAD, 0.8 m, or NAV_FW_ALT_RAD, 10 m."""
 _TAKEOFFS: Final = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
-_LANDING_PARTS: Final = (dialect.MAV_CMD_DO_LAND_START, dialect.MAV_CMD_DO_RETURN_PATH_START)
+LANDING_PARTS: Final = (dialect.MAV_CMD_DO_LAND_START, dialect.MAV_CMD_DO_RETURN_PATH_START)
+_LANDING_TEXTS: Final = (
+    "Landing sequence start",
+    "Landing sequence active",
+    "Return path started",
+    "Return path active",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,13 +34,14 @@ class StoredPlan:
         steps: its steps in the order in which they are executed.
         again_from: step from which it repeats for ever; None: it ends.
         first: sequence number of its first item on the link.
-        commands: MAV_CMDs of its items.
+        landing: sequence number on the link of the first item that begins a landing (DO_LAND_START) or the
+            way to it; None: there is none.
     """
 
     steps: tuple[MissionStep, ...]
     again_from: int | None
     first: int
-    commands: frozenset[int]
+    landing: int | None = None
 
     def tracker(self) -> ItemTracker:
         """A tracker of a flight along the plan, from its beginning."""
@@ -54,9 +62,11 @@ class ModeTasks:
         self._firmware = firmware
         self._plan: StoredPlan | None = None
         self._tracker: ItemTracker | None = None
-        self._in_mission = False
+        self._mode: int | None = None
         self._complete = False
         self._reached = -1
+        self._current = -1
+        self._landing_reported = False
         self._total = 0
         self._takeoff_alt_m: float | None = None
         self._alt_m: float | None = None
@@ -81,11 +91,23 @@ class ModeTasks:
         """Process the newest mode that is commanded or has followed: a mission begins anew when its mode is
         entered.
         """
-        in_mission = custom_mode == self._firmware.modes[Mode.MISSION]
-        if in_mission and not self._in_mission:
+        modes = self._firmware.modes
+        before, self._mode = self._mode, custom_mode
+        if custom_mode == before:
+            return
+        if custom_mode == modes[Mode.MISSION]:
             self._complete, self._reached = False, -1
             self._tracker = None if self._plan is None else self._plan.tracker()
-        self._in_mission = in_mission
+        elif custom_mode == modes[Mode.RETURN]:
+            self._landing_reported = False
+
+    @property
+    def _in_mission(self) -> bool:
+        return self._mode == self._firmware.modes[Mode.MISSION]
+
+    def on_text(self, text: str) -> None:
+        """Process a text of the autopilot."""
+        self._landing_reported = self._landing_reported or text.startswith(_LANDING_TEXTS)
 
     def on_mission_message(self, message: Any, time_us: int) -> None:
         """Process a MISSION_CURRENT or MISSION_ITEM_REACHED."""
@@ -94,7 +116,7 @@ class ModeTasks:
         if message.get_type() == "MISSION_ITEM_REACHED":
             self._reached = max(self._reached, int(message.seq))
             return
-        self._total = int(message.total)
+        self._current, self._total = int(message.seq), int(message.total)
         self._complete = self._in_mission and message.mission_state == dialect.MISSION_STATE_COMPLETE
 
     def on_position(self, lat_deg: float, lon_deg: float, alt_m: float, time_us: int) -> None:
@@ -115,8 +137,17 @@ class ModeTasks:
         if before == modes[Mode.TAKEOFF]:
             return self._risen
         if before == modes[Mode.RETURN]:
-            return self._plan is None or not self._plan.commands.isdisjoint(_LANDING_PARTS)
+            # a QuadPlane's QRTL: it ends as RTL does, and a pilot's looks the same
+            return after != modes[Mode.MISSION] or self._landing_begun
         return False
+
+    @property
+    def _landing_begun(self) -> bool:
+        """Whether the autopilot's mission has gone on with its landing. A pilot who commands the mission
+        resumes it where it was left.
+        """
+        landing = None if self._plan is None else self._plan.landing
+        return self._landing_reported or (landing is not None and self._current >= landing)
 
     @property
     def _risen(self) -> bool:
@@ -129,7 +160,8 @@ class ModeTasks:
         tracker = self._tracker
         if tracker is None:
             return self._complete or 0 < self._total <= self._reached + 1
-        if after == self._firmware.modes[Mode.RETURN]:
+        returning = self._firmware.modes[Mode.RETURN]
+        if after in (returning, *self._firmware.modes_instead.get(returning, ())):
             if dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH in self._last_commands:
                 return tracker.coming_down or tracker.at_the_last_place
             if self._ends_in_hold:

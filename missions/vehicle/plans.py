@@ -19,7 +19,7 @@ from missions.vehicle.item_tracker import (
 from missions.vehicle.link import VehicleLink
 from missions.vehicle.mission_rules import refuse_infeasible
 from missions.vehicle.mission_transfer import clear, download, renumbered, upload
-from missions.vehicle.mode_tasks import StoredPlan
+from missions.vehicle.mode_tasks import LANDING_PARTS, StoredPlan
 from missions.vehicle.parameters import VehicleParameters
 
 _REWINDS: Final = 4
@@ -97,7 +97,7 @@ class VehiclePlans:
             steps=steps,
             again_from=order.again_from,
             first=first,
-            commands=frozenset(item.command for item in items),
+            landing=next((first + k for k, i in enumerate(items) if i.command in LANDING_PARTS), None),
         )
         self._link.tasks.plan = plan
         return plan

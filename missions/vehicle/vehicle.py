@@ -86,6 +86,7 @@ class Vehicle:
         self._adapter: Adapter | None = None
         self._wing: FixedWing | None = None
         self._resuming: asyncio.Task[None] | None = None
+        self._left_safe_at = -1  # the number of commands when it was last left safe
         self.link.on_regained = self._resume_streams
 
     # parts that depend on the firmware and on the class of vehicle
@@ -251,6 +252,15 @@ class Vehicle:
         await self.adapter.prepare_arming()
         await self.commands.arm(timeout_s)
 
+    async def wait_armed(self, timeout_s: float = 300.0) -> None:
+        """Wait until a pilot or another ground station arms the vehicle, and command it afterwards. Without
+        this wait a vehicle that another one arms is left to them.
+        """
+        self.link.authority.others_may_arm = True
+        await self.link.wait_until(
+            lambda: self.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=timeout_s
+        )
+
     async def disarm(self) -> None:
         """Disarm and wait for it in a heartbeat. In the air the vehicle refuses it."""
         await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
@@ -389,7 +399,8 @@ class Vehicle:
     @asynccontextmanager
     async def safe_on_exit(self, action: Mode = Mode.RETURN) -> AsyncIterator["Vehicle"]:
         """Leave the vehicle safe: when the block fails, is cancelled or is interrupted in flight, `action` is
-        commanded. A vehicle on the ground is disarmed first.
+        commanded. A vehicle on the ground is disarmed first. Of blocks in each other the innermost one
+        commands; the others do so only for what the program commands afterwards, or after a refusal.
 
         A vehicle that a pilot, another ground station or a failsafe has taken is commanded nothing: the block
         ends at once with TakenOver, whatever it does.
@@ -419,7 +430,7 @@ class Vehicle:
         """Command the action, unless another one has the vehicle or it is disarmed."""
         link = self.link
         # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
-        if not link.identified or not self.commands.may_be_armed:
+        if not link.identified or not self.commands.may_be_armed or self._left_safe:
             return
         # What failed may be the effect of a mode that was not reported yet, or that is not explained.
         await self._next_heartbeat(_FRESH_S)
@@ -435,6 +446,14 @@ class Vehicle:
             await self._next_heartbeat(_FRESH_S)  # for the autopilot's texts about it
             withheld = self._withheld()
         self.notes.withheld = withheld
+        self._left_safe_at = link.authority.commands
+
+    @property
+    def _left_safe(self) -> bool:
+        """Whether a block inside this one has left the vehicle safe, and nothing was commanded since."""
+        commands = self.notes.safety_commands
+        refused = bool(commands) and commands[-1].answer is Answer.REFUSED
+        return self._left_safe_at == self.link.authority.commands and not refused
 
     def _withheld(self) -> str:
         """Why nothing is commanded; "": there is no reason against it."""
@@ -524,5 +543,6 @@ class Vehicle:
             armed=link.armed,
             on_ground=landed == dialect.MAV_LANDED_STATE_ON_GROUND if landed else None,
             height_m=None if position is None else position.height_m,
+            height_older_s=0.0 if position is None else link.older_s(position.time_us),
             silent_s=silent_s if silent_s > QUIET_AFTER_S else 0.0,
         )

@@ -13,6 +13,7 @@ from autopilot_bridge.clock import TelemetryClock
 from autopilot_bridge.links import Address, ReplayLog, open_link
 from autopilot_bridge.mavlink import SigningKey, dialect
 from missions.errors import CommandRejected, MissionError, PlanError, VehicleTimeout
+from missions.how_left import height_text
 from missions.runs.signing import client_signing
 from missions.vehicle import Mode, Vehicle
 from missions.vehicle.connection import Connection
@@ -34,6 +35,7 @@ class VehicleState:
         mode: flight mode, with the firmware's name.
         armed: whether it is armed.
         height_m: above home; None: not reported.
+        height_older_s: how much older it is than the newest heartbeat, when that is long.
         landed: whether it reports that it is on the ground; None: not reported.
         battery: share of its charge; None: not reported.
         silent_s: vehicle time since its newest heartbeat.
@@ -43,12 +45,15 @@ class VehicleState:
     mode: str
     armed: bool
     height_m: float | None
+    height_older_s: float
     landed: bool | None
     battery: float | None
     silent_s: float
 
     def __str__(self) -> str:
-        height = "height not reported" if self.height_m is None else f"{self.height_m:.1f} m above home"
+        height = "height not reported"
+        if self.height_m is not None:
+            height = height_text(self.height_m, self.height_older_s, " above home")
         parts = [f"mode {self.mode}", height, "armed" if self.armed else "disarmed"]
         if self.landed is not None:
             parts.append("on the ground" if self.landed else "in the air")
@@ -158,6 +163,7 @@ def watched(vehicle: Vehicle) -> VehicleState:
         mode=vehicle.mode,
         armed=vehicle.armed,
         height_m=None if position is None else position.height_m,
+        height_older_s=0.0 if position is None else link.older_s(position.time_us),
         landed=None if landed_state == 0 else landed_state == dialect.MAV_LANDED_STATE_ON_GROUND,
         battery=remaining,
         silent_s=max(0.0, (link.clock.time_us - heartbeat_us) * 1e-6),

@@ -161,14 +161,94 @@ def test_commands_that_lead_to_a_mode_are_commands_of_the_mode(firmware, command
 @every
 def test_before_the_program_arms_or_commands_in_flight_modes_are_the_operators(firmware):
     flight = Flight(firmware)
-    for armed in (False, True):
-        for mode in (Mode.POSITION, Mode.GUIDED, foreign(firmware)):
-            assert flight.heartbeat(mode, armed=armed) is Command.OURS
+    for mode in (Mode.POSITION, Mode.GUIDED, foreign(firmware)):
+        assert flight.heartbeat(mode) is Command.OURS
+    flight.heartbeat(foreign(firmware), armed=False)  # a glitch, not the end of the operator's flight
+    flight.heartbeat(foreign(firmware))
     assert not flight.authority.engaged
     flight.send(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 33.0, 1e5)
     assert not flight.authority.engaged
     flight.command(Mode.GUIDED)  # in the air
     assert flight.authority.engaged
+
+
+@every
+@pytest.mark.parametrize("command", ["mode", "setpoint", "plan", "speed"])
+def test_a_vehicle_that_a_pilot_arms_before_the_first_command_is_the_pilots(firmware, command):
+    flight = Flight(firmware)
+    flight.heartbeat(Mode.HOLD, armed=False)
+    assert flight.heartbeat(foreign(firmware)) is Command.OURS
+    assert flight.send(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 33.0, 1e5)  # a program that only observes
+    assert flight.heartbeat(foreign(firmware)) is Command.OURS
+    sent = {
+        "mode": lambda: flight.command(Mode.TAKEOFF),
+        "speed": lambda: flight.send(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, 5.0),
+        "setpoint": lambda: flight.authority.may_send(
+            mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0)
+        ),
+        "plan": lambda: flight.authority.may_send(mavlink.MAVLink_mission_count_message(1, 1, 5)),
+    }[command]
+    assert not sent()
+    assert flight.authority.state is Command.TAKEN
+    assert not flight.send(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 33.0, 1e5)
+    assert flight.authority.take_over.sentence == (
+        "the pilot (or another ground station) armed the vehicle and has it, mode "
+        f"{firmware.mode_name(foreign(firmware))}; nothing was commanded"
+    )
+
+
+@every
+def test_a_program_that_waits_for_a_pilots_arming_may_command_the_vehicle(firmware):
+    flight = Flight(firmware)
+    flight.authority.others_may_arm = True
+    flight.heartbeat(Mode.HOLD, armed=False)
+    flight.heartbeat(Mode.HOLD)
+    assert flight.command(Mode.TAKEOFF)
+    assert flight.heartbeat(Mode.TAKEOFF) is Command.OURS
+
+
+def test_a_pilot_who_arms_after_our_flight_or_our_refused_arming_has_the_vehicle():
+    flight = Flight(PX4_COPTER).in_flight(Mode.LAND)
+    for _ in range(3):
+        flight.heartbeat(Mode.LAND, armed=False)
+    flight.heartbeat(Mode.POSITION)
+    assert not flight.command(Mode.TAKEOFF)
+    flight = Flight(PX4_COPTER)
+    flight.heartbeat(Mode.HOLD, armed=False)
+    flight.send(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    flight.answer(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+    flight.heartbeat(Mode.HOLD)
+    assert not flight.command(Mode.TAKEOFF)
+
+
+def test_px4_that_is_armed_by_mission_start_is_armed_by_the_program():
+    """PX4 1.16.1, Commander.cpp: VEHICLE_CMD_MISSION_START arms."""
+    flight = Flight(PX4_COPTER)
+    flight.heartbeat(Mode.HOLD, armed=False)
+    flight.send(mavlink.MAV_CMD_MISSION_START)
+    flight.heartbeat(Mode.MISSION)
+    assert flight.command(Mode.HOLD)
+    assert flight.heartbeat(foreign(PX4_COPTER)) is Command.TAKEN
+
+
+@every
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_pilots_mode_wins_over_a_mode_command_that_is_not_reported_yet(firmware, armed):
+    """Also before the program has armed the vehicle: a repeated command would override the pilot."""
+    flight = Flight(firmware)
+    flight.heartbeat(Mode.HOLD, armed=armed)
+    assert flight.command(Mode.GUIDED)
+    assert flight.heartbeat(Mode.HOLD, armed=armed) is Command.OURS
+    assert flight.heartbeat(foreign(firmware), armed=armed) is Command.TAKEN
+    assert not flight.command(Mode.GUIDED)
+
+
+def test_a_mode_that_was_reported_as_commanded_on_the_ground_is_the_operators_to_change():
+    flight = Flight(PX4_COPTER)
+    flight.heartbeat(Mode.RETURN, armed=False)
+    flight.command(Mode.HOLD)
+    assert flight.heartbeat(Mode.HOLD, armed=False) is Command.OURS
+    assert flight.heartbeat(Mode.POSITION, armed=False) is Command.OURS
 
 
 @every
@@ -180,7 +260,6 @@ def test_after_the_flight_modes_are_the_operators_again_and_one_glitch_is_not_it
     for _ in range(3):
         flight.heartbeat(Mode.LAND, armed=False)
     assert flight.heartbeat(foreign(firmware), armed=False) is Command.OURS
-    assert flight.heartbeat(foreign(firmware)) is Command.OURS
     assert not flight.authority.engaged
 
 
@@ -279,12 +358,59 @@ def test_px4_returns_at_the_end_of_a_mission_only_by_an_item():
     ):
         tasks = ModeTasks(PX4_COPTER)
         steps = tuple(MissionStep(index=k, command=c) for k, c in enumerate((16, last)))
-        tasks.plan = StoredPlan(steps=steps, again_from=None, first=0, commands=frozenset((16, last)))
+        tasks.plan = StoredPlan(steps=steps, again_from=None, first=0)
         modes = PX4_COPTER.modes
         tasks.on_mode(modes[Mode.MISSION])
         tasks.on_mission_message(mavlink.MAVLink_mission_item_reached_message(1), 1_000_000)
         assert tasks.done(modes[Mode.MISSION], modes[Mode.RETURN]) is returns
         assert tasks.done(modes[Mode.MISSION], modes[Mode.HOLD])
+
+
+def plane_in_return(landing, text="", current=None):
+    """An aircraft in its return, with a plan of this program or without, and what it then reports."""
+    tasks = ModeTasks(ARDUPLANE)
+    if landing is not None:
+        tasks.plan = StoredPlan(
+            steps=(MissionStep(index=0),), again_from=None, first=1, landing=landing or None
+        )
+    modes = ARDUPLANE.modes
+    tasks.on_mode(modes[Mode.MISSION])
+    tasks.on_mission_message(mavlink.MAVLink_mission_current_message(2), 1_000_000)
+    tasks.on_mode(modes[Mode.RETURN])
+    tasks.on_text(text)
+    if current is not None:
+        tasks.on_mission_message(mavlink.MAVLink_mission_current_message(current), 2_000_000)
+    return Flight(ARDUPLANE, tasks.done).in_flight(Mode.RETURN)
+
+
+@pytest.mark.parametrize(
+    ("landing", "text", "current", "ours"),
+    [
+        (5, "", 5, True),  # the autopilot jumped to the landing
+        (5, "", 2, False),  # a pilot resumes the mission where it was left
+        (5, "", None, False),
+        (0, "", 2, False),  # the plan has no landing
+        (None, "Landing sequence start", None, True),  # a plan that was stored before
+        (None, "", 3, False),
+    ],
+)
+def test_arduplanes_return_goes_on_with_a_landing_only_by_evidence(landing, text, current, ours):
+    flight = plane_in_return(landing, text, current)
+    states = [flight.heartbeat(Mode.MISSION) for _ in range(3)]
+    assert states[-1] is (Command.OURS if ours else Command.TAKEN)
+    assert flight.send(mavlink.MAV_CMD_REQUEST_MESSAGE, 1.0) is ours
+
+
+def test_a_quadplane_returns_by_qrtl():
+    """ArduPlane 4.6.3, mode_rtl.cpp: near home QRTL follows RTL; by Q_RTL_MODE it is entered at once."""
+    flight = plane_in_return(None)
+    assert flight.heartbeat(21) is Command.OURS
+    assert flight.send(mavlink.MAV_CMD_REQUEST_MESSAGE, 1.0)
+    flight = Flight(ARDUPLANE).in_flight(Mode.GUIDED)
+    flight.command(Mode.RETURN)
+    assert flight.heartbeat(21) is Command.OURS
+    assert ARDUPLANE.mode_name(21) == "QRTL"
+    assert Flight(ARDUPLANE).in_flight(Mode.GUIDED).heartbeat(21) is Command.TAKEN
 
 
 def test_what_was_commanded_before_a_take_over_is_said():

@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import math
+import re
 
 import pytest
 
@@ -24,6 +25,7 @@ from missions.vehicle.telemetry import (
     attitude,
     local_position,
 )
+from missions.vehicle_client.actions import watched
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
@@ -257,6 +259,57 @@ def test_a_failing_script_leaves_the_vehicle_safe(flown, flavour, action):
         return autopilot.kind
 
     assert flown(script, flavour) == action.value
+
+
+@both
+def test_of_blocks_in_each_other_the_innermost_leaves_the_vehicle_safe_and_only_once(flown, flavour):
+    """As a script's own block inside that of the run."""
+
+    async def script(vehicle, autopilot):
+        with pytest.raises(MissionError):
+            async with vehicle.safe_on_exit(Mode.RETURN):
+                try:
+                    async with vehicle.safe_on_exit(Mode.HOLD):
+                        await vehicle.takeoff(8.0)
+                        raise ZeroDivisionError
+                except ZeroDivisionError as error:
+                    raise MissionError("the script's own words") from error
+        once = [c.action for c in vehicle.notes.safety_commands]
+        with pytest.raises(ZeroDivisionError):
+            async with vehicle.safe_on_exit(Mode.LAND), vehicle.safe_on_exit(Mode.HOLD):
+                await vehicle.try_command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, 3.0)  # it flies on
+                raise ZeroDivisionError
+        return once, [c.action for c in vehicle.notes.safety_commands], autopilot.kind
+
+    assert flown(script, flavour) == (["hold"], ["hold", "hold"], "hold")
+
+
+def test_after_a_refusal_the_outer_block_tries_again(flown):
+    async def script(vehicle, autopilot):
+        with pytest.raises(ZeroDivisionError):
+            async with vehicle.safe_on_exit(Mode.RETURN), vehicle.safe_on_exit(Mode.RETURN):
+                await vehicle.takeoff(8.0)
+                autopilot.refuse_modes |= {"return", "land", "hold"}
+                asyncio.get_running_loop().call_later(20.0, autopilot.refuse_modes.clear)
+                raise ZeroDivisionError
+        return autopilot.kind
+
+    assert flown(script, "ardupilot") == "return"
+
+
+def test_a_height_that_is_older_than_the_heartbeats_is_stated_with_its_age(flown):
+    async def script(vehicle, autopilot):
+        await vehicle.takeoff(8.0)
+        assert vehicle.how_left().height_older_s == 0.0
+        autopilot.streams.pop("GLOBAL_POSITION_INT")
+        await vehicle.clock.sleep(8.0)
+        return vehicle.how_left().text, vehicle.link.last_received(), str(watched(vehicle))
+
+    left, received, state = flown(script)
+    age = r" \((7|8) s before\)"
+    assert re.search(rf"at (7|8)\.\d m{age}, armed", left)
+    assert re.search(rf"m above home{age}", received)
+    assert re.search(rf"m above home{age}", state)
 
 
 def test_a_cancelled_script_leaves_the_vehicle_safe_even_if_the_first_choice_is_refused(flown):

@@ -51,9 +51,7 @@ def test_a_designation_reaches_the_estimator_of_the_tracker_and_its_log():
     sent = {1: [], 2: []}
     vehicles = [
         SimpleNamespace(
-            system_id=system,
-            clock=SimpleNamespace(time_us=0),
-            link=SimpleNamespace(connection=SimpleNamespace(send=sent[system].append)),
+            system_id=system, clock=SimpleNamespace(time_us=0), link=SimpleNamespace(send=sent[system].append)
         )
         for system in (1, 2)
     ]
