@@ -29,7 +29,7 @@ from estimators.orbit_target.relative_target import RelativeState
 from estimators.vision import FrameDifferenceDetector
 from estimators.vision.ground_points import CameraAxes
 from flightsim.picture import Renderer
-from missions.orbit.guidance import OrbitGuidance, OrbitParameters
+from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
 from missions.studies.handoff_pixels import PixelWorld
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld
 

@@ -22,11 +22,11 @@ from typing import Any
 
 from flightsim.environment import Environment
 from flightsim.world_spec import WorldSpec
-from missions.embedded import orbit_world
+from missions.base.options import parse_wind
 from missions.errors import PlanError
 from missions.library import find_mission
-from missions.options import parse_wind
 from missions.orbit.options import OrbitOptions
+from missions.orbit.world import orbit_world
 from missions.runs.session import COMPLETED, RunRequest, fly
 
 MEAN_ERROR_PERCENT, STD_M, ALTITUDE_M = 5.0, 8.0, 10.0

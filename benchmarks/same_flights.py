@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from missions.options import FlightOptions
+    from missions.base.options import FlightOptions
     from missions.vehicle.vehicle import Vehicle
 
 PLAN: Final = "camera.waypoints"

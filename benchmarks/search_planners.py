@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from missions.embedded import TargetField
-from missions.multi_target.objective import Exploration
 from missions.multi_target.options import REACH, MultiTargetOptions, PlannerKind
 from missions.multi_target.search import planner_of
+from missions.multi_target.world import TargetField
+from missions.search.planner_parameters import Exploration
 from missions.studies.multi_target_trial import EXPERIMENTS, STEP_S
 from missions.studies.statistics import paired_difference
 

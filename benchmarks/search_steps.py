@@ -20,13 +20,13 @@ import numpy as np
 
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.world_spec import WorldSpec
-from missions.mission import Mission
-from missions.multi_target.steps import BacksteppingLaw, TrajectoryLaw
-from missions.options import MissionOptions
-from missions.planning.limits import MulticopterLimits
-from missions.runs.records import FlightRecords, positions_ned_m
-from missions.runs.request import RunRequest
+from missions.base.mission import Mission
+from missions.base.options import MissionOptions
+from missions.base.request import RunRequest
+from missions.flown.records import FlightRecords, positions_ned_m
 from missions.runs.session import fly
+from missions.search.steps import BacksteppingLaw, TrajectoryLaw
+from missions.vehicle.limits import MulticopterLimits
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.telemetry import Position
 

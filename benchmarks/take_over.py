@@ -25,11 +25,11 @@ from pymavlink import mavutil
 from autopilot_bridge.mavlink import decode, definition, dialect
 from autopilot_bridge.tlog import TlogReader
 from benchmarks.firmware import FIRMWARES, VEHICLES, Firmware, FirmwareMissing
+from missions.base.mission import Mission
+from missions.base.options import FlightOptions, Via
+from missions.base.request import RunRequest
 from missions.library import find_mission
-from missions.mission import Mission
-from missions.options import FlightOptions, Via
 from missions.runs import session
-from missions.runs.request import RunRequest
 from missions.vehicle import Mode, Setpoint, Vehicle, VehicleKind
 from missions.vehicle.connection import GROUND_STATION
 from missions.vehicle.firmware_records import FIRMWARES as RECORDS

@@ -43,17 +43,17 @@ from flightsim.payload import (
     PayloadParameters,
 )
 from flightsim.world_spec import WorldSpec, team
-from missions.notes import PATTERN
-from missions.options import FlightOptions, Via
+from missions.base.options import FlightOptions, Via
+from missions.flown.run_folder import EPOCH_UNIX_US
 from missions.pattern_search.flight import fly_pattern
 from missions.patterns.curve import Lap
 from missions.patterns.lissajous import Lissajous
-from missions.runs.run_folder import EPOCH_UNIX_US
 from missions.studies import Pool, Study, run_study
 from missions.studies.pool import processors
 from missions.studies.study import run_of
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection
+from missions.vehicle.notes import PATTERN
 from missions.vehicle.vehicle import Vehicle
 
 FORMS = ("measurement", "kalman", "proposed", "frequency")

@@ -7,8 +7,8 @@ The same file flies on a real vehicle: add `--connect URL`.
 
 import math
 
+from missions.base.options import FlightOptions
 from missions.errors import PlanError
-from missions.options import FlightOptions
 from missions.vehicle import Setpoint, Vehicle
 from missions.vehicle.telemetry import Battery, Position
 

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Final
 from flightsim.foundation.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from missions.embedded import occupancy_world, orbit_world
+    from missions.base.mission import Mission
+    from missions.base.options import FlightOptions, MissionOptions, Via
+    from missions.base.request import RunRequest
     from missions.errors import MissionError, PlanError
     from missions.library import MISSIONS, find_mission
-    from missions.mission import Mission
     from missions.occupancy.options import OccupancyOptions
-    from missions.options import FlightOptions, MissionOptions, Via
+    from missions.occupancy.world import occupancy_world
     from missions.orbit.options import OrbitOptions
-    from missions.runs.request import RunRequest
+    from missions.orbit.world import orbit_world
     from missions.runs.session import RunResult, fly
     from missions.vehicle.setpoint import Setpoint
     from missions.vehicle.vehicle import Vehicle
@@ -46,22 +47,22 @@ __all__ = [
 
 _MODULES: Final = {
     "MISSIONS": "missions.library",
-    "FlightOptions": "missions.options",
-    "Mission": "missions.mission",
+    "FlightOptions": "missions.base.options",
+    "Mission": "missions.base.mission",
     "MissionError": "missions.errors",
-    "MissionOptions": "missions.options",
+    "MissionOptions": "missions.base.options",
     "OccupancyOptions": "missions.occupancy.options",
     "OrbitOptions": "missions.orbit.options",
     "PlanError": "missions.errors",
-    "RunRequest": "missions.runs.request",
+    "RunRequest": "missions.base.request",
     "RunResult": "missions.runs.session",
     "Setpoint": "missions.vehicle.setpoint",
     "Vehicle": "missions.vehicle.vehicle",
-    "Via": "missions.options",
+    "Via": "missions.base.options",
     "find_mission": "missions.library",
     "fly": "missions.runs.session",
-    "occupancy_world": "missions.embedded",
-    "orbit_world": "missions.embedded",
+    "occupancy_world": "missions.occupancy.world",
+    "orbit_world": "missions.orbit.world",
 }
 
 __getattr__ = lazy_exports(__name__, _MODULES)

@@ -9,9 +9,9 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from autopilot_bridge.errors import BridgeError
+from missions.base.mission import Mission
+from missions.base.options import FlightOptions
 from missions.errors import MissionError, PlanError
-from missions.mission import Mission
-from missions.options import FlightOptions
 from missions.pattern_search.curves import (
     expanding_square_curve,
     lissajous_curve,
@@ -25,7 +25,7 @@ from missions.pattern_search.curves import (
 from missions.pattern_search.mission import PatternMission
 from missions.plan_files.mission import FileMission
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
-from missions.planning.limits import Limits
+from missions.vehicle.limits import Limits
 from missions.vehicle.vehicle import Vehicle
 
 

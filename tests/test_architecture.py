@@ -28,6 +28,25 @@ ANGLE_FUNCTIONS = (
     *("quaternion_from_euler", "euler_from_quaternion", "from_euler", "rotate_inverse", "conjugate"),
 )
 WORLD = ("flightsim.world_spec",)  # what a run flies in: no mission and no estimator may know it
+# The floors of `missions`, from the roof to the ground: rooms (folders and files at its top) import of their own
+# floor and of those below.
+THE_MISSIONS = (
+    *("handoff", "multi_target", "occupancy", "orbit", "pattern_search", "plan_files", "survey"),
+    "vision_search",
+)
+FLOORS = (
+    ("__main__", "missions"),  # `missions` itself: the public names
+    ("cli",),
+    ("studies",),
+    ("runs",),
+    ("library",),
+    THE_MISSIONS,
+    ("embedded", "worlds", "estimation", "vehicle_client"),
+    ("base", "search"),
+    ("flown", "planning", "teams", "preflight"),
+    ("vehicle", "patterns"),
+    ("errors", "how_left", "kind", "process"),
+)
 # Where the wall clock, sockets and files may be met.
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")
 SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "threading", "subprocess", "time")
@@ -111,8 +130,14 @@ def imports_of(name):
 
 
 def is_embedding(name):
-    """Modules of `missions` that may start an embedded SITL."""
-    return is_in(name, ("missions.embedded", "missions.cli"))
+    """Modules of `missions` that may start an embedded SITL, or describe a world."""
+    return is_in(name, ("missions.embedded", "missions.worlds", "missions.cli")) or is_world(name)
+
+
+def is_world(name):
+    """Modules of a mission that add to the description of a world what the mission is for."""
+    parts = name.split(".")
+    return len(parts) > 2 and parts[1] in THE_MISSIONS and parts[2].startswith("world")
 
 
 def complaints(name, imports):
@@ -137,11 +162,13 @@ def complaints(name, imports):
     elif is_embedding(name):
         allowed, forbidden = PACKAGES, set()
     else:
-        world = WORLD if is_in(name, ("missions.runs", "missions.studies")) else ()
+        world = WORLD if is_in(name, ("missions.base.request", "missions.runs", "missions.studies")) else ()
         allowed, forbidden = ("missions", "estimators", *FOUNDATION, *GROUND_FLOOR, *world), set()
         # The command line stands above the missions, not below them.
         if name != "missions.__main__":
             forbidden |= {item for item in imports if is_in(item, ("missions.cli",))}
+        if not is_in(name, ("missions.runs", "missions.studies")) and name != "missions":
+            forbidden |= {item for item in imports if is_world(item)}
     # `from autopilot_bridge import links` names the package and the part; the part is what counts.
     parents = {item.rpartition(".")[0] for item in ours}
     wrong = {item for item in ours if not is_in(item, allowed) and not (item in parents and "." not in item)}
@@ -281,6 +308,54 @@ def test_messages_to_a_vehicle_pass_its_link():
 def test_the_test_sees_sendings():
     assert sendings("vehicle.link.connection.send(message)") == [1]
     assert sendings("vehicle.link.send(message)") == []
+
+
+def room(name):
+    """A folder or file at the top of a package; the package itself is one as well."""
+    return name.split(".")[1] if "." in name else name
+
+
+def rooms(package):
+    """By room, the other rooms of the package that it needs, with the imports: (module, needed module)."""
+    arrows = {room(name): {} for name in MODULES if is_in(name, (package,))}
+    for name in MODULES:
+        for item in needed(name) if is_in(name, (package,)) else ():
+            if is_in(item, (package,)) and room(item) != room(name):
+                arrows[room(name)].setdefault(room(item), []).append((name, item))
+    return arrows
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_rooms_import_each_other(package):
+    """Imports in functions and for type checking count."""
+    assert in_circles({name: set(others) for name, others in rooms(package).items()}) == []
+
+
+def climbs(arrows):
+    """Imports of rooms of a higher floor, and of one mission by another."""
+    floor = {name: level for level, names in enumerate(FLOORS) for name in names}
+    return [
+        item
+        for name, others in arrows.items()
+        for other, items in others.items()
+        if floor[other] < floor[name] or (name in THE_MISSIONS and other in THE_MISSIONS)
+        for item in items
+    ]
+
+
+def test_missions_stand_in_floors():
+    arrows = rooms("missions")
+    assert sorted(arrows) == sorted(name for names in FLOORS for name in names)
+    assert climbs(arrows) == []
+
+
+def test_the_test_sees_climbs():
+    up = ("missions.vehicle.link", "missions.base.mission")
+    beside = ("missions.orbit.mission", "missions.survey.plan")
+    within = ("missions.worlds.motions", "missions.embedded.sitl")
+    down = ("missions.cli.fly", "missions.errors")
+    arrows = {room(name): {room(item): [(name, item)]} for name, item in (up, beside, within, down)}
+    assert climbs(arrows) == [up, beside]
 
 
 FLAG = re.compile(r"(?<![\w-])--[a-z]")
@@ -440,8 +515,14 @@ def test_the_test_sees_constants(source, constants):
         ("estimators.ekf", "from flightsim.foundation.kernels import kernel", []),
         ("estimators.ekf", "import autopilot_bridge.navigation", ["autopilot_bridge.navigation"]),
         ("missions.lissajous", "import flightsim", ["flightsim"]),
-        ("missions.runs.request", "from flightsim.world_spec import WorldSpec", []),
-        ("missions.runs.request", "import flightsim.world", ["flightsim.world"]),
+        ("missions.base.request", "from flightsim.world_spec import WorldSpec", []),
+        ("missions.base.request", "import flightsim.world", ["flightsim.world"]),
+        ("missions.orbit.world", "from flightsim.world_spec import WorldSpec", []),
+        (
+            "missions.orbit.mission",
+            "from missions.orbit.world import orbit_world",
+            ["missions.orbit.world", "missions.orbit.world.orbit_world"],
+        ),
         (
             "missions.orbit.mission",
             "from flightsim.world_spec import WorldSpec",

@@ -49,7 +49,7 @@ OWN: Final = MissionCommand(
         ),
         _ALLOW_BELOW_HOME,
     ),
-    made=("missions.options", "FlightOptions"),
+    made=("missions.base.options", "FlightOptions"),
     values=lambda given: {"arguments": arguments_of(given["arg"])},
 )
 

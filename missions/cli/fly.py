@@ -19,9 +19,9 @@ from missions.cli.world import WORLD_HELP, world_of
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
+    from missions.base.mission import Mission
+    from missions.base.request import RunRequest
     from missions.cli.mission_command import MissionCommand
-    from missions.mission import Mission
-    from missions.runs.request import RunRequest
 
 _link = partial(flight_option, group="Vehicles")
 _embedded = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
@@ -155,7 +155,7 @@ def fly(**given: Any) -> int:
     options)`. The run folder gets flight.tlog, summary.json and track.png.
     """
     from missions.errors import PlanError
-    from missions.runs.ending import signal_of
+    from missions.process.ending import signal_of
 
     try:
         return _fly(given)
@@ -178,7 +178,7 @@ def _world(given: dict[str, Any], mission: "Mission[Any]", chosen: frozenset[str
 
 def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
     """Write the mission's file instead of flying it."""
-    from missions.plan_files.export import export_plan
+    from missions.runs.plan_export import export_plan
 
     count = export_plan(mission, request, path)
     click.echo(f"{count} items: {path}")
@@ -191,8 +191,8 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
     Raises:
         click.UsageError, PlanError: a value is not accepted.
     """
+    from missions.base.options import check_positive, parameters_from_file
     from missions.library import find_mission
-    from missions.options import check_positive, parameters_from_file
 
     given = context.params
     refuse_idle_options(context, connected=bool(given["connect"]))
@@ -217,7 +217,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
     left_out_parameters: tuple[str, ...] = ()
     if parameters and world is not None:
         parameters, left_out_parameters = known_to_all(parameters, world, strict=given["strict_params"])
-    from missions.runs.request import REGAIN_S, RunRequest
+    from missions.base.request import REGAIN_S, RunRequest
     from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
     from missions.vehicle.firmware import Mode
 

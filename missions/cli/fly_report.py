@@ -13,7 +13,7 @@ from missions.cli.options import report
 from missions.cli.status_line import StatusLine, announce_compiling
 
 if TYPE_CHECKING:
-    from missions.mission import Mission
+    from missions.base.mission import Mission
     from missions.runs.session import Flight, RunResult
     from missions.vehicle.vehicle import Vehicle
 
@@ -70,7 +70,7 @@ class ProgressLine:
         if self._line.terminal:
             self._show(flight, known)
             return
-        from missions.notes import FLIGHT
+        from missions.vehicle.notes import FLIGHT
 
         for vehicle in known:
             phase = vehicle.notes.current
@@ -190,7 +190,7 @@ class Pace:
 
 def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
     """Print the result of a run; returns the exit code."""
-    from missions.runs.run_folder import POOR, wind_words
+    from missions.flown.run_folder import POOR, wind_words
 
     summary = result.summary
     if result.outcome == "interrupted":

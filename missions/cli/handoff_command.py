@@ -20,7 +20,7 @@ def _values(given: Given) -> Mapping[str, Any]:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded import WalkingTargets, handoff_world
+    from missions.handoff.world import WalkingTargets, handoff_world
 
     walking = WalkingTargets(count=given["targets"], pixels=given["camera"] == "pixels", film=given["film"])
     return handoff_world(world, options, walking)

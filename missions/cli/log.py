@@ -244,7 +244,7 @@ def play(
     from autopilot_bridge.links import open_link, parse_address
     from missions.runs.log_play import MIN_SPEED, Played
     from missions.runs.log_play import play as send
-    from missions.runs.signing import client_signing
+    from missions.vehicle.signing import client_signing
 
     try:
         factor = math.inf if speed == "max" else float(speed)

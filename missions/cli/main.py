@@ -15,7 +15,7 @@ from typing import Final
 import click
 
 from missions.cli.options import report
-from missions.runs.supervision import supervised
+from missions.process.supervision import supervised
 
 _COMMANDS: Final = {
     "fly": ("missions.cli.fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),

@@ -12,7 +12,7 @@ from missions.cli.options import option_of
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
-    from missions.options import MissionOptions
+    from missions.base.options import MissionOptions
 
 Given = Mapping[str, Any]
 """Values of the command line's options by name, with _ in place of -."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded.target_fields import TargetField, multi_target_world
+    from missions.multi_target.world import TargetField, multi_target_world
 
     field = TargetField(
         count=given["targets"],

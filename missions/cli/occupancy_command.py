@@ -25,7 +25,7 @@ def _values(given: Given) -> Mapping[str, Any]:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded import occupancy_world
+    from missions.occupancy.world import occupancy_world
 
     along_m, across_m = given["sigma"]
     return occupancy_world(

@@ -21,7 +21,8 @@ def _values(given: Given) -> Mapping[str, Any]:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded import MotionKind, orbit_world
+    from missions.orbit.world import orbit_world
+    from missions.worlds.motions import MotionKind
 
     motion = given["target_motion"]
     return orbit_world(world, options, motion=None if motion is None else MotionKind(motion))

@@ -31,7 +31,7 @@ def _values(given: Given) -> Mapping[str, Any]:
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
     if not options.search:
         return world
-    from missions.embedded.tag_search import TagTarget, tag_search_world
+    from missions.pattern_search.world import TagTarget, tag_search_world
 
     target = TagTarget(speed_m_s=given["target_speed"], size_m=given["tag_size"])
     return tag_search_world(world, options, target)
@@ -137,7 +137,7 @@ def _pattern(help_text: str, own: tuple[FlightOption, ...]) -> MissionCommand:
     return MissionCommand(
         help=help_text,
         options=(*own, *_EVERY),
-        made=("missions.options", "FlightOptions"),
+        made=("missions.base.options", "FlightOptions"),
         values=_values,
         world=_world,
     )

@@ -23,7 +23,7 @@ def report(path: Path, out: Path | None, no_picture: bool) -> int:
     """
     from autopilot_bridge.errors import BridgeError
     from missions.errors import MissionError, PlanError
-    from missions.runs.recovery import recover
+    from missions.flown.recovery import recover
 
     try:
         made = recover(path, out, picture=not no_picture)

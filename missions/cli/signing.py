@@ -34,7 +34,7 @@ def key_from(path: Path | None) -> "SigningKey | None":
     """
     if path is None:
         return None
-    from missions.runs.signing import read_key, readable_by_others
+    from missions.vehicle.signing import read_key, readable_by_others
 
     key = read_key(path)
     if readable_by_others(path):
@@ -66,7 +66,7 @@ def vehicle_signing(
         SigningKeyError: a file can't be read or written, or holds something else; the message names it.
     """
     from autopilot_bridge.sitl import SigningParameters, SigningStore, UnsignedFrom
-    from missions.runs.signing import now
+    from missions.vehicle.signing import now
 
     return SigningParameters(
         key=key_from(key),

@@ -18,7 +18,7 @@ from missions.cli.status_line import StatusLine, announce_compiling
 from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
 from missions.cli.world import WORLD_HELP, equipped, world_of
-from missions.runs.ending import EndRequests
+from missions.process.ending import EndRequests
 
 if TYPE_CHECKING:
     from autopilot_bridge.sitl import Port, Sitl
@@ -246,8 +246,8 @@ def sitl(
     from autopilot_bridge.firmware.simulator import simulator_defaults
     from autopilot_bridge.parameter_files import left_out
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
-    from missions.mission import WorldDefaults
-    from missions.options import parameters_from_file
+    from missions.base.mission import WorldDefaults
+    from missions.base.options import parameters_from_file
 
     context = click.get_current_context()
     chosen = chosen_names(context)

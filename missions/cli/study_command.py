@@ -218,7 +218,7 @@ def run_and_tell(
         repeat: the command that repeats a trial.
         arguments: what `--resume` needs to build the study again.
     """
-    from missions.runs.ending import EndedBySignal, EndSignalHandler
+    from missions.process.ending import EndedBySignal, EndSignalHandler
     from missions.studies.running import run_study
 
     class Ending(EndSignalHandler):

@@ -54,7 +54,7 @@ def _magnetic_search(given: Given) -> "Study[Any, Any]":
 
 
 def _multi_target(given: Given) -> "Study[Any, Any]":
-    from missions.multi_target.objective import Exploration
+    from missions.search.planner_parameters import Exploration
     from missions.studies.multi_target_search import study
 
     return study(given["horizon"], given["alpha"], Exploration(given["exploration"]))

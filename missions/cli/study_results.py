@@ -43,7 +43,7 @@ def show(folder: str, failed: bool, as_json: bool) -> int:
     study = _study_of(place, results)
     summary = summary_of(study, results)
     if as_json:
-        from missions.runs.run_folder import finite
+        from missions.flown.run_folder import finite
 
         click.echo(json.dumps(finite(summary), indent=2))
         return 0
@@ -87,7 +87,7 @@ def compare(**given: Any) -> int:
     except PlanError as error:
         raise click.UsageError(in_options(error)) from error
     if given["as_json"]:
-        from missions.runs.run_folder import finite
+        from missions.flown.run_folder import finite
 
         click.echo(json.dumps(finite(differences), indent=2))
         return 0

@@ -20,7 +20,7 @@ def _values(given: Given) -> Mapping[str, Any]:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded import survey_world
+    from missions.survey.world import survey_world
 
     return survey_world(
         world,

@@ -18,8 +18,8 @@ from missions.cli.mission_command import FlightOption, Given, Scope
 from missions.cli.study_command import StudyCommand
 
 if TYPE_CHECKING:
-    from missions.mission import Mission
-    from missions.runs.request import RunRequest
+    from missions.base.mission import Mission
+    from missions.base.request import RunRequest
     from missions.studies.design import Design, Value
     from missions.studies.flights import FlightRow
     from missions.studies.study import Study
@@ -135,8 +135,8 @@ def sweep_study(
     Raises:
         click.UsageError, PlanError: an option or a value is not accepted.
     """
+    from missions.base.options import parse_wind
     from missions.library import find_mission
-    from missions.options import parse_wind
     from missions.runs.limits_before_flight import check_request
     from missions.runs.vehicle_opening import VehicleOpener
     from missions.studies.flights import FlightRow

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _world(given: Given, options: Any, world: "WorldSpec") -> "WorldSpec":
-    from missions.embedded.hidden_tag import HiddenTag, vision_search_world
+    from missions.vision_search.world import HiddenTag, vision_search_world
 
     hidden = HiddenTag(
         place_ne_m=given["target"],

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from missions.cli.mission_command import Given
+from missions.orbit.options import WANDERING_M
 
 if TYPE_CHECKING:
     from flightsim.payload import GroundTargetParameters
     from flightsim.world_spec import VehicleSpec, WorldSpec
-    from missions.mission import WorldDefaults
+    from missions.base.mission import WorldDefaults
 
 WORLD_HELP: Final = (
     "Description of the world (TOML, docs/world.md). An option that is also given overrides the file's value."
@@ -87,7 +88,7 @@ def _air(given: Given, chosen: frozenset[str], file: "WorldSpec | None", default
     """The air with the options' values; what no option gives is the file's."""
     from flightsim.environment import Environment
     from flightsim.wind_profile import WindLaw, WindProfile
-    from missions.options import parse_wind
+    from missions.base.options import parse_wind
 
     before = Environment() if file is None else file.air
     speed_m_s, from_deg = before.wind_speed_m_s, before.wind_from_deg
@@ -135,7 +136,7 @@ def equipped(
         ValueError: a target is impossible, or the vehicles carry nothing that can detect it.
     """
     from flightsim.payload import GaussianSignature, MagneticSpec
-    from missions.embedded import CAMERA, MAGNETOMETER, carrying
+    from missions.worlds.payloads import CAMERA, MAGNETOMETER, carrying
 
     if camera:
         world = carrying(world, CAMERA)
@@ -159,7 +160,7 @@ def equipped(
 
 def _target(text: str, tag: int) -> "GroundTargetParameters":
     from flightsim.payload import GroundTargetParameters
-    from missions.embedded import MotionKind, motion_of
+    from missions.worlds.motions import MotionKind, motion_of
 
     numbers = _numbers(text, "--target", (2, 4))
     speed_m_s, heading_deg = numbers[2:] or (0.0, 0.0)
@@ -168,6 +169,7 @@ def _target(text: str, tag: int) -> "GroundTargetParameters":
         place_ne_m=(numbers[0], numbers[1]),
         speed_m_s=speed_m_s,
         course_rad=math.radians(heading_deg),
+        range_m=WANDERING_M,
     )
     return GroundTargetParameters(motion=motion, tag_id=tag)
 

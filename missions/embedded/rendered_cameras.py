@@ -7,10 +7,10 @@ from autopilot_bridge.links import MemoryLink
 from autopilot_bridge.sitl import Sitl
 from estimators.vision import CameraDescription
 from flightsim.payload import Camera, MovingPointCamera
-from missions.camera_film import CameraFilm
-from missions.camera_picture import CameraPicture
 from missions.embedded.rendered_points import RenderedPointsReader, watched
 from missions.embedded.rendered_tags import RenderedTagsReader
+from missions.flown.camera_film import CameraFilm
+from missions.flown.camera_picture import CameraPicture
 
 __all__ = ["RenderedCameras"]
 

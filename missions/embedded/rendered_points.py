@@ -13,9 +13,9 @@ from estimators.messages import read_message
 from estimators.vision import CameraDescription, CameraGeometry
 from flightsim.payload import CameraParameters, CameraView, ImagerParameters, PinholeModel, Terrain
 from flightsim.picture import Renderer, Scenery
-from missions.camera_picture import CameraPicture
 from missions.embedded.picture_geometry import picture_geometry
 from missions.embedded.rendered_tags import FrameWriter
+from missions.flown.camera_picture import CameraPicture
 
 __all__ = ["POINT_CAMERA", "RenderedPoints", "RenderedPointsReader", "watched"]
 

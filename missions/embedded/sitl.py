@@ -17,8 +17,8 @@ from flightsim.hover_endurance import hover_endurance_s
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
-from missions.camera_picture import CameraPicture
 from missions.errors import MissionError
+from missions.flown.camera_picture import CameraPicture
 from missions.kind import VehicleKind
 
 if TYPE_CHECKING:

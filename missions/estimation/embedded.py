@@ -15,9 +15,9 @@ from estimators.runner import Runner
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
-from missions.notes import FlightNotes
-from missions.runs.run_folder import LOG_NAME
+from missions.flown.run_folder import LOG_NAME
 from missions.vehicle.connection import Recorder
+from missions.vehicle.notes import FlightNotes
 
 if TYPE_CHECKING:
     from autopilot_bridge.clock import Clock

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from missions.base.request import RunRequest
 from missions.errors import PlanError
-from missions.runs.request import RunRequest
 
 if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators

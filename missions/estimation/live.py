@@ -28,11 +28,11 @@ from missions.estimation.embedded import COMPONENT_ID
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
-from missions.runs.ending import end_signals
-from missions.runs.records import FlightRecorder
-from missions.runs.run_folder import LOG_NAME, create_run_folder
-from missions.runs.signing import client_signing
+from missions.flown.records import FlightRecorder
+from missions.flown.run_folder import LOG_NAME, create_run_folder
+from missions.process.ending import end_signals
 from missions.vehicle.connection import Connection
+from missions.vehicle.signing import client_signing
 
 SILENCE_S: Final = 10.0
 _LOOK_S: Final = 0.25

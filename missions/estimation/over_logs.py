@@ -15,7 +15,7 @@ from estimators.logs.dialect import load_dialect
 from estimators.reports.summary import FAILED
 from missions.errors import PlanError
 from missions.estimation.report import EstimationResult, ReportRequest, report
-from missions.runs.run_folder import RUNS, create_run_folder
+from missions.flown.run_folder import RUNS, create_run_folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

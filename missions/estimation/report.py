@@ -15,7 +15,7 @@ from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
 from estimators.reports.summary import COMPLETED, FAILED, assess
 from estimators.runner import EstimateTable
-from missions.runs.run_folder import replace_summary, versions, whole, write_summary
+from missions.flown.run_folder import replace_summary, versions, whole, write_summary
 
 PICTURE_NAME: Final = "errors.png"
 ESTIMATES_NAME: Final = "estimates"

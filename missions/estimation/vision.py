@@ -19,7 +19,7 @@ from missions.estimation.vision_request import (
     VisionRequest,
     VisionResult,
 )
-from missions.runs.run_folder import write_summary
+from missions.flown.run_folder import write_summary
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "VisionProgress", "VisionRequest", "VisionResult", "watch"]
 

@@ -13,7 +13,6 @@ from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
 from estimators.vision.video import Picture
-from missions.camera_film import CameraFilm
 from missions.errors import LinkClosed
 from missions.estimation.picture_source import LivePictures
 from missions.estimation.rates import interval_request
@@ -28,11 +27,12 @@ from missions.estimation.vision_request import (
     VisionRequest,
     progress_of,
 )
-from missions.runs.ending import end_signals
-from missions.runs.records import FlightRecorder
-from missions.runs.run_folder import LOG_NAME, create_run_folder
-from missions.runs.signing import client_signing
+from missions.flown.camera_film import CameraFilm
+from missions.flown.records import FlightRecorder
+from missions.flown.run_folder import LOG_NAME, create_run_folder
+from missions.process.ending import end_signals
 from missions.vehicle.connection import Connection
+from missions.vehicle.signing import client_signing
 
 __all__ = ["next_to_link"]
 

@@ -20,7 +20,7 @@ from missions.estimation.vision_request import (
     VisionRequest,
     progress_of,
 )
-from missions.runs.run_folder import LOG_NAME, create_run_folder
+from missions.flown.run_folder import LOG_NAME, create_run_folder
 
 __all__ = ["over_log"]
 

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions
-from missions.multi_target.figures import true_targets
-from missions.runs.records import place_of, positions_ned_m
+from missions.flown.records import place_of, positions_ned_m
+from missions.flown.targets import true_targets
 
 if TYPE_CHECKING:
     from estimators.handoff import HandoffEstimate
+    from missions.base.mission import Debriefing
+    from missions.flown.records import FlightRecords
     from missions.handoff.team import HandoffTeam
-    from missions.mission import Debriefing
-    from missions.runs.records import FlightRecords
 
 __all__ = ["HandoffTruth", "handoff_figures", "handoff_truth", "handoff_verdict"]
 

@@ -14,10 +14,10 @@ from missions.errors import MissionError
 from missions.handoff.camera import GIMBAL_HZ, GimbalPointing
 from missions.handoff.operator import TrackOperator
 from missions.handoff.options import HandoffOptions, check_vehicle
-from missions.orbit.gps_switch import GpsSwitch
-from missions.orbit.guidance import OrbitGuidance, OrbitParameters
-from missions.orbit.roll_flight import follow_rolls
-from missions.planning.limits import FixedWingLimits
+from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
+from missions.vehicle.gps_switch import GpsSwitch
+from missions.vehicle.limits import FixedWingLimits
+from missions.vehicle.roll_flight import follow_rolls
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 

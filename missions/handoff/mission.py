@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from missions.camera_picture import PicturesOf
+from missions.base.mission import Debriefing, WorldDefaults
+from missions.base.team_mission import TeamMission
+from missions.flown.camera_picture import PicturesOf
 from missions.handoff.options import HandoffOptions, check_vehicle
 from missions.handoff.team import HandoffTeam
 from missions.kind import VehicleKind
-from missions.mission import Debriefing, WorldDefaults
-from missions.planning.limits import Limits
-from missions.team_mission import TeamMission
+from missions.vehicle.limits import Limits
 
 if TYPE_CHECKING:
     from missions.vehicle.sensors import Sensor

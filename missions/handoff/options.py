@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from missions.base.options import MissionOptions, check_positive
 from missions.errors import PlanError
-from missions.options import MissionOptions, check_positive
-from missions.orbit.options import GpsOff
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.gps_switch import GpsOff
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 _TRACKER_ORBIT: Final = 1.25
 """Radius of the tracker's orbit over that of the first aircraft. In opposite orbits with equal rates of turn

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimators.reports.picture import tidy
-from missions.camera_picture import CameraPicture, PicturesOf, clip, png
+from missions.flown.camera_picture import CameraPicture, PicturesOf, clip, png
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
 
 if TYPE_CHECKING:
+    from missions.base.mission import Debriefing
     from missions.handoff.team import HandoffTeam
     from missions.handoff.watch import Moment
-    from missions.mission import Debriefing
 
 Point = tuple[float, float]
 

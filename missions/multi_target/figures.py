@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 from estimators.tracking.association import assign
 from estimators.tracking.ospa import gospa, ospa
 from flightsim.foundation.geodesy import LocalFrame
-from missions.orbit.score import TARGET_SYSTEM
-from missions.runs.records import positions_ned_m
+from missions.flown.targets import true_targets
 
 if TYPE_CHECKING:
-    from missions.mission import Debriefing
+    from missions.base.mission import Debriefing
     from missions.multi_target.search import SearchState
     from missions.multi_target.team import TargetSearchTeam
-    from missions.runs.records import FlightRecords
 
 __all__ = ["SearchScore", "search_figures", "search_score", "search_verdict"]
 
@@ -49,15 +47,6 @@ class SearchScore:
     gospa_m: Array
     targets_ne_m: Array
     match_m: float
-
-
-def true_targets(records: "FlightRecords", frame: LocalFrame) -> list[tuple[Array, Array]]:
-    """Times (us) and places (n, 2) of each true target, from the truth in the log; empty: there is none."""
-    found, component = [], 1
-    while len(own := records.truth(TARGET_SYSTEM, component)):
-        found.append((own["time_usec"].astype(np.float64), positions_ned_m(own, frame)[:, :2]))
-        component += 1
-    return found
 
 
 def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchScore | None:

@@ -5,11 +5,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from missions.mission import Debriefing, WorldDefaults
+from missions.base.mission import Debriefing, WorldDefaults
+from missions.base.team_mission import TeamMission
 from missions.multi_target.options import MultiTargetOptions, check_vehicle
 from missions.multi_target.team import TargetSearchTeam
-from missions.planning.limits import Limits
-from missions.team_mission import TeamMission
+from missions.vehicle.limits import Limits
 
 if TYPE_CHECKING:
     from missions.vehicle.sensors import Sensor

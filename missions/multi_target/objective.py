@@ -6,7 +6,6 @@ several vehicles, and why exploration counts what the scan sees.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +13,13 @@ from numpy.typing import NDArray
 from estimators.tracking.exploration import ExplorationMap
 from estimators.tracking.information import condensed, detections_at, information_at
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
+from missions.search.planner_parameters import Exploration
 
-__all__ = ["Exploration", "Outlook", "SearchObjective"]
+__all__ = ["Outlook", "SearchObjective"]
 
 Array = NDArray[np.float64]
 
 _CELL_M = 1.0  # the intensity is summed up in cells of this side: the sensor's scale is some ten metres
-
-
-class Exploration(StrEnum):
-    """What the exploration of a scan is."""
-
-    VIEW = "view"
-    """The expected number of targets that it detects for the first time."""
-    PLACE = "place"
-    """The exploration map at the place of the vehicle (the paper's equation 14)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

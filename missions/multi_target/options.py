@@ -3,15 +3,16 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Protocol
+from typing import Final
 
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
 from estimators.tracking.intensity import MotionKind
+from missions.base.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.errors import PlanError
-from missions.multi_target.objective import Exploration
-from missions.multi_target.planner import Area, PlannerParameters
-from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.search.area import Area
+from missions.search.options import StepLawKind, check_steps
+from missions.search.planner_parameters import Exploration, PlannerParameters
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 REACH: Final = 100.0 / 15.0
 """Radius of the field of view, in scales of its fall: there the probability of detection is 0.035."""
@@ -31,13 +32,6 @@ class PlannerKind(StrEnum):
     """Information alone."""
     SWEEP = "sweep"
     """Along the legs of a parallel sweep, whatever is detected."""
-
-
-class StepLawKind(StrEnum):
-    """How a multicopter flies a step."""
-
-    TRAJECTORY = "trajectory"
-    BACKSTEPPING = "backstepping"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,54 +227,3 @@ def check_vehicle(options: MultiTargetOptions, limits: Limits) -> None:
             f"`step_m` {step_m:.0f} m leaves the searched area of {options.area.height_m:g} m by "
             f"{options.area.width_m:g} m; ask for a larger `area_m`, or a smaller `step_m`"
         )
-
-
-class SteppedOptions(Protocol):
-    """Options of a search by steps in an area."""
-
-    @property
-    def vehicles(self) -> int: ...
-    @property
-    def separation_m(self) -> float: ...
-    @property
-    def own_altitude_m(self) -> float: ...
-    @property
-    def area_m(self) -> tuple[float, float, float, float]: ...
-    @property
-    def step_m(self) -> float | None: ...
-    @property
-    def speed_m_s(self) -> float | None: ...
-
-
-def check_steps(options: SteppedOptions, limits: Limits) -> tuple[float, float]:
-    """Refuse layers, altitude, area, speed and steps that one vehicle can't fly.
-
-    Returns:
-        Step and speed.
-
-    Raises:
-        PlanError: names the option to change.
-    """
-    limits.check_separation(options.separation_m, options.vehicles)
-    limits.check_altitude(options.own_altitude_m)
-    south_m, west_m, north_m, east_m = options.area_m
-    reach_m = math.hypot(max(abs(south_m), abs(north_m)), max(abs(west_m), abs(east_m)))
-    if not reach_m <= limits.reach_m:
-        raise PlanError(
-            f"the searched area reaches {reach_m:.0f} m from home, more than {limits.reach_m:g} m; "
-            "ask for a smaller `area_m`, or one nearer to home"
-        )
-    step_m, speed_m_s = options.step_m, options.speed_m_s
-    if step_m is None or speed_m_s is None:
-        raise PlanError("the options are not those of a vehicle yet: call for_vehicle")
-    if not isinstance(limits, FixedWingLimits):
-        limits.check_speed(speed_m_s)
-        return step_m, speed_m_s
-    limits.check_airspeed(speed_m_s)
-    radius_m = limits.turn_radius_m(speed_m_s)
-    if step_m < radius_m:
-        raise PlanError(
-            f"`step_m` {step_m:g} m is too short for an aircraft whose turns have a radius of "
-            f"{radius_m:.0f} m; ask for {math.ceil(radius_m)} m or more, or a lower `speed_m_s`"
-        )
-    return step_m, speed_m_s

@@ -13,21 +13,18 @@ from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.information import condensed
 from estimators.tracking.range_bearing import Viewpoint
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
-from missions.multi_target.planner import Area, ExploringPlanner, Place, SearchPlanner, SweepPlanner
-from missions.patterns.iamsar import parallel_sweep
-from missions.patterns.polyline import Polyline
+from missions.multi_target.planner import ExploringPlanner, SearchPlanner
+from missions.search.area import Place
+from missions.search.sweep import SweepPlanner, sweep_path
+from missions.search.team import HEADING_RAD
 
-__all__ = ["HEADING_RAD", "Moment", "SearchState", "Step", "TargetSearch", "planner_of"]
+__all__ = ["Moment", "SearchState", "Step", "TargetSearch", "planner_of"]
 
 Array = NDArray[np.float64]
 
-HEADING_RAD: Final = 0.0
-"""Heading of a multicopter while it searches (paper: the desired angles are 0)."""
 
 _MOMENTS: Final = 64
 _CELL_M: Final = 1.0
-_LEAST_LEGS: Final = 2
-_MOST_LEGS: Final = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,35 +65,6 @@ class Moment:
 
     time_us: int
     points: tuple[Array, Array, Array]
-
-
-def sweep_path(area: Area, start: Place, length_m: float, spacing_m: float | None) -> Polyline:
-    """A parallel sweep of the area that begins at the corner nearest to a place.
-
-    Args:
-        length_m: length of the flight, with the way to its beginning.
-        spacing_m: track spacing; None: the smallest with which one pass is not longer than the flight.
-    """
-
-    def made(spacing: float) -> list[Place]:
-        north_m, east_m = area.centre_ne_m
-        path = parallel_sweep(width_m=area.width_m, height_m=area.height_m, spacing_m=spacing)
-        forth = [(north_m + n, east_m + e) for n, e in path.vertices_m]
-        turned = [(2.0 * north_m - n, e) for n, e in forth]
-        return min(
-            (forth, forth[::-1], turned, turned[::-1]), key=lambda vertices: math.dist(vertices[0], start)
-        )
-
-    if spacing_m is not None:
-        return Polyline(tuple(made(spacing_m)))
-    short_m = min(area.height_m, area.width_m)
-    found = made(short_m / _LEAST_LEGS)
-    for legs in range(_LEAST_LEGS + 1, _MOST_LEGS):
-        vertices = made(short_m / legs)
-        if math.dist(start, vertices[0]) + Polyline(tuple(vertices)).length_m > length_m:
-            break
-        found = vertices
-    return Polyline(tuple(found))
 
 
 def planner_of(options: MultiTargetOptions) -> SearchPlanner:

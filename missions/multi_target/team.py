@@ -8,7 +8,7 @@ from estimators.multi_target.estimate import TargetRow
 from missions.multi_target.options import MultiTargetOptions, check_vehicle
 from missions.multi_target.search import TargetSearch
 from missions.multi_target.sensor_watch import SensorWatch
-from missions.search_team import SearchTeam
+from missions.search.team import SearchTeam
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

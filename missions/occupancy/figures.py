@@ -10,11 +10,11 @@ from missions.occupancy.suspect import Suspect
 
 if TYPE_CHECKING:
     from estimators.occupancy.detection import Anomaly
-    from missions.mission import Debriefing
+    from missions.base.mission import Debriefing
+    from missions.flown.score import FlightScore
     from missions.occupancy.candidate import Candidate
     from missions.occupancy.search import Search
     from missions.occupancy.team import Searcher, SearchTeam
-    from missions.runs.score import FlightScore
 
 
 def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flightsim.foundation.geodesy import GeodeticPosition
+from missions.base.mission import Debriefing, WorldDefaults
+from missions.base.team_mission import TeamMission
 from missions.errors import PlanError
-from missions.mission import Debriefing, WorldDefaults
 from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle, read_map
 from missions.occupancy.team import SearchTeam
-from missions.planning.limits import Limits
-from missions.team_mission import TeamMission
+from missions.vehicle.limits import Limits
 
 if TYPE_CHECKING:
     from missions.vehicle.sensors import Sensor

@@ -12,12 +12,12 @@ from estimators.occupancy.detection import DetectionModel, MapError
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.tracking.grid import GridLayout
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.base.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
 from missions.occupancy.search import SearchParameters
 from missions.occupancy.suspect import Identify
-from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from estimators.received import not_in_gaps
 from flightsim.foundation.geodesy import LocalFrame
-from missions.runs.records import place_of, positions_ned_m
+from missions.flown.records import place_of, positions_ned_m
 
 if TYPE_CHECKING:
-    from missions.runs.records import FlightRecords
+    from missions.flown.records import FlightRecords
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ from estimators.occupancy.placed_readings import PlacedReading
 from estimators.occupancy.survey_map import SurveyMap
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.layers import Layers
 from missions.occupancy.field_watch import FieldWatch
 from missions.occupancy.investigation import Investigation
 from missions.occupancy.noise_check import require_quiet
@@ -20,7 +19,8 @@ from missions.occupancy.options import OccupancyOptions, check_map, check_reach,
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
 from missions.occupancy.suspect import Identify
-from missions.steering import Steering, steering
+from missions.teams.layers import Layers
+from missions.teams.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.telemetry import Attitude, Position
 

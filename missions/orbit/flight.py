@@ -9,15 +9,15 @@ from typing import Final
 from estimators.orbit_target.tracker import TargetStatus
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
-from missions.orbit.gps_switch import GpsSwitch
-from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
 from missions.orbit.options import OrbitOptions
-from missions.orbit.roll_flight import follow_rolls
 from missions.orbit.score import ORBIT
 from missions.orbit.target_observer import TICK_HZ, TargetObserver
-from missions.planning.limits import FixedWingLimits
+from missions.planning.orbit_guidance import OrbitCommand, OrbitGuidance, OrbitParameters
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
+from missions.vehicle.gps_switch import GpsSwitch
+from missions.vehicle.limits import FixedWingLimits
+from missions.vehicle.roll_flight import follow_rolls
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.vehicle import Vehicle
 

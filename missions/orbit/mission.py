@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from missions.base.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
-from missions.notes import FlightNotes
 from missions.orbit.options import WANDERING_M, OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.limits import FixedWingLimits, Limits
+from missions.vehicle.notes import FlightNotes
 from missions.vehicle.sensors import CAMERA, GIMBAL, Sensor
 from missions.vehicle.vehicle import Vehicle
 

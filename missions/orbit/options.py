@@ -6,9 +6,10 @@ from enum import StrEnum
 from typing import Final
 
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from missions.base.options import MissionOptions, check_positive
 from missions.errors import PlanError
-from missions.options import MissionOptions, check_positive
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.gps_switch import GpsOff
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 WANDERING_M: Final = 100.0
 """Largest distance of a wandering target from its place: radius of its circle, half the side of its area."""
@@ -20,17 +21,6 @@ class AttitudeFrom(StrEnum):
     AUTOPILOT = "autopilot"
     FILTER = "filter"
     """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
-
-
-class GpsOff(StrEnum):
-    """The way in which GPS is switched off for the orbit."""
-
-    AUTO = "auto"
-    """By the command or, for a simulator that does not support it, by its parameter."""
-    FAILURE = "failure"
-    """By MAV_CMD_INJECT_FAILURE."""
-    PARAMETER = "parameter"
-    """By a parameter of the simulator, or of the filter that fuses GPS."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

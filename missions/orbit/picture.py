@@ -8,10 +8,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimators.reports.picture import tidy
-from missions.mission import Debriefing
+from missions.base.mission import Debriefing
+from missions.flown.picture import draw_run
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import OrbitTruth, orbit_truth
-from missions.runs.picture import draw_run
 
 _INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"

@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import LocalFrame
-from missions.mission import Debriefing
-from missions.notes import FlightNotes
+from missions.base.mission import Debriefing
+from missions.flown.records import FlightRecords, place_of, positions_ned_m
+from missions.flown.targets import TARGET_SYSTEM
 from missions.orbit.options import OrbitOptions
-from missions.runs.records import FlightRecords, place_of, positions_ned_m
+from missions.vehicle.notes import FlightNotes
 
 Array = NDArray[np.float64]
 
 ORBIT: Final = "orbit"
 """Name of the phase that is scored."""
-TARGET_SYSTEM: Final = 251
-"""MAVLink system id of the simulated targets' truth; the first target is component 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

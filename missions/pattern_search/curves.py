@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
+from missions.base.options import FlightOptions
 from missions.errors import PlanError
-from missions.options import FlightOptions
 from missions.patterns import (
     Curve,
     Lap,
@@ -18,7 +18,6 @@ from missions.patterns import (
     sector,
 )
 from missions.patterns.lissajous import reduced_ratio
-from missions.planning.limits import FixedWingLimits
 from missions.planning.sizing import (
     curve_side_m,
     legs_side_m,
@@ -26,6 +25,7 @@ from missions.planning.sizing import (
     spacing_for_turns_m,
     spacing_within_m,
 )
+from missions.vehicle.limits import FixedWingLimits
 
 MAX_LENGTH_M: Final = 100_000.0
 """Longest pattern that is planned: some hours of flight, and small enough for a planner's memory."""

@@ -12,16 +12,14 @@ from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
+from missions.base.options import FlightOptions, Via
 from missions.errors import PlanError, VehicleTimeout
-from missions.notes import PATTERN, CommandedPath, CutShort
-from missions.options import FlightOptions, Via
-from missions.outline import Outline
 from missions.pattern_search.wings.pattern import check_wings, fly_pattern_with_wings, pattern_flight_of
 from missions.pattern_search.wings.waypoints import mission_items
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
-from missions.planning.limits import FixedWingLimits, Limits, MulticopterLimits
 from missions.planning.natural import is_lissajous, natural_frequencies, natural_trajectory
+from missions.planning.outline import Outline
 from missions.planning.trajectory import (
     Trajectory,
     TrajectoryPoint,
@@ -31,6 +29,8 @@ from missions.planning.trajectory import (
 )
 from missions.planning.waypoints import leg_speeds, waypoints_along
 from missions.vehicle.guided import GuidedSession
+from missions.vehicle.limits import FixedWingLimits, Limits, MulticopterLimits
+from missions.vehicle.notes import PATTERN, CommandedPath, CutShort
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.telemetry import Attitude
 from missions.vehicle.vehicle import Vehicle

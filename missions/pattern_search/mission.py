@@ -4,10 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from autopilot_bridge.mission_plan import MissionItem
+from missions.base.mission import Debriefing, Mission
+from missions.base.options import FlightOptions
 from missions.errors import PlanError
-from missions.mission import Debriefing, Mission
-from missions.options import FlightOptions
-from missions.outline import Outline
 from missions.pattern_search.flight import (
     check_pattern,
     fly_pattern,
@@ -16,7 +15,8 @@ from missions.pattern_search.flight import (
     pattern_outline,
 )
 from missions.patterns import Curve
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.planning.outline import Outline
+from missions.vehicle.limits import FixedWingLimits, Limits
 from missions.vehicle.sensors import TAG_CAMERA, Sensor
 from missions.vehicle.vehicle import Vehicle
 

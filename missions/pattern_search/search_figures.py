@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flightsim.foundation.geodesy import LocalFrame
-from missions.multi_target.figures import true_targets
-from missions.options import FlightOptions
+from missions.base.options import FlightOptions
+from missions.flown.targets import true_targets
 
 if TYPE_CHECKING:
-    from missions.mission import Debriefing
+    from missions.base.mission import Debriefing
 
 __all__ = ["search_figures"]
 

@@ -11,7 +11,7 @@ from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, CameraScan
 from estimators.messages import read_message
 from estimators.vision import VehicleTrack, ground_place
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.notes import CutShort
+from missions.vehicle.notes import CutShort
 from missions.vehicle.telemetry import Position
 
 if TYPE_CHECKING:

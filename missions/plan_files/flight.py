@@ -7,11 +7,11 @@ import numpy as np
 
 from missions.errors import PlanError, VehicleTimeout
 from missions.kind import VehicleKind
-from missions.notes import CommandedPath, CutShort
 from missions.plan_files.document import NAV_WAYPOINT, MissionDocument
 from missions.plan_files.options import FileOptions, Then
 from missions.plan_files.progress import MissionWatch
 from missions.plan_files.route import Route, Stop, path_ned_m, placed, route_of, scored_stops
+from missions.vehicle.notes import CommandedPath, CutShort
 from missions.vehicle.vehicle import Vehicle
 
 FARTHEST_M: Final = 10_000.0

@@ -11,24 +11,24 @@ import numpy as np
 from autopilot_bridge.mission_plan import MissionItem
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition
+from missions.base.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
-from missions.notes import PATTERN, Phase
 from missions.plan_files.document import NAV_LAND, MissionDocument, PlannedHome
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
 from missions.plan_files.options import FileOptions, Then
 from missions.plan_files.progress import CURVED
 from missions.plan_files.route import Stop, route_of, scored_stops, straight
-from missions.planning.limits import FixedWingLimits, Limits
 from missions.vehicle.item_tracker import THROUGH
 from missions.vehicle.items import FLOWN_TO
+from missions.vehicle.limits import FixedWingLimits, Limits
+from missions.vehicle.notes import PATTERN, Phase
 
 if TYPE_CHECKING:
-    from missions.notes import FlightNotes
-    from missions.outline import Outline
-    from missions.runs.score import FlightScore
+    from missions.flown.score import FlightScore
+    from missions.planning.outline import Outline
+    from missions.vehicle.notes import FlightNotes
     from missions.vehicle.vehicle import Vehicle
 
 _MODELS: Final = {VehicleKind.MULTICOPTER: "iris", VehicleKind.FIXED_WING: "aerosonde"}
@@ -106,7 +106,7 @@ class FileMission(Mission[FileOptions]):
         return self.document.items
 
     async def outline(self, vehicle: "Vehicle", options: FileOptions) -> "Outline":
-        from missions.outline import Outline
+        from missions.planning.outline import Outline
 
         route = route_of(self.document, vehicle.home)
         return Outline(
@@ -137,7 +137,7 @@ class FileMission(Mission[FileOptions]):
 
     def _verdict(self, notes: "FlightNotes", score: "FlightScore", max_error_m: float | None) -> str:
         """Check that every waypoint was passed in order; the path between them is chosen by the autopilot."""
-        from missions.runs.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
+        from missions.flown.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
 
         commanded = notes.commanded
         if commanded is None:

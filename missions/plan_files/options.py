@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from missions.base.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.errors import PlanError
-from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 
 
 class Then(StrEnum):

@@ -4,11 +4,11 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError, VehicleTimeout
-from missions.notes import PATTERN
 from missions.plan_files.document import MissionDocument
 from missions.plan_files.route import Stop, has_curves, placed
 from missions.vehicle.firmware import Mode
 from missions.vehicle.item_tracker import FlownOrder, ItemTracker, MissionModeWatch, mission_steps
+from missions.vehicle.notes import PATTERN
 from missions.vehicle.vehicle import Vehicle
 
 CURVED: Final = "mission"

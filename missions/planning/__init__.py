@@ -1,9 +1,9 @@
 """Converts a pattern to something that a vehicle can fly: a trajectory in time, or waypoints."""
 
-from missions.planning.limits import MulticopterLimits
 from missions.planning.natural import natural_trajectory
 from missions.planning.trajectory import Trajectory, TrajectoryPoint, line_trajectory, plan_trajectory
 from missions.planning.waypoints import leg_speeds, waypoints_along
+from missions.vehicle.limits import MulticopterLimits
 
 __all__ = [
     "MulticopterLimits",

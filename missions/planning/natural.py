@@ -11,9 +11,9 @@ import numpy as np
 from missions.errors import PlanError
 from missions.patterns.curve import Array, Curve
 from missions.patterns.lissajous import Lissajous
-from missions.planning.limits import MulticopterLimits
 from missions.planning.profile import STEP_S
 from missions.planning.trajectory import Trajectory
+from missions.vehicle.limits import MulticopterLimits
 
 _SHARE_OF_LIMIT: Final = 0.5  # of the acceleration, for the smooth start and stop
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from missions.patterns.curve import Array
-from missions.planning.limits import MulticopterLimits
+from missions.vehicle.limits import MulticopterLimits
 
 STEP_S: Final = 0.02
 _GRID_M: Final = 0.1

@@ -5,8 +5,8 @@ from typing import Final
 
 from missions.patterns.curve import Curve
 from missions.patterns.polyline import Polyline
-from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import leg_needed_m, smallest_radius_m
+from missions.vehicle.limits import FixedWingLimits
 
 WINGS_SIDE_M: Final = 1000.0  # of a fixed wing's pattern, unless its turns need more
 _ROOM: Final = 1.05

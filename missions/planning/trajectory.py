@@ -10,8 +10,8 @@ import numpy as np
 from missions.errors import PlanError
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
-from missions.planning.limits import MulticopterLimits
 from missions.planning.profile import STEP_S, Profile, speed_profile
+from missions.vehicle.limits import MulticopterLimits
 
 _BISECTIONS: Final = 14
 _SAME_COURSE_RAD: Final = 0.3

@@ -9,7 +9,7 @@ from missions.errors import PlanError
 from missions.patterns.curve import Curve, curvature_per_m
 from missions.patterns.polyline import Polyline
 from missions.planning.corners import corner_reach_m
-from missions.planning.limits import FixedWingLimits
+from missions.vehicle.limits import FixedWingLimits
 
 _SAMPLES: Final = 20_000
 # time to roll from level into the steepest turn, including the delay before the roll begins

@@ -10,9 +10,8 @@ from autopilot_bridge.fence_shapes import FenceShape, Point, fence_shapes, outsi
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import MissionError
-from missions.mission import Mission
-from missions.options import MissionOptions
-from missions.outline import Outline
+from missions.kind import VehicleKind
+from missions.planning.outline import Outline
 from missions.preflight.endurance import PARAMETERS as ENDURANCE_PARAMETERS
 from missions.preflight.endurance import Endurance, endurance_finding, reported_endurance
 from missions.preflight.finding import Finding, Level, ok, problem, warning
@@ -81,25 +80,42 @@ meanwhile.
 """
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedFlight:
+    """What is known of the mission that a vehicle is to fly.
+
+    Attributes:
+        mission: its name.
+        kinds: kinds of vehicles that can fly it.
+        autopilot: flavour that it was planned for; None: any.
+        outline: its path and duration; None: not known.
+    """
+
+    mission: str
+    kinds: Sequence[VehicleKind]
+    autopilot: str | None
+    outline: Outline | None
+
+
 async def look(
     vehicle: Vehicle,
-    mission: Mission[Any],
-    options: MissionOptions,
+    planned_flight: PlannedFlight,
     simulation_proof: str = "",
     endurance: Endurance | None = None,
 ) -> Look:
     """Check a vehicle that is ready to arm, and the mission to be flown with it.
 
     Args:
+        planned_flight: the mission.
         simulation_proof: what proves that the vehicle is a simulation; "": nothing.
         endurance: how long its battery lasts; None: as it reports.
     """
     snapshot, fence_items = await _snapshot(vehicle)
-    outline = await mission.outline(vehicle, options)
+    outline = planned_flight.outline
     planned = () if outline is None else outline.fence
     own_fence = planned or tuple(fence_items)
     findings = [
-        *_match(vehicle, mission, simulation_proof),
+        *_match(vehicle, planned_flight, simulation_proof),
         *health_findings(snapshot),
         fence(snapshot, len(planned)),
         *_way(vehicle, outline, own_fence, snapshot.parameters),
@@ -176,19 +192,20 @@ async def _parameters(vehicle: Vehicle) -> dict[str, float]:
     return {name: value for name, value in zip(names, values, strict=True) if value is not None}
 
 
-def _match(vehicle: Vehicle, mission: Mission[Any], simulation_proof: str) -> list[Finding]:
+def _match(vehicle: Vehicle, flight: PlannedFlight, simulation_proof: str) -> list[Finding]:
     text = f"{vehicle.autopilot} {vehicle.kind}, system id {vehicle.system_id}, mode {vehicle.mode}; "
     text += f"simulated: {simulation_proof}" if simulation_proof else "nothing proves that it is simulated"
     findings = []
-    if vehicle.kind not in mission.kinds:
-        kinds = " or a ".join(mission.kinds)
+    if vehicle.kind not in flight.kinds:
+        kinds = " or a ".join(flight.kinds)
         findings.append(
-            problem("vehicle", f"{text}; {mission.name} is for a {kinds}", "choose the right one")
+            problem("vehicle", f"{text}; {flight.mission} is for a {kinds}", "choose the right one")
         )
-    planned = mission.world_defaults.autopilot
-    if planned not in (None, vehicle.autopilot):
+    if flight.autopilot not in (None, vehicle.autopilot):
         findings.append(
-            warning("vehicle", f"{text}; {mission.name} was planned for {planned}", "see that it fits")
+            warning(
+                "vehicle", f"{text}; {flight.mission} was planned for {flight.autopilot}", "see that it fits"
+            )
         )
     return findings or [ok("vehicle", text)]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from missions.outline import Outline
+from missions.planning.outline import Outline
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.snapshot import Snapshot
 

@@ -7,8 +7,8 @@ from autopilot_bridge.mavlink import dialect, enum_name
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.snapshot import Snapshot
+from missions.vehicle.arming_reasons import PREARM_BIT, bit_names, reasons_against_arming
 
-PREARM_BIT: Final = dialect.MAV_SYS_STATUS_PREARM_CHECK
 _RC_BIT: Final = dialect.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 _NEEDED: Final = (
     dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -22,7 +22,6 @@ _SAID_ELSEWHERE: Final = PREARM_BIT | _RC_BIT | dialect.MAV_SYS_STATUS_SENSOR_BA
 _TERRAIN_BIT: Final = dialect.MAV_SYS_STATUS_TERRAIN
 TERRAIN_PARAMETERS: Final = ("TERRAIN_FOLLOW", "RTL_ALT_TYPE")
 """ArduPilot flies by terrain data if one of them is not 0."""
-_REASONS: Final = ("PreArm", "Arm:", "Arming denied", "Preflight Fail", "Preflight:")
 _UNKNOWN_EPH: Final = 65535
 _SATELLITES: Final = 6
 _HDOP_WARN: Final = 2.0
@@ -62,48 +61,16 @@ def sensors(snapshot: Snapshot) -> list[Finding]:
     if missing:
         findings.append(
             warning(
-                "sensors", f"not fitted: {_bit_names(missing)}", "see that this vehicle is meant to fly so"
+                "sensors", f"not fitted: {bit_names(missing)}", "see that this vehicle is meant to fly so"
             )
         )
     if sick & _NEEDED:
         findings.append(
-            problem("sensors", f"not healthy: {_bit_names(sick & _NEEDED)}", "calibrate or mend, and reboot")
+            problem("sensors", f"not healthy: {bit_names(sick & _NEEDED)}", "calibrate or mend, and reboot")
         )
     if sick & ~_NEEDED:
-        findings.append(warning("sensors", f"not healthy: {_bit_names(sick & ~_NEEDED)}", "look at each"))
-    return findings or [ok("sensors", f"healthy: {_bit_names(enabled & present & health & _NEEDED)}")]
-
-
-def _bit_names(bits: int) -> str:
-    names = []
-    for bit in range(32):
-        if bits & 1 << bit:
-            name = enum_name("MAV_SYS_STATUS_SENSOR", 1 << bit) or f"bit {bit}"
-            name = name.removeprefix("MAV_SYS_STATUS_")  # some names have this prefix
-            names.append(name.lower().replace("_", " "))
-    return ", ".join(names)
-
-
-def reasons_against_arming(texts: tuple[str, ...]) -> list[str]:
-    """The texts in which autopilots report why they refuse to arm, without repetitions."""
-    return list(dict.fromkeys(t.strip() for t in texts if t.startswith(_REASONS)))
-
-
-def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
-    """Why the pre-arm checks fail: the autopilot's texts or, without any, the sensors that are not healthy.
-
-    Args:
-        texts: texts that the autopilot sent after a request.
-        sensors_unhealthy: SYS_STATUS bits of the sensors that are enabled and not healthy.
-
-    Returns:
-        The reasons as text; "" when none is known.
-    """
-    reasons = reasons_against_arming(texts)
-    if reasons:
-        return " / ".join(reasons)
-    unhealthy = sensors_unhealthy & ~PREARM_BIT
-    return f"not healthy: {_bit_names(unhealthy)}" if unhealthy else ""
+        findings.append(warning("sensors", f"not healthy: {bit_names(sick & ~_NEEDED)}", "look at each"))
+    return findings or [ok("sensors", f"healthy: {bit_names(enabled & present & health & _NEEDED)}")]
 
 
 def arming(snapshot: Snapshot) -> Finding:

@@ -7,7 +7,7 @@ from pathlib import Path
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.tlog import TlogWriter
 from missions.errors import PlanError
-from missions.runs.run_folder import LOG_NAME, RUNS, create_run_folder
+from missions.flown.run_folder import LOG_NAME, RUNS, create_run_folder
 
 
 @dataclass(slots=True, kw_only=True)

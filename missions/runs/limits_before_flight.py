@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from missions.base.mission import Mission
+from missions.base.options import MissionOptions
+from missions.base.request import RunRequest
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.mission import Mission
-from missions.options import MissionOptions
-from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
-from missions.runs.request import RunRequest
 from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.vehicle.firmware_records import FIRMWARES
+from missions.vehicle.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
 
 if TYPE_CHECKING:
     from flightsim.world_spec import VehicleSpec

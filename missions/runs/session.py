@@ -15,20 +15,13 @@ from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.parameter_files import left_out
+from missions.base.mission import Debriefing, Mission
+from missions.base.options import MissionOptions
+from missions.base.request import RunRequest
 from missions.errors import MissionError, PlanError, TakenOver
 from missions.estimation.in_flight import estimators_of, refused_in_plan
-from missions.how_left import HowLeft
-from missions.library import find_mission
-from missions.mission import Debriefing, Mission
-from missions.notes import FLIGHT, FlightNotes
-from missions.options import MissionOptions
-from missions.preflight.endurance import Endurance, too_long
-from missions.runs.claimed_folder import ClaimedFolder, claim_folder
-from missions.runs.ending import EndingSignals, signal_of
-from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
-from missions.runs.records import FlightRecorder, FlightRecords
-from missions.runs.request import RunRequest
-from missions.runs.run_folder import (
+from missions.flown.records import FlightRecorder, FlightRecords
+from missions.flown.run_folder import (
     LOG_NAME,
     PICTURE_NAME,
     replace_summary,
@@ -39,15 +32,22 @@ from missions.runs.run_folder import (
     wind_words,
     write_summary,
 )
-from missions.runs.signing import client_signing, require_key
+from missions.how_left import HowLeft
+from missions.library import find_mission
+from missions.preflight.endurance import Endurance, too_long
+from missions.process.ending import EndingSignals, signal_of
+from missions.runs.claimed_folder import ClaimedFolder, claim_folder
+from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection, Recorder
+from missions.vehicle.notes import FLIGHT, FlightNotes
+from missions.vehicle.signing import client_signing, require_key
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators
-    from missions.runs.score import FlightScore
+    from missions.flown.score import FlightScore
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
 
@@ -346,7 +346,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     vehicle.notes.autopilot = vehicle.autopilot
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
-        await require_key(request, vehicle)
+        await require_key(request.signing_key, vehicle)
         await _set_parameters(vehicle, request)
     vehicle.sensors.watch(*mission.sensors(request.options))  # its messages while it gets ready count, too
     await vehicle.wait_ready(leave_mode=mission.commands)
@@ -407,7 +407,7 @@ async def _confirm(
     mission: Mission[Any], vehicles: Sequence[Vehicle], options: Sequence[MissionOptions], request: RunRequest
 ) -> None:
     """Check the vehicles and ask for confirmation, unless all prove to be simulations."""
-    from missions.preflight.before_flight import confirmed, look
+    from missions.preflight.before_flight import PlannedFlight, confirmed, look
     from missions.preflight.simulation import simulation_proof
 
     proofs = [await simulation_proof(vehicle) for vehicle in vehicles]
@@ -415,7 +415,17 @@ async def _confirm(
         return
     endurance = _given_endurance(request)
     looks = [
-        await look(vehicle, mission, own, proof, endurance)
+        await look(
+            vehicle,
+            PlannedFlight(
+                mission=mission.name,
+                kinds=mission.kinds,
+                autopilot=mission.world_defaults.autopilot,
+                outline=await mission.outline(vehicle, own),
+            ),
+            proof,
+            endurance,
+        )
         for vehicle, own, proof in zip(vehicles, options, proofs, strict=True)
     ]
     await confirmed(looks, request.confirm)
@@ -467,11 +477,12 @@ async def _report(flight: Flight, on_progress: ProgressListener | None) -> None:
 
 
 def _debrief(request: RunRequest, records: FlightRecords, flight: Flight) -> Debriefing:
-    from missions.runs.score import score
+    from missions.flown.score import score
 
     notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
     flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
-    options = notes[0].options if notes and notes[0].options is not None else request.options
+    flown = notes[0].options if notes else None
+    options = flown if isinstance(flown, MissionOptions) else request.options
     targets_ne_m = None if request.world is None else request.world.magnetic_targets_ne_m
     return Debriefing(
         records=records,

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.camera_picture import PicturesOf
+from missions.base.request import RunRequest
 from missions.errors import PlanError
+from missions.flown.camera_picture import PicturesOf
+from missions.flown.run_folder import EPOCH_UNIX_US
 from missions.kind import VehicleKind
 from missions.runs.claimed_folder import ClaimedFolder
-from missions.runs.request import RunRequest
-from missions.runs.run_folder import EPOCH_UNIX_US
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Link

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Self
 
-from missions.mission import Mission
-from missions.runs.ending import EndedBySignal
-from missions.runs.request import RunRequest
+from missions.base.mission import Mission
+from missions.base.request import RunRequest
+from missions.process.ending import EndedBySignal
 from missions.runs.session import COMPLETED, INTERRUPTED, RunResult, fly
 from missions.studies.trial_runner import trial_folder
 

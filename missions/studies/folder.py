@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 from pyarrow import fs
 
 from missions.errors import MissionError, PlanError
-from missions.runs.run_folder import create_run_folder, finite
+from missions.flown.run_folder import create_run_folder, finite
 from missions.studies.rows import FIGURES, TIMING, Outcome, TrialResult
 from missions.studies.study import Trials
 

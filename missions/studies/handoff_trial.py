@@ -23,7 +23,7 @@ from estimators.relative_pose import (
     RelativePoseParameters,
 )
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
-from missions.orbit.guidance import OrbitGuidance, OrbitParameters
+from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
 
 Array = NDArray[np.float64]

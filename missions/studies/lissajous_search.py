@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from flightsim.world_spec import WorldSpec
-from missions.embedded import TagTarget, tag_search_world
-from missions.options import FlightOptions
-from missions.runs.request import RunRequest
+from missions.base.options import FlightOptions
+from missions.base.request import RunRequest
+from missions.pattern_search.world import TagTarget, tag_search_world
 from missions.studies.design import grid
 from missions.studies.flights import fly_trial
 from missions.studies.results import Results

@@ -12,17 +12,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from missions.embedded.point_searchers import search_with_points
-from missions.embedded.worlds import default_world, occupancy_world
+from missions.base.request import RunRequest
 from missions.occupancy.figures import NAMED_WITHIN_M
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.suspect import Identify
-from missions.runs.request import RunRequest
+from missions.occupancy.world import occupancy_world
+from missions.occupancy.world_searchers import search_with_points
 from missions.studies.design import grid
 from missions.studies.flights import fly_trial
 from missions.studies.results import Results
 from missions.studies.study import Study
+from missions.worlds.defaults import default_world
 
 __all__ = ["Cell", "SearchRow", "study"]
 

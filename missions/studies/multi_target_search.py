@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from missions.multi_target.objective import Exploration
+from missions.search.planner_parameters import Exploration
 from missions.studies.design import grid
 from missions.studies.multi_target_trial import EXPERIMENTS, MAPS, PLANNERS, Cell, Found, SearchTrial
 from missions.studies.results import Results

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.world_spec import WorldSpec
-from missions.embedded import TargetField, multi_target_world, terrain_targets_world
-from missions.multi_target.objective import Exploration
+from missions.base.request import RunRequest
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
-from missions.runs.request import RunRequest
+from missions.multi_target.world import TargetField, multi_target_world, terrain_targets_world
+from missions.search.planner_parameters import Exploration
 from missions.studies.flights import fly_trial
 from missions.studies.study import run_of
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.errors import MissionError, PlanError
-from missions.runs.ending import signal_of
+from missions.process.ending import signal_of
 from missions.studies.engine import Engine, Progress
 from missions.studies.folder import SUMMARY, RowWriter, StudyFolder
 from missions.studies.inline import Inline

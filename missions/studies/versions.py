@@ -4,7 +4,7 @@ import json
 from importlib import metadata
 from typing import Final
 
-from missions.runs.run_folder import versions
+from missions.flown.run_folder import versions
 
 _ALSO: Final = ("scipy",)
 

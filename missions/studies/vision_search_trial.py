@@ -19,12 +19,12 @@ from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
 from flightsim.world_spec import WorldSpec
-from missions.embedded.hidden_tag import vision_search_world
-from missions.runs.request import RunRequest
+from missions.base.request import RunRequest
 from missions.studies.flights import fly_trial
 from missions.studies.study import run_of
 from missions.vision_search.figures import ELLIPSE_95
 from missions.vision_search.options import VisionSearchOptions
+from missions.vision_search.world import vision_search_world
 
 __all__ = ["BELIEFS", "MOMENTS_S", "TEAMS", "Cell", "Localized", "VisionSearchTrial"]
 

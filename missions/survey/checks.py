@@ -8,11 +8,11 @@ from estimators.errors import EstimatorError
 from estimators.survey.processing import check_grid
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
-from missions.planning.limits import FixedWingLimits, Limits
 from missions.survey.flight import airspeed_m_s, planned_lines
 from missions.survey.manoeuvres import box_side_m
 from missions.survey.options import SurveyOptions, map_frame
 from missions.survey.plan import check_lines
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 __all__ = ["check_reach", "check_survey"]
 

@@ -12,16 +12,15 @@ from autopilot_bridge.mission_plan import MissionItem
 from estimators.survey.lines import LinePlan, SurveyLine
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
-from missions.notes import PATTERN, CommandedPath
-from missions.outline import Outline
-from missions.pattern_search.wings.flight import Entry, runway_approach
-from missions.pattern_search.wings.waypoints import way_in_items, waypoint_item
-from missions.planning.limits import FixedWingLimits
+from missions.planning.outline import Outline
+from missions.planning.way_in import Entry, runway_approach, way_in_items, waypoint_item
 from missions.survey.drape import Drape
 from missions.survey.manoeuvres import Programme, manoeuvres
 from missions.survey.options import SurveyOptions, map_frame
 from missions.survey.plan import SurveyPath, line_plan, survey_path
 from missions.vehicle.firmware import Mode
+from missions.vehicle.limits import FixedWingLimits
+from missions.vehicle.notes import PATTERN, CommandedPath
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 from missions.vehicle.vehicle import Vehicle

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Final
 
 from estimators.survey.compensation import CYCLES
-from missions.piloting.control import HeadingController
+from missions.vehicle.piloting import HeadingController
 
 __all__ = ["BOXES", "HEADINGS", "AttitudeCommand", "Manoeuvre", "Programme", "box_side_m", "manoeuvres"]
 

@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flightsim.foundation.geodesy import GeodeticPosition
+from missions.base.mission import Debriefing, Mission, WorldDefaults
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.mission import Debriefing, Mission, WorldDefaults
-from missions.planning.limits import FixedWingLimits, Limits
 from missions.survey.options import SurveyOptions
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 if TYPE_CHECKING:
     from autopilot_bridge.mission_plan import MissionItem
     from estimators.survey.lines import LinePlan
-    from missions.notes import FlightNotes
-    from missions.outline import Outline
+    from missions.planning.outline import Outline
     from missions.survey.outcome import Outcome
+    from missions.vehicle.notes import FlightNotes
     from missions.vehicle.sensors import Sensor
     from missions.vehicle.vehicle import Vehicle
 

@@ -10,10 +10,10 @@ from estimators.occupancy.survey_map import SurveyMap, load_survey_map
 from estimators.survey.compensation import Compensation, load_compensation
 from estimators.survey.processing import LEAST_SPACING_M, ProcessingParameters
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.base.options import MissionOptions, check_positive
 from missions.errors import PlanError
-from missions.options import MissionOptions, check_positive
-from missions.planning.limits import FixedWingLimits, Limits
 from missions.survey.drape import TerrainModel, load_terrain
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 LARGEST_SIDE_M: Final = 60_000.0
 MAX_LINES: Final = 1000

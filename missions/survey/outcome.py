@@ -15,7 +15,7 @@ from estimators.survey.lines import LineKind, LinePlan
 from estimators.survey.processing import SurveyResult, process_survey
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
-from missions.mission import Debriefing
+from missions.base.mission import Debriefing
 from missions.survey.options import SurveyOptions
 from missions.survey.records import Calibration, calibrated, flight_readings
 

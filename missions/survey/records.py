@@ -20,9 +20,9 @@ from estimators.survey.processing import aircraft_field_nt, white_noise_nt
 from estimators.survey.readings import SurveyReadings, placed_readings
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.main_field import MainField
-from missions.notes import FlightNotes
-from missions.runs.records import FlightRecords
+from missions.flown.records import FlightRecords
 from missions.survey.manoeuvres import BOXES, manoeuvres
+from missions.vehicle.notes import FlightNotes
 
 __all__ = ["Calibration", "calibrated", "flight_readings"]
 

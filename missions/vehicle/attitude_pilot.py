@@ -12,11 +12,11 @@ from typing import Final
 from estimators.pressure_height import PressureHeight
 from flightsim.foundation.atmosphere import air_density_ratio
 from missions.errors import MissionError, VehicleTimeout
-from missions.piloting.control import EnergyController, EnergyParameters, EnergyState
 from missions.vehicle.adapters import Adapter
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.link import VehicleLink
 from missions.vehicle.parameters import VehicleParameters
+from missions.vehicle.piloting import EnergyController, EnergyParameters, EnergyState
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.stream_room import make_room
 from missions.vehicle.telemetry import AirData, Attitude, Pressure

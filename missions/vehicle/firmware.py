@@ -8,7 +8,7 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.kind import VehicleKind
-from missions.planning.limits import Limits
+from missions.vehicle.limits import Limits
 
 
 class Mode(StrEnum):

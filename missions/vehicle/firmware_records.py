@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.kind import VehicleKind
-from missions.planning.limits import FixedWingLimits, Limits, MulticopterLimits
 from missions.vehicle.firmware import Firmware, Mode
+from missions.vehicle.limits import FixedWingLimits, Limits, MulticopterLimits
 
 _DATA: Final = tomllib.loads(
     files("missions.vehicle").joinpath("firmware_records.toml").read_text(encoding="utf-8")

@@ -10,13 +10,13 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError, PlanError
-from missions.piloting.control import HeadingController, heading_deg
 from missions.vehicle.adapters import Adapter
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
 from missions.vehicle.guided import guided_session
 from missions.vehicle.parameters import VehicleParameters
+from missions.vehicle.piloting import HeadingController, heading_deg
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude
 

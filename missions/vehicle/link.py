@@ -25,7 +25,6 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, TakenOver, VehicleTimeout
 from missions.how_left import height_text
 from missions.kind import KIND_OF_TYPE, VehicleKind
-from missions.notes import FlightNotes, LinkLoss
 from missions.vehicle import px4_events
 from missions.vehicle.command_authority import CommandAuthority
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
@@ -33,6 +32,7 @@ from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
 from missions.vehicle.link_watch import LOST_AFTER_S, QUIET_AFTER_S, LinkWatch
 from missions.vehicle.mode_tasks import ModeTasks
+from missions.vehicle.notes import FlightNotes, LinkLoss
 from missions.vehicle.system_id_check import SystemIdCheck
 from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
-from missions.planning.limits import Limits
 from missions.vehicle.connection import AUTOPILOT_COMPONENT
+from missions.vehicle.limits import Limits
 from missions.vehicle.link import VehicleLink
 
 _TRIES: Final = 4

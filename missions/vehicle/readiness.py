@@ -5,8 +5,8 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import VehicleTimeout
-from missions.preflight.health import not_ready_because
 from missions.vehicle.adapters import PREARM, Adapter
+from missions.vehicle.arming_reasons import not_ready_because
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
 from missions.vehicle.link import IN_THE_AIR

@@ -20,8 +20,6 @@ from missions.errors import (
 )
 from missions.how_left import Answer, HowLeft, SafetyCommand
 from missions.kind import VehicleKind
-from missions.notes import FlightNotes
-from missions.planning.limits import FORECAST_WIND_M_S, FixedWingLimits, Limits
 from missions.vehicle.adapters import Adapter, ArduPilot, Px4
 from missions.vehicle.command_authority import HEARTBEATS_UNEXPLAINED, Command
 from missions.vehicle.commands import ACK_S, VehicleCommands
@@ -29,8 +27,10 @@ from missions.vehicle.concurrency import run_to_end
 from missions.vehicle.connection import Connection
 from missions.vehicle.firmware import Firmware, Mode
 from missions.vehicle.guided import GuidedSession, LocalOrigin, SetpointSource, guided_session
+from missions.vehicle.limits import FORECAST_WIND_M_S, FixedWingLimits, Limits
 from missions.vehicle.link import VehicleLink
 from missions.vehicle.link_watch import QUIET_AFTER_S
+from missions.vehicle.notes import FlightNotes
 from missions.vehicle.parameters import VehicleParameters
 from missions.vehicle.payload import Payload
 from missions.vehicle.plans import VehiclePlans

@@ -14,9 +14,9 @@ from autopilot_bridge.links import Address, ReplayLog, open_link
 from autopilot_bridge.mavlink import SigningKey, dialect
 from missions.errors import CommandRejected, MissionError, PlanError, VehicleTimeout
 from missions.how_left import height_text
-from missions.runs.signing import client_signing
 from missions.vehicle import Mode, Vehicle
 from missions.vehicle.connection import Connection
+from missions.vehicle.signing import client_signing
 from missions.vehicle.telemetry import Battery, Position
 
 __all__ = ["VehicleState", "connected_vehicle", "disarm", "set_mode", "state", "watched"]

@@ -14,10 +14,11 @@ from autopilot_bridge.links import Address
 from autopilot_bridge.mavlink import dialect, enum_name
 from missions.errors import MissionError, VehicleTimeout
 from missions.preflight.finding import Finding, ok, problem, warning
-from missions.preflight.health import PREARM_BIT, health_findings, remote_control_received
+from missions.preflight.health import health_findings, remote_control_received
 from missions.preflight.lost_link import lost_link, lost_link_words
 from missions.preflight.settings import fence, settings_findings
 from missions.preflight.snapshot import Snapshot
+from missions.vehicle.arming_reasons import PREARM_BIT
 from missions.vehicle_client.client import WANTED, VehicleClient, open_client
 from missions.vehicle_client.listening import SIGNED, LinkQuality, listen
 from missions.vehicle_client.parameters import read_all

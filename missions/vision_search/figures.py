@@ -8,11 +8,11 @@ import numpy as np
 
 from estimators.vision_search import AreaEstimate
 from flightsim.foundation.geodesy import LocalFrame
-from missions.multi_target.figures import true_targets
+from missions.flown.targets import true_targets
 from missions.vision_search.pose_errors import pose_errors
 
 if TYPE_CHECKING:
-    from missions.mission import Debriefing
+    from missions.base.mission import Debriefing
     from missions.vision_search.team import VisionSearchTeam
 
 __all__ = ["ELLIPSE_95", "search_figures", "search_verdict", "true_place"]

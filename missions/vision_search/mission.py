@@ -5,9 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from missions.mission import Debriefing, WorldDefaults
-from missions.planning.limits import Limits
-from missions.team_mission import TeamMission
+from missions.base.mission import Debriefing, WorldDefaults
+from missions.base.team_mission import TeamMission
+from missions.vehicle.limits import Limits
 from missions.vision_search.options import VisionSearchOptions, check_vehicle
 from missions.vision_search.team import VisionSearchTeam
 

@@ -6,12 +6,13 @@ from enum import StrEnum
 from typing import Final
 
 from estimators.vision_search.parameters import BeliefKind, VisionSearchParameters
+from missions.base.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.errors import PlanError
-from missions.multi_target.options import StepLawKind, check_steps
-from missions.multi_target.planner import Area, PlannerParameters
-from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.patterns.lissajous import NAMED_PATTERNS
-from missions.planning.limits import FixedWingLimits, Limits
+from missions.search.area import Area
+from missions.search.options import StepLawKind, check_steps
+from missions.search.planner_parameters import PlannerParameters
+from missions.vehicle.limits import FixedWingLimits, Limits
 
 MAX_STEPS: Final = 20_000
 LARGEST_SIDE_M: Final = 20_000.0

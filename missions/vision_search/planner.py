@@ -18,10 +18,11 @@ from estimators.tracking.camera_sight import CameraSight, SightModel
 from estimators.tracking.grid import GridLayout
 from estimators.vision_search.estimate import AreaEstimate
 from flightsim.foundation.vectors import from_euler, product
-from missions.multi_target.planner import Area, Place, PlannerParameters, SweepPlanner
-from missions.multi_target.search import sweep_path
 from missions.patterns.lissajous import named_lissajous
 from missions.patterns.polyline import Polyline
+from missions.search.area import Area, Place
+from missions.search.planner_parameters import PlannerParameters
+from missions.search.sweep import SweepPlanner, sweep_path
 from missions.vision_search.options import LocalizeKind, SearchPlannerKind, VisionSearchOptions
 
 __all__ = ["AreaPlanner", "HorizonPlanner", "Localizer", "PathPlanner", "planner_of"]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from estimators.received import not_in_gaps, received_times
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
-from missions.runs.records import positions_ned_m
+from missions.flown.records import positions_ned_m
 
 if TYPE_CHECKING:
-    from missions.runs.records import FlightRecords
+    from missions.flown.records import FlightRecords
 
 __all__ = ["PoseErrorFigures", "pose_errors"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from estimators.vision_search import AreaEstimate
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.random_streams import RandomStreams
-from missions.search_team import SearchTeam
+from missions.search.team import SearchTeam
 from missions.vehicle.telemetry import Attitude, Position
 from missions.vision_search.options import VisionSearchOptions, check_vehicle
 from missions.vision_search.search import VisionSearch

@@ -20,7 +20,7 @@ for name in (
     "missions.embedded",
     "missions.estimation.live",
     "missions.library",
-    "missions.runs.picture",
+    "missions.flown.picture",
     "missions.vehicle.concurrency",
     "missions.vehicle_client.doctor",
     "missions.vehicle_client.logs",

@@ -12,8 +12,8 @@ from pymavlink import mavutil
 
 from flightsim.environment import Environment
 from flightsim.world_spec import WorldSpec
+from missions.base.options import FlightOptions, Via
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
 from tests.rotations import rotation_matrix
 from tests.slow import slow

@@ -8,8 +8,8 @@ import pytest
 
 from flightsim.environment import Environment
 from flightsim.world_spec import WorldSpec
+from missions.base.options import FlightOptions, Via
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
 
 FLAVOURS = ("px4", "ardupilot")

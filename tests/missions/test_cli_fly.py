@@ -10,16 +10,16 @@ import pytest
 from click.testing import CliRunner
 
 from autopilot_bridge.clock import Clock
+from missions.base.mission import Debriefing
+from missions.base.options import FlightOptions
+from missions.base.request import RunRequest
 from missions.cli.fly import flight_of, fly
 from missions.cli.fly_report import Pace, print_result
 from missions.cli.mission_command import FlightOption
 from missions.errors import PlanError
+from missions.flown.records import FlightRecords
+from missions.flown.run_folder import wind_words
 from missions.library import MISSIONS
-from missions.mission import Debriefing
-from missions.options import FlightOptions
-from missions.runs.records import FlightRecords
-from missions.runs.request import RunRequest
-from missions.runs.run_folder import wind_words
 from missions.runs.session import Flight, RunResult
 from missions.runs.session import title as run_title
 from missions.vehicle.vehicle import Vehicle

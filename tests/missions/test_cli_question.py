@@ -10,7 +10,7 @@ from tests.terminal import CTRL_C, END_OF_FILE, at_terminal
 FLY = """
 import asyncio, sys
 from missions.cli.confirm import confirmation
-from missions.runs.ending import EndingSignals
+from missions.process.ending import EndingSignals
 from missions.errors import MissionError
 from missions.preflight.before_flight import Look, confirmed
 

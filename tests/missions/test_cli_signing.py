@@ -10,7 +10,7 @@ from autopilot_bridge.links import Reach, listens_to_network, open_link, parse_a
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningState, dialect
 from autopilot_bridge.tlog import TlogWriter
 from missions.cli.main import command_line
-from missions.runs.signing import read_key
+from missions.vehicle.signing import read_key
 
 SHORT = ("--speedup", "0", "--duration", "2", "--no-wait")
 NETWORK = "udpin:0.0.0.0:0"

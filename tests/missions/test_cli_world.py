@@ -11,13 +11,14 @@ from flightsim.home import Home
 from flightsim.payload import GroundTargetParameters, MagneticSpec, Static
 from flightsim.wind_profile import WindLaw, WindProfile
 from flightsim.world_spec import HOMES, VehicleSpec, WorldSpec, team
+from missions.base.mission import WorldDefaults
 from missions.cli.fly import fly
 from missions.cli.sitl import sitl
 from missions.cli.world import world_of
-from missions.embedded import occupancy_world, orbit_world
-from missions.mission import WorldDefaults
 from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions
+from missions.orbit.world import orbit_world
 
 NOT_GIVEN = {
     "world": None, "model": (), "autopilot": None, "launch": None, "gps": None, "home": None, "seed": 0,

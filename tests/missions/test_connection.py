@@ -10,9 +10,9 @@ from autopilot_bridge.clock import LoopClock, TelemetryClock, VirtualTimeLoop, r
 from autopilot_bridge.links import memory_pair, open_link
 from autopilot_bridge.mavlink import FrameEncoder, Intake, dialect
 from autopilot_bridge.mavlink.intake import MAX_PEERS
+from missions.base.options import FlightOptions, Via
 from missions.errors import LinkClosed
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.runs.session import RunRequest, fly
 from missions.vehicle import Vehicle
 from missions.vehicle.connection import ONBOARD_COMPUTER, Connection

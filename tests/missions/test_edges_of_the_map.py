@@ -11,26 +11,23 @@ import pytest
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.world_spec import WorldSpec
-from missions.embedded import (
-    TargetField,
-    handoff_world,
-    multi_target_world,
-    occupancy_world,
-    orbit_world,
-    survey_world,
-    vision_search_world,
-)
+from missions.base.options import FlightOptions, Via
+from missions.base.request import RunRequest
 from missions.handoff.options import HandoffOptions
+from missions.handoff.world import handoff_world
 from missions.library import find_mission
 from missions.multi_target.options import MultiTargetOptions
+from missions.multi_target.world import TargetField, multi_target_world
 from missions.occupancy.options import OccupancyOptions
-from missions.options import FlightOptions, Via
+from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions
+from missions.orbit.world import orbit_world
 from missions.plan_files.options import FileOptions
-from missions.runs.request import RunRequest
 from missions.runs.session import RunResult, fly
 from missions.survey.options import SurveyOptions
+from missions.survey.world import survey_world
 from missions.vision_search.options import VisionSearchOptions
+from missions.vision_search.world import vision_search_world
 
 LINE = Home(lat_deg=20.0, lon_deg=179.9999, alt_m=100.0)
 NORTH = Home(lat_deg=89.0, lon_deg=-30.0, alt_m=100.0)

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from missions.base.options import FlightOptions
 from missions.cli import main as cli
-from missions.options import FlightOptions
+from missions.process.ending import EndedBySignal, EndingSignals
 from missions.runs import session
-from missions.runs.ending import EndedBySignal, EndingSignals
 from missions.runs.session import Flight, RunRequest, RunResult
 
 OPTIONS = FlightOptions(width_m=40.0, height_m=30.0, pattern="L2")
@@ -78,7 +78,7 @@ def test_it_is_obeyed_in_the_background_where_ctrl_c_is_ignored(
 def test_what_is_sent_twice_at_once_is_sent_once(
     elsewhere: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("missions.runs.ending.wall_time_s", lambda: 5.0)
+    monkeypatch.setattr("missions.process.ending.wall_time_s", lambda: 5.0)
     elsewhere.refuse_modes = {"return"}  # so that it takes a while
 
     def send(flight: Flight) -> None:
@@ -104,7 +104,7 @@ def test_a_second_one_stops_at_once(
         now_s[0] += 10.0
         return now_s[0]
 
-    monkeypatch.setattr("missions.runs.ending.wall_time_s", later)
+    monkeypatch.setattr("missions.process.ending.wall_time_s", later)
     send = sending(signal.SIGTERM, second)
 
     def deafen_and_send(flight: Flight) -> None:

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from autopilot_bridge.clock import TelemetryClock
+from missions.base.options import FlightOptions, Via
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.runs import session
 from missions.runs.session import RunRequest
 from missions.runs.vehicle_opening import VehicleOpener, embedded_stage

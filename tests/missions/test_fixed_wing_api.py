@@ -14,10 +14,10 @@ from flightsim.world_spec import WorldSpec
 from missions.embedded import EmbeddedSitl
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.planning.limits import FixedWingLimits
 from missions.vehicle import Mode, Vehicle
 from missions.vehicle.adapters import ArduPilot, Px4
 from missions.vehicle.connection import Connection
+from missions.vehicle.limits import FixedWingLimits
 from missions.vehicle.telemetry import AirData, Attitude, Position
 from missions.vehicle.wing import Approach
 

@@ -3,10 +3,10 @@
 import pytest
 
 from autopilot_bridge.mavlink import FrameParser, LinkSigning, SigningKey, SigningState, dialect
+from missions.base.options import FlightOptions
+from missions.base.request import RunRequest
 from missions.errors import VehicleTimeout
-from missions.options import FlightOptions
-from missions.runs.request import RunRequest
-from missions.runs.signing import require_key
+from missions.vehicle.signing import require_key
 
 KEY = SigningKey.from_passphrase("theirs")
 
@@ -35,7 +35,7 @@ def test_a_vehicle_that_signs_and_does_not_answer_is_refused_before_anything_is_
         autopilot.link.on_receive = lambda data: received.extend(FrameParser().feed(data))
         await vehicle.wait_heartbeat()
         with pytest.raises(VehicleTimeout, match=r"vehicle 1 signs its messages.*`signing_key` FILE"):
-            await require_key(REQUEST, vehicle)
+            await require_key(None, vehicle)
         return {frame.message_id for frame in received}
 
     assert flown(script, ready=False, setup=sign) <= {0, dialect.MAVLINK_MSG_ID_COMMAND_LONG}
@@ -45,7 +45,7 @@ def test_a_vehicle_that_signs_and_does_not_answer_is_refused_before_anything_is_
 def test_a_vehicle_that_answers_wants_no_key(flown, setup):
     async def script(vehicle, autopilot):
         await vehicle.wait_heartbeat()
-        await require_key(REQUEST, vehicle)
+        await require_key(None, vehicle)
         return len(autopilot.commands)
 
     assert flown(script, ready=False, setup=setup) == (setup is sign)

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from missions.layers import Traffic
+from missions.teams.layers import Traffic
 
 
 def test_no_vehicle_rises_before_all_were_checked():

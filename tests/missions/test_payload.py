@@ -7,8 +7,8 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameParser, decode, dialect
 from missions.errors import PlanError
-from missions.notes import FlightNotes
 from missions.vehicle import AttitudeSetpoint
+from missions.vehicle.notes import FlightNotes
 from missions.vehicle.payload import GIMBAL_COMPONENT, Payload, detection, gimbal_attitude
 
 d = dialect

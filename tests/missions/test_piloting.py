@@ -8,8 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimators.pressure_height import PressureHeight
-from missions.piloting import EnergyController, EnergyParameters, HeadingController
-from missions.piloting.control import EnergyState, heading_deg
+from missions.vehicle.piloting import (
+    EnergyController,
+    EnergyParameters,
+    EnergyState,
+    HeadingController,
+    heading_deg,
+)
 
 G = 9.80665
 

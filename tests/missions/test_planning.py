@@ -20,13 +20,13 @@ from missions.patterns import (
     sector,
 )
 from missions.planning import (
-    MulticopterLimits,
     leg_speeds,
     line_trajectory,
     natural_trajectory,
     plan_trajectory,
     waypoints_along,
 )
+from missions.vehicle.limits import MulticopterLimits
 
 LIMITS = MulticopterLimits()
 CURVES = {

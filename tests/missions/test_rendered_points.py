@@ -26,11 +26,11 @@ from flightsim import truth as t
 from flightsim.foundation.vectors import from_euler
 from flightsim.home import Home
 from flightsim.payload import GroundTargets, MovingPointCamera, MovingPointParameters
-from missions.camera_film import CameraFilm
-from missions.camera_picture import CameraPicture, clip, png
 from missions.cli.main import run_command_line
 from missions.embedded.rendered_points import POINT_CAMERA, RenderedPoints, watched
 from missions.estimation.vision import VisionRequest, watch
+from missions.flown.camera_film import CameraFilm
+from missions.flown.camera_picture import CameraPicture, clip, png
 from tests.clients.sitl_process import free_port
 from tests.estimators.vision.test_video import serving
 from tests.missions.test_rendered_motion import CAR, HEIGHT_M, MODEL, PARKED, PITCH_RAD

@@ -10,12 +10,12 @@ import pytest
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.cli.fly_report import report_left_out
-from missions.notes import PATTERN, CommandedPath, FlightNotes
-from missions.runs.picture import draw_run
-from missions.runs.records import FlightRecords
-from missions.runs.run_folder import team_figures, vehicle_summary, versions, write_summary
-from missions.runs.score import Track, path_errors_m, score
-from missions.runs.track import waypoint_misses_m
+from missions.flown.picture import draw_run
+from missions.flown.records import FlightRecords
+from missions.flown.run_folder import team_figures, vehicle_summary, versions, write_summary
+from missions.flown.score import Track, path_errors_m, score
+from missions.flown.track import waypoint_misses_m
+from missions.vehicle.notes import PATTERN, CommandedPath, FlightNotes
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
 

@@ -8,10 +8,10 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.world_spec import WorldSpec
+from missions.base.options import FlightOptions, Via
 from missions.embedded import EmbeddedSitl
 from missions.errors import VehicleTimeout
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.runs.limits_before_flight import adapted
 from missions.vehicle import Vehicle
 from missions.vehicle.connection import Connection

@@ -8,18 +8,18 @@ from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mavlink.target_scan import scan_messages
 from flightsim.payload import CameraParameters, Device, DeviceOutage, PayloadParameters
 from flightsim.world_spec import VehicleSpec, WorldSpec
+from missions.base.options import FlightOptions
+from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
-from missions.embedded import tag_search_world
 from missions.errors import MissionError, VehicleTimeout
 from missions.handoff.options import HandoffOptions
 from missions.kind import VehicleKind
 from missions.library import MISSIONS
 from missions.multi_target.options import MultiTargetOptions
 from missions.occupancy.options import OccupancyOptions
-from missions.options import FlightOptions
 from missions.orbit.options import OrbitOptions
 from missions.pattern_search.mission import PatternMission
-from missions.runs.request import RunRequest
+from missions.pattern_search.world import tag_search_world
 from missions.runs.session import fly
 from missions.survey.options import SurveyOptions
 from missions.vehicle.sensors import CAMERA, GIMBAL, SURVEY_MAGNETOMETER, TAG_CAMERA, TARGET_SENSOR

@@ -19,17 +19,17 @@ from pymavlink import mavutil
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.world_spec import WorldSpec
+from missions.base.mission import Mission
+from missions.base.options import FlightOptions, Via, parameters_from_file, parse_wind
 from missions.cli import fly as cli_fly
 from missions.cli import main as cli
 from missions.cli.options import SIDES
 from missions.errors import MissionError, PlanError
+from missions.flown.records import FlightRecords
+from missions.flown.run_folder import create_run_folder
 from missions.library import MISSIONS, find_mission
-from missions.mission import Mission
-from missions.options import FlightOptions, Via, parameters_from_file, parse_wind
 from missions.pattern_search.mission import PatternMission
 from missions.runs import session
-from missions.runs.records import FlightRecords
-from missions.runs.run_folder import create_run_folder
 from missions.runs.session import RunRequest
 
 REQUIRED = {
@@ -368,7 +368,7 @@ def test_a_failed_flight_exits_1_with_one_line(scripted, tmp_path, capsys, make_
 def lissajous_off_by(monkeypatch, offset_m):
     """Every commanded pattern is drawn some way off from what is flown."""
     monkeypatch.setattr(
-        "missions.runs.score.path_errors_m", lambda path, track: np.full(len(track.time_s), offset_m)
+        "missions.flown.score.path_errors_m", lambda path, track: np.full(len(track.time_s), offset_m)
     )
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from missions.errors import PlanError
-from missions.planning.limits import MulticopterLimits
-from missions.steering import CourseReference
+from missions.teams.steering import CourseReference
+from missions.vehicle.limits import MulticopterLimits
 
 LIMITS = MulticopterLimits()
 STEP_S = 0.04

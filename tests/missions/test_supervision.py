@@ -11,7 +11,7 @@ from tests.clients.tied_process import gone
 SCRIPT = """
 import os, signal, sys, time
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # as on a terminal, though the tests are run by nohup
-from missions.runs.supervision import supervised
+from missions.process.supervision import supervised
 
 {setup}
 

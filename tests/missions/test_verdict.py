@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from flightsim.world_spec import WorldSpec
+from missions.base.options import FlightOptions, Via
+from missions.flown.score import Track
+from missions.flown.verdict import path_verdict
 from missions.kind import VehicleKind
-from missions.notes import PATTERN, CommandedPath, CutShort, FlightNotes
-from missions.options import FlightOptions, Via
 from missions.runs import session
-from missions.runs.score import Track
 from missions.runs.session import RunRequest
-from missions.runs.verdict import path_verdict
+from missions.vehicle.notes import PATTERN, CommandedPath, CutShort, FlightNotes
 from tests.missions.conftest import HOME
 
 PATH = np.column_stack((np.arange(0.0, 201.0), np.zeros(201), np.full(201, -10.0)))

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from missions.base.options import FlightOptions, Via
 from missions.errors import PlanError
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.pattern_search.mission import PatternMission
 from missions.pattern_search.wings.flight import with_leads
 from missions.pattern_search.wings.pattern import check_wings
@@ -22,9 +22,9 @@ from missions.pattern_search.wings.setpoints import path_point
 from missions.pattern_search.wings.waypoints import turn_in_m, waypoints_of
 from missions.patterns import named_lissajous
 from missions.planning.flyable import FlyablePath, flyable_path
-from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import roll_in_m
 from missions.vehicle.firmware_records import ARDUPLANE, PX4_PLANE
+from missions.vehicle.limits import FixedWingLimits
 
 STOCK_PLANE = {"AIRSPEED_CRUISE": 22.0, "ROLL_LIMIT_DEG": 65.0, "NAVL1_PERIOD": 15.0, "RLL2SRV_TCONST": 0.25}
 """What ArduPilot 4.6.3's simulated plane reports, where it is not the firmware's default."""

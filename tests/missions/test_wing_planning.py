@@ -13,19 +13,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from missions.base.options import FlightOptions, Via
 from missions.errors import PlanError
 from missions.library import MISSIONS
 from missions.occupancy.options import OccupancyOptions
-from missions.options import FlightOptions, Via
 from missions.orbit.options import OrbitOptions
-from missions.pattern_search.wings.flight import Entry, with_leads
+from missions.pattern_search.wings.flight import with_leads
 from missions.pattern_search.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.patterns import Polyline, named_lissajous, parallel_sweep, sector
 from missions.planning.corners import Corner
 from missions.planning.flyable import flyable_path
-from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import check_turns, roll_in_m
+from missions.planning.way_in import Entry
+from missions.vehicle.limits import FixedWingLimits
 
 AEROSONDE = FixedWingLimits(
     airspeed_min_m_s=18.0,

@@ -21,19 +21,31 @@ from autopilot_bridge.sitl import Sitl
 from estimators.interface import Estimator
 from flightsim.payload import GroundTargetParameters, Static
 from flightsim.world_spec import FaultSpec, FaultUnit, WorldSpec
-from missions.embedded import CAMERA, carrying, occupancy_world, orbit_world
+from missions.base.mission import Mission
+from missions.base.options import FlightOptions
 from missions.embedded.sitl import EmbeddedSitl
-from missions.mission import Mission
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions
-from missions.options import FlightOptions
+from missions.occupancy.world import occupancy_world
 from missions.orbit.mission import OrbitMission
 from missions.orbit.options import OrbitOptions
+from missions.orbit.world import orbit_world
 from missions.runs.session import RunRequest, fly
+from missions.worlds.payloads import CAMERA, carrying
 
 OURS = ("flightsim", "autopilot_bridge", "estimators", "missions", "tests")
 BORDER = ("autopilot_bridge.links", "autopilot_bridge.clock")
-HIDDEN = ("flightsim", "autopilot_bridge.sitl", "autopilot_bridge.autopilot", "missions.embedded")
+MISSIONS = ("handoff", "multi_target", "occupancy", "orbit", "pattern_search", "survey", "vision_search")
+HIDDEN = (
+    *(
+        "flightsim",
+        "autopilot_bridge.sitl",
+        "autopilot_bridge.autopilot",
+        "missions.embedded",
+        "missions.worlds",
+    ),
+    *(f"missions.{name}.world" for name in MISSIONS),
+)
 CONTAINERS = (dict, list, tuple, set, frozenset, deque, types.MappingProxyType)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from missions.runs.records import FlightRecords
+from missions.flown.records import FlightRecords
 from tests.system.runs import SHORT, started, wait_until
 from tests.terminal import at_terminal
 

@@ -15,12 +15,12 @@ import pytest
 from autopilot_bridge.clock import LoopClock
 from autopilot_bridge.mavlink import decode, definition, dialect
 from autopilot_bridge.tlog import TlogReader
+from missions.base.mission import Mission
+from missions.base.options import FlightOptions, Via
+from missions.base.request import RunRequest
 from missions.embedded import EmbeddedSitl
 from missions.library import find_mission
-from missions.mission import Mission
-from missions.options import FlightOptions, Via
 from missions.runs import session
-from missions.runs.request import RunRequest
 from missions.runs.vehicle_opening import VehicleOpener, embedded_stage
 from missions.vehicle import Mode, Setpoint, Vehicle
 from missions.vehicle.connection import GROUND_STATION, Connection

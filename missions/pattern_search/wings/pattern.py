@@ -6,15 +6,15 @@ from typing import Final
 import numpy as np
 
 from flightsim.foundation.geodesy import LocalFrame
+from missions.base.options import FlightOptions, Via
 from missions.errors import PlanError
-from missions.options import FlightOptions, Via
 from missions.pattern_search.wings.flight import PatternFlight, with_leads
 from missions.pattern_search.wings.setpoints import fly_setpoints
 from missions.pattern_search.wings.waypoints import fly_waypoints
 from missions.patterns.curve import Curve
 from missions.planning.flyable import flyable_path
-from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import check_turns, roll_in_m
+from missions.vehicle.limits import FixedWingLimits
 from missions.vehicle.vehicle import Vehicle
 
 _REACH_SAMPLES: Final = 1000

@@ -6,12 +6,13 @@ from typing import Final
 
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
-from missions.notes import PATTERN
-from missions.pattern_search.wings.flight import Entry, PatternFlight
+from missions.pattern_search.wings.flight import PatternFlight
 from missions.pattern_search.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.planning.flyable import FlyablePath
+from missions.planning.way_in import Entry
 from missions.vehicle import telemetry
+from missions.vehicle.notes import PATTERN
 from missions.vehicle.setpoint import AnySetpoint, AttitudeSetpoint, Setpoint
 from missions.vehicle.vehicle import Vehicle
 

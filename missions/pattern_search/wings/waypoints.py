@@ -1,19 +1,17 @@
 """Flies a pattern as an uploaded mission: takeoff, an entry circle, its waypoints, the landing."""
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from flightsim.foundation.geodesy import LocalFrame
+from missions.base.options import FlightOptions
 from missions.errors import VehicleTimeout
-from missions.notes import PATTERN, CutShort
-from missions.options import FlightOptions
-from missions.pattern_search.wings.flight import Entry, PatternFlight
+from missions.pattern_search.wings.flight import PatternFlight
 from missions.pattern_search.wings.place import PlaceOnPath
 from missions.planning.flyable import FlyablePath
-from missions.planning.limits import FixedWingLimits
+from missions.planning.way_in import Entry, way_in_items, waypoint_item
+from missions.vehicle.limits import FixedWingLimits
+from missions.vehicle.notes import PATTERN, CutShort
 from missions.vehicle.vehicle import Vehicle
 
 _DEVIATION_M: Final = 1.0
@@ -133,59 +131,10 @@ def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
     )
 
 
-def way_in_items(
-    vehicle: Vehicle, entry: Entry, *, airspeed_m_s: float, takeoff_m: float, height_m: float
-) -> list[MissionItem]:
-    """Takeoff, airspeed, and a circle that is left along a path's beginning.
-
-    Args:
-        vehicle: the aircraft.
-        entry: the circle, from its home.
-        airspeed_m_s: from the takeoff on.
-        takeoff_m: height above home at the end of the takeoff.
-        height_m: height above home of the circle.
-    """
-    lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(*entry.centre_m, 0.0)
-    return [
-        vehicle.firmware.takeoff_item(vehicle.home, takeoff_m),
-        MissionItem(
-            command=dialect.MAV_CMD_DO_CHANGE_SPEED,
-            frame=dialect.MAV_FRAME_MISSION,
-            param1=0.0,  # airspeed
-            param2=airspeed_m_s,
-            param3=-1.0,
-        ),
-        MissionItem(
-            command=dialect.MAV_CMD_NAV_LOITER_TO_ALT,
-            param1=1.0,  # leave the circle only in the direction of the next item
-            param2=math.copysign(entry.radius_m, 1.0 if entry.clockwise else -1.0),
-            param4=1.0,  # the leg begins where the circle is left
-            x=lat,
-            y=lon,
-            z=height_m,
-        ),
-    ]
-
-
 def _waypoint(
     vehicle: Vehicle, options: FlightOptions, radius_m: float, north_m: float, east_m: float
 ) -> MissionItem:
     return waypoint_item(vehicle, radius_m, north_m, east_m, options.own_altitude_m)
-
-
-def waypoint_item(
-    vehicle: Vehicle, radius_m: float, north_m: float, east_m: float, height_m: float
-) -> MissionItem:
-    """A waypoint at a place from home, with the distance before it at which the next leg may begin."""
-    lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(north_m, east_m, 0.0)
-    return MissionItem(
-        command=dialect.MAV_CMD_NAV_WAYPOINT,
-        param2=radius_m,
-        param4=vehicle.firmware.unset,
-        x=lat,
-        y=lon,
-        z=height_m,
-    )
 
 
 async def _passed(vehicle: Vehicle, place: PlaceOnPath, arc_m: float) -> None:

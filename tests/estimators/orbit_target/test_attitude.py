@@ -12,9 +12,9 @@ from estimators.vehicle_time import VehicleTime
 from flightsim.environment import Environment
 from flightsim.foundation.vectors import yaw_of
 from flightsim.world_spec import WorldSpec
-from missions.embedded import orbit_world
 from missions.library import find_mission
 from missions.orbit.options import AttitudeFrom, OrbitOptions
+from missions.orbit.world import orbit_world
 from missions.runs.session import RunRequest, fly
 
 ROLL, PITCH, YAW = 0.3, -0.1, 2.0

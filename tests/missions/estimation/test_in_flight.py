@@ -8,12 +8,12 @@ import pytest
 
 from estimators.logs import open_log
 from flightsim.world_spec import WorldSpec
+from missions.base.options import FlightOptions, Via
 from missions.cli.main import run_command_line
 from missions.errors import PlanError
 from missions.estimation.in_flight import estimators_of
 from missions.estimation.over_logs import ReplayRequest, replay_logs
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
 from missions.runs import session
 from missions.runs.session import RunRequest
 

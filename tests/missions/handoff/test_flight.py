@@ -11,11 +11,11 @@ from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
 from flightsim.world_spec import WorldSpec
+from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
-from missions.embedded import WalkingTargets, handoff_world
 from missions.handoff.mission import HandoffMission
 from missions.handoff.options import HandoffOptions
-from missions.runs.request import RunRequest
+from missions.handoff.world import WalkingTargets, handoff_world
 from missions.runs.session import fly
 
 

@@ -8,11 +8,11 @@ import pytest
 from autopilot_bridge.mavlink import dialect
 from flightsim.payload import TargetShape
 from flightsim.world_spec import WorldSpec
-from missions.embedded import WalkingTargets, handoff_world
 from missions.errors import PlanError
 from missions.handoff.options import HandoffOptions, check_vehicle
 from missions.handoff.watch import RadioLink
-from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.handoff.world import WalkingTargets, handoff_world
+from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 
 
 @pytest.mark.parametrize(

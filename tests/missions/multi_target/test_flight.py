@@ -14,12 +14,13 @@ from estimators.log_replay import replay
 from estimators.logs import open_log
 from flightsim.payload import ScanDisturbance
 from flightsim.world_spec import WorldSpec
+from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
-from missions.embedded import TargetField, multi_target_world
 from missions.multi_target.mission import MultiTargetMission
-from missions.multi_target.options import MultiTargetOptions, StepLawKind
-from missions.runs.request import RunRequest
+from missions.multi_target.options import MultiTargetOptions
+from missions.multi_target.world import TargetField, multi_target_world
 from missions.runs.session import fly
+from missions.search.options import StepLawKind
 from tests.clients.sent_again import send_again
 from tests.clients.sitl_process import free_port
 from tests.slow import slow

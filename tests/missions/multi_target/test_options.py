@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from flightsim.world_spec import WorldSpec
-from missions.embedded import TargetField, multi_target_world
 from missions.errors import PlanError
 from missions.multi_target.options import MultiTargetOptions, check_vehicle
-from missions.multi_target.planner import Area
-from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.multi_target.world import TargetField, multi_target_world
+from missions.search.area import Area
+from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,13 @@ from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.information import detection_information
 from estimators.tracking.range_bearing import Viewpoint
 from missions.errors import PlanError
-from missions.multi_target.objective import Exploration, SearchObjective
+from missions.multi_target.objective import SearchObjective
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
-from missions.multi_target.planner import Area, ExploringPlanner, PlannerParameters, SweepPlanner
-from missions.multi_target.search import TargetSearch, sweep_path
+from missions.multi_target.planner import ExploringPlanner
+from missions.multi_target.search import TargetSearch
+from missions.search.area import Area
+from missions.search.planner_parameters import Exploration, PlannerParameters
+from missions.search.sweep import SweepPlanner, sweep_path
 
 AREA = Area(south_m=0.0, west_m=0.0, north_m=200.0, east_m=200.0)
 PARAMETERS = MultiTargetParameters(south_m=0.0, west_m=0.0, north_m=200.0, east_m=200.0)

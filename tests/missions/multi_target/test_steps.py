@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 
 from missions.errors import PlanError
-from missions.multi_target.steps import BacksteppingGains, BacksteppingLaw, TrajectoryLaw
-from missions.planning.limits import MulticopterLimits
+from missions.search.steps import BacksteppingGains, BacksteppingLaw, TrajectoryLaw
+from missions.vehicle.limits import MulticopterLimits
 
 LIMITS = MulticopterLimits()
 START, AIM = (0.0, 0.0, -10.0), (9.0, 0.0, -10.0)

@@ -19,15 +19,15 @@ from flightsim.foundation.geodesy import LocalFrame
 from flightsim.home import Home
 from flightsim.payload import DipoleSignature, MagneticMap, magnetic_field_of
 from flightsim.world_spec import WorldSpec
+from missions.base.request import RunRequest
 from missions.cli import main as cli
-from missions.embedded import occupancy_world
 from missions.errors import PlanError
+from missions.flown.records import FlightRecords
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.suspect import Identify
-from missions.runs.records import FlightRecords
-from missions.runs.request import RunRequest
+from missions.occupancy.world import occupancy_world
 from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
 

@@ -6,13 +6,12 @@ from dataclasses import replace
 import pytest
 
 from flightsim.world_spec import WorldSpec
-from missions.embedded import occupancy_world
-from missions.embedded.worlds import drawn_false_anomalies, drawn_target
 from missions.errors import PlanError
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions, check_vehicle
 from missions.occupancy.suspect import Identify
-from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.occupancy.world import drawn_false_anomalies, drawn_target, occupancy_world
+from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 
 WINGS = FixedWingLimits(
     airspeed_min_m_s=18.0,

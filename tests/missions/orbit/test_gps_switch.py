@@ -4,11 +4,11 @@ import pytest
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError
-from missions.notes import FlightNotes
-from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.mission import orbit_verdict
-from missions.orbit.options import GpsOff, OrbitOptions
+from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
+from missions.vehicle.gps_switch import GpsOff, GpsSwitch
+from missions.vehicle.notes import FlightNotes
 
 INJECT = dialect.MAV_CMD_INJECT_FAILURE
 REAL = 9  # MAV_PARAM_TYPE

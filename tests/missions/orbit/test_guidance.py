@@ -8,7 +8,12 @@ import pytest
 from estimators.orbit_target.attitude import AutopilotAttitude
 from estimators.orbit_target.relative_target import RelativeState
 from estimators.orbit_target.tracker import TargetStatus, TargetTracker
-from missions.orbit.guidance import GRAVITY_M_S2, OrbitGuidance, OrbitParameters, bearing_off_velocity_rad
+from missions.planning.orbit_guidance import (
+    GRAVITY_M_S2,
+    OrbitGuidance,
+    OrbitParameters,
+    bearing_off_velocity_rad,
+)
 from tests.missions.orbit.coordinated_turn import PointMass
 from tests.slow import slow_after
 

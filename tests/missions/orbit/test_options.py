@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from missions.cli.fly import fly
 from missions.errors import PlanError
 from missions.orbit.options import OrbitOptions
-from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 
 WINGS = FixedWingLimits(
     airspeed_min_m_s=18.0,

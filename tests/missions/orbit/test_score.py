@@ -2,13 +2,13 @@
 
 import pytest
 
-from missions.mission import Debriefing
-from missions.notes import FlightNotes
+from missions.base.mission import Debriefing
+from missions.flown.records import FlightRecords
+from missions.flown.score import score
 from missions.orbit.mission import OrbitMission
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.runs.records import FlightRecords
-from missions.runs.score import score
+from missions.vehicle.notes import FlightNotes
 
 MARKS = {
     "radius_estimate_mean_m": 150.4,

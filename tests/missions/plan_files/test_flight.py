@@ -7,14 +7,14 @@ import pytest
 
 from flightsim.home import Home
 from flightsim.world_spec import WorldSpec
+from missions.base.options import FlightOptions
 from missions.errors import PlanError
 from missions.library import find_mission
-from missions.options import FlightOptions
-from missions.plan_files.export import export_plan
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.options import FileOptions, Then
-from missions.planning.limits import WIDEST_LIMITS
+from missions.runs.plan_export import export_plan
 from missions.runs.session import RunRequest, fly
+from missions.vehicle.limits import WIDEST_LIMITS
 from tests.missions.plan_files.plans import LANDING, LAT, LON, changed, simple, waypoint, write
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

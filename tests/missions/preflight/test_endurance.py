@@ -4,15 +4,15 @@ import pytest
 
 from flightsim.hover_endurance import hover_endurance_s
 from flightsim.world_spec import VehicleSpec, WorldSpec
+from missions.base.options import FlightOptions
+from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.options import FlightOptions
-from missions.outline import Outline
+from missions.planning.outline import Outline
 from missions.preflight.endurance import Endurance, endurance_finding, reported_endurance, too_long
 from missions.preflight.finding import Level
 from missions.preflight.snapshot import Snapshot
-from missions.runs.request import RunRequest
 from missions.runs.session import fly
 
 OUTLINE = Outline(duration_s=600.0)

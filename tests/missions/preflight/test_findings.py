@@ -13,10 +13,11 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.kind import VehicleKind
 from missions.preflight.before_flight import first_outside
 from missions.preflight.finding import Finding, Level
-from missions.preflight.health import health_findings, not_ready_because, reasons_against_arming, sensors
+from missions.preflight.health import health_findings, sensors
 from missions.preflight.lost_link import lost_link, lost_link_words
 from missions.preflight.settings import areas_watched, fence, settings_findings, shapes_join
 from missions.preflight.snapshot import Snapshot
+from missions.vehicle.arming_reasons import not_ready_because, reasons_against_arming
 
 HEALTH, PRESENT = "onboard_control_sensors_health", "onboard_control_sensors_present"
 COPTER, PLANE = VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING

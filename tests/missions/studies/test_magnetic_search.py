@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from missions.cli.main import run_command_line
-from missions.embedded.point_searchers import search_with_points
-from missions.embedded.worlds import drawn_target
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.suspect import Identify
+from missions.occupancy.world import drawn_target
+from missions.occupancy.world_searchers import search_with_points
 from missions.studies import run_study, run_trial
 from missions.studies.magnetic_search import report, study, summarise
 

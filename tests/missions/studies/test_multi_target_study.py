@@ -5,8 +5,8 @@ import pytest
 
 from flightsim.payload import TerrainSpec
 from flightsim.world_spec import WorldSpec
-from missions.embedded import terrain_targets_world
 from missions.multi_target.options import MultiTargetOptions
+from missions.multi_target.world import terrain_targets_world
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.design import grid
 from missions.studies.multi_target_search import study, summarise

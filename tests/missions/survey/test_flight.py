@@ -24,16 +24,16 @@ from flightsim.home import Home
 from flightsim.payload import VehicleField, VehicleFieldParameters, magnetic_field_of
 from flightsim.payload.survey_grid import map_from_survey
 from flightsim.world_spec import WorldSpec
+from missions.base.request import RunRequest
 from missions.cli import main as cli
-from missions.embedded import survey_world
-from missions.runs.records import FlightRecords
-from missions.runs.request import RunRequest
+from missions.flown.records import FlightRecords
 from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
 from missions.survey.mission import SurveyMission
 from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
 from missions.survey.outcome import COMPENSATION
 from missions.survey.records import flight_readings
+from missions.survey.world import survey_world
 from tests.measured_survey import SURVEY, with_measured_survey
 
 SMALL = SurveyOptions(width_m=500.0, height_m=600.0, spacing_m=250.0, tie_spacing_m=500.0, map_error_nt=0.0)

@@ -11,7 +11,6 @@ from scipy.optimize import linprog
 from estimators.survey.lines import LineKind
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
-from missions.planning.limits import FixedWingLimits
 from missions.survey.checks import check_reach, check_survey
 from missions.survey.drape import Drape, TerrainModel, load_terrain
 from missions.survey.dubins import Pose, shortest_path
@@ -19,6 +18,7 @@ from missions.survey.flight import planned_survey
 from missions.survey.manoeuvres import Axis, Programme, manoeuvres
 from missions.survey.options import SurveyOptions
 from missions.survey.plan import _followed, line_plan, survey_path
+from missions.vehicle.limits import FixedWingLimits
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.55, alt_m=480.0)
 WINGS = FixedWingLimits(

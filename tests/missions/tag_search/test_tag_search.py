@@ -11,12 +11,13 @@ from pymavlink import mavutil
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.payload import CameraView, GroundTargetParameters, Static, TargetView
 from flightsim.world_spec import WorldSpec
-from missions.embedded import TagTarget, search_camera, tag_search_world
+from missions.base.options import FlightOptions, Via
+from missions.base.request import RunRequest
 from missions.errors import PlanError
 from missions.library import find_mission
-from missions.options import FlightOptions, Via
-from missions.runs.request import RunRequest
+from missions.pattern_search.world import TagTarget, tag_search_world
 from missions.runs.session import fly
+from missions.worlds.search_camera import search_camera
 
 LOW_HOME_SEED = 16
 """With this seed the autopilot's home is 1.2 m below the origin of its local frame."""

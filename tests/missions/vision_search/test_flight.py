@@ -17,14 +17,14 @@ from estimators.logs import open_log
 from estimators.messages import read_message
 from flightsim.payload import PayloadParameters, PinholeModel
 from flightsim.world_spec import WorldSpec
+from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
-from missions.embedded import HiddenTag, vision_search_world
-from missions.embedded.tag_search import search_camera
-from missions.embedded.worlds import carrying
-from missions.runs.request import RunRequest
 from missions.runs.session import fly
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
+from missions.vision_search.world import HiddenTag, vision_search_world
+from missions.worlds.payloads import carrying
+from missions.worlds.search_camera import search_camera
 from tests.clients.sent_again import send_again
 from tests.clients.sitl_process import free_port
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from missions.errors import PlanError
-from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 from missions.vision_search.options import LocalizeKind, VisionSearchOptions, check_vehicle
 
 COPTER = MulticopterLimits()

@@ -10,7 +10,7 @@ import pytest
 from estimators.tracking.camera_sight import CameraSight
 from estimators.vision_search import AreaEstimate, VisionSearchEstimator
 from flightsim.foundation.vectors import from_euler, product
-from missions.planning.limits import FixedWingLimits, MulticopterLimits
+from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 from missions.vision_search.figures import search_verdict
 from missions.vision_search.options import LocalizeKind, SearchPlannerKind, VisionSearchOptions
 from missions.vision_search.planner import Localizer, planner_of

@@ -7,9 +7,9 @@ import pytest
 
 from flightsim.payload import RandomWalk
 from flightsim.world_spec import WorldSpec
-from missions.embedded import HiddenTag, vision_search_world
 from missions.errors import PlanError
 from missions.vision_search.options import VisionSearchOptions
+from missions.vision_search.world import HiddenTag, vision_search_world
 
 OPTIONS = VisionSearchOptions(area_m=(0.0, -50.0, 100.0, 50.0))
 

@@ -1,0 +1,1 @@
+"""What every mission has: its base class, its options, and the request of a run."""

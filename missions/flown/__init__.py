@@ -1,0 +1,1 @@
+"""A finished flight: its records, score, verdict, pictures and run folder."""

@@ -1,0 +1,237 @@
+"""The world of a search for many targets: sensors on the vehicles, and targets drawn from the seed."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from flightsim.foundation.random_streams import RandomStreams
+from flightsim.payload import (
+    GroundTargetParameters,
+    PayloadParameters,
+    RandomWalk,
+    ScanDisturbance,
+    Static,
+    TargetMotion,
+    TargetSensorParameters,
+    TerrainSpec,
+)
+from flightsim.world_spec import WorldSpec
+from missions.errors import PlanError
+from missions.multi_target.options import REACH, MultiTargetOptions
+from missions.search.area import Area
+from missions.worlds.payloads import carrying
+
+__all__ = ["TargetField", "multi_target_world", "terrain_targets_world"]
+
+MAX_TARGETS: Final = 250
+_APART_M: Final = 6.0  # least distance of two targets of a cluster
+_CENTRES_APART: Final = 0.28  # least distance of two clusters, in shorter sides of the area
+_EDGE: Final = 0.15  # of a side: the centres of clusters keep this distance from the edges
+_TRIES: Final = 10_000
+_TERRAIN_SIGMA_M: Final = 15.0  # standard deviation of a cluster at a high or low place
+_TERRAIN_RELIEF_M: Final = 25.0
+_TERRAIN_APART_M: Final = 90.0
+_TERRAIN_EDGE_M: Final = 35.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetField:
+    """The true targets.
+
+    Attributes:
+        count: number of targets (paper: 18, and 14).
+        clusters: number of clusters; 0: the targets are uniform over the area.
+        cluster_sigma_m: standard deviation of a cluster, per axis.
+        speed_m_s: speed of targets that walk about in the area; 0: they stay where they are.
+    """
+
+    count: int = 18
+    clusters: int = 3
+    cluster_sigma_m: float = 14.0
+    speed_m_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.count <= MAX_TARGETS:
+            raise PlanError(f"`targets` {self.count} is not in 0..{MAX_TARGETS}")
+        if not 0 <= self.clusters <= max(self.count, 0):
+            raise PlanError(f"`clusters` {self.clusters} is not in 0..{self.count}, the number of targets")
+        if not (math.isfinite(self.cluster_sigma_m) and self.cluster_sigma_m > 0.0):
+            raise PlanError(
+                f"`cluster_sigma_m` {self.cluster_sigma_m:g} m is not possible; ask for more than 0"
+            )
+        if not 0.0 <= self.speed_m_s <= 15.0:
+            raise PlanError(f"`target_speed_m_s` {self.speed_m_s:g} m/s is not in 0..15 m/s")
+
+    def places(self, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
+        """Places of the targets: the clusters have equal numbers, apart from a remainder.
+
+        Raises:
+            PlanError: the area is too small for them.
+        """
+        return _around(self._centres(area, rng), self.count, self.cluster_sigma_m, area, rng)
+
+    def _centres(self, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
+        apart_m = _CENTRES_APART * min(area.height_m, area.width_m)
+        edge_n, edge_e = _EDGE * area.height_m, _EDGE * area.width_m
+        for shrink in range(_TRIES):
+            centres: list[tuple[float, float]] = []
+            for _ in range(self.clusters):
+                centres.append(
+                    (
+                        float(rng.uniform(area.south_m + edge_n, area.north_m - edge_n)),
+                        float(rng.uniform(area.west_m + edge_e, area.east_m - edge_e)),
+                    )
+                )
+            nearest = min(
+                (math.dist(a, b) for k, a in enumerate(centres) for b in centres[:k]), default=math.inf
+            )
+            if nearest >= apart_m * 0.995**shrink:
+                return centres
+        raise AssertionError("the distance falls until the centres have room")
+
+
+def multi_target_world(
+    world: WorldSpec,
+    options: MultiTargetOptions,
+    field: TargetField | None = None,
+    *,
+    terrain_relief_m: float | None = None,
+    disturbances: tuple[ScanDisturbance, ...] = (),
+    scan_period_s: float = 1.0,
+) -> WorldSpec:
+    """The world of a search: a target sensor on each vehicle, with the properties that the operator knows,
+    and targets.
+
+    Args:
+        world: the rest of the world; targets that it has stay, and no other is added.
+        options: the search.
+        field: the targets, drawn from the world's seed.
+        terrain_relief_m: standard deviation of generated terrain that hides targets; None: level ground.
+        disturbances: of the sensors.
+        scan_period_s: time between scans.
+
+    Raises:
+        PlanError: targets or sensor are impossible.
+    """
+    area = options.area
+    try:
+        sensor = TargetSensorParameters(
+            period_s=scan_period_s,
+            gain=options.gain,
+            forward_scale_m=options.field_of_view_m[0],
+            right_scale_m=options.field_of_view_m[1],
+            reach_m=REACH * max(options.field_of_view_m),
+            range_sigma_m=options.range_sigma_m,
+            bearing_sigma_rad=options.bearing_sigma_rad,
+            clutter_per_scan=options.clutter_per_scan,
+            disturbances=disturbances,
+        )
+    except ValueError as error:
+        raise PlanError(f"the target sensor can't be made: {error}") from None
+    world = carrying(world, PayloadParameters(target_sensor=sensor))
+    if terrain_relief_m is not None and world.terrain is None:
+        margin_m = sensor.reach_m
+        try:
+            terrain = TerrainSpec(
+                south_m=area.south_m - margin_m,
+                west_m=area.west_m - margin_m,
+                north_m=area.north_m + margin_m,
+                east_m=area.east_m + margin_m,
+                relief_m=terrain_relief_m,
+            )
+        except ValueError as error:
+            raise PlanError(f"the terrain can't be made: {error}") from None
+        world = replace(world, terrain=terrain)
+    if world.targets:
+        return world
+    field = field or TargetField()
+    rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("multi_target", "field")))
+    targets = tuple(
+        GroundTargetParameters(motion=_motion(place, area, field.speed_m_s))
+        for place in field.places(area, rng)
+    )
+    return replace(world, targets=targets)
+
+
+def _motion(place_ne_m: tuple[float, float], area: Area, speed_m_s: float) -> TargetMotion:
+    if not speed_m_s:
+        return Static(north_m=place_ne_m[0], east_m=place_ne_m[1])
+    return RandomWalk(
+        south_m=area.south_m,
+        west_m=area.west_m,
+        north_m=area.north_m,
+        east_m=area.east_m,
+        speed_m_s=speed_m_s,
+        start_m=place_ne_m,
+    )
+
+
+def terrain_targets_world(
+    world: WorldSpec, options: MultiTargetOptions, number: int, *, count: int, clusters: int
+) -> WorldSpec:
+    """The world with targets in clusters at the lowest places of a terrain (even numbers), or at the highest
+    (odd numbers): litter that water carries downhill, or that stays uphill (the paper's second experiment).
+
+    The terrain is the same for every seed. It decides where the targets are, and hides none.
+
+    Args:
+        world: the targets are drawn from its seed.
+        options: the search.
+        number: number of the terrain.
+        count, clusters: of the targets.
+    """
+    area = options.area
+    terrain = TerrainSpec(
+        south_m=area.south_m,
+        west_m=area.west_m,
+        north_m=area.north_m,
+        east_m=area.east_m,
+        relief_m=_TERRAIN_RELIEF_M,
+        stream=number,
+    ).made(0)
+    heights = terrain.height_m if number % 2 == 0 else -terrain.height_m
+    rows, columns = np.indices(heights.shape)
+    north = terrain.south_m + terrain.spacing_m * rows
+    east = terrain.west_m + terrain.spacing_m * columns
+    free = (north >= area.south_m + _TERRAIN_EDGE_M) & (north <= area.north_m - _TERRAIN_EDGE_M)
+    free &= (east >= area.west_m + _TERRAIN_EDGE_M) & (east <= area.east_m - _TERRAIN_EDGE_M)
+    centres: list[tuple[float, float]] = []
+    for _ in range(clusters):
+        lowest = int(np.argmin(np.where(free, heights, np.inf)))
+        centre = float(north.flat[lowest]), float(east.flat[lowest])
+        centres.append(centre)
+        free &= np.hypot(north - centre[0], east - centre[1]) >= _TERRAIN_APART_M
+    rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("multi_target", "terrain")))
+    places = _around(centres, count, _TERRAIN_SIGMA_M, area, rng)
+    targets = tuple(GroundTargetParameters(motion=_motion(place, area, 0.0)) for place in places)
+    return replace(world, targets=targets)
+
+
+def _around(
+    centres: Sequence[tuple[float, float]], count: int, sigma_m: float, area: Area, rng: np.random.Generator
+) -> list[tuple[float, float]]:
+    """Places around centres in turn, apart from each other; without centres uniform over the area.
+
+    Raises:
+        PlanError: they have no room.
+    """
+    found: list[tuple[float, float]] = []
+    for _ in range(_TRIES):
+        if len(found) == count:
+            return found
+        if centres:
+            north_m, east_m = centres[len(found) % len(centres)]
+            off_n, off_e = (sigma_m * rng.standard_normal(2)).tolist()
+            place = north_m + off_n, east_m + off_e
+        else:
+            place = rng.uniform(area.south_m, area.north_m), rng.uniform(area.west_m, area.east_m)
+        apart_m = _APART_M if centres else 0.0
+        if area.contains(*place) and all(math.dist(place, other) >= apart_m for other in found):
+            found.append(place)
+    raise PlanError(
+        f"{count} targets in {len(centres)} clusters have no room; ask for more `clusters`, or a larger "
+        "`cluster_sigma_m`"
+    )

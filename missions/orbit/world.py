@@ -1,0 +1,60 @@
+"""The world of an orbit: cameras, and a target with a tag."""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+from flightsim.payload import GroundTargetParameters
+from flightsim.world_spec import WorldSpec
+from missions.errors import PlanError
+from missions.orbit.options import LEAST_DEPRESSION_RAD, WANDERING_M, OrbitOptions
+from missions.worlds.motions import MotionKind, motion_of
+from missions.worlds.payloads import CAMERA, carrying
+
+_TAG_PX: Final = 24.0  # size seen from above; half of the tags with 11 pixels are read
+_FORESHORTENING: Final = 0.742  # effective size: times the sine of the depression to this power
+_FOCAL_PX: Final = 1108.5  # focal length of the camera, 1280 pixels over 60 degrees
+_LEAST_TAG_M: Final = 4.0
+
+
+def orbit_world(world: WorldSpec, options: OrbitOptions, *, motion: MotionKind | None = None) -> WorldSpec:
+    """The world of an orbit: cameras, and a target with a tag that is where the operator reports it.
+
+    Args:
+        world: the rest of the world; targets that it has stay, and no other is added.
+        options: what the operator reports.
+        motion: how the target really moves; None: straight on if its reported speed is not 0, else static.
+
+    Raises:
+        PlanError: the motion does not go with the reported speed.
+    """
+    speed_m_s = options.target_speed_m_s
+    if motion is None:
+        motion = MotionKind.STRAIGHT if speed_m_s > 0.0 else MotionKind.STATIC
+    if motion is not MotionKind.STATIC and speed_m_s == 0.0:
+        raise PlanError(f"`target_motion` {motion} needs a `target_speed_m_s` of more than 0")
+    if motion is MotionKind.STATIC and speed_m_s > 0.0:
+        raise PlanError("`target_motion=static` leaves no `target_speed_m_s`; choose one")
+    world = carrying(world, CAMERA)
+    if world.targets:
+        return world
+    target = GroundTargetParameters(
+        motion=motion_of(
+            motion,
+            place_ne_m=options.target_ne_m,
+            speed_m_s=speed_m_s,
+            course_rad=options.target_heading_rad,
+            range_m=WANDERING_M,
+        ),
+        size_m=_tag_size_m(options),
+        tag_id=0,
+    )
+    return replace(world, targets=(target,))
+
+
+def _tag_size_m(options: OrbitOptions) -> float:
+    """Side of a tag so large that the camera reads it from the orbit and from somewhat farther away."""
+    height_m = options.height_over_target_m
+    range_m = math.hypot(height_m, options.radius_m)
+    foreshortened = max(height_m / range_m, math.sin(LEAST_DEPRESSION_RAD)) ** _FORESHORTENING
+    return max(_LEAST_TAG_M, _TAG_PX * range_m / (_FOCAL_PX * foreshortened))

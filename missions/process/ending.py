@@ -1,0 +1,158 @@
+"""The signals that end a command: from Ctrl-C, `kill`, a service manager, or a closed terminal.
+
+`kill`, `timeout` and service managers send SIGTERM; a closed terminal sends SIGHUP. By default both end a
+process immediately, with its vehicles in the air. Here they act like Ctrl-C: a process that receives one
+leaves its vehicles safe before it ends.
+"""
+
+import asyncio
+import signal
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Coroutine
+from types import FrameType, TracebackType
+from typing import Any, ClassVar, Final, Self
+
+from autopilot_bridge.clock import run
+from autopilot_bridge.clock.pacing import wall_time_s
+from missions.process.supervision import END_SIGNALS
+
+_SAME_S: Final = 1.0
+"""A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: within this time they
+count as one.
+"""
+
+
+def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
+    """SIGINT, SIGTERM and SIGHUP, as far as this process should handle them now.
+
+    Signals that are ignored (`nohup`, a background job) or that already have another handler are left out,
+    except those in `always`. Outside the main thread all are left out, because only the main thread can
+    handle signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return ()
+    theirs = (signal.SIG_DFL, signal.default_int_handler)
+    return tuple(n for n in END_SIGNALS if n in always or signal.getsignal(n) in theirs)
+
+
+class EndSignalHandler(ABC):
+    """A context in which it handles these signals.
+
+    Attributes:
+        always: signals that are handled even if they were ignored or had a handler, see `end_signals`.
+    """
+
+    always: ClassVar[tuple[signal.Signals, ...]] = ()
+
+    def __init__(self) -> None:
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in end_signals(*self.always):
+            self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    @abstractmethod
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Handle one of the signals."""
+
+
+class EndedBySignal(KeyboardInterrupt):
+    """A KeyboardInterrupt that carries the signal that caused it.
+
+    Attributes:
+        number: the signal's number.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"ended by {signal.Signals(number).name}")
+        self.number = number
+
+
+def signal_of(interrupt: KeyboardInterrupt) -> int:
+    """The signal that caused the interrupt."""
+    return interrupt.number if isinstance(interrupt, EndedBySignal) else signal.SIGINT
+
+
+class EndingSignals(EndSignalHandler):
+    """A context in which Ctrl-C, SIGTERM and SIGHUP interrupt in the same way.
+
+    During `run`, the first signal cancels the coroutine, and a later one stops it immediately; outside `run`,
+    the first one stops immediately. See `end_signals` for the signals that are not handled.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._task: asyncio.Task[Any] | None = None
+        self._number: int | None = None
+        self._first_wall_s = 0.0
+
+    def run(self, main: Coroutine[Any, Any, None], loop: asyncio.AbstractEventLoop) -> None:
+        """Run a coroutine on a loop as `autopilot_bridge.clock.run` does.
+
+        Raises:
+            EndedBySignal: it was interrupted, and has ended.
+        """
+        try:
+            run(self._interruptible(main), loop)
+        except asyncio.CancelledError:
+            if self._number is None:
+                raise
+            raise EndedBySignal(self._number) from None
+
+    async def _interruptible(self, main: Coroutine[Any, Any, None]) -> None:
+        self._task = asyncio.current_task()
+        await main
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        now_s = wall_time_s()
+        task, again = self._task, self._number is not None
+        if again and number != signal.SIGINT and now_s - self._first_wall_s < _SAME_S:
+            return
+        self._number, self._first_wall_s = self._number or number, now_s
+        if again or task is None or task.done():
+            raise EndedBySignal(self._number)
+        task.cancel()
+        # wakes the loop, which may be waiting for a long time
+        task.get_loop().call_soon_threadsafe(lambda: None)
+
+
+class EndRequests(EndSignalHandler):
+    """A context in which such a signal ends the command with an orderly shutdown.
+
+    At first a signal raises KeyboardInterrupt, so that it stops the start at any point; after `remember` it
+    only sets `requested`. SIGHUP stays ignored if it is ignored on entry (`nohup`). For the main thread only.
+
+    Attributes:
+        requested: whether such a signal was received.
+    """
+
+    always = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.requested = False
+        self._raises = True
+
+    def remember(self) -> None:
+        """Stop raising KeyboardInterrupt; requests are only remembered from now on.
+
+        Raises:
+            KeyboardInterrupt: a request came earlier in a place where no exception can be raised (for example
+                a finaliser).
+        """
+        self._raises = False
+        if self.requested:
+            raise KeyboardInterrupt
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        again, self.requested = self.requested, True
+        if self._raises and not again:  # at the second signal the command is already ending
+            raise KeyboardInterrupt

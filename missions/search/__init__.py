@@ -1,0 +1,1 @@
+"""Search by steps from place to place: what the searching missions share."""

@@ -1,0 +1,57 @@
+"""The searched rectangle."""
+
+import math
+from dataclasses import dataclass, replace
+
+from missions.errors import PlanError
+
+Place = tuple[float, float]
+"""North and east of the origin, metres."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Area:
+    """The searched rectangle, metres from the origin."""
+
+    south_m: float
+    west_m: float
+    north_m: float
+    east_m: float
+
+    def __post_init__(self) -> None:
+        edges = (self.south_m, self.west_m, self.north_m, self.east_m)
+        if not (all(map(math.isfinite, edges)) and self.north_m > self.south_m and self.east_m > self.west_m):
+            raise PlanError(
+                f"`area_m` {','.join(f'{edge:g}' for edge in edges)} is not an area; "
+                "give SOUTH,WEST,NORTH,EAST"
+            )
+
+    def contains(self, north_m: float, east_m: float) -> bool:
+        """Whether a place is inside, edges included."""
+        return self.south_m <= north_m <= self.north_m and self.west_m <= east_m <= self.east_m
+
+    def nearest(self, north_m: float, east_m: float) -> Place:
+        """The place inside that is nearest to a place."""
+        return (min(max(north_m, self.south_m), self.north_m), min(max(east_m, self.west_m), self.east_m))
+
+    def strip(self, index: int, count: int) -> "Area":
+        """One of `count` equal strips of the longer side, from the south or from the west."""
+        if self.height_m >= self.width_m:
+            side_m = self.height_m / count
+            south_m = self.south_m + index * side_m
+            return replace(self, south_m=south_m, north_m=south_m + side_m)
+        side_m = self.width_m / count
+        west_m = self.west_m + index * side_m
+        return replace(self, west_m=west_m, east_m=west_m + side_m)
+
+    @property
+    def centre_ne_m(self) -> Place:
+        return 0.5 * (self.south_m + self.north_m), 0.5 * (self.west_m + self.east_m)
+
+    @property
+    def height_m(self) -> float:
+        return self.north_m - self.south_m
+
+    @property
+    def width_m(self) -> float:
+        return self.east_m - self.west_m
