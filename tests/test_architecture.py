@@ -28,8 +28,8 @@ ANGLE_FUNCTIONS = (
     *("quaternion_from_euler", "euler_from_quaternion", "from_euler", "rotate_inverse", "conjugate"),
 )
 WORLD = ("flightsim.world_spec",)  # what a run flies in: no mission and no estimator may know it
-# The floors of `missions`, from the roof to the ground: rooms (folders and files at its top) import of their own
-# floor and of those below.
+# The floors of `missions`, from the roof to the ground: rooms (folders and files at its top) import rooms
+# of their own floor and of those below.
 THE_MISSIONS = (
     *("handoff", "multi_target", "occupancy", "orbit", "pattern_search", "plan_files", "survey"),
     "vision_search",
