@@ -5,7 +5,7 @@ other and carry their number in param1; circles carry the radius in param1.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -36,6 +36,23 @@ class FencePolygon:
 
 
 @dataclass(frozen=True, slots=True)
+class UnwrappedPolygon(FencePolygon):
+    """A polygon across 180 degrees of longitude for an autopilot that compares longitudes without wrap: it
+    covers the other way round the earth.
+
+    Source: PX4 1.16.1, navigator/geofence.cpp, insidePolygon.
+    """
+
+    vertices_deg: tuple[tuple[float, float], ...]
+    frame: LocalFrame
+
+    def allows(self, point: Point) -> bool:
+        """The shape allows a point."""
+        lat_deg, lon_deg, _ = self.frame.geodetic_from_ned(*point, 0.0)
+        return inside_polygon((lat_deg, lon_deg), self.vertices_deg) == self.inclusion
+
+
+@dataclass(frozen=True, slots=True)
 class FenceCircle:
     """A circle to stay in (`inclusion`), or out of. Nothing is inside of a circle of radius 0."""
 
@@ -51,8 +68,16 @@ class FenceCircle:
 FenceShape = FencePolygon | FenceCircle
 
 
-def fence_shapes(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[FenceShape, ...]:
-    """The shapes that fence items describe; invalid shapes are left out one by one."""
+def fence_shapes(
+    items: Iterable[MissionItem], frame: LocalFrame, *, unwrapped: bool = False
+) -> tuple[FenceShape, ...]:
+    """The shapes that fence items describe; invalid shapes are left out one by one.
+
+    Args:
+        items: items of a fence plan.
+        frame: of the points that are tested.
+        unwrapped: the autopilot compares the longitudes of polygons without wrap (PX4).
+    """
     shapes: list[FenceShape] = []
     pending: list[MissionItem] = []
     for item in items:
@@ -66,10 +91,18 @@ def fence_shapes(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[Fence
                 pending = []
             pending.append(item)
             if len(pending) >= 3 and len(pending) == item.param1:
-                vertices = tuple(fence_point(vertex, frame) for vertex in pending)
-                shapes.append(FencePolygon(vertices, item.command == POLYGON_INCLUSION))
+                shapes.append(_polygon(pending, frame, unwrapped=unwrapped))
                 pending = []
     return tuple(shapes)
+
+
+def _polygon(items: Sequence[MissionItem], frame: LocalFrame, *, unwrapped: bool) -> FencePolygon:
+    vertices = tuple(fence_point(item, frame) for item in items)
+    inclusion = items[0].command == POLYGON_INCLUSION
+    lons_deg = [item.y for item in items]
+    if not unwrapped or max(lons_deg) - min(lons_deg) <= 180.0:
+        return FencePolygon(vertices, inclusion)
+    return UnwrappedPolygon(vertices, inclusion, tuple((item.x, item.y) for item in items), frame)
 
 
 def fence_point(item: MissionItem, frame: LocalFrame) -> Point:

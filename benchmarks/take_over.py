@@ -38,11 +38,10 @@ PILOT: Final = (255, 50)
 """ArduPilot takes RC_CHANNELS_OVERRIDE from system 255 only (SYSID_MYGCS)."""
 HEARTBEAT: Final = definition("HEARTBEAT").message_id
 REACTIONS: Final[Mapping[str, Mapping[str, float]]] = {
-    "px4": {"COM_RC_OVERRIDE": 3, "GF_ACTION": 3, "COM_LOW_BAT_ACT": 3, "SYS_FAILURE_EN": 1},
+    "px4": {"COM_RC_OVERRIDE": 3, "GF_ACTION": 3, "COM_LOW_BAT_ACT": 3},
     "ardupilot": {"BATT_LOW_VOLT": 10.5, "BATT_FS_LOW_ACT": 2, "FENCE_TYPE": 1, "FENCE_ACTION": 1},
 }
 """Reactions that are set before the flight."""
-_GPS: Final = (float(dialect.FAILURE_UNIT_SENSOR_GPS), float(dialect.FAILURE_TYPE_OFF))
 _MODES: Final = {"hold": Mode.HOLD, "land": Mode.LAND, "return": Mode.RETURN, "position": Mode.POSITION}
 _STABILIZE: Final[Mapping[tuple[str, str], tuple[float, float]]] = {
     ("px4", "copter"): (7.0, 0.0),
@@ -53,13 +52,16 @@ _STABILIZE: Final[Mapping[tuple[str, str], tuple[float, float]]] = {
 PROVOKED: Final[Mapping[tuple[str, str], Mapping[str, float]]] = {
     ("px4", "battery"): {"SIM_BAT_MIN_PCT": 6.0, "SIM_BAT_DRAIN": 2.0},
     ("px4", "fence"): {"GF_MAX_VER_DIST": 5.0},
+    ("px4", "gps"): {"SIM_GPS_USED": 0.0},
     ("ardupilot", "battery"): {"SIM_BATT_VOLTAGE": 10.0},
     ("ardupilot", "fence"): {"FENCE_ALT_MAX": 10.0, "FENCE_ENABLE": 1.0},
     ("ardupilot", "gps"): {"SIM_GPS_DISABLE": 1.0},
 }
 BY: Final = (*_MODES, "stabilize", "sticks", "battery", "fence", "gps")
 KINDS: Final = ("waypoints", "setpoints", "script")
-_INTEGERS: Final = ("SIM_GPS_DISABLE", "FENCE_ENABLE")
+_INTEGERS: Final = {"SIM_GPS_DISABLE": 2, "FENCE_ENABLE": 2, "SIM_GPS_USED": 6}
+"""MAV_PARAM_TYPE of those that are no REAL32; of an integer PX4 reads the bits: 0 has the same."""
+_REAL32: Final = 9
 
 
 class Script(Mission[FlightOptions]):
@@ -156,10 +158,8 @@ class Pilot:
                 _STABILIZE[self.firmware, self.vehicle] if command is None else (command.main, command.sub)
             )
             self._command(link, dialect.MAV_CMD_DO_SET_MODE, 1.0, main, sub)
-        elif self.by == "gps" and self.firmware == "px4":
-            self._command(link, dialect.MAV_CMD_INJECT_FAILURE, *_GPS)
         for name, value in PROVOKED.get((self.firmware, self.by), {}).items():
-            link.mav.param_set_send(self._system_id, 1, name.encode(), value, 2 if name in _INTEGERS else 9)
+            link.mav.param_set_send(self._system_id, 1, name.encode(), value, _INTEGERS.get(name, _REAL32))
 
     def _command(self, link: Any, command: int, *params: float) -> None:
         values = (*params, *(0.0,) * (7 - len(params)))

@@ -44,7 +44,7 @@ class Geofence:
 
     def return_point(self, frame: LocalFrame) -> Point | None:
         """ArduPlane's return point: that of the plan, else the centre of its first inclusion."""
-        self._compile(frame)
+        self._compile(frame, unwrapped=False)
         if self._return_point is not None:
             return self._return_point
         for shape in self._shapes:
@@ -86,15 +86,15 @@ class Geofence:
             if FenceType.HEIGHT_MIN in walls and parameters.floor and height_m < parameters.height_min_m:
                 broken |= FenceType.HEIGHT_MIN
         if FenceType.SHAPES in walls and parameters.shapes and frame is not None:
-            self._compile(frame)
+            self._compile(frame, unwrapped=parameters.unwrapped)
             if outside_shapes(self._shapes, (north_m, east_m), join=parameters.inclusions_join):
                 broken |= FenceType.SHAPES
         return broken
 
-    def _compile(self, frame: LocalFrame) -> None:
+    def _compile(self, frame: LocalFrame, *, unwrapped: bool) -> None:
         if self._version == self._plan.version and self._frame is frame:
             return
         self._version, self._frame = self._plan.version, frame
-        self._shapes = fence_shapes(self._plan.items, frame)
+        self._shapes = fence_shapes(self._plan.items, frame, unwrapped=unwrapped)
         returns = [item for item in self._plan.items if item.command == RETURN_POINT]
         self._return_point = fence_point(returns[-1], frame) if returns else None

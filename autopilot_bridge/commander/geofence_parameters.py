@@ -43,6 +43,7 @@ class FenceParameters:
         margin_m: distance that returns keep from the height limits.
         inclusions_join: being inside one inclusion shape is enough (PX4; FENCE_OPTIONS bit 1); else inside
             all.
+        unwrapped: longitudes of polygons are compared without wrap (PX4).
         predicts: a breach that can't be avoided any more counts as a breach (PX4 GF_PREDICT).
         by_gps: the receiver's position is checked, not the filter's (PX4 GF_SOURCE).
         locks_mode: no other mode is accepted while the action of a breach is flown (FENCE_OPTIONS bit 0).
@@ -67,6 +68,7 @@ class FenceParameters:
     shapes: bool = True
     margin_m: float = 0.0
     inclusions_join: bool = True
+    unwrapped: bool = False
     predicts: bool = False
     by_gps: bool = False
     locks_mode: bool = False

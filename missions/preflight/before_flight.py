@@ -238,7 +238,8 @@ def _way(
                 )
             )
     watched = areas_watched(vehicle.autopilot, parameters)
-    shapes = fence_shapes(items, LocalFrame(vehicle.home)) if watched else ()
+    unwrapped = vehicle.firmware.unwrapped_fences
+    shapes = fence_shapes(items, LocalFrame(vehicle.home), unwrapped=unwrapped) if watched else ()
     join = shapes_join(vehicle.autopilot, parameters)
     outside = first_outside(shapes, [(n, e) for n, e, _ in points], join=join)
     if outside is not None:

@@ -56,6 +56,10 @@ class Firmware:
         failsafe_status_acts: whether MAV_STATE_CRITICAL says that a failsafe flies the vehicle (PX4), not
             only that one was triggered (ArduPilot).
         resting_mode: a mode in which the vehicle may stand on the ground and be armed.
+        placeless_in_mission_frame: whether items without a place are accepted in MAV_FRAME_MISSION only
+            (PX4).
+        unwrapped_fences: whether longitudes of fence polygons are compared without wrap, so that none may lie
+            across 180 degrees (PX4).
         unset: value of a command or item parameter that is not set.
         system_id_parameter: name of the parameter that sets the vehicle's system id.
         roll_alone: whether a roll command in the guided mode may leave pitch and throttle to the autopilot.
@@ -80,6 +84,8 @@ class Firmware:
     goto_mode: Mode
     left_before_arming: frozenset[int]
     resting_mode: Mode
+    placeless_in_mission_frame: bool
+    unwrapped_fences: bool
     unset: float
     system_id_parameter: str
     roll_alone: bool = False

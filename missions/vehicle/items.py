@@ -18,6 +18,17 @@ FLOWN_TO: Final = frozenset(
 )
 """Commands that contain a place to fly to."""
 
+WITH_PLACE: Final = FLOWN_TO | {
+    dialect.MAV_CMD_NAV_VTOL_TAKEOFF,
+    dialect.MAV_CMD_NAV_VTOL_LAND,
+    dialect.MAV_CMD_CONDITION_GATE,
+    dialect.MAV_CMD_NAV_ROI,
+    dialect.MAV_CMD_DO_SET_ROI,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+    dialect.MAV_CMD_DO_SET_HOME,
+}
+"""Commands that contain a place."""
+
 
 def item_name(index: int, command: int) -> str:
     """Name of an item from its index in the mission (from 0), numbered from 1 as in ground stations: "item 3

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.fence_shapes import fence_shapes, outside_shapes
+from autopilot_bridge.fence_shapes import UnwrappedPolygon, fence_shapes, outside_shapes
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_feasibility import ardupilot, px4
 from autopilot_bridge.mission_plan import MissionItem
@@ -56,12 +56,20 @@ class _Rules:
 _FENCE_PARAMETERS: Final = MappingProxyType({"GF_MAX_HOR_DIST": 0.0, "GF_MAX_VER_DIST": 0.0})  # 0: no limit
 
 
+_ACROSS: Final = (
+    "a polygon of the geofence lies across 180 degrees of longitude, where PX4 takes the other way round the "
+    "earth; divide it there into two polygons"
+)
+
+
 def _px4(kind: VehicleKind) -> _Rules:
     wings = kind is VehicleKind.FIXED_WING
     own = {name: value for name, value in px4.PARAMETERS.items() if wings or name != "FW_LND_ANG"}
 
     def problems(situation: _Situation, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        return px4.mission_problems(
+        shapes = fence_shapes(situation.fence, LocalFrame(situation.home), unwrapped=True)
+        apart = (_ACROSS,) if any(isinstance(shape, UnwrappedPolygon) for shape in shapes) else ()
+        return apart or px4.mission_problems(
             situation.items,
             px4.Px4MissionRules.of({**px4.PARAMETERS, **parameters}, fixed_wing=wings),
             home_alt_m=situation.home.alt_m,
@@ -75,7 +83,7 @@ def _px4(kind: VehicleKind) -> _Rules:
 def _outside(situation: _Situation, parameters: Mapping[str, float]) -> Callable[[MissionItem], bool]:
     """Whether an item lies outside the geofence that is uploaded, or outside the limits around home."""
     home, frame = situation.home, LocalFrame(situation.home)
-    shapes = fence_shapes(situation.fence, frame)
+    shapes = fence_shapes(situation.fence, frame, unwrapped=True)
     reach_m, height_limit_m = (parameters[name] or math.inf for name in _FENCE_PARAMETERS)
 
     def outside(item: MissionItem) -> bool:

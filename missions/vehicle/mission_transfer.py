@@ -9,6 +9,7 @@ from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_from_message, item_message
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.vehicle.connection import AUTOPILOT_COMPONENT, MessageStream
+from missions.vehicle.items import WITH_PLACE
 from missions.vehicle.link import VehicleLink
 
 _RETRY_S: Final = 1.5
@@ -37,6 +38,16 @@ def _item_message(item: MissionItem, sequence: int, system_id: int, mission_type
 def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
     """The items with jump targets adjusted for `by` other items placed before all of them."""
     return [replace(i, param1=i.param1 + by) if i.command == _DO_JUMP and by else i for i in items]
+
+
+def in_mission_frame(items: Sequence[MissionItem]) -> list[MissionItem]:
+    """The items with MAV_FRAME_MISSION for those without a place.
+
+    Ground stations and scripts also write them in the frame of the waypoints, which PX4 does not accept
+    (1.16.1, mavlink_mission.cpp: parse_mavlink_mission_item).
+    """
+    frame = dialect.MAV_FRAME_MISSION
+    return [i if i.command in WITH_PLACE or i.frame == frame else replace(i, frame=frame) for i in items]
 
 
 def _result_name(result: int) -> str:

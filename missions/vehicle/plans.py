@@ -18,16 +18,16 @@ from missions.vehicle.item_tracker import (
 )
 from missions.vehicle.link import VehicleLink
 from missions.vehicle.mission_rules import refuse_infeasible
-from missions.vehicle.mission_transfer import clear, download, renumbered, upload
+from missions.vehicle.mission_transfer import clear, download, in_mission_frame, renumbered, upload
 from missions.vehicle.mode_tasks import LANDING_PARTS, StoredPlan
 from missions.vehicle.parameters import VehicleParameters
 
 _REWINDS: Final = 4
 _REWIND_S: Final = 1.5
 _ACCEPTANCE_M: Final = 2.0
+"""Distance at which a position shows that a waypoint was passed, if the waypoint specifies none."""
 _POSITION: Final = definition("GLOBAL_POSITION_INT").message_id
 _read_position: Final = field_reader("GLOBAL_POSITION_INT", "lat", "lon", "alt")
-"""Distance at which a position shows that a waypoint was passed, if the waypoint specifies none."""
 
 
 class VehiclePlans:
@@ -79,6 +79,8 @@ class VehiclePlans:
             command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m
         )
         own = renumbered(items, first)
+        if self._link.firmware.placeless_in_mission_frame:
+            own = in_mission_frame(own)
         await upload(self._link, [marker, *own] if first else own, before=first)
         await self.rewind_mission()
         self._tracker = self.note_stored(items, first).tracker()

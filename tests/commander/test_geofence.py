@@ -17,7 +17,7 @@ from autopilot_bridge.flight.context import LandedState
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 from flightsim import interface
-from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.commander.rig import ORIGIN, Rig
 from tests.services.plane_rig import PlaneRig
 
@@ -50,6 +50,20 @@ def store_of(*items: MissionItem) -> MissionStore:
 
 
 # shapes
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_polygon_across_180_degrees_covers_the_other_way_round_for_px4_only(inside: bool) -> None:
+    """PX4 1.16.1, geofence.cpp: insidePolygon compares longitudes without wrap. ArduPilot wraps."""
+    frame = LocalFrame(GeodeticPosition(lat_deg=10.0, lon_deg=179.999, alt_m=0.0))
+    command = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION + (not inside)
+    corners = ((9.9, 179.9), (9.9, -179.9), (10.1, -179.9), (10.1, 179.9))
+    plan = store_of(*(MissionItem(command=command, frame=5, param1=4.0, x=x, y=y) for x, y in corners))
+    for unwrapped in (True, False):
+        parameters = FenceParameters(enabled=True, unwrapped=unwrapped)
+        for east_m in (0.0, 500.0):  # on both sides of 180 degrees, in the polygon
+            broken = Geofence(plan).broken((0.0, east_m, -10.0), HOME, frame, parameters, ALL_FENCES)
+            assert (broken == FenceType.SHAPES) == (inside if unwrapped else not inside)
 
 
 @pytest.mark.parametrize("join", [True, False])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from autopilot_bridge.fence_shapes import CIRCLE_INCLUSION
+from autopilot_bridge.fence_shapes import CIRCLE_INCLUSION, POLYGON_INCLUSION
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
@@ -17,6 +17,10 @@ TAKEOFF, WAYPOINT = at(dialect.MAV_CMD_NAV_TAKEOFF, 0.0, 10.0), at(dialect.MAV_C
 CIRCLE = MissionItem(
     command=CIRCLE_INCLUSION, frame=0, param1=50.0, x=HOME.lat_deg, y=HOME.lon_deg, z=0.0
 )  # fmt: skip
+ACROSS = [
+    MissionItem(command=POLYGON_INCLUSION, frame=0, param1=3.0, x=lat, y=lon, z=0.0)
+    for lat, lon in ((1.0, 179.9), (1.0, -179.9), (2.0, -179.9))
+]
 
 
 @pytest.mark.parametrize(
@@ -27,6 +31,7 @@ CIRCLE = MissionItem(
         ("px4", [TAKEOFF, WAYPOINT], [CIRCLE], {}, "Geofence violation for waypoint 2"),
         ("px4", [TAKEOFF, WAYPOINT], [], {"GF_MAX_HOR_DIST": 100.0}, "Geofence violation for waypoint 2"),
         ("px4", [TAKEOFF, WAYPOINT], [], {"GF_MAX_VER_DIST": 5.0}, "Geofence violation for waypoint 1"),
+        ("px4", [TAKEOFF, WAYPOINT], ACROSS, {}, "lies across 180 degrees of longitude"),
         ("ardupilot", [WAYPOINT], [], {}, "Auto: Missing Takeoff Cmd"),
         ("ardupilot", [TAKEOFF], [], {"ARMING_MIS_ITEMS": 64}, "Missing mission item: RTL"),
     ],

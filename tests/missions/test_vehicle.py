@@ -220,6 +220,23 @@ def test_mission_upload_download_clear_and_flight(flown, flavour):
     flown(script, flavour)
 
 
+@both
+def test_items_without_a_place_are_sent_to_px4_in_the_frame_without_one(flown, flavour):
+    async def script(vehicle, autopilot):
+        takeoff = vehicle.firmware.takeoff_item(vehicle.home, 10.0)
+        commands = (
+            dialect.MAV_CMD_DO_CHANGE_SPEED,
+            dialect.MAV_CMD_DO_LAND_START,
+            dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        )
+        items = [takeoff, *(MissionItem(command=c, frame=3, x=47.4, y=8.5, z=10.0) for c in commands)]
+        await vehicle.plans.upload_mission(items)
+        return [item.frame for item in await vehicle.plans.download_mission()]
+
+    plain = [2, 2, 2] if flavour == "px4" else [3, 3, 3]
+    assert flown(script, flavour)[1:] == plain
+
+
 def test_refused_mission_names_the_item(flown):
     async def script(vehicle, autopilot):
         items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=47.0, y=8.0, z=10.0)] * 4

@@ -123,6 +123,7 @@ def fence_parameters(store: ParameterStore) -> FenceParameters:
         radius_m=store.limited("GF_MAX_HOR_DIST"),
         height_max_m=store.limited("GF_MAX_VER_DIST"),
         shapes=True,
+        unwrapped=True,
         predicts=bool(integer(store, "GF_PREDICT")),
         by_gps=bool(integer(store, "GF_SOURCE")),
     )
