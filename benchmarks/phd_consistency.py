@@ -17,6 +17,7 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.multi_target.models import sensor_of
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.ospa import ospa
@@ -65,11 +66,11 @@ def scene(number: int, kind: Belief, clutter: float, scans: int, *, find: bool) 
         reach_m=55.0,
         clutter_per_scan=clutter,
         belief=kind,
-        birth_per_m2=MEAN_TARGETS / (2.0 * HALF_M) ** 2,
+        expected_targets=MEAN_TARGETS,
         found_mass=0.9 if find else 1e9,
         seed=number,
     )
-    belief, sensor = SearchBelief(parameters), parameters.sensor
+    belief, sensor = SearchBelief(parameters), sensor_of(parameters)
     bound = Bound(count, sensor)
     numbers, distances = np.empty((scans, 2)), np.empty((scans, 2))
     for k in range(scans):

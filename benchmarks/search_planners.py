@@ -25,9 +25,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.multi_target.parameters import REACH
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from missions.multi_target.options import REACH, MultiTargetOptions, PlannerKind
+from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.search import planner_of
 from missions.multi_target.world import TargetField
 from missions.search.planner_parameters import Exploration

@@ -4,13 +4,12 @@ docs/attitude.md.
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from math import isfinite
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_members
+from flightsim.foundation.options import Options, option
 
 TRIM_LIMIT_RAD: Final = 0.3
 """ArduPilot itself accepts 10 degrees."""
@@ -49,136 +48,130 @@ class AirspeedSource(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AttitudeParameters:
-    """Gains, models and uncertainty of the attitude filter.
+class AttitudeParameters(Options):
+    """Gains, models and uncertainty of the attitude filter."""
 
-    Attributes:
-        vehicle: form of the filter.
-        imu: inertial message.
-        imu_instance: `id` of the inertial message, for messages that have one (HIGHRES_IMU, RAW_IMU).
-        airspeed: source of the airspeed.
-        gain_1_s: k_p, gain from the reference to the attitude.
-        bias_gain_1_s2: k_I, gain from the accelerometer to the gyro bias.
-        rest_gain_1_s: gain used instead of k_p while the vehicle is disarmed; k_I is then a quarter of its
-            square.
-        rest_bias_time_s: longest averaging time for the gyro bias about the down axis at rest.
-        reference_tolerance_m_s2: difference of the reference's length from g at which its weight is one half.
-        trim_roll_rad, trim_pitch_rad: rotation of the board relative to the vehicle; None: the vehicle's
-            parameters AHRS_TRIM_X and AHRS_TRIM_Y if they are known (PX4 corrects its sensors itself).
-        gap_max_s: a longer gap of the inertial messages restarts the filter.
-        airspeed_age_max_s: an older airspeed is not used.
-        airspeed_min_m_s: below it lift is negligible, and angle of attack and sideslip are taken as zero.
-        longitudinal: whether the change of airspeed is taken into account (Tolman et al. 2021 assume
-            unaccelerated flight).
-        speed_gain_1_s: gain from the airspeed to the filter that provides its rate of change.
-        attack: whether the angle of attack is estimated; otherwise it is zero.
-        lift_1_m: k_L / m; None: learned in flight.
-        lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: computed with the ratio below.
-        lift_slope_ratio_1_rad: ratio of lift slope to k_L, used when the slope is not specified.
-        lift_time_s: averaging time for learning k_L.
-        climb_time_s: averaging time with which the rate of climb corrects the angle of attack; infinite: no
-            correction.
-        thrust_m_s2: k_M / m, thrust acceleration at full throttle.
-        thrust_loss_1_m: k_T / m, its loss per square of airspeed.
-        throttle_trim: value used when no throttle is received, 0..1.
-        side_force_ratio_1_rad: ratio of side force per sideslip to mean lift; infinite: no sideslip.
-        side_force_time_s: time constant of the side force's smoothing.
-        drag_1_s: initial value of a multirotor's drag acceleration per speed.
-        drag_velocity_gain_1_s: gain from the velocity computed from drag to the velocity filter.
-        drag_learning_m_s: difference of the two velocities at which a sample has half weight in learning the
-            drag; infinite: the drag is not learned.
-        gyro_noise_rad_rts: angular random walk, rad/s/sqrt(Hz).
-        gyro_bias_walk_rad_s_rts: random walk of the gyro bias, rad/s per square root of a second.
-        gyro_bias_start_rad_s: standard deviation of the gyro bias at the start.
-        rest_error_rad: standard error of the reference at rest.
-        flight_error_rad: standard error of the reference in steady flight.
-        manoeuvre_error: standard error of the reference per manoeuvre load (rad at 1 g).
-        reference_time_s: correlation time of the reference's errors.
-    """
-
-    vehicle: VehicleKind = VehicleKind.AUTO
-    imu: ImuSource = ImuSource.AUTO
-    imu_instance: int = 0
-    airspeed: AirspeedSource = AirspeedSource.AUTO
-    gain_1_s: float = 0.11
-    bias_gain_1_s2: float = 0.003
-    rest_gain_1_s: float = 0.5
-    rest_bias_time_s: float = 20.0
-    reference_tolerance_m_s2: float = 2.0
-    trim_roll_rad: float | None = None
-    trim_pitch_rad: float | None = None
-    gap_max_s: float = 2.0
-    airspeed_age_max_s: float = 3.0
-    airspeed_min_m_s: float = 6.0
-    longitudinal: bool = True
-    speed_gain_1_s: float = 2.0
-    attack: bool = True
-    lift_1_m: float | None = None
-    lift_slope_1_m_rad: float | None = None
-    lift_slope_ratio_1_rad: float = 10.0
-    lift_time_s: float = 10.0
-    climb_time_s: float = 10.0
-    thrust_m_s2: float = 0.0
-    thrust_loss_1_m: float = 0.0
-    throttle_trim: float = 0.5
-    side_force_ratio_1_rad: float = 3.0
-    side_force_time_s: float = 1.0
-    drag_1_s: float = 0.4
-    drag_velocity_gain_1_s: float = 0.5
-    drag_learning_m_s: float = 5.0
-    gyro_noise_rad_rts: float = 1e-3
-    gyro_bias_walk_rad_s_rts: float = 1e-5
-    gyro_bias_start_rad_s: float = 0.01
-    rest_error_rad: float = 0.01
-    flight_error_rad: float = 0.03
-    manoeuvre_error: float = 0.08
-    reference_time_s: float = 3.0
-
-    def __post_init__(self) -> None:
-        require_members(self, vehicle=VehicleKind, imu=ImuSource, airspeed=AirspeedSource)
-        for name, (low, high) in _RANGES.items():
-            value = getattr(self, name)
-            if value is None:
-                continue
-            if not low <= value <= high or (name not in _MAY_BE_INFINITE and not isfinite(value)):
-                raise ValueError(f"{name} {value:g} is not in {low:g}..{high:g}")
-
-
-_RANGES: Final[dict[str, tuple[float, float]]] = {
-    "imu_instance": (0, 255),
-    "gain_1_s": (0.0, 50.0),
-    "bias_gain_1_s2": (0.0, 10.0),
-    "rest_gain_1_s": (0.0, 50.0),
-    "rest_bias_time_s": (0.1, 1e4),
-    "reference_tolerance_m_s2": (0.01, float("inf")),
-    "trim_roll_rad": (-TRIM_LIMIT_RAD, TRIM_LIMIT_RAD),
-    "trim_pitch_rad": (-TRIM_LIMIT_RAD, TRIM_LIMIT_RAD),
-    "gap_max_s": (0.05, 60.0),
-    "airspeed_age_max_s": (0.1, 60.0),
-    "airspeed_min_m_s": (1.0, 100.0),
-    "speed_gain_1_s": (0.01, 20.0),
-    "lift_1_m": (1e-6, 100.0),
-    "lift_slope_1_m_rad": (1e-6, 1e3),
-    "lift_slope_ratio_1_rad": (1.0, 200.0),
-    "lift_time_s": (0.5, 1e4),
-    "climb_time_s": (0.5, float("inf")),
-    "thrust_m_s2": (0.0, 100.0),
-    "thrust_loss_1_m": (0.0, 10.0),
-    "throttle_trim": (0.0, 1.0),
-    "side_force_ratio_1_rad": (0.1, float("inf")),
-    "side_force_time_s": (0.01, 100.0),
-    "drag_1_s": (0.05, 5.0),
-    "drag_velocity_gain_1_s": (0.01, 20.0),
-    "drag_learning_m_s": (0.01, float("inf")),
-    "gyro_noise_rad_rts": (0.0, 1.0),
-    "gyro_bias_walk_rad_s_rts": (0.0, 0.1),
-    "gyro_bias_start_rad_s": (0.0, 1.0),
-    "rest_error_rad": (0.0, 1.0),
-    "flight_error_rad": (0.0, 1.0),
-    "manoeuvre_error": (0.0, 1.0),
-    "reference_time_s": (0.01, 100.0),
-}
-_MAY_BE_INFINITE: Final = frozenset(name for name, (_, high) in _RANGES.items() if not isfinite(high))
+    vehicle: VehicleKind = option(VehicleKind.AUTO, help="Form of the filter.")
+    imu: ImuSource = option(ImuSource.AUTO, help="Inertial message.")
+    imu_instance: int = option(
+        0, least=0, most=255, help="`id` of the inertial message, of those that have one."
+    )
+    airspeed: AirspeedSource = option(AirspeedSource.AUTO, help="Source of the airspeed.")
+    gain_1_s: float = option(
+        0.11, least=0.0, most=50.0, help="Gain from the reference to the attitude (k_p)."
+    )
+    bias_gain_1_s2: float = option(
+        0.003, least=0.0, most=10.0, help="Gain from the accelerometer to the gyro bias (k_I)."
+    )
+    rest_gain_1_s: float = option(
+        0.5, least=0.0, most=50.0, help="Gain k_p while disarmed; k_I is then a quarter of its square."
+    )
+    rest_bias_time_s: float = option(
+        20.0, least=0.1, most=10000.0, help="Longest averaging time of the gyro bias about down at rest."
+    )
+    reference_tolerance_m_s2: float = option(
+        2.0, least=0.01, infinite=True, help="Difference of the reference from g at which it has half weight."
+    )
+    trim_roll_rad: float | None = option(
+        None,
+        least=-TRIM_LIMIT_RAD,
+        most=TRIM_LIMIT_RAD,
+        varies="AHRS_TRIM_X",
+        help="Roll of the board relative to the vehicle.",
+    )
+    trim_pitch_rad: float | None = option(
+        None,
+        least=-TRIM_LIMIT_RAD,
+        most=TRIM_LIMIT_RAD,
+        varies="AHRS_TRIM_Y",
+        help="Pitch of the board relative to the vehicle.",
+    )
+    gap_max_s: float = option(
+        2.0, least=0.05, most=60.0, help="Longest gap of inertial messages that is bridged."
+    )
+    airspeed_age_max_s: float = option(
+        3.0, least=0.1, most=60.0, help="Largest age of an airspeed that is used."
+    )
+    airspeed_min_m_s: float = option(
+        6.0, least=1.0, most=100.0, help="Airspeed below which lift, and angles of the air, are zero."
+    )
+    longitudinal: bool = option(
+        True, help="Acceleration along the path is taken from the change of airspeed."
+    )
+    speed_gain_1_s: float = option(
+        2.0, least=0.01, most=20.0, help="Gain of the filter that gives the rate of change of the airspeed."
+    )
+    attack: bool = option(True, help="Angle of attack is estimated; otherwise it is zero.")
+    lift_1_m: float | None = option(
+        None,
+        least=1e-06,
+        most=100.0,
+        varies="learned in flight",
+        help="Lift per square of airspeed over mass (k_L / m).",
+    )
+    lift_slope_1_m_rad: float | None = option(
+        None,
+        least=1e-06,
+        most=1000.0,
+        varies="lift times lift_slope_ratio_1_rad",
+        help="Lift slope over mass and square of airspeed.",
+    )
+    lift_slope_ratio_1_rad: float = option(
+        10.0, least=1.0, most=200.0, help="Ratio of lift slope to k_L, for a slope that is not given."
+    )
+    lift_time_s: float = option(10.0, least=0.5, most=10000.0, help="Averaging time for learning k_L.")
+    climb_time_s: float = option(
+        10.0,
+        least=0.5,
+        infinite=True,
+        help="Time by which the rate of climb corrects the angle of attack; inf: never.",
+    )
+    thrust_m_s2: float = option(
+        0.0, least=0.0, most=100.0, help="Thrust acceleration at full throttle (k_M / m)."
+    )
+    thrust_loss_1_m: float = option(
+        0.0, least=0.0, most=10.0, help="Loss of thrust acceleration per square of airspeed (k_T / m)."
+    )
+    throttle_trim: float = option(
+        0.5, least=0.0, most=1.0, help="Throttle that is assumed when none is received, 0..1."
+    )
+    side_force_ratio_1_rad: float = option(
+        3.0, least=0.1, infinite=True, help="Ratio of side force per sideslip to lift; inf: no sideslip."
+    )
+    side_force_time_s: float = option(
+        1.0, least=0.01, most=100.0, help="Time constant of the side force's smoothing."
+    )
+    drag_1_s: float = option(
+        0.4, least=0.05, most=5.0, help="Initial value of a multirotor's drag acceleration per speed."
+    )
+    drag_velocity_gain_1_s: float = option(
+        0.5, least=0.01, most=20.0, help="Gain from the velocity computed from drag to the velocity filter."
+    )
+    drag_learning_m_s: float = option(
+        5.0,
+        least=0.01,
+        infinite=True,
+        help="Difference of velocities with half weight in learning the drag; inf: none.",
+    )
+    gyro_noise_rad_rts: float = option(
+        1e-3, least=0.0, most=1.0, help="Angular random walk of the gyros, rad/s/sqrt(Hz)."
+    )
+    gyro_bias_walk_rad_s_rts: float = option(
+        1e-5, least=0.0, most=0.1, help="Random walk of the gyro bias, rad/s per square root of a second."
+    )
+    gyro_bias_start_rad_s: float = option(
+        0.01, least=0.0, most=1.0, help="Standard deviation of the gyro bias at the start."
+    )
+    rest_error_rad: float = option(0.01, least=0.0, most=1.0, help="Standard error of the reference at rest.")
+    flight_error_rad: float = option(
+        0.03, least=0.0, most=1.0, help="Standard error of the reference in steady flight."
+    )
+    manoeuvre_error: float = option(
+        0.08, least=0.0, most=1.0, help="Standard error of the reference per manoeuvre load (rad at 1 g)."
+    )
+    reference_time_s: float = option(
+        3.0, least=0.01, most=100.0, help="Correlation time of the reference's errors."
+    )
 
 
 # Order of the coefficients for the compiled step: every numeric parameter, by its name.

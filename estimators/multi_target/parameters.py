@@ -1,16 +1,20 @@
 """Parameters of the multi-target estimator."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
-from estimators.errors import EstimatorError
-from estimators.tracking.grid import GridLayout
-from estimators.tracking.intensity import Motion, MotionKind
-from estimators.tracking.range_bearing import RangeBearingSensor
-from estimators.tracking.smc_phd import SmcPhdParameters
-from flightsim.foundation.checks import check_fields, named, require_finite, require_members, require_positive
+from estimators.tracking.cell_count import cells_over
+from estimators.tracking.motion import MotionKind
+from flightsim.foundation.options import Options, option
 
 __all__ = ["Belief", "MultiTargetParameters"]
+
+REACH: Final = 100.0 / 15.0
+"""Radius of the field of view, in scales of its fall: there the probability of detection is 0.035."""
+_CELLS: Final = 60  # of the exploration map along the longer side
+_LEAST_CELL_M: Final = 5.0
 
 
 class Belief(StrEnum):
@@ -21,124 +25,111 @@ class Belief(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MultiTargetParameters:
-    """Parameters of `MultiTargetEstimator`. Places are metres from the home of the centre vehicle.
+class MultiTargetParameters(Options):
+    """Parameters of `MultiTargetEstimator`. Places are metres from the home of the centre vehicle."""
 
-    Attributes:
-        south_m, west_m, north_m, east_m: edges of the searched area (paper: -30..270 m).
-        cell_m: side of a cell of the exploration map.
-        gain, forward_scale_m, right_scale_m, reach_m, range_sigma_m, bearing_sigma_rad, clutter_per_scan: the
-            sensor, as in `RangeBearingSensor`.
-        belief: particles, or Gaussian components.
-        birth_per_m2: targets per square metre expected before the search; times the exploration map, it is
-            the intensity of targets that were never detected.
-        motion, walk_m_sqrt_s, acceleration_m_s2_sqrt_hz, speed_sigma_m_s, survival_per_s: the targets, as in
-            `Motion`.
-        forget_s: time constant with which the exploration map returns to 1 when targets move.
-        particles_per_target, births_per_measurement, max_particles: of the particle filter.
-        found_width_m: T_W; a cluster is a found target when it is narrower, ...
-        found_mass: T_m; ... and its mass is at least this (paper: 1; see docs/multi_target.md).
-        found_distance_m: T_z; a measurement nearer to a found target belongs to it.
-        reported_mass: clusters of at least this mass are reported as targets.
-        least_height_m: scans from below this height above home are not used: the sensor looks from the air.
-        centre_vehicle: system id of the vehicle whose home is the origin; 0: of the first one that scans.
-        seed: of the random numbers of the particle filter.
-    """
+    south_m: float = option(-30.0, help="Southern edge of the searched area (paper: -30 m).")
+    west_m: float = option(-30.0, help="Western edge of the searched area.")
+    north_m: float = option(270.0, help="Northern edge of the searched area (paper: 270 m).")
+    east_m: float = option(270.0, help="Eastern edge of the searched area.")
+    cell_m: float | None = option(
+        None, above=0.0, varies="1/60 of the longer side", help="Side of a cell of the exploration map."
+    )
+    gain: float = option(
+        0.98, above=0.0, most=1.0, help="Probability to detect a target below the vehicle (paper: G)."
+    )
+    forward_scale_m: float = option(
+        15.0, above=0.0, help="Scale of the sensor's fall ahead of the vehicle (paper: F_X)."
+    )
+    right_scale_m: float = option(
+        15.0, above=0.0, help="Scale of the sensor's fall beside the vehicle (paper: F_Y)."
+    )
+    reach_m: float | None = option(
+        None, above=0.0, varies="6.7 of the larger scale", help="Radius of the field of view."
+    )
+    range_sigma_m: float = option(0.5, above=0.0, help="Standard deviation of the sensor's range.")
+    bearing_sigma_rad: float = option(
+        math.radians(1.7), above=0.0, help="Standard deviation of the sensor's bearing."
+    )
+    place_sigma_m: float = option(0.3, least=0.0, help="Standard deviation of the vehicle's place.")
+    heading_sigma_rad: float = option(
+        0.02, least=0.0, help="Standard deviation of the vehicle's own heading."
+    )
+    clutter_per_scan: float = option(0.0, least=0.0, help="Mean number of false detections in a scan.")
+    belief: Belief = option(Belief.PARTICLES, help="Representation of the intensity of targets.")
+    expected_targets: float = option(
+        18.0, above=0.0, help="Number of targets in the area that is expected before the search."
+    )
+    motion: MotionKind = option(MotionKind.STATIC, help="Motion of the targets, as the filter expects it.")
+    walk_m_sqrt_s: float | None = option(
+        None,
+        least=0.0,
+        varies="0.5; static targets: 0.03",
+        help="Standard deviation of a place, per axis, m after one second of motion.",
+    )
+    acceleration_m_s2_sqrt_hz: float = option(
+        0.1, least=0.0, help="Spectral density of the acceleration's noise (constant velocity)."
+    )
+    speed_sigma_m_s: float = option(
+        1.0, least=0.0, help="Standard deviation of a new target's velocity per axis (constant velocity)."
+    )
+    survival_per_s: float | None = option(
+        None,
+        above=0.0,
+        most=1.0,
+        varies="0.999; static targets: 1",
+        help="Probability of a target to survive a second.",
+    )
+    forget_s: float = option(
+        120.0, above=0.0, help="Time constant of the exploration map's return to 1, when targets move."
+    )
+    particles_per_target: int = option(
+        500, least=1, most=1_000_000, help="Number of particles of each expected target."
+    )
+    births_per_measurement: int = option(
+        250, least=1, most=1_000_000, help="Number of particles born at each measurement."
+    )
+    max_particles: int = option(20_000, least=1, most=1_000_000, help="Largest number of particles.")
+    found_width_m: float = option(
+        0.5, above=0.0, help="Width of a cluster below which it is a found target (paper: T_W)."
+    )
+    found_mass: float = option(
+        0.9,
+        above=0.0,
+        help="Expected number of targets from which a cluster is a found target (paper: T_m, 1).",
+    )
+    found_distance_m: float = option(
+        4.0, above=0.0, help="Distance from a found target within which measurements are of it (paper: T_z)."
+    )
+    reported_mass: float = option(
+        0.5, above=0.0, help="Expected number of targets from which a cluster is reported as a target."
+    )
+    least_height_m: float = option(3.0, help="Height above home below which scans are not used.")
+    centre_vehicle: int = option(
+        0,
+        least=0,
+        most=255,
+        help="System id of the vehicle whose home is the origin; 0: of the first that scans.",
+    )
+    seed: int = option(0, least=0, help="Seed of the random numbers of filter and planner.")
 
-    south_m: float = -30.0
-    west_m: float = -30.0
-    north_m: float = 270.0
-    east_m: float = 270.0
-    cell_m: float = 5.0
-    gain: float = 0.98
-    forward_scale_m: float = 15.0
-    right_scale_m: float = 15.0
-    reach_m: float = 100.0
-    range_sigma_m: float = 0.6
-    bearing_sigma_rad: float = 0.035
-    clutter_per_scan: float = 0.0
-    belief: Belief = Belief.PARTICLES
-    birth_per_m2: float = 2e-4
-    motion: MotionKind = MotionKind.STATIC
-    walk_m_sqrt_s: float = 0.03
-    acceleration_m_s2_sqrt_hz: float = 0.1
-    speed_sigma_m_s: float = 1.0
-    survival_per_s: float = 1.0
-    forget_s: float = 120.0
-    particles_per_target: int = 500
-    births_per_measurement: int = 250
-    max_particles: int = 20_000
-    found_width_m: float = 0.5
-    found_mass: float = 0.9
-    found_distance_m: float = 4.0
-    reported_mass: float = 0.5
-    least_height_m: float = 3.0
-    centre_vehicle: int = 0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        require_members(self, belief=Belief, motion=MotionKind)
-        check_fields(self, require_finite)
-        require_positive(
-            **named(self, "cell_m", "birth_per_m2", "found_width_m", "found_mass", "found_distance_m"),
-            **named(self, "reported_mass", "forget_s"),
-        )
-        if not 0 <= self.centre_vehicle <= 255:
-            raise ValueError(f"centre_vehicle {self.centre_vehicle} is not a system id, 0..255")
-        if self.seed < 0:
-            raise ValueError(f"seed {self.seed} is not accepted: 0 or more is")
-        _ = self.sensor, self.target_motion, self.particles  # these constructors refuse impossible values
-        try:
-            _ = self.layout
-        except EstimatorError as error:
-            raise ValueError(str(error)) from error
-
-    @property
-    def layout(self) -> GridLayout:
-        """Cells of the exploration map."""
+    def check_together(self) -> None:
         if not (self.north_m > self.south_m and self.east_m > self.west_m):
             raise ValueError(
                 f"the area from {self.south_m:g},{self.west_m:g} to {self.north_m:g},{self.east_m:g} is "
                 "empty; north_m must be above south_m, and east_m above west_m"
             )
-        return GridLayout.over(
-            width_m=self.east_m - self.west_m,
-            height_m=self.north_m - self.south_m,
-            cell_m=self.cell_m,
-            centre_ne_m=(0.5 * (self.north_m + self.south_m), 0.5 * (self.east_m + self.west_m)),
-        )
+        cells_over(self.east_m - self.west_m, self.north_m - self.south_m, self.cell_side_m)
 
     @property
-    def sensor(self) -> RangeBearingSensor:
-        """What is known about the sensor."""
-        return RangeBearingSensor(
-            gain=self.gain,
-            forward_scale_m=self.forward_scale_m,
-            right_scale_m=self.right_scale_m,
-            reach_m=self.reach_m,
-            range_sigma_m=self.range_sigma_m,
-            bearing_sigma_rad=self.bearing_sigma_rad,
-            clutter_per_scan=self.clutter_per_scan,
-        )
+    def cell_side_m(self) -> float:
+        """Side of a cell of the exploration map."""
+        longer_m = max(self.north_m - self.south_m, self.east_m - self.west_m)
+        return self.cell_m or max(_LEAST_CELL_M, longer_m / _CELLS)
 
     @property
-    def target_motion(self) -> Motion:
-        """How targets move."""
-        return Motion(
-            kind=self.motion,
-            walk_m_sqrt_s=self.walk_m_sqrt_s,
-            acceleration_m_s2_sqrt_hz=self.acceleration_m_s2_sqrt_hz,
-            speed_sigma_m_s=self.speed_sigma_m_s,
-            survival_per_s=self.survival_per_s,
-        )
-
-    @property
-    def particles(self) -> SmcPhdParameters:
-        """Parameters of the particle filter; a cluster's radius is four found widths."""
-        return SmcPhdParameters(
-            particles_per_target=self.particles_per_target,
-            births_per_measurement=self.births_per_measurement,
-            max_particles=self.max_particles,
-            min_particles=min(200, self.max_particles),
-            cluster_radius_m=4.0 * self.found_width_m,
-        )
+    def birth_per_m2(self) -> float:
+        """Targets per square metre that are expected before the search; times the exploration map, the
+        intensity of targets that were never detected.
+        """
+        return self.expected_targets / ((self.north_m - self.south_m) * (self.east_m - self.west_m))

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.multi_target.models import layout_of, motion_of, particles_of, sensor_of
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
 from estimators.tracking.exploration import ExplorationMap
 from estimators.tracking.gaussian_phd import GaussianPhd
@@ -58,16 +59,16 @@ class SearchBelief:
 
     def __init__(self, parameters: MultiTargetParameters) -> None:
         p = self.parameters = parameters
-        self.sensor = p.sensor
-        motion = p.target_motion
+        self.sensor = sensor_of(p)
+        motion = motion_of(p)
         self.intensity: TargetIntensity
         if p.belief is Belief.PARTICLES:
             seed = RandomStreams(p.seed).child("multi_target")
-            self.intensity = SmcPhd(self.sensor, motion, p.particles, seed=seed)
+            self.intensity = SmcPhd(self.sensor, motion, particles_of(p), seed=seed)
         else:
             self.intensity = GaussianPhd(self.sensor, motion)
         self._static = not motion.moves
-        self.exploration = ExplorationMap(p.layout, self.sensor, math.inf if self._static else p.forget_s)
+        self.exploration = ExplorationMap(layout_of(p), self.sensor, math.inf if self._static else p.forget_s)
         self.found: list[FoundTarget] = []
         self.clusters: Sequence[Cluster] = ()
         self.scans = self.removed = self.outside = 0

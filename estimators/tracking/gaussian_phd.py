@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.tracking.intensity import BirthIntensity, Cluster, Motion, MotionKind
+from estimators.tracking.intensity import BirthIntensity, Cluster
+from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
 from flightsim.foundation.checks import named, require_positive
 

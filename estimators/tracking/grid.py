@@ -5,16 +5,15 @@ North and east are metres from home; arrays have rows to the north and columns t
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
+from estimators.tracking.cell_count import MAX_CELLS, cells_over
 
 Array = NDArray[np.float64]
 
-MAX_CELLS: Final = 250_000
 Cell = tuple[int, int]
 """(row, column): row 0 is the southernmost, column 0 the westernmost."""
 
@@ -27,10 +26,6 @@ class GridLayout:
         south_m, west_m: corner of the rectangle, north and east of home.
         cell_m: side of a cell.
         rows, columns: number of rows and columns.
-        most_cells: largest number of cells that is accepted.
-
-    Raises:
-        EstimatorError: the size gives no map.
     """
 
     south_m: float
@@ -38,21 +33,6 @@ class GridLayout:
     cell_m: float
     rows: int
     columns: int
-    most_cells: int = MAX_CELLS
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
-            raise EstimatorError(f"`cell_m` {self.cell_m:g} m is not possible; ask for more than 0")
-        if self.rows < 2 or self.columns < 2:
-            raise EstimatorError(
-                f"`cell_m` {self.cell_m:g} m leaves {self.rows} x {self.columns} cells in the area; "
-                "ask for smaller cells or a larger `width_m, height_m`: at least 2 x 2 make a map"
-            )
-        if self.rows * self.columns > self.most_cells:
-            raise EstimatorError(
-                f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than "
-                f"{self.most_cells}; ask for larger cells or a smaller `width_m, height_m`"
-            )
 
     @classmethod
     def over(
@@ -64,17 +44,18 @@ class GridLayout:
         centre_ne_m: tuple[float, float],
         most_cells: int = MAX_CELLS,
     ) -> "GridLayout":
-        """Cells over `width_m` (east) by `height_m` (north) around a centre; partial cells are left out."""
-        if not (math.isfinite(cell_m) and cell_m > 0.0):
-            raise EstimatorError(f"`cell_m` {cell_m:g} m is not possible; ask for more than 0")
-        rows, columns = math.floor(height_m / cell_m + 1e-9), math.floor(width_m / cell_m + 1e-9)
+        """Cells over `width_m` (east) by `height_m` (north) around a centre; partial cells are left out.
+
+        Raises:
+            EstimatorError: there are too few cells or too many.
+        """
+        rows, columns = cells_over(width_m, height_m, cell_m, most_cells)
         return cls(
             south_m=centre_ne_m[0] - 0.5 * rows * cell_m,
             west_m=centre_ne_m[1] - 0.5 * columns * cell_m,
             cell_m=cell_m,
             rows=rows,
             columns=columns,
-            most_cells=most_cells,
         )
 
     @property

@@ -1,4 +1,4 @@
-"""The intensity of a random finite set of targets (PHD): its role, the clusters in it, and how targets move.
+"""The intensity of a random finite set of targets (PHD): its role, and the clusters in it.
 
 The integral of the intensity over a region is the expected number of targets there. `SmcPhd` represents it by
 particles, `GaussianPhd` by Gaussian components.
@@ -6,59 +6,19 @@ particles, `GaussianPhd` by Gaussian components.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.checks import named, require_not_negative
 
-__all__ = ["BirthIntensity", "Cluster", "Motion", "MotionKind", "TargetIntensity"]
+__all__ = ["BirthIntensity", "Cluster", "TargetIntensity"]
 
 Array = NDArray[np.float64]
 
 BirthIntensity = Callable[[Array, Array], Array]
 """North and east of places (n,) -> intensity of targets that were never detected, per square metre (n,)."""
-
-
-class MotionKind(StrEnum):
-    """How targets move."""
-
-    STATIC = "static"
-    RANDOM_WALK = "random-walk"
-    CONSTANT_VELOCITY = "constant-velocity"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
-    """Motion and survival of targets.
-
-    Attributes:
-        kind: static, random walk, or constant velocity with white noise in the acceleration.
-        walk_m_sqrt_s: growth of the standard deviation of a place, per axis, metres after one second. For
-            static targets a small value keeps particles apart that resampling has copied.
-        acceleration_m_s2_sqrt_hz: spectral density of the acceleration's noise (constant velocity).
-        speed_sigma_m_s: standard deviation of a new target's velocity per axis (constant velocity).
-        survival_per_s: probability to survive a second; below 1, targets may disappear.
-    """
-
-    kind: MotionKind = MotionKind.STATIC
-    walk_m_sqrt_s: float = 0.03
-    acceleration_m_s2_sqrt_hz: float = 0.1
-    speed_sigma_m_s: float = 1.0
-    survival_per_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_not_negative(**named(self, "walk_m_sqrt_s", "acceleration_m_s2_sqrt_hz", "speed_sigma_m_s"))
-        if not 0.0 < self.survival_per_s <= 1.0:
-            raise ValueError(f"survival_per_s {self.survival_per_s:g} is not in 0..1, or is 0")
-
-    @property
-    def moves(self) -> bool:
-        """Whether the model is of targets that move."""
-        return self.kind is not MotionKind.STATIC
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,7 @@ from estimators.errors import EstimatorError
 from estimators.tracking.camera_likelihood import FrameLikelihood
 from estimators.tracking.camera_sight import CameraSight, SightModel
 from estimators.tracking.grid import GridLayout
-from estimators.tracking.intensity import Motion, MotionKind
+from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.particle_kernels import (
     DRAWS,
     add_particles,

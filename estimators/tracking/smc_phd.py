@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking.clusters import find_clusters, inside
-from estimators.tracking.intensity import BirthIntensity, Cluster, Motion, MotionKind
+from estimators.tracking.intensity import BirthIntensity, Cluster
+from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.range_bearing import (
     BEARING_SIGMA,
     FORWARD,

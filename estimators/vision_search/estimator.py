@@ -25,6 +25,7 @@ from estimators.tracking.area_belief import AreaBelief
 from estimators.tracking.camera_sight import CameraSight
 from estimators.vision_search.estimate import AreaEstimate
 from estimators.vision_search.frames import Camera, likelihood_of, sight_of
+from estimators.vision_search.models import new_belief, pose_errors_of
 from estimators.vision_search.parameters import VisionSearchParameters
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
@@ -62,7 +63,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
             "LANDING_TARGET": self._on_detection,
             "TUNNEL": self._on_tunnel,
         }
-        self._errors = self.parameters.pose_errors
+        self._errors = pose_errors_of(self.parameters)
         self.reset()
 
     @property
@@ -83,7 +84,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     def reset(self) -> None:
         """Discard everything except the parameters."""
-        self.belief: AreaBelief = self.parameters.new_belief()
+        self.belief: AreaBelief = new_belief(self.parameters)
         self.detections = self.frames = 0
         self.newest: dict[int, CameraSight] = {}
         self._cameras: dict[int, Camera] = {}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking.association import assign
+from estimators.tracking.motion import MotionKind
 from estimators.tracking.ospa import gospa, ospa
 from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.targets import true_targets
@@ -64,7 +65,9 @@ def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchSc
     for k, (time_us, place) in enumerate(truth):
         for axis in (0, 1):
             places[:, k, axis] = np.interp(times, time_us, place[:, axis])
-    moving = team.watch.belief.parameters.target_motion.moves  # then the reported ones count as found
+    moving = (
+        team.watch.belief.parameters.motion is not MotionKind.STATIC
+    )  # then the reported ones count as found
     right, apart, apart_general = [], [], []
     for state, true in zip(states, places, strict=True):
         reported = np.array([(t.north_m, t.east_m) for t in state.targets]).reshape(-1, 2)

@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Final
 
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
-from estimators.tracking.intensity import MotionKind
+from estimators.tracking.motion import MotionKind
 from missions.base.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.errors import PlanError
 from missions.search.area import Area
@@ -14,12 +14,8 @@ from missions.search.options import StepLawKind, check_steps
 from missions.search.planner_parameters import Exploration, PlannerParameters
 from missions.vehicle.limits import FixedWingLimits, Limits
 
-REACH: Final = 100.0 / 15.0
-"""Radius of the field of view, in scales of its fall: there the probability of detection is 0.035."""
 MAX_STEPS: Final = 10_000
 LARGEST_SIDE_M: Final = 20_000.0
-_MAP_CELLS: Final = 60  # cells of the exploration map along the longer side
-_LEAST_CELL_M: Final = 5.0
 _TURNS: Final = 2.5  # step of an aircraft, in turn radii
 
 
@@ -94,7 +90,7 @@ class MultiTargetOptions(MissionOptions):
     gain: float = 0.98
     field_of_view_m: tuple[float, float] = (15.0, 15.0)
     range_sigma_m: float = 0.5
-    bearing_sigma_rad: float = 0.03
+    bearing_sigma_rad: float = math.radians(1.7)
     place_sigma_m: float = 0.3
     heading_sigma_rad: float = 0.02
     clutter_per_scan: float = 0.0
@@ -172,26 +168,23 @@ class MultiTargetOptions(MissionOptions):
     @property
     def estimator_parameters(self) -> MultiTargetParameters:
         """Parameters of the estimator that the mission runs; the same as those of `estimator_settings`."""
-        area = self.area
         south_m, west_m, north_m, east_m = self.area_m
         return MultiTargetParameters(
             south_m=south_m,
             west_m=west_m,
             north_m=north_m,
             east_m=east_m,
-            cell_m=max(_LEAST_CELL_M, max(area.height_m, area.width_m) / _MAP_CELLS),
             gain=self.gain,
             forward_scale_m=self.field_of_view_m[0],
             right_scale_m=self.field_of_view_m[1],
-            reach_m=REACH * max(self.field_of_view_m),
-            range_sigma_m=math.hypot(self.range_sigma_m, self.place_sigma_m),
-            bearing_sigma_rad=math.hypot(self.bearing_sigma_rad, self.heading_sigma_rad),
+            range_sigma_m=self.range_sigma_m,
+            bearing_sigma_rad=self.bearing_sigma_rad,
+            place_sigma_m=self.place_sigma_m,
+            heading_sigma_rad=self.heading_sigma_rad,
             clutter_per_scan=self.clutter_per_scan,
             belief=self.belief,
-            birth_per_m2=self.expected_targets / (area.height_m * area.width_m),
+            expected_targets=self.expected_targets,
             motion=self.motion,
-            walk_m_sqrt_s=0.03 if self.motion is MotionKind.STATIC else 0.5,
-            survival_per_s=1.0 if self.motion is MotionKind.STATIC else 0.999,
             found_width_m=self.found_width_m,
             found_mass=self.found_mass,
             found_distance_m=self.found_distance_m,

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from estimators.multi_target.parameters import REACH
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import (
     GroundTargetParameters,
@@ -20,7 +21,7 @@ from flightsim.payload import (
 )
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
-from missions.multi_target.options import REACH, MultiTargetOptions
+from missions.multi_target.options import MultiTargetOptions
 from missions.search.area import Area
 from missions.worlds.payloads import carrying
 

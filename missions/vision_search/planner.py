@@ -17,6 +17,7 @@ from estimators.tracking.camera_likelihood import FrameLikelihood
 from estimators.tracking.camera_sight import CameraSight, SightModel
 from estimators.tracking.grid import GridLayout
 from estimators.vision_search.estimate import AreaEstimate
+from estimators.vision_search.models import sight_model_of
 from flightsim.foundation.vectors import from_euler, product
 from missions.patterns.lissajous import named_lissajous
 from missions.patterns.polyline import Polyline
@@ -255,7 +256,7 @@ def planner_of(options: VisionSearchOptions) -> AreaPlanner:
         return HorizonPlanner(
             options.planner_parameters,
             area,
-            options.estimator_parameters.sight_model,
+            sight_model_of(options.estimator_parameters),
             altitude_m=options.own_altitude_m,
         )
     if options.planner is SearchPlannerKind.LISSAJOUS:

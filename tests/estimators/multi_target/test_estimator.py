@@ -10,14 +10,18 @@ from autopilot_bridge.mavlink.target_scan import scan_messages
 from estimators.interface import Outcome
 from estimators.messages import read_message
 from estimators.multi_target import MultiTargetEstimator, MultiTargetParameters
+from estimators.multi_target.models import sensor_of
 from estimators.runner import Runner
 from estimators.tracking.ospa import gospa
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 FRAME = LocalFrame(HOME)
-AREA = MultiTargetParameters(south_m=-50.0, west_m=-50.0, north_m=50.0, east_m=50.0, birth_per_m2=1e-3)
-SENSOR = AREA.sensor
+AREA = MultiTargetParameters(
+    south_m=-50.0, west_m=-50.0, north_m=50.0, east_m=50.0, expected_targets=10.0,
+    range_sigma_m=0.6, place_sigma_m=0.0, bearing_sigma_rad=0.035, heading_sigma_rad=0.0,
+)  # fmt: skip
+SENSOR = sensor_of(AREA)
 
 
 class Flight:

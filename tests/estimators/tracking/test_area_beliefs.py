@@ -11,7 +11,7 @@ from estimators.errors import EstimatorError
 from estimators.tracking.camera_likelihood import ground_spread
 from estimators.tracking.camera_sight import CameraSight, DetectionRate, PoseErrors, SightModel
 from estimators.tracking.grid import GridLayout
-from estimators.tracking.intensity import Motion, MotionKind
+from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.search_grid import Scale, SearchGrid
 from estimators.tracking.search_particles import SearchParticles
 from flightsim.foundation.vectors import from_euler, product

@@ -7,7 +7,7 @@ import pytest
 
 from estimators.tracking.clusters import find_clusters
 from estimators.tracking.gaussian_phd import GaussianPhd
-from estimators.tracking.intensity import Motion, MotionKind
+from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
 from estimators.tracking.smc_phd import SmcPhd, update_weights
 

@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink.search_likelihood import read_search_likelihood
 from estimators.interface import Outcome
 from estimators.runner import Runner
 from estimators.vision_search import VisionSearchEstimator, VisionSearchParameters
+from estimators.vision_search.models import layout_of
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
@@ -256,7 +257,7 @@ def test_a_tag_of_another_id_is_counted_only():
         pass
     assert runner.estimator.detections == 0
     assert runner.remarks["detections_of_other_tags"] >= 4
-    assert runner.estimator.belief.shares(parameters(cell_m=50.0).layout)[2, 1] < 0.01
+    assert runner.estimator.belief.shares(layout_of(parameters(cell_m=50.0)))[2, 1] < 0.01
 
 
 def test_two_tags_of_the_id_leave_both_places():
@@ -266,7 +267,7 @@ def test_two_tags_of_the_id_leave_both_places():
     flight = Flight(runner)
     for k in range(6):
         flight.look(12.0, -8.0 + k, tags=((0, TAG), (0, other)))
-    shares = runner.estimator.belief.shares(parameters(cell_m=20.0).layout)
+    shares = runner.estimator.belief.shares(layout_of(parameters(cell_m=20.0)))
     places = [((np.array(p) + 100.0) / 20.0).astype(int) for p in (TAG, other)]
     assert all(0.2 < shares[row - 1 : row + 2, column - 1 : column + 1].sum() < 0.8 for row, column in places)
 
@@ -288,9 +289,9 @@ def test_a_reset_discards_the_belief():
         ({"tag_id": 300}, "tag_id 300 is not in 0..254"),
         ({"north_m": -200.0}, "north_m must be above south_m"),
         ({"cell_m": 0.01}, "more than 16000000"),
-        ({"false_rate": 0.0}, "false_rate 0 is not between 0 and 1"),
+        ({"false_rate": 0.0}, "false_rate 0 is not possible; ask for more than 0, less than 1"),
         ({"frame_period_s": -1.0}, "frame_period_s -1"),
-        ({"cell_m": math.nan}, "cell_m nan is not a finite number"),
+        ({"cell_m": math.nan}, "cell_m nan is not possible"),
         ({"own_vehicle": 256}, "own_vehicle 256"),
     ],
 )

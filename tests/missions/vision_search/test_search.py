@@ -9,6 +9,7 @@ import pytest
 
 from estimators.tracking.camera_sight import CameraSight
 from estimators.vision_search import AreaEstimate, VisionSearchEstimator
+from estimators.vision_search.models import new_belief, pose_errors_of
 from flightsim.foundation.vectors import from_euler, product
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 from missions.vision_search.figures import search_verdict
@@ -24,7 +25,7 @@ PARAMETERS = OPTIONS.estimator_parameters
 
 def frame(place, heading_rad, options=OPTIONS):
     down = from_euler(0.0, -0.5 * math.pi, 0.0)
-    place_m2, rotation_rad2 = options.estimator_parameters.pose_errors.covariances(
+    place_m2, rotation_rad2 = pose_errors_of(options.estimator_parameters).covariances(
         from_euler(0.0, 0.0, heading_rad), down
     )
     return CameraSight(
@@ -40,7 +41,7 @@ def frame(place, heading_rad, options=OPTIONS):
 
 def detection_probability_after(planner, steps, options=OPTIONS):
     """Of a search that sees nothing, with a frame in the middle and at the end of each step."""
-    belief = options.estimator_parameters.new_belief()
+    belief = new_belief(options.estimator_parameters)
     here, direction, camera = (0.0, 0.0), None, frame((0.0, 0.0), 0.0)
     for _ in range(steps):
         there = planner.next_place(belief, here, direction, camera)
@@ -72,7 +73,7 @@ def test_the_planner_with_a_horizon_detects_sooner_than_the_greedy_one_and_the_c
 
 def test_vehicles_that_plan_by_the_same_belief_part():
     options = replace(OPTIONS, planner=SearchPlannerKind.HORIZON, horizon=2)
-    belief, planner, camera = PARAMETERS.new_belief(), planner_of(options), frame((0.0, 0.0), 0.0)
+    belief, planner, camera = new_belief(PARAMETERS), planner_of(options), frame((0.0, 0.0), 0.0)
     first = planner.next_place(belief, (0.0, 0.0), None, camera)
     direction = math.atan2(first[1], first[0])
     second = planner.next_place(belief, (0.0, 0.0), None, camera, [(first, direction)])
@@ -86,7 +87,7 @@ def test_a_sweep_sees_the_whole_area_and_each_vehicle_its_strip():
         own = replace(OPTIONS, vehicles=2, index=index)
         planner, here, places = planner_of(own), (0.0, 0.0), []
         for _ in range(30):
-            here = planner.next_place(PARAMETERS.new_belief(), here, None, None)
+            here = planner.next_place(new_belief(PARAMETERS), here, None, None)
             places.append(here)
         north = np.array(places)[5:, 0]
         assert low <= north.min() and north.max() <= high
@@ -96,7 +97,7 @@ def test_the_planner_of_an_aircraft_turns_by_90_degrees_at_most():
     options = VisionSearchOptions(
         area_m=(-600.0, -600.0, 600.0, 600.0), planner=SearchPlannerKind.HORIZON, horizon=1
     ).for_vehicle(FixedWingLimits())
-    belief, planner = options.estimator_parameters.new_belief(), planner_of(options)
+    belief, planner = new_belief(options.estimator_parameters), planner_of(options)
     here, direction = (0.0, 0.0), 0.0
     for _ in range(10):
         there = planner.next_place(belief, here, direction, frame(here, direction, options))
