@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from missions.cli.mission_command import Given
-from missions.orbit.options import WANDERING_M
 
 if TYPE_CHECKING:
     from flightsim.payload import GroundTargetParameters
@@ -169,7 +168,6 @@ def _target(text: str, tag: int) -> "GroundTargetParameters":
         place_ne_m=(numbers[0], numbers[1]),
         speed_m_s=speed_m_s,
         course_rad=math.radians(heading_deg),
-        range_m=WANDERING_M,
     )
     return GroundTargetParameters(motion=motion, tag_id=tag)
 

@@ -26,7 +26,7 @@ def motion_of(
     place_ne_m: tuple[float, float],
     speed_m_s: float = 0.0,
     course_rad: float = 0.0,
-    range_m: float,
+    range_m: float = 0.0,
 ) -> TargetMotion:
     """Motion of a ground target that begins at a place.
 
@@ -35,7 +35,8 @@ def motion_of(
         place_ne_m: place at boot, from home; for a circle, which begins in the north, its northernmost point.
         speed_m_s: ground speed; 0 for a static target.
         course_rad: course of a straight motion, and initial course of a random walk.
-        range_m: radius of a circle; for a random walk, half the side of the square that it stays in.
+        range_m: radius of a circle; for a random walk, half the side of the square that it stays in; 0 where
+            the kind needs none.
 
     Raises:
         PlanError: a place or speed is impossible.
