@@ -19,7 +19,7 @@ from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
 from missions.plan_files.options import FileOptions, Then
 from missions.plan_files.progress import CURVED
-from missions.plan_files.route import Stop, route_of, scored_stops, straight
+from missions.plan_files.route import Stop, placed, route_of, scored_stops, straight
 from missions.vehicle.item_tracker import THROUGH
 from missions.vehicle.items import FLOWN_TO
 from missions.vehicle.limits import FixedWingLimits, Limits
@@ -97,6 +97,9 @@ class FileMission(Mission[FileOptions]):
         reason = await vehicle.return_end.stays_because()
         if not reason:
             return ()
+        # its advice is of no use for a plan that the vehicle would not fly
+        items = placed(self.document.items, vehicle.home, vehicle.firmware.unset)
+        await vehicle.plans.refuse_infeasible(items, self.document.fence)
         return (
             f"the flight ends in the air: after its return it {vehicle.return_end.stay} over home "
             f"({reason}); `then=land` lands it",

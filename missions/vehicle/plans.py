@@ -70,7 +70,7 @@ class VehiclePlans:
         first = 1 if self._link.firmware.first_mission_item_is_home else 0
         home = self._link.home
         refuse_low_items(items, home.alt_m, below_home_allowed=self._heights.below_home_allowed)
-        await refuse_infeasible(self._link, self._parameters, items, fence)
+        await self.refuse_infeasible(items, fence)
         if fence:
             await upload(self._link, fence, MissionType.FENCE)
         if rally:
@@ -85,6 +85,12 @@ class VehiclePlans:
         await self.rewind_mission()
         self._tracker = self.note_stored(items, first).tracker()
         return first
+
+    async def refuse_infeasible(
+        self, items: Sequence[MissionItem], fence: Sequence[MissionItem] = ()
+    ) -> None:
+        """Raise PlanError for a mission that the vehicle would store and then not fly (`mission_rules`)."""
+        await refuse_infeasible(self._link, self._parameters, items, fence)
 
     def note_stored(self, items: Sequence[MissionItem], first: int) -> StoredPlan:
         """Note the uploaded plan, so that a mode at its end is distinguished from a pilot's.

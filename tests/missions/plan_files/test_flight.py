@@ -196,3 +196,27 @@ def test_a_return_of_arduplane_ends_in_the_air_and_that_is_said_before(returns: 
     warning = result.summary["vehicles"][0]["warnings"][-1]
     assert "its return has ended in the air: it circles over home in mode RTL" in warning
     assert result.summary["sim_time_s"] < 300.0
+
+
+@pytest.mark.parametrize(("flavour", "words"), [("px4", "Landing waypoint"), ("ardupilot", "item: RTL")])
+def test_what_lands_a_return_is_not_advised_for_a_plan_that_is_refused(
+    flavour: str, words: str, tmp_path: Path
+) -> None:
+    plan = changed("mission", "vehicleType", to=1)
+    plan["geoFence"] = {"version": 2, "circles": [], "polygons": []}
+    takeoff = simple(1, 22, [12, 0, 0, None, LAT + 0.003, LON, 60])
+    plan["mission"]["items"] = [takeoff, waypoint(2, 0.006, 0.0, 80)]
+    remarks: list[str] = []
+    result = fly(
+        find_mission(str(write(tmp_path, plan))),
+        request(
+            tmp_path / "a.plan",
+            flavour,
+            options=FileOptions(then=Then.RETURN),
+            parameters={} if flavour == "px4" else {"ARMING_MIS_ITEMS": 64},
+            on_remark=remarks.append,
+        ),
+    )
+    assert result.outcome == "failed"
+    assert words in result.reason
+    assert remarks == []
