@@ -21,6 +21,7 @@ __all__ = [
     "broken_at_gaps",
     "counted_words",
     "gaps_of",
+    "interpolated",
     "not_in_gaps",
     "received_positions",
     "received_times",
@@ -126,6 +127,26 @@ def not_in_gaps(at_s: Array, time_s: Array) -> NDArray[np.bool_]:
     after = np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1)
     known: NDArray[np.bool_] = (at_s >= time_s[0]) & (at_s <= time_s[-1])
     return known & ((time_s[after] - time_s[after - 1] <= GAP_S) | (time_s[after] == at_s))
+
+
+def interpolated(at: Array | float, times: Array, values: Array, *, gap: float = GAP_S) -> Array:
+    """Values (n,) or (n, k) of increasing times, at other times: NaN where nothing was received.
+
+    Args:
+        at: (m,) times or one, in the unit of `times`.
+        times: (n,), at least one.
+        values: at these times.
+        gap: times that are farther apart have nothing between them; beyond the ends the last value holds for
+            as long. `GAP_US` for microseconds.
+    """
+    at = np.asarray(at, dtype=np.float64)
+    after = np.clip(np.searchsorted(times, at), 0, len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    known = (at >= times[0] - gap) & (at <= times[-1] + gap)
+    known &= (times[after] - times[before] <= gap) | (times[after] == at) | (at > times[-1])
+    columns = [np.interp(at, times, column) for column in np.atleast_2d(values.T)]
+    found = np.where(known, columns, np.nan).T
+    return np.asarray(found if values.ndim > 1 else found[..., 0])
 
 
 def broken_at_gaps(time_s: Array, *columns: Array) -> tuple[Array, ...]:

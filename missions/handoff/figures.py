@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import GAP_US, interpolated
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions
 from missions.flown.records import place_of, positions_ned_m
@@ -39,8 +40,8 @@ class HandoffTruth:
     targets: Array
 
     def at(self, time_us: float, columns: Array) -> Array:
-        """Columns (n, k) at a time."""
-        return np.array([np.interp(time_us, self.time_us, column) for column in columns.T])
+        """Columns (n, k) at a time; NaN: not received."""
+        return interpolated(time_us, self.time_us, columns, gap=GAP_US)
 
     def placed(self, index: int, estimates: "Sequence[HandoffEstimate]") -> Array:
         """North and east (n, 2) of the targets of estimates, by true place and heading of the aircraft."""
@@ -53,12 +54,14 @@ class HandoffTruth:
         return found
 
     def nearest(self, time_us: float, place_ne_m: Array) -> tuple[int, float] | None:
-        """The target nearest to a place, and its distance; None: there is no target, or no place."""
+        """The target nearest to a place, and its distance; None: there is no target or no place, or the place
+        of a target is not known.
+        """
         if not len(self.targets) or not np.isfinite(place_ne_m).all():
             return None
         places = np.array([self.at(time_us, target) for target in self.targets])
         off = np.hypot(*(places - place_ne_m).T)
-        return int(off.argmin()), float(off.min())
+        return (int(off.argmin()), float(off.min())) if np.isfinite(off).all() else None
 
 
 def handoff_truth(records: "FlightRecords", system_ids: Sequence[int]) -> HandoffTruth | None:
@@ -76,10 +79,9 @@ def handoff_truth(records: "FlightRecords", system_ids: Sequence[int]) -> Handof
         )
         columns = (*positions_ned_m(table, frame).T[:2], yaw)
         times = table["time_usec"].astype(np.float64)
-        aircraft.append(np.column_stack([np.interp(time_us, times, column) for column in columns]))
+        aircraft.append(interpolated(time_us, times, np.column_stack(columns), gap=GAP_US))
     targets = [
-        np.column_stack([np.interp(time_us, times, places[:, k]) for k in (0, 1)])
-        for times, places in true_targets(records, frame)
+        interpolated(time_us, times, places, gap=GAP_US) for times, places in true_targets(records, frame)
     ]
     return HandoffTruth(
         time_us=time_us,

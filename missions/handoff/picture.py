@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from estimators.received import broken_at_gaps
 from estimators.reports.picture import tidy
 from missions.flown.camera_picture import CameraPicture, PicturesOf, clip, png
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
@@ -112,13 +113,14 @@ def _draw_ground(
     for aircraft, colour, name in zip(
         truth.aircraft, (_BLUE, _RED), ("handoff aircraft", "tracker"), strict=True
     ):
-        own = aircraft[during]
-        thin = max(1, len(own) // 4000)
-        axes.plot(own[::thin, 1], own[::thin, 0], color=colour, linewidth=0.6, alpha=0.4, label=name)
+        thin = max(1, np.count_nonzero(during) // 4000)
+        _, own = broken_at_gaps(1e-6 * truth.time_us[during][::thin], aircraft[during][::thin])
+        axes.plot(own[:, 1], own[:, 0], color=colour, linewidth=0.6, alpha=0.4, label=name)
     for number, target in enumerate(truth.targets):
+        _, shown = broken_at_gaps(1e-6 * truth.time_us[during], target[during])
         axes.plot(
-            target[during, 1],
-            target[during, 0],
+            shown[:, 1],
+            shown[:, 0],
             color=_GREY,
             linewidth=2.5,
             label="true targets" if number == 0 else None,
@@ -135,6 +137,8 @@ def _draw_ground(
     if len(truth.targets):
         # the aircraft fly on for some seconds when they leave
         places = truth.targets[:, during].reshape(-1, 2)
+        places = places[np.isfinite(places[:, 0])]
+    if len(truth.targets) and len(places):
         margin = 2.5 * radius_m
         axes.set_xlim(places[:, 1].min() - margin, places[:, 1].max() + margin)
         axes.set_ylim(places[:, 0].min() - margin, places[:, 0].max() + margin)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import GAP_US, interpolated
 from estimators.tracking.association import assign
 from estimators.tracking.motion import MotionKind
 from estimators.tracking.ospa import gospa, ospa
@@ -51,7 +52,9 @@ class SearchScore:
 
 
 def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchScore | None:
-    """The score of a search; None without truth or without a scan."""
+    """The score of a search, at the times of which the truth was received; None without truth or without a
+    scan.
+    """
     origin, search = team.watch.origin, team.search
     states = [state for state in search.states if state.time_us >= search.began_us >= 0]
     if origin is None or not states:
@@ -63,11 +66,13 @@ def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchSc
     places = np.empty((len(states), len(truth), 2))
     times = np.array([state.time_us for state in states], dtype=np.float64)
     for k, (time_us, place) in enumerate(truth):
-        for axis in (0, 1):
-            places[:, k, axis] = np.interp(times, time_us, place[:, axis])
-    moving = (
-        team.watch.belief.parameters.motion is not MotionKind.STATIC
-    )  # then the reported ones count as found
+        places[:, k] = interpolated(times, time_us, place, gap=GAP_US)
+    known = np.isfinite(places).all(axis=(1, 2))
+    if not known.any():
+        return None
+    states, times, places = [states[k] for k in np.flatnonzero(known)], times[known], places[known]
+    # of moving targets the reported ones count as found
+    moving = team.watch.belief.parameters.motion is not MotionKind.STATIC
     right, apart, apart_general = [], [], []
     for state, true in zip(states, places, strict=True):
         reported = np.array([(t.north_m, t.east_m) for t in state.targets]).reshape(-1, 2)

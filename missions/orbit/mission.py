@@ -92,6 +92,8 @@ class OrbitMission(Mission[OrbitOptions]):
         if summary.get("orbit_s") is None:
             return ()
         circle = f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s"
+        if summary.get("orbit_not_received_s"):
+            circle += f" ({summary['orbit_not_received_s']:.0f} s of it not received)"
         if summary["radius_mean_error_percent"] is not None:
             return (
                 f"{circle}: mean radius {summary['radius_mean_error_percent']:+.2f} %, standard deviation "

@@ -54,8 +54,8 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
         if lost_s is not None:
             axes.axvspan(lost_s, back_s or flown.time_s[-1], color=_GPS_LOST, zorder=0, linewidth=0)
     thin = max(1, len(flown.time_s) // 8000)
-    times = flown.time_s[::thin]
-    distance.plot(times, flown.radius_m[::thin], color=_BLUE, linewidth=1.0)
+    shown = flown.broken_at_gaps(thin)
+    distance.plot(shown.time_s, shown.radius_m, color=_BLUE, linewidth=1.0)
     distance.axhline(options.radius_m, color=_GREY, linewidth=3.0, alpha=0.6)
     distance.set_ylim(0.0, max(3.0 * options.radius_m, 1.2 * options.entry_distance_m))
     distance.set_ylabel("distance to\ntarget, m", fontsize=9, color=_INK)
@@ -69,7 +69,7 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
             fontsize=9,
             color=_INK,
         )
-    height.plot(times, -flown.aircraft_ned_m[::thin, 2], color=_BLUE, linewidth=1.0)
+    height.plot(shown.time_s, -shown.aircraft_ned_m[:, 2], color=_BLUE, linewidth=1.0)
     height.axhline(options.own_altitude_m, color=_GREY, linewidth=3.0, alpha=0.6)
     height.set_ylim(bottom=0.0)
     height.set_ylabel("height, m", fontsize=9, color=_INK)
@@ -83,13 +83,14 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
 def _draw_ground(axes: Any, flown: OrbitTruth, orbit: OrbitTruth | None) -> None:
     track, target = flown.aircraft_ned_m, flown.target_ned_m
     thin = max(1, len(track) // 8000)
-    axes.plot(track[::thin, 1], track[::thin, 0], color=_GREY, linewidth=0.9, label="aircraft")
+    shown = flown.broken_at_gaps(thin)
+    north, east, _ = shown.aircraft_ned_m.T
+    axes.plot(east, north, color=_GREY, linewidth=0.9, label="aircraft")
     if orbit is not None and len(orbit.time_s):
-        axes.plot(
-            orbit.aircraft_ned_m[::thin, 1], orbit.aircraft_ned_m[::thin, 0], color=_BLUE, linewidth=0.9,
-            label="its orbit",
-        )  # fmt: skip
-    axes.plot(target[::thin, 1], target[::thin, 0], color=_RED, linewidth=2.0, label="target")
+        north, east, _ = orbit.broken_at_gaps(thin).aircraft_ned_m.T
+        axes.plot(east, north, color=_BLUE, linewidth=0.9, label="its orbit")
+    north, east, _ = shown.target_ned_m.T
+    axes.plot(east, north, color=_RED, linewidth=2.0, label="target")
     axes.plot(target[-1, 1], target[-1, 0], "o", color=_RED, markersize=6)
     axes.plot(
         track[0, 1], track[0, 0], "o", color="#15803d", markersize=8, markeredgecolor="white", label="start"
@@ -117,7 +118,8 @@ def _draw_around(
     )
     for part, colour, width in ((entry, _GREY, 1.0), (orbit, _BLUE, 0.8)):
         if part is not None and len(part.time_s):
-            offset = part.aircraft_ned_m - part.target_ned_m
+            shown = part.broken_at_gaps()
+            offset = shown.aircraft_ned_m - shown.target_ned_m
             axes.plot(offset[:, 1], offset[:, 0], color=colour, linewidth=width)
     axes.plot(0.0, 0.0, "o", color=_RED, markersize=7)
     axes.set_aspect("equal", adjustable="datalim")

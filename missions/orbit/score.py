@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.received import GAP_S, broken_at_gaps, gaps_of, interpolated
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import LocalFrame
 from missions.base.mission import Debriefing
@@ -24,7 +25,7 @@ ORBIT: Final = "orbit"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitTruth:
-    """True positions of aircraft and target, at the aircraft's times.
+    """True positions of aircraft and target, at those of the aircraft's times at which both were received.
 
     Attributes:
         time_s: (n,) vehicle time.
@@ -47,6 +48,16 @@ class OrbitTruth:
             radius_m=self.radius_m[kept],
         )
 
+    def broken_at_gaps(self, stride: int = 1) -> "OrbitTruth":
+        """Each `stride`-th moment, with one of NaN in each gap, so that no line is drawn there."""
+        parts = (self.aircraft_ned_m, self.target_ned_m, self.radius_m)
+        rows = np.flatnonzero(np.diff(self.time_s) > GAP_S)
+        shown = np.union1d(np.arange(0, len(self.time_s), stride), np.concatenate((rows, rows + 1)))
+        time_s, aircraft, target, radius = broken_at_gaps(
+            self.time_s[shown], *(part[shown] for part in parts)
+        )
+        return OrbitTruth(time_s=time_s, aircraft_ned_m=aircraft, target_ned_m=target, radius_m=radius)
+
 
 def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
     """The true orbit from the truth frames of a vehicle and of the first target; None without them."""
@@ -57,7 +68,9 @@ def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
     frame = LocalFrame(place_of(own[0]))
     time_s = own["time_usec"] * 1e-6
     aircraft, theirs = positions_ned_m(own, frame), positions_ned_m(target, frame)
-    at = np.column_stack([np.interp(time_s, target["time_usec"] * 1e-6, axis) for axis in theirs.T])
+    at = interpolated(time_s, target["time_usec"] * 1e-6, theirs)
+    both = np.isfinite(at[:, 0])
+    time_s, aircraft, at = time_s[both], aircraft[both], at[both]
     offset = at - aircraft
     return OrbitTruth(
         time_s=time_s, aircraft_ned_m=aircraft, target_ned_m=at, radius_m=np.hypot(offset[:, 0], offset[:, 1])
@@ -72,6 +85,7 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
     * radius_max_error_m: largest difference from the commanded radius.
     * altitude_error_m: largest difference of the true height above the start from the commanded altitude.
     * orbit_s: duration of the orbit.
+    * orbit_not_received_s: the part of it of which the truth was not received, and which no figure contains.
     * radius_estimate_..., altitude_estimate_error_m: the same figures from the mission's estimates in flight,
       by its filter and by pressure.
     * target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
@@ -91,6 +105,7 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
         "gps_back_at_s": _rounded(marks.get("gps_back_at_s")),
         "orbit_captured_after_s": _rounded(marks.get("orbit_captured_after_s")),
         "orbit_s": None,
+        "orbit_not_received_s": None,
         "radius_estimate_mean_m": _rounded(marks.get("radius_estimate_mean_m")),
         "radius_estimate_std_m": _rounded(marks.get("radius_estimate_std_m")),
         "altitude_estimate_error_m": _rounded(marks.get("altitude_estimate_error_m")),
@@ -108,6 +123,9 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
     orbit = None if truth is None else truth.during(*window)
     if orbit is None or not len(orbit.time_s):
         return figures
+    ends_s = np.array(window) * 1e-6
+    gaps = gaps_of(np.concatenate((ends_s[:1], orbit.time_s, ends_s[1:])))
+    figures["orbit_not_received_s"] = _rounded(sum(end - begin for begin, end in gaps))
     error = orbit.radius_m - options.radius_m
     height = -orbit.aircraft_ned_m[:, 2] - options.altitude_m
     figures |= {

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from estimators.received import GAP_US, interpolated
 from flightsim.foundation.geodesy import LocalFrame
 from missions.base.options import FlightOptions
 from missions.flown.targets import true_targets
@@ -29,12 +30,12 @@ def search_figures(debriefing: "Debriefing") -> Mapping[str, Any]:
     error_m = None
     if north_m is not None and east_m is not None and notes.commanded is not None:
         at_us = marks["search_exposed_us"]
-        places = [
-            (float(np.interp(at_us, times, place[:, 0])), float(np.interp(at_us, times, place[:, 1])))
+        distances = [
+            math.dist(interpolated(at_us, times, place, gap=GAP_US), (north_m, east_m))
             for times, place in true_targets(debriefing.records, LocalFrame(notes.commanded.origin))
         ]
-        if places:
-            error_m = min(math.dist(place, (north_m, east_m)) for place in places)
+        if distances and np.isfinite(distances).all():
+            error_m = min(distances)
     return {
         "tag_id": options.tag_id,
         "found": bool(marks.get("search_found", 0.0)),

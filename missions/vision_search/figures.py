@@ -4,8 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
+from estimators.received import GAP_US, interpolated
 from estimators.vision_search import AreaEstimate
 from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.targets import true_targets
@@ -33,7 +32,8 @@ def true_place(
     if not truth:
         return None
     times, places = truth[0]
-    return float(np.interp(time_us, times, places[:, 0])), float(np.interp(time_us, times, places[:, 1]))
+    north_m, east_m = interpolated(time_us, times, places, gap=GAP_US).tolist()
+    return (north_m, east_m) if math.isfinite(north_m) else None
 
 
 def search_figures(team: "VisionSearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:
