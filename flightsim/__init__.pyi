@@ -1,0 +1,31 @@
+"""Public names of `flightsim`, each where it is defined; see `__init__.py`."""
+
+from flightsim.airframe_file import known_models as known_models
+from flightsim.airframe_file import load_airframe as load_airframe
+from flightsim.environment import Environment as Environment
+from flightsim.environment import Turbulence as Turbulence
+from flightsim.foundation.random_streams import RandomStreams as RandomStreams
+from flightsim.home import Home as Home
+from flightsim.payload.camera import CameraParameters as CameraParameters
+from flightsim.payload.gimbal import GimbalParameters as GimbalParameters
+from flightsim.payload.magnetic_field import MagneticField as MagneticField
+from flightsim.payload.magnetic_spec import InducedDipole as InducedDipole
+from flightsim.payload.magnetic_spec import MagneticSpec as MagneticSpec
+from flightsim.payload.payload import PayloadParameters as PayloadParameters
+from flightsim.payload.range_radio import RangeRadioParameters as RangeRadioParameters
+from flightsim.payload.survey_magnetometer import SurveyMagnetometerParameters as SurveyMagnetometerParameters
+from flightsim.payload.target_motion import Circle as Circle
+from flightsim.payload.target_motion import ConstantVelocity as ConstantVelocity
+from flightsim.payload.target_motion import RandomWalk as RandomWalk
+from flightsim.payload.target_motion import Static as Static
+from flightsim.payload.target_sensor import TargetSensorParameters as TargetSensorParameters
+from flightsim.payload.targets import GroundTargetParameters as GroundTargetParameters
+from flightsim.payload.terrain import Terrain as Terrain
+from flightsim.payload.terrain import TerrainSpec as TerrainSpec
+from flightsim.sensors.fault_kinds import FaultType as FaultType
+from flightsim.sensors.suite import SensorSuiteParameters as SensorSuiteParameters
+from flightsim.world import World as World
+from flightsim.world_spec import FaultSpec as FaultSpec
+from flightsim.world_spec import FaultUnit as FaultUnit
+from flightsim.world_spec import VehicleSpec as VehicleSpec
+from flightsim.world_spec import WorldSpec as WorldSpec
