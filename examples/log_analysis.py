@@ -10,10 +10,7 @@ import sys
 
 import numpy as np
 
-from estimators.comparison import comparisons
-from estimators.library import make_estimator
-from estimators.log_replay import replay
-from estimators.logs import LogError, open_log
+from flightstack import LogError, comparisons, make_estimator, open_log, replay
 
 AUTOPILOT, SIMULATOR = 1, 25  # component ids
 

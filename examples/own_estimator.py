@@ -10,8 +10,7 @@ The three commands run it in a flight, over a log and on a live link. It needs n
 from dataclasses import dataclass
 from typing import ClassVar
 
-from estimators.input_guard import InputGuard
-from estimators.interface import Estimator, Need, Outcome
+from flightstack import Estimator, InputGuard, Need, Outcome
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

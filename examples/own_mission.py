@@ -7,10 +7,7 @@ The same file flies on a real vehicle: add `--connect URL`.
 
 import math
 
-from missions.base.options import FlightOptions
-from missions.errors import PlanError
-from missions.vehicle import Setpoint, Vehicle
-from missions.vehicle.telemetry import Battery, Position
+from flightstack import Battery, FlightOptions, PlanError, Position, Setpoint, Vehicle
 
 
 class Mission:

@@ -14,8 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightsim import Environment, WorldSpec
-from missions import FlightOptions, RunRequest, Via, fly
+from flightstack import Environment, FlightOptions, RunRequest, Via, WorldSpec, fly
 
 MISSION = "lissajous"
 OPTIONS = FlightOptions(pattern="L1", width_m=60.0, height_m=60.0, speed_m_s=4.0, via=Via.SETPOINTS)

@@ -4,6 +4,7 @@ from flightsim.airframe_file import known_models as known_models
 from flightsim.airframe_file import load_airframe as load_airframe
 from flightsim.environment import Environment as Environment
 from flightsim.environment import Turbulence as Turbulence
+from flightsim.flight_envelope import flight_envelope as flight_envelope
 from flightsim.foundation.random_streams import RandomStreams as RandomStreams
 from flightsim.home import Home as Home
 from flightsim.payload.camera import CameraParameters as CameraParameters
