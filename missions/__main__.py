@@ -1,5 +1,5 @@
 """Entry point of `python -m missions`: the command line."""
 
-from missions.cli.main import main
+from missions.cli.entry import main
 
 main()

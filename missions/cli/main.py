@@ -14,6 +14,7 @@ from typing import Final
 
 import click
 
+from missions.cli.exit_codes import DONE, FAILED, INTERRUPTED, USAGE
 from missions.cli.options import report
 from missions.process.supervision import supervised
 
@@ -31,7 +32,6 @@ _COMMANDS: Final = {
 }
 
 YOUNG_OBJECTS: Final = 50_000  # imports make as many that stay: looked through once, and not 250 times
-DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 _NOT_WRITTEN: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogWriter
+from missions.cli import entry
 
 ROOT = Path(__file__).parents[2]
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
@@ -67,6 +68,20 @@ def test_without_any_output_a_sitl_runs() -> None:
 def test_without_an_error_output_a_command_runs(closed: str, log: str) -> None:
     done = run(closed, "log", "play", log, "--link", "udpout:127.0.0.1:9")
     assert done.returncode == 0
+
+
+def test_ctrl_c_while_the_command_line_is_imported_is_one_line(monkeypatch, capsys) -> None:
+    class Interrupted:
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == "missions.cli.main":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "missions.cli.main", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Interrupted(), *sys.meta_path])
+    with pytest.raises(SystemExit) as ended:
+        entry.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "\ninterrupted\n"
 
 
 def test_no_file_gets_the_number_of_a_closed_stream() -> None:
