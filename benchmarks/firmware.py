@@ -96,7 +96,7 @@ class Firmware:
         port = self.address(instance).rpartition(":")[2]
         return [
             *(str(self.build), "--model", _ARDUPILOT_MODELS[self.vehicle], "--speedup", f"{speed:g}"),
-            *("--defaults", str(self._defaults), f"-I{instance}"),
+            *("--defaults", str(self._defaults), f"-I{instance}", "--sysid", f"{instance + 1}"),
             *("--serial0", f"udpclient:127.0.0.1:{port}"),
         ]
 
@@ -108,7 +108,7 @@ class Firmware:
 
         Args:
             folder: its output is in firmware.txt there.
-            instance: 0 to 9; side by side each needs its own.
+            instance: 0 to 9; side by side each needs its own. The system id is one more.
             speed: times real time.
             gyro_calibration: PX4's gyro calibration at rest (IMU_GYRO_CAL_EN). It changes its own timer at
                 every arming, which can damage the list of timers in PX4's POSIX build: `px4_timers`.

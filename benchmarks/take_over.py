@@ -15,7 +15,7 @@ import json
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -58,7 +58,8 @@ PROVOKED: Final[Mapping[tuple[str, str], Mapping[str, float]]] = {
     ("ardupilot", "gps"): {"SIM_GPS_DISABLE": 1.0},
 }
 BY: Final = (*_MODES, "stabilize", "sticks", "battery", "fence", "gps")
-KINDS: Final = ("waypoints", "setpoints", "script")
+KINDS: Final = ("waypoints", "setpoints", "script", "team")
+"""`team` is two vehicles by waypoints, of which the first one is taken."""
 _INTEGERS: Final = {"SIM_GPS_DISABLE": 2, "FENCE_ENABLE": 2, "SIM_GPS_USED": 6}
 """MAV_PARAM_TYPE of those that are no REAL32; of an integer PX4 reads the bits: 0 has the same."""
 _REAL32: Final = 9
@@ -102,7 +103,7 @@ class Pilot:
             if firmware == "px4"
             else f"tcp:127.0.0.1:{5762 + 10 * instance}"
         )
-        self._system_id = instance + 1 if firmware == "px4" else 1
+        self._system_id = instance + 1
 
     def look(self, flight: session.Flight) -> None:
         """Act when the vehicle is in the pattern."""
@@ -202,15 +203,18 @@ def fly_cell(cell: Cell, build: Firmware, out: Path, instance: int, speed: float
     size = {"width_m": 60.0, "height_m": 40.0, "altitude_m": 14.0, "speed_m_s": 3.0}
     if cell.vehicle == "plane":
         size = {"width_m": 800.0, "height_m": 600.0, "altitude_m": 60.0}
-    options = FlightOptions(**size)  # type: ignore[arg-type]
-    if cell.kind != "script":
+    instances = [instance, instance + 1] if cell.kind == "team" else [instance]
+    options = FlightOptions(**size, vehicles=len(instances))  # type: ignore[arg-type]
+    if cell.kind in list(Via):
         options = replace(options, via=Via(cell.kind))
     mission: Mission[Any] = Script() if cell.kind == "script" else find_mission("lissajous")
     pilot = Pilot(cell.firmware, cell.vehicle, instance, cell.by)
-    with build.running(folder / "firmware", instance=instance, speed=speed):
+    with ExitStack() as stack:
+        for number in instances:
+            stack.enter_context(build.running(folder / f"firmware{number}", instance=number, speed=speed))
         request = RunRequest(
             options=options,
-            connect=[build.address(instance)],
+            connect=[build.address(number) for number in instances],
             parameters=dict(REACTIONS[cell.firmware]),
             out=folder / "run",
             picture=False,

@@ -49,6 +49,7 @@ class TelemetryClock:
         reboots: number of backward jumps of the vehicle's own time.
         jumps: number of steps ahead that the vehicle's rate did not explain.
         wraps: how often the time stamps began again at 0, every 49.7 days.
+        first_step_us: step of `time_us` at the first observation, by which times before it are too small.
     """
 
     def __init__(self, monotonic: Callable[[], float] = wall_time_s) -> None:
@@ -68,6 +69,7 @@ class TelemetryClock:
         self.reboots = 0
         self.jumps = 0
         self.wraps = 0
+        self.first_step_us = 0
         self._stood_still_s = 0.0
 
     @property
@@ -224,8 +226,9 @@ class TelemetryClock:
                 self._remove_deadline(deadline)
 
     def _set_first(self, vehicle_time_us: int, now_us: int) -> None:
+        self.first_step_us = vehicle_time_us - now_us
         for deadline in self._deadlines:
-            deadline.time_us += vehicle_time_us - now_us
+            deadline.time_us += self.first_step_us
         self._reported_us = vehicle_time_us
 
     def _update_rate(self, wall_s: float, vehicle_us: int) -> None:

@@ -74,7 +74,6 @@ class VehicleLink:
         notes: the mission's record of its phases, its progress and its commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
         first_heartbeat_us: vehicle time of the first heartbeat that was received when vehicle time was known.
-        heartbeat_us: vehicle time of the newest heartbeat; None before the first.
         contradiction: why what is received can't come from one vehicle; "": nothing was found.
         on_regained: called when a link that counted as lost is back.
     """
@@ -88,7 +87,7 @@ class VehicleLink:
         self._authority: CommandAuthority | None = None
         self._tasks: ModeTasks | None = None
         self._last_ack: Any = None
-        self.heartbeat_us: int | None = None
+        self._heartbeat_us: int | None = None
         self.on_regained: Callable[[], None] = lambda: None
         # newest usable telemetry: its frame, the value, and the time at which it was examined
         self._usable: dict[type, tuple[Frame, Any, int]] = {}
@@ -172,7 +171,7 @@ class VehicleLink:
             clock = self.clock
             self._timed = not isinstance(clock, TelemetryClock) or clock.vehicle_time_us is not None
             self.first_heartbeat_us = clock.time_us
-        self.heartbeat_us = self.clock.time_us
+        self._heartbeat_us = self.clock.time_us
         self._watch.on_heartbeat()
         self._judge_mode(decode(frame))
 
@@ -212,6 +211,17 @@ class VehicleLink:
         take_over = authority.take_over
         if take_over is not None:
             self._watch.end_all(lambda: TakenOver(take_over))
+
+    @property
+    def heartbeat_us(self) -> int | None:
+        """Vehicle time of the newest heartbeat; None before the first.
+
+        A heartbeat has no time stamp: one that was received before the first message with one has the time
+        that is known by now.
+        """
+        if self._timed or self._heartbeat_us is None or not isinstance(self.clock, TelemetryClock):
+            return self._heartbeat_us
+        return self._heartbeat_us + self.clock.first_step_us
 
     @property
     def authority(self) -> CommandAuthority:

@@ -563,6 +563,29 @@ def test_the_clock_of_a_connection_is_that_of_its_vehicle():
     assert clock.vehicle_time_us == 1_000_000
 
 
+def test_a_heartbeat_before_the_first_time_stamp_is_no_silence_as_long_as_the_vehicle_was_on():
+    theirs, ours = memory_pair("mission", "vehicles")
+    clock = TelemetryClock()
+    connection = Connection(theirs, clock)
+
+    async def main():
+        connection.start()
+        vehicle = Vehicle(connection)
+        encoder = FrameEncoder(1, 1)
+        for message in (
+            dialect.MAVLink_heartbeat_message(2, 3, 1, 4, 4, 3),
+            dialect.MAVLink_attitude_message(190_000, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        ):
+            ours.send(encoder.encode(message))
+        seen = vehicle.link.last_received(), watched(vehicle).silent_s, vehicle.how_left().silent_s
+        await connection.close()
+        return seen
+
+    text, silent_s, left_s = asyncio.run(main())
+    assert "no heartbeat" not in text
+    assert max(silent_s, left_s) < 1.0
+
+
 def test_what_else_failed_side_by_side_hangs_on_the_first_error():
     async def fails(text):
         raise MissionError(text)
