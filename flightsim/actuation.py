@@ -36,11 +36,11 @@ def _scale(scales: Array, limits: Array, values: Array, commands: Array) -> None
         scales: (properties, n).
         limits: (properties, 3): offset, minimum, maximum.
         values: (properties,), written.
-        commands: (n,).
+        commands: (n,) or more; more are ignored.
     """
     for i in range(values.shape[0]):
         value = limits[i, 0]
-        for j in range(commands.shape[0]):
+        for j in range(scales.shape[1]):
             if scales[i, j] != 0.0:
                 value += commands[j] * scales[i, j]
         values[i] = limits[i, 1] if value < limits[i, 1] else limits[i, 2] if value > limits[i, 2] else value

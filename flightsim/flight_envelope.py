@@ -21,7 +21,7 @@ from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M
 from flightsim.home import Home
 from flightsim.linear_modes import LinearModel, P, Q, R, U, V, W, linearise
 from flightsim.model_files import content_digest
-from flightsim.trim_flight import FlightTrim, TrimError, trim_in_tunnel
+from flightsim.trim_flight import AIRSPEEDS_M_S, FlightTrim, TrimError, trim_in_tunnel
 from flightsim.wind_tunnel import WindTunnel
 
 __all__ = ["FlightEnvelope", "flight_envelope"]
@@ -174,6 +174,13 @@ class _Survey:
         if speed is None:  # a lift coefficient of 0.5 is within any wing's reach
             weight_n = tunnel.mass_kg * GRAVITY_M_S2
             speed = math.sqrt(weight_n / (0.5 * SEA_LEVEL_DENSITY_KG_M3 * tunnel.wing_area_m2 * 0.5))
+        slowest, fastest = AIRSPEEDS_M_S
+        if not slowest <= speed * self.to_true <= fastest:
+            raise AirframeError(
+                f"vehicle '{tunnel.airframe.name}' can't be trimmed: {tunnel.mass_kg:.3g} kg on a wing of "
+                f"{tunnel.wing_area_m2:.3g} m2 fly at {speed:.3g} m/s; "
+                f"accepted: {slowest:g} to {fastest:g} m/s"
+            )
         try:
             flies = self.glide(speed)
         except TrimError as error:
@@ -182,6 +189,8 @@ class _Survey:
         stalled = 0.0
         while speed - stalled > _STALL_RESOLUTION * speed:
             trial = speed * _STALL_STEP if stalled == 0.0 else 0.5 * (speed + stalled)
+            if trial * self.to_true < slowest:
+                break
             try:
                 flies, speed = self.glide(trial, flies), trial
             except TrimError:

@@ -30,6 +30,10 @@ _ALPHA_MIN_RAD: Final = math.radians(-20.0)
 _ALPHA_MAX_RAD: Final = math.radians(40.0)
 
 
+AIRSPEEDS_M_S: Final = (1.0, 500.0)
+"""Airspeeds at which a flight can be trimmed."""
+
+
 class TrimError(ArithmeticError):
     """The model cannot fly steadily under the given conditions."""
 
@@ -88,8 +92,9 @@ def trim_in_tunnel(
     iterations: int = 25,
 ) -> FlightTrim:
     """As `trim_flight`, in a tunnel that is there already, starting from a flight `near` the wanted one."""
-    if not 1.0 <= airspeed_m_s <= 500.0:
-        raise ValueError(f"airspeed {airspeed_m_s} m/s is not in 1..500 m/s")
+    slowest, fastest = AIRSPEEDS_M_S
+    if not slowest <= airspeed_m_s <= fastest:
+        raise ValueError(f"airspeed {airspeed_m_s} m/s is not in {slowest:g}..{fastest:g} m/s")
     if turn_radius_m is not None and bank_rad is not None:
         raise ValueError("give the turn's radius or its bank, not both")
     if turn_radius_m is not None and not abs(turn_radius_m) >= 1.0:

@@ -9,6 +9,7 @@ from flightsim.airframe_file import package_aircraft
 from flightsim.environment import Environment
 from flightsim.flight_envelope import flight_envelope
 from flightsim.home import Home
+from flightsim.interface import MAX_ACTUATORS
 from flightsim.vehicle import Vehicle
 from missions.cli.main import run_command_line
 from missions.cli.sitl import sitl
@@ -30,6 +31,12 @@ def test_a_model_that_needs_properties_of_another_simulator_is_refused(model: st
         make(model)
 
 
+@pytest.mark.parametrize("model", ["ball", "ballx"])
+def test_a_model_without_a_wing_is_refused(model: str) -> None:
+    with pytest.raises(AirframeError, match=rf"'{model}' can't be trimmed: .* on a wing of .* fly at \d"):
+        flight_envelope(model)
+
+
 def test_a_glider_that_has_no_glide_is_refused() -> None:
     with pytest.raises(AirframeError, match="'SGS' can't be trimmed"):
         flight_envelope("SGS")
@@ -46,6 +53,16 @@ def test_the_command_line_refuses_a_model_in_one_line(
     assert "vehicle 'minisgs' can't be simulated" in refused.output
 
 
+def test_commands_of_actuators_that_the_vehicle_does_not_have_are_ignored() -> None:
+    """With more than MAX_ACTUATORS the kernel read the scales of other surfaces, and memory behind them."""
+    commands = np.zeros(2 * MAX_ACTUATORS)
+    commands[MAX_ACTUATORS:] = 1.0
+    vehicle = make("T37")
+    vehicle.step(commands)
+    surfaces = [vehicle._fdm[f"fcs/{name}-cmd-norm"] for name in ("aileron", "elevator", "rudder")]
+    assert surfaces == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("model", package_aircraft())
 def test_each_model_of_the_package_is_flown_or_refused(model: str) -> None:
@@ -56,4 +73,4 @@ def test_each_model_of_the_package_is_flown_or_refused(model: str) -> None:
         assert "\n" not in str(refusal) or "JSBSim cannot load" in str(refusal)
         return
     for _ in range(250):
-        vehicle.step(np.zeros(16))
+        vehicle.step(np.zeros(MAX_ACTUATORS))
