@@ -29,16 +29,17 @@ from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Service, Source, TimedService, receivers_by_id
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import CommandHooks
 from autopilot_bridge.services.commands.message_interval import MessageIntervalService
 from autopilot_bridge.services.commands.protocol import CommandService
 from autopilot_bridge.services.inputs.radio import RadioService
 from autopilot_bridge.services.inputs.setpoints import SetpointService
 from autopilot_bridge.services.inputs.timesync import TimeSyncService
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice, Simulation
+from autopilot_bridge.services.microservice import Microservice, receivers_by_id
 from autopilot_bridge.services.parameters.parameter_file import boot_parameters
 from autopilot_bridge.services.parameters.protocol import ParameterService, fix_identity
+from autopilot_bridge.services.parts import AutopilotParts, Simulation
 from autopilot_bridge.services.plans.geofence import MissionFence
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
@@ -263,7 +264,7 @@ class Autopilot:
             on_fixed=self._report_fixed,
         )
         timed = [more for more in self._more if type(more).tick is not Microservice.tick]
-        self._timed: tuple[TimedService, ...] = (
+        self._timed: tuple[Microservice, ...] = (
             self._parameter_service,
             self.missions,
             *(more for more in timed if not more.coarse_timers),
@@ -277,7 +278,7 @@ class Autopilot:
             flavour.command_address(system_id),
             merged(*(more.commands for more in self._more)),
         )
-        services: tuple[Service, ...] = (
+        services: tuple[Microservice, ...] = (
             SetpointService(firmware.setpoints(self.commander)),
             self.commands,
             self._parameter_service,

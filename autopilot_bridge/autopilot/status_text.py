@@ -1,20 +1,21 @@
 """STATUSTEXT: the texts that a ground station shows; long texts are sent in chunks."""
 
-from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import Event
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.flavour import Flavour
-from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
 
 CHUNK_BYTES: Final = 50
 _MAX_CHUNKS: Final = 5
 _MAX_ID: Final = 0xFFFF
 
 
-class StatusTextService:
+class StatusTextService(Microservice):
     """Sends texts on all channels. In some flavours a channel gets no texts before a heartbeat.
 
     Args:
@@ -28,11 +29,7 @@ class StatusTextService:
         self._greeted: set[str] = set()
         self._next_id = 1
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """HEARTBEAT: the channels that have received one get texts."""
-        return {mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat}
-
+    @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._greeted.add(source.channel.name)
 

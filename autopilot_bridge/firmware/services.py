@@ -13,8 +13,9 @@ from autopilot_bridge.services.commands.handlers import CommandHandlers, Command
 from autopilot_bridge.services.commands.message_interval import IntervalPolicy
 from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.services.inputs.setpoints import SetpointRules
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.protocol import ParameterPolicy
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.policy import MissionPolicy
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.line import FlowControl

@@ -5,7 +5,7 @@ channels. Message fields are untrusted: whatever their values, a service does no
 whole or not.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -59,32 +59,6 @@ NO_CLIENT: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
 
 Receiver = Callable[[MavlinkMessage, Source, int], None]
 """Handles one received message: (message, source, time_us). Never raises because of its contents."""
-
-
-class Service(Protocol):
-    """One MAVLink microservice of an autopilot."""
-
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """The messages that it handles: message id -> method. Read once."""
-        ...
-
-
-class TimedService(Service, Protocol):
-    """A microservice with its own timeouts or queues."""
-
-    def tick(self, time_us: int) -> None:
-        """Advance timers and queues; called at 50 Hz of vehicle time."""
-        ...
-
-
-def receivers_by_id(services: Iterable[Service]) -> dict[int, tuple[Receiver, ...]]:
-    """The methods that handle each message id, in the order of the services."""
-    table: dict[int, tuple[Receiver, ...]] = {}
-    for service in services:
-        for message_id, receiver in service.receivers.items():
-            table[message_id] = (*table.get(message_id, ()), receiver)
-    return table
 
 
 def send_to_all(broadcast: Broadcast, message: MavlinkMessage) -> None:

@@ -1,91 +1,21 @@
-"""What a MAVLink microservice may provide besides answers to messages, and which parts it may use.
+"""The one kind of service of an autopilot: what it may receive, execute, stream and follow."""
 
-`FirmwareServices.microservices` of each firmware builds those of an autopilot.
-"""
+from collections.abc import Callable, Iterable, Mapping
+from typing import ClassVar
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
-
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event
-from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.mission_plan import MissionStore, MissionType
-from autopilot_bridge.navigation import NavigationFilter
-from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, Broadcast, Channel, Receiver
-from autopilot_bridge.services.commands.handlers import Command, Handler
-from autopilot_bridge.services.plans.policy import MissionPolicy
-from autopilot_bridge.services.vehicle_memory import VehicleMemory
+from autopilot_bridge.dispatch import BUILDERS, COMMANDS, ON_DEMAND, RECEIVERS, table_of
+from autopilot_bridge.services.channel import Channel, Receiver
+from autopilot_bridge.services.commands.command import Handler
 from autopilot_bridge.telemetry.streams import Builder
-from flightsim.airframe import AirframeKind
-from flightsim.interface import SensorReadings
-
-
-class Simulation(Protocol):
-    """The simulated world of an autopilot, if there is one: it makes received data fail."""
-
-    def connect(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
-        """An autopilot has booted.
-
-        Args:
-            store: its parameters, of which some act on the simulated world.
-            lose_radio: interrupts (True) or restores (False) the pilot's stick input.
-        """
-        ...
-
-    def apply_failure(self, unit: int, values: NDArray[np.float64]) -> bool:
-        """Apply a failure to the values of a FAILURE_UNIT's sample in place; False: the sample is lost."""
-        ...
-
-    def drops_message(self, command: int | None) -> bool:
-        """Whether a received message is lost; `command`: MAV_CMD of a command, None: another message."""
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AutopilotParts:
-    """The parts of an autopilot that microservices may use.
-
-    Attributes:
-        kind: the class of vehicle.
-        system_id: the vehicle's.
-        commander: modes, arming, guidance.
-        navigation: the filter; `navigation.state` is in `navigation.layout`.
-        parameters: the parameter store.
-        readings: the sensors.
-        stores: the uploaded plans, by type.
-        missions: which plans the firmware takes.
-        broadcast: all channels.
-        announce: sends a STATUSTEXT.
-        memory: card, clock and power of the computer it runs on.
-        simulation: the simulated world; None: there is none.
-        execute: executes a command as if a client had sent it; None: not available.
-    """
-
-    kind: AirframeKind
-    system_id: int
-    commander: Commander
-    navigation: NavigationFilter
-    parameters: ParameterStore
-    readings: SensorReadings
-    stores: Mapping[MissionType, MissionStore]
-    missions: MissionPolicy
-    broadcast: Broadcast
-    announce: Announce
-    memory: VehicleMemory
-    simulation: Simulation | None = None
-    execute: Callable[[Command], Result | None] | None = None
 
 
 class Microservice:
     """One microservice; by default it does nothing.
 
-    All methods are called between two steps of the autopilot, and never raise because of a message's
-    contents.
+    What it executes, handles and sends is declared at its methods, by the decorators of
+    `autopilot_bridge.dispatch`. All methods are called between two steps of the autopilot, and never raise
+    because of a message's contents.
 
     Attributes:
         coarse_timers: `tick` is called at 10 Hz only, so timers may be late by a tenth of a second.
@@ -95,26 +25,25 @@ class Microservice:
 
     @property
     def receivers(self) -> Mapping[int, Receiver]:
-        """The messages that it handles: message id -> method. Read once."""
-        return {}
+        """The messages that it handles: message id -> method, by `@receives`. Read once."""
+        return table_of(self, RECEIVERS)
 
     @property
     def commands(self) -> Mapping[int, Handler]:
-        """The MAV_CMDs that it executes; they take precedence over the firmware's own table. Read once."""
-        return {}
+        """The MAV_CMDs that it executes, by `@command`. Read once."""
+        return table_of(self, COMMANDS)
 
     @property
     def builders(self) -> Mapping[int, Builder]:
-        """Messages that can be requested and streamed: message id -> field values, packed payload, or None.
-
-        Read once.
+        """Messages that can be requested and streamed, by `@streams`: message id -> field values, packed
+        payload, or None. Read once.
         """
-        return {}
+        return table_of(self, BUILDERS)
 
     @property
     def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
-        """Messages that are sent on REQUEST_MESSAGE only, with its param2. Read once."""
-        return {}
+        """Messages that are sent on REQUEST_MESSAGE only, with its param2, by `@on_request`. Read once."""
+        return table_of(self, ON_DEMAND)
 
     def tick(self, time_us: int) -> None:
         """Timers and queues, at 50 Hz of vehicle time, or at 10 Hz with `coarse_timers`."""
@@ -124,3 +53,12 @@ class Microservice:
 
     def close(self) -> None:
         """The autopilot goes down: files are closed, what waits to be stored is stored."""
+
+
+def receivers_by_id(services: Iterable[Microservice]) -> dict[int, tuple[Receiver, ...]]:
+    """The methods that handle each message id, in the order of the services."""
+    table: dict[int, tuple[Receiver, ...]] = {}
+    for service in services:
+        for message_id, receiver in service.receivers.items():
+            table[message_id] = (*table.get(message_id, ()), receiver)
+    return table

@@ -8,6 +8,7 @@ from typing import Any, Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.dispatch import BUILDERS, streams, table_of
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import NavigationFilter
@@ -75,29 +76,24 @@ class CommonMessages:
 
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its field values."""
-        return {
-            **self.motion.builders(),
-            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self.sources.heartbeat,
-            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
-            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
-            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
-            mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: self.scaled_pressure,
-            mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self.servo_output_raw,
-            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self.sources.mission_current,
-            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
-            mavlink.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: self.attitude_target,
-            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self.position_target_local_ned,
-            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: self.position_target_global_int,
-            mavlink.MAVLINK_MSG_ID_SCALED_IMU: self.scaled_imu,
-            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
-            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.sources.autopilot_version,
-            mavlink.MAVLINK_MSG_ID_VIBRATION: self.vibration,
-            mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
-            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self.extended_sys_state,
-            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self.distance_sensor,
-        }
+        return {**self.motion.builders(), **table_of(self, BUILDERS)}
 
+    @streams(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+    def heartbeat(self) -> Values:
+        """HEARTBEAT (0)."""
+        return self.sources.heartbeat()
+
+    @streams(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
+    def mission_current(self) -> bytes:
+        """MISSION_CURRENT (42)."""
+        return self.sources.mission_current()
+
+    @streams(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    def autopilot_version(self) -> Values:
+        """AUTOPILOT_VERSION (148)."""
+        return self.sources.autopilot_version()
+
+    @streams(mavlink.MAVLINK_MSG_ID_SYS_STATUS)
     def sys_status(self) -> Values:
         """SYS_STATUS (1)."""
         present, enabled, health = self.sources.sys_status()
@@ -109,10 +105,12 @@ class CommonMessages:
             remaining = round(battery[3] * 100.0)
         return (present, enabled, health, 0, voltage_mv, current_ca, remaining, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 
+    @streams(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
     def system_time(self) -> Values:
         """SYSTEM_TIME (2)."""
         return (self.sources.unix_epoch_us + self.view.time_us, self.view.time_ms)
 
+    @streams(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT)
     def gps_raw_int(self) -> Values | None:
         """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send.
 
@@ -157,6 +155,7 @@ class CommonMessages:
             0,
         )
 
+    @streams(mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE)
     def scaled_pressure(self) -> Values | None:
         """SCALED_PRESSURE (29), hPa."""
         pressure_pa, temperature_c = self.view.pressure()
@@ -174,6 +173,7 @@ class CommonMessages:
         """Pressure of the pitot tube; 0 without one."""
         return 0.0
 
+    @streams(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW)
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""
         motors = self.sources.controller.actuators.tolist()[:4]
@@ -183,6 +183,7 @@ class CommonMessages:
             pulses = [self.servo_disarmed_us] * 4
         return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
 
+    @streams(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     def gps_global_origin(self) -> Values | None:
         """GPS_GLOBAL_ORIGIN (49): the filter's local origin."""
         frame = self.sources.context.frame
@@ -196,6 +197,7 @@ class CommonMessages:
             self.view.time_us,
         )
 
+    @streams(mavlink.MAVLINK_MSG_ID_VFR_HUD)
     def vfr_hud(self) -> Values:
         """VFR_HUD (74)."""
         v = self.view.refreshed()
@@ -216,6 +218,7 @@ class CommonMessages:
         """Collective being commanded, 0..1."""
         return self.sources.controller.thrust if self.sources.context.armed else 0.0
 
+    @streams(mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET)
     def attitude_target(self) -> Values | None:
         """ATTITUDE_TARGET (83): the setpoint of the attitude loop."""
         context = self.sources.context
@@ -239,6 +242,7 @@ class CommonMessages:
         values = context.setpoint.tolist()
         return [*values[sp.MOTION], values[sp.YAW_RAD], values[sp.YAW_RATE_RAD_S]]
 
+    @streams(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED)
     def position_target_local_ned(self) -> Values | None:
         """POSITION_TARGET_LOCAL_NED (85)."""
         target = self.trajectory_setpoint()
@@ -246,6 +250,7 @@ class CommonMessages:
             return None
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, 0, *target)
 
+    @streams(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT)
     def position_target_global_int(self) -> Values | None:
         """POSITION_TARGET_GLOBAL_INT (87)."""
         target = self.trajectory_setpoint()
@@ -277,11 +282,13 @@ class CommonMessages:
         """IMU temperature, centidegrees."""
         return round(self.view.imu()[interface.IMU_TEMPERATURE_C] * 100.0)
 
+    @streams(mavlink.MAVLINK_MSG_ID_SCALED_IMU)
     def scaled_imu(self) -> Values | None:
         """SCALED_IMU (26)."""
         values = self.raw_scaled_imu()
         return None if values is None else (self.view.time_ms, *values, self.temperature_cdeg())
 
+    @streams(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS)
     def battery_status(self) -> Values | None:
         """BATTERY_STATUS (147)."""
         battery = self.view.battery
@@ -305,10 +312,12 @@ class CommonMessages:
             0,
         )
 
+    @streams(mavlink.MAVLINK_MSG_ID_VIBRATION)
     def vibration(self) -> Values:
         """VIBRATION (241)."""
         return (self.view.time_us, *self.view.vibration.rms_m_s2, 0, 0, 0)
 
+    @streams(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
     def home_position(self) -> Values | None:
         """HOME_POSITION (242)."""
         place = self.home_place()
@@ -338,10 +347,12 @@ class CommonMessages:
         half_yaw = 0.5 * self.sources.context.home_yaw_rad
         return (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
 
+    @streams(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245)."""
         return (mavlink.MAV_VTOL_STATE_UNDEFINED, int(self.sources.context.landed_state))
 
+    @streams(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
     def distance_sensor(self) -> Values | None:
         """DISTANCE_SENSOR (132), facing down."""
         reading = self.sources.readings.rangefinder

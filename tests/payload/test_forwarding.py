@@ -11,7 +11,7 @@ from autopilot_bridge.flight.context import RoiMode
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command
+from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.equipment.payload_commands import PayloadCommands
 from autopilot_bridge.services.plans.equipment import MissionEquipment
 from tests.services.command_rig import Channel, ServiceRig

@@ -9,9 +9,11 @@ from autopilot_bridge.autopilot.status_text import StatusTextService
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
 from autopilot_bridge.firmware.px4 import services as px4_services
+from autopilot_bridge.firmware.px4.event_service import EventService
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import CommandHooks
 from autopilot_bridge.services.commands.protocol import CommandService
+from autopilot_bridge.services.equipment.payload_commands import PayloadCommands
 from autopilot_bridge.services.inputs.manual import ManualService
 from autopilot_bridge.services.inputs.setpoints import SetpointService
 from autopilot_bridge.services.plans.geofence import ArdupilotGeofence
@@ -90,13 +92,21 @@ class ServiceRig(Rig):
             mission_item_count=lambda: len(self.missions.items),
             inject_failure=self._inject,
         )
-        more = ArdupilotGeofence(self.commander, self.store, self).commands if flavour == "ardupilot" else {}
+        parts: Any = SimpleNamespace(
+            commander=self.commander, system_id=1, parameters=self.store, broadcast=self
+        )
+        if flavour == "ardupilot":
+            more = ArdupilotGeofence(self.commander, self.store, self).commands
+        else:
+            more = {
+                **PayloadCommands(parts, px4_services.PAYLOAD).commands,
+                **EventService(self.commander, self, lambda event: ()).commands,
+            }
         services = self.flavour.services
         self.commands = CommandService(
             services.commands(self.commander, hooks), self.flavour.command_address(1), more
         )
         self.setpoints = SetpointService(services.setpoints(self.commander))
-        parts: Any = SimpleNamespace(commander=self.commander, system_id=1, parameters=self.store)
         self.manual = ManualService(parts, MANUAL[flavour, self.flavour.kind])
 
     def handle(self, message: Any) -> bool:

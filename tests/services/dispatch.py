@@ -2,10 +2,11 @@
 
 from typing import Any
 
-from autopilot_bridge.services.channel import Service, Source, receivers_by_id
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.microservice import Microservice, receivers_by_id
 
 
-def deliver(message: Any, source: Source, time_us: int, *services: Service) -> bool:
+def deliver(message: Any, source: Source, time_us: int, *services: Microservice) -> bool:
     """Call the methods that handle the message's id; False when there are none."""
     receivers = receivers_by_id(services).get(message.get_msgId(), ())
     for receiver in receivers:

@@ -4,8 +4,9 @@ from typing import Any, TypeVar
 
 from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
 from autopilot_bridge.firmware.px4 import services as px4_services
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.protocol import new_stores
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.storage.memory import MemoryCard

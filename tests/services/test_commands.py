@@ -13,7 +13,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav_layout
-from autopilot_bridge.services.commands.handlers import Command, command_from_message, flags, on_earth, whole
+from autopilot_bridge.services.commands.command import Command, command_from_message, flags, on_earth, whole
 from tests.services.command_rig import NAN, ServiceRig
 
 ARM, MODE, TAKEOFF, LAND, RTL = 400, 176, 22, 21, 20

@@ -1,11 +1,16 @@
 """Received messages reach the services by message id."""
 
+from collections import Counter
+from typing import Any
+
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot import Autopilot
+from autopilot_bridge.dispatch import command, streams
 from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
 from autopilot_bridge.mavlink import FrameParser
+from autopilot_bridge.services.microservice import Microservice
 from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 from tests.services.aircraft import SMALL_AIRCRAFT
@@ -36,6 +41,43 @@ def test_a_message_belongs_to_one_service(flavour: str, kind: AirframeKind) -> N
         "PayloadCommands",
         "StatusTextService",
     ]
+
+
+@pytest.mark.parametrize("kind", AirframeKind)
+@pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
+def test_a_command_belongs_to_one_service(flavour: str, kind: AirframeKind) -> None:
+    autopilot = autopilot_of(flavour, kind)
+    owners = Counter(
+        number for service in (autopilot.commands._handlers, *autopilot._more) for number in service.commands
+    )
+    assert [number for number, count in owners.items() if count > 1] == [] and len(owners) > 40
+
+
+class Base(Microservice):
+    @command(1, 2)
+    def first(self) -> str:
+        return "base"
+
+    @streams(1)
+    def third(self) -> str:
+        return "stream"
+
+
+class Child(Base):
+    def first(self) -> str:
+        return "child"
+
+    @command(2, 3)
+    def second(self) -> str:
+        return "second"
+
+
+def test_an_overridden_method_keeps_its_numbers_and_a_later_declaration_replaces_it() -> None:
+    commands: Any = Child().commands
+    assert {number: take() for number, take in commands.items()} == {1: "child", 2: "second", 3: "second"}
+    commands = Base().commands
+    assert {number: take() for number, take in commands.items()} == {1: "base", 2: "base"}
+    assert list(Child().builders) == [1] and not Child().receivers and not Child().on_demand
 
 
 def test_a_message_that_no_service_handles_is_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command
+from autopilot_bridge.services.commands.command import Command
 from tests.services.command_rig import Channel, ServiceRig
 from tests.services.dispatch import deliver
 from tests.services.parts_rig import parts_of

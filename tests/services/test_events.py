@@ -19,7 +19,7 @@ from autopilot_bridge.firmware.px4.event_service import KEPT, EventService
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE, EVENT, RequestEvent
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command
+from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.files.ftp_protocol import crc32
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver

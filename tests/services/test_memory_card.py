@@ -7,7 +7,7 @@ import pytest
 from autopilot_bridge.commander.events import RebootRequested
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command
+from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.commands.power import PowerService
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.services.files.log_transfer import LogTransferService

@@ -12,16 +12,17 @@ found or changed.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
-from autopilot_bridge.services.commands.handlers import Command, Handler, flags, whole
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.commands.command import Command, flags, whole
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
 _NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
@@ -55,19 +56,7 @@ class ArdupilotCalibration(Microservice):
         self._requested_us = 0
         self._begun_us = 0
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """PREFLIGHT_CALIBRATION, ACCELCAL_VEHICLE_POS, FIXED_MAG_CAL_YAW."""
-        return {
-            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
-            mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS: self._vehicle_position,
-        }
-
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """COMMAND_ACK stands for "any key": old ground stations confirm a position with it."""
-        return {mavlink.MAVLINK_MSG_ID_COMMAND_ACK: self._on_acknowledgement}
-
+    @receives(mavlink.MAVLINK_MSG_ID_COMMAND_ACK)
     def _on_acknowledgement(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         waiting = self._position is not None and self._measured_us is None
         if waiting and message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS):
@@ -87,6 +76,7 @@ class ArdupilotCalibration(Microservice):
         elif time_us - self._requested_us >= _REPEAT_US:
             self._send(_POSITIONS[self._position][0])
 
+    @command(mavlink.MAV_CMD_PREFLIGHT_CALIBRATION)
     def _calibrate(self, command: Command, source: Source) -> Result:
         if self._commander.armed:
             self._parts.announce(_NOTICE, "Disarm to allow calibration")
@@ -133,6 +123,7 @@ class ArdupilotCalibration(Microservice):
 
     # the accelerometer, one position after the other
 
+    @command(mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS)
     def _vehicle_position(self, command: Command, source: Source) -> Result:
         """ACCELCAL_VEHICLE_POS: the vehicle is in the requested position."""
         if self._position is None or self._measured_us is not None:
@@ -195,16 +186,6 @@ class CompassCalibration(Microservice):
         self._finished: int | None = None  # MAG_CAL_STATUS, until it is accepted or cancelled
         self._strengths: list[float] = []
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """DO_START_MAG_CAL, DO_ACCEPT_MAG_CAL, DO_CANCEL_MAG_CAL, FIXED_MAG_CAL_YAW."""
-        return {
-            mavlink.MAV_CMD_DO_START_MAG_CAL: self._start,
-            mavlink.MAV_CMD_DO_ACCEPT_MAG_CAL: self._accept,
-            mavlink.MAV_CMD_DO_CANCEL_MAG_CAL: self._cancel,
-            mavlink.MAV_CMD_FIXED_MAG_CAL_YAW: self._known_heading,
-        }
-
     def tick(self, time_us: int) -> None:
         """Send progress while the calibration runs, and reports when it has ended."""
         if time_us < self._next_us or (self._start_us is None and self._finished is None):
@@ -223,6 +204,7 @@ class CompassCalibration(Microservice):
         if done >= 0.0:
             self._progress(done)
 
+    @command(mavlink.MAV_CMD_DO_START_MAG_CAL)
     def _start(self, command: Command, source: Source) -> Result:
         """DO_START_MAG_CAL: p1 compasses (0: all), p3 autosave, p4 delay in seconds."""
         if self._commander.armed:
@@ -239,17 +221,20 @@ class CompassCalibration(Microservice):
         self._commander.situation.calibrating = True
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_ACCEPT_MAG_CAL)
     def _accept(self, command: Command, source: Source) -> Result:
         if self._finished != mavlink.MAG_CAL_SUCCESS or flags(command.p1) not in (0, _MASK):
             return Result.FAILED
         self._finished = None
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_CANCEL_MAG_CAL)
     def _cancel(self, command: Command, source: Source) -> Result:
         self._start_us = self._finished = None
         self._commander.situation.calibrating = False
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_FIXED_MAG_CAL_YAW)
     def _known_heading(self, command: Command, source: Source) -> Result:
         """FIXED_MAG_CAL_YAW: the heading is known, so the vehicle need not be turned."""
         return Result.FAILED if self._commander.armed else Result.ACCEPTED

@@ -6,13 +6,14 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands import handlers as handlers
+from autopilot_bridge.services.commands.command import FORCE_NUMBER, Command, flags, on_earth, whole
+from autopilot_bridge.services.commands.handlers import CommandHandlers
 
 _CUSTOM_MODE_FLAG = 1
 _SERVO_CHANNELS = 32
@@ -20,7 +21,7 @@ _FIRST_FREE_SERVO = 5  # 1 to 4 are motors or surfaces
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 
 
-class ArduPilotCommands(handlers.CommandHandlers):
+class ArduPilotCommands(CommandHandlers):
     """ArduPilot's commands; a vehicle adds its own. Everything not in the table is UNSUPPORTED, as in the
     firmware.
 
@@ -30,23 +31,6 @@ class ArduPilotCommands(handlers.CommandHandlers):
 
     reposition_denied: ClassVar[Result]
 
-    def __init__(self, commander: Commander, hooks: handlers.CommandHooks) -> None:
-        super().__init__(commander, hooks)
-        self.table = {
-            **self.table,
-            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self.arm_disarm,
-            mavlink.MAV_CMD_DO_SET_MODE: self.set_mode,
-            mavlink.MAV_CMD_NAV_LOITER_UNLIM: self.loiter,
-            mavlink.MAV_CMD_DO_REPOSITION: self.reposition,
-            mavlink.MAV_CMD_DO_CHANGE_SPEED: self.change_speed,
-            mavlink.MAV_CMD_MISSION_START: self.start_mission,
-            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self.set_mission_current,
-            mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
-            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
-            mavlink.MAV_CMD_DO_SET_SERVO: self.set_servo,
-            mavlink.MAV_CMD_DO_SEND_BANNER: self.send_banner,
-        }
-
     @abstractmethod
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
@@ -55,9 +39,10 @@ class ArduPilotCommands(handlers.CommandHandlers):
         """SET_MODE: works, never acknowledged."""
         self._set_mode(base_mode, custom_mode)
 
-    def set_mode(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SET_MODE)
+    def set_mode(self, command: Command, source: Source) -> Result:
         """DO_SET_MODE: p1 base mode, p2 mode number."""
-        return self._set_mode(handlers.flags(command.p1), handlers.flags(command.p2))
+        return self._set_mode(flags(command.p1), flags(command.p2))
 
     def _set_mode(self, base_mode: int, number: int) -> Result:
         if not base_mode & _CUSTOM_MODE_FLAG:
@@ -77,11 +62,12 @@ class ArduPilotCommands(handlers.CommandHandlers):
         return self.commander.set_mode(mode).result
 
     @staticmethod
-    def is_forced(command: handlers.Command) -> bool:
+    def is_forced(command: Command) -> bool:
         """COMPONENT_ARM_DISARM: p2 holds the number that overrides the checks."""
-        return command.p2 == handlers.FORCE_NUMBER
+        return command.p2 == FORCE_NUMBER
 
-    def arm_disarm(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+    def arm_disarm(self, command: Command, source: Source) -> Result:
         """COMPONENT_ARM_DISARM: p1 exactly 1 or 0."""
         forced = self.is_forced(command)
         if command.p1 == 1.0:
@@ -90,11 +76,13 @@ class ArduPilotCommands(handlers.CommandHandlers):
             return self.commander.disarm(forced=forced).result
         return Result.UNSUPPORTED
 
-    def loiter(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
+    def loiter(self, command: Command, source: Source) -> Result:
         """NAV_LOITER_UNLIM: mode LOITER."""
         return self.commander.set_mode(FlightMode.HOLD).result
 
-    def reposition(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_REPOSITION)
+    def reposition(self, command: Command, source: Source) -> Result:
         """DO_REPOSITION, COMMAND_INT only: p2 bit 0 changes to GUIDED."""
         if not command.is_int:
             return Result.UNSUPPORTED
@@ -102,9 +90,9 @@ class ArduPilotCommands(handlers.CommandHandlers):
             self.hooks.announce(_WARNING, f"Unknown mavlink coordinate frame {command.frame}")
             return Result.DENIED
         unset = not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z))
-        if unset or not handlers.on_earth(command):
+        if unset or not on_earth(command):
             return Result.DENIED
-        change = handlers.flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+        change = flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if not change and self.commander.mode is not FlightMode.GUIDED:
             return self.reposition_denied
         north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
@@ -117,35 +105,39 @@ class ArduPilotCommands(handlers.CommandHandlers):
         )
         return Result.ACCEPTED if verdict.accepted else Result.FAILED
 
-    def radius_of(self, command: handlers.Command) -> float:
+    def radius_of(self, command: Command) -> float:
         """Radius of DO_REPOSITION's circle, positive clockwise; NaN: there is none."""
         return math.nan
 
+    @command(mavlink.MAV_CMD_DO_CHANGE_SPEED)
     @abstractmethod
-    def change_speed(self, command: handlers.Command, source: Source) -> Result:
+    def change_speed(self, command: Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed."""
 
-    def start_mission(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_MISSION_START)
+    def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: whole missions only."""
-        if (handlers.whole(command.p1, 0) or 0) != 0 or (handlers.whole(command.p2, 0) or 0) != 0:
+        if (whole(command.p1, 0) or 0) != 0 or (whole(command.p2, 0) or 0) != 0:
             return Result.DENIED
         return self.commander.guidance.start_mission().result
 
-    def set_mission_current(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
+    def set_mission_current(self, command: Command, source: Source) -> Result:
         """DO_SET_MISSION_CURRENT: p1 item."""
-        item = handlers.whole(command.p1)
+        item = whole(command.p1)
         if item is None or not 0 <= item < self.hooks.mission_item_count():
             return Result.DENIED
         return Result.ACCEPTED if self.hooks.set_current_item(item) else Result.FAILED
 
-    def set_home(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SET_HOME)
+    def set_home(self, command: Command, source: Source) -> Result:
         """DO_SET_HOME: p1 = 1, or no position given: the current position."""
         nowhere = command.x == 0.0 and command.y == 0.0
         if command.p1 == 1.0 or nowhere:
             return Result.ACCEPTED if self.commander.set_home_here() else Result.FAILED
         if not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z)):
             return Result.DENIED
-        if not handlers.on_earth(command):
+        if not on_earth(command):
             return Result.FAILED
         altitude_m = command.z
         home = self.commander.home.position
@@ -154,25 +146,32 @@ class ArduPilotCommands(handlers.CommandHandlers):
         placed = self.commander.home.command(command.x, command.y, altitude_m)
         return Result.ACCEPTED if placed else Result.FAILED
 
-    def terminate(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_FLIGHTTERMINATION)
+    def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors permanently."""
         if not command.p1 > 0.5:
             return Result.FAILED
         self.commander.terminate()
         return Result.ACCEPTED
 
-    def set_servo(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SET_SERVO)
+    def set_servo(self, command: Command, source: Source) -> Result:
         """DO_SET_SERVO: outputs without a function can be set (and drive nothing here)."""
-        channel = handlers.whole(command.p1)
+        channel = whole(command.p1)
         if channel is None or not _FIRST_FREE_SERVO <= channel <= _SERVO_CHANNELS:
             return Result.FAILED
         return Result.ACCEPTED
 
-    def send_banner(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SEND_BANNER)
+    def send_banner(self, command: Command, source: Source) -> Result:
         """DO_SEND_BANNER: send the texts of the firmware's version on the requesting channel."""
         self.hooks.banner(source.channel)
         return Result.ACCEPTED
 
-    def fail(self, command: handlers.Command, source: Source) -> Result:
-        """FAILED: the vehicle has no such device."""
-        return Result.FAILED
+    @command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+    def run_prearm_checks(self, command: Command, source: Source) -> Result:
+        """RUN_PREARM_CHECKS: the reasons follow as texts."""
+        if self.commander.armed:
+            return Result.TEMPORARILY_REJECTED
+        self.commander.check_arming()
+        return Result.ACCEPTED

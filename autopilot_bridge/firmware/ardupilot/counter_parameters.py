@@ -3,7 +3,8 @@
 from typing import Final
 
 from autopilot_bridge.mission_plan import MissionType
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 MISSION_ITEMS: Final = "MIS_TOTAL"
 BOOTS: Final = "STAT_BOOTCNT"

@@ -12,9 +12,10 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.messages import plan_checksum
 
@@ -70,11 +71,7 @@ class OldPoints(Microservice):
         self._versions = [0, 0]
         parameters.subscribe(self._on_parameter)
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """The four messages."""
-        return dict.fromkeys(_NAMES, self._on_point)
-
+    @receives(*_NAMES)
     def _on_point(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         number = message.get_msgId()
         if number not in self._warned:

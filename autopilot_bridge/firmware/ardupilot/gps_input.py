@@ -8,14 +8,15 @@ Source: MAVLink common.xml (GPS_INPUT 232, HIL_GPS 113); ArduPilot 4.6 AP_GPS_MA
 """
 
 import math
-from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 from flightsim import interface as i
 
 _FIX_3D: Final = 3
@@ -51,16 +52,18 @@ class GpsInputService(Microservice):
         self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
         self.taken = self.refused = 0
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """GPS_INPUT and HIL_GPS."""
-        return dict.fromkeys(_READERS, self._on_fix)
-
-    def _on_fix(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_GPS_INPUT)
+    def _on_gps_input(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """Only the first receiver (`gps_id`) exists."""
-        if not self._listens or getattr(message, "gps_id", 0) != 0:
-            return
-        values = _READERS[message.get_msgId()](message)
+        if self._listens and message.gps_id == 0:
+            self._take(message, _gps_input(message), time_us)
+
+    @receives(mavlink.MAVLINK_MSG_ID_HIL_GPS)
+    def _on_hil_gps(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if self._listens:
+            self._take(message, _hil_gps(message), time_us)
+
+    def _take(self, message: MavlinkMessage, values: list[float] | None, time_us: int) -> None:
         if values is None:
             self.refused += 1
             return
@@ -156,10 +159,3 @@ def _fix(
 def _least(reported: float, otherwise: float) -> float:
     """The received value if it is valid, else the other one."""
     return reported if reported > 0.0 else otherwise
-
-
-_Reader = Callable[[MavlinkMessage], list[float] | None]
-_READERS: Final[dict[int, _Reader]] = {
-    mavlink.MAVLINK_MSG_ID_GPS_INPUT: _gps_input,
-    mavlink.MAVLINK_MSG_ID_HIL_GPS: _hil_gps,
-}

@@ -7,11 +7,12 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_ids
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.common import NAN, CommonMessages
-from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.streams import Values
 from flightsim.foundation.vectors import euler_of
 
 _M = mavlink
@@ -51,25 +52,7 @@ _SECONDS_PER_HOUR: Final = 3600.0
 class ArdupilotMessages(CommonMessages):
     """Builders of what ArduCopter sends."""
 
-    def builders(self) -> Mapping[int, Builder]:
-        """Message id -> builder."""
-        return {
-            **super().builders(),
-            _M.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
-            _M.MAVLINK_MSG_ID_RAW_IMU: self.raw_imu,
-            _M.MAVLINK_MSG_ID_SCALED_IMU2: self.scaled_imu,
-            _M.MAVLINK_MSG_ID_POWER_STATUS: self.power_status,
-            _M.MAVLINK_MSG_ID_MEMINFO: self.meminfo,
-            _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self.nav_controller_output,
-            _M.MAVLINK_MSG_ID_RC_CHANNELS: self.rc_channels,
-            _M.MAVLINK_MSG_ID_AHRS: self.ahrs,
-            _M.MAVLINK_MSG_ID_AHRS2: self.ahrs2,
-            _M.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self.ekf_status_report,
-            _M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4: self.esc_telemetry,
-            _M.MAVLINK_MSG_ID_TERRAIN_REPORT: self.terrain_report,
-            _M.MAVLINK_MSG_ID_WIND: self.wind,
-        }
-
+    @streams(_M.MAVLINK_MSG_ID_TIMESYNC)
     def timesync(self) -> Values:
         """TIMESYNC (111) request."""
         return (0, self.view.time_us * 1000, 0, 0)
@@ -78,19 +61,28 @@ class ArdupilotMessages(CommonMessages):
         """Without an airspeed sensor ArduCopter shows its ground speed."""
         return self.view.refreshed().ground_speed_m_s
 
+    @streams(_M.MAVLINK_MSG_ID_RAW_IMU)
     def raw_imu(self) -> Values | None:
         """RAW_IMU (27), scaled like SCALED_IMU."""
         values = self.raw_scaled_imu()
         return None if values is None else (self.view.time_us, *values, 0, self.temperature_cdeg())
 
+    @streams(_M.MAVLINK_MSG_ID_SCALED_IMU2)
+    def scaled_imu2(self) -> Values | None:
+        """SCALED_IMU2 (116): the values of the first IMU."""
+        return self.scaled_imu()
+
+    @streams(_M.MAVLINK_MSG_ID_POWER_STATUS)
     def power_status(self) -> Values:
         """POWER_STATUS (125)."""
         return (5000, 0, 0)
 
+    @streams(_M.MAVLINK_MSG_ID_MEMINFO)
     def meminfo(self) -> Values:
         """MEMINFO (152): free memory of the emulated board."""
         return (0, 65535, 131072)
 
+    @streams(_M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT)
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62)."""
         roll, pitch, _ = euler_of(self.sources.controller.attitude_setpoint.tolist())
@@ -114,15 +106,18 @@ class ArdupilotMessages(CommonMessages):
             0.0,
         )
 
+    @streams(_M.MAVLINK_MSG_ID_RC_CHANNELS)
     def rc_channels(self) -> Values:
         """RC_CHANNELS (65): the simulated transmitter at rest."""
         return (self.view.time_ms, 8, *_RC_NEUTRAL_US, *(0,) * 10, 255)
 
+    @streams(_M.MAVLINK_MSG_ID_AHRS)
     def ahrs(self) -> Values:
         """AHRS (163): gyro bias estimate."""
         bias = self.sources.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
         return (*bias, 0.0, 0.0, 0.0, 0.0)
 
+    @streams(_M.MAVLINK_MSG_ID_AHRS2)
     def ahrs2(self) -> Values | None:
         """AHRS2 (178)."""
         v = self.view.refreshed()
@@ -130,6 +125,7 @@ class ArdupilotMessages(CommonMessages):
             return None
         return (v.roll, v.pitch, v.yaw, v.alt_amsl_m, v.lat_e7, v.lon_e7)
 
+    @streams(_M.MAVLINK_MSG_ID_EKF_STATUS_REPORT)
     def ekf_status_report(self) -> Values:
         """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
         health = self.sources.navigation.health
@@ -147,6 +143,7 @@ class ArdupilotMessages(CommonMessages):
         """EKF_STATUS_FLAGS."""
         return ekf_flags(self.sources.navigation.health, position_ready=self.sources.position_ready())
 
+    @streams(_M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4)
     def esc_telemetry(self) -> Values | None:
         """ESC_TELEMETRY_1_TO_4 (11030): voltage of the battery; the ESCs report no speed."""
         battery = self.view.battery
@@ -165,6 +162,7 @@ class ArdupilotMessages(CommonMessages):
             (count,) * 4,
         )
 
+    @streams(_M.MAVLINK_MSG_ID_TERRAIN_REPORT)
     def terrain_report(self) -> Values | None:
         """TERRAIN_REPORT (136): no terrain data is loaded."""
         v = self.view.refreshed()
@@ -172,6 +170,7 @@ class ArdupilotMessages(CommonMessages):
             return None
         return (v.lat_e7, v.lon_e7, 0, 0.0, 0.0, 0, 0)
 
+    @streams(_M.MAVLINK_MSG_ID_WIND)
     def wind(self) -> Values:
         """WIND (168); a copter without a drag model reports calm."""
         return (-180.0, 0.0, 0.0)

@@ -47,9 +47,10 @@ from autopilot_bridge.services.inputs.manual import ManualRules, ManualService
 from autopilot_bridge.services.inputs.obstacles import ObstacleService
 from autopilot_bridge.services.inputs.traffic import TrafficRules, TrafficService
 from autopilot_bridge.services.inputs.transmitter import GestureRules, ModeSwitchRules
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.protocol import ParameterPolicy
 from autopilot_bridge.services.parameters.storage import RESET, StoragePolicy
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.equipment import MissionEquipment
 from autopilot_bridge.services.plans.geofence import ArdupilotGeofence
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerAction

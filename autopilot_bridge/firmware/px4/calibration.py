@@ -1,16 +1,17 @@
 """PREFLIGHT_CALIBRATION as PX4 accepts it: acknowledged at once, then a sequence of "[cal] ..." texts."""
 
-from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.px4 import calibration_script as scripts
 from autopilot_bridge.firmware.px4.calibration_script import CalibrationScript
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command, Handler, whole
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.commands.command import Command, whole
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
 _CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
@@ -48,14 +49,6 @@ class Px4Calibration(Microservice):
         self._due_us = 0
         self._cancelled = False
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """PREFLIGHT_CALIBRATION, FIXED_MAG_CAL_YAW."""
-        return {
-            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
-            mavlink.MAV_CMD_FIXED_MAG_CAL_YAW: self._known_heading,
-        }
-
     def tick(self, time_us: int) -> None:
         """Send the texts that are due."""
         script = self._running
@@ -75,6 +68,7 @@ class Px4Calibration(Microservice):
         if self._next == len(script.lines):
             self._end()
 
+    @command(mavlink.MAV_CMD_PREFLIGHT_CALIBRATION)
     def _calibrate(self, command: Command, source: Source) -> Result:
         parameters = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
         values = [whole(value, 0) or 0 for value in parameters]
@@ -97,6 +91,7 @@ class Px4Calibration(Microservice):
             return self._mute(False)
         return Result.UNSUPPORTED
 
+    @command(mavlink.MAV_CMD_FIXED_MAG_CAL_YAW)
     def _known_heading(self, command: Command, source: Source) -> Result:
         """FIXED_MAG_CAL_YAW: the heading is known, so the vehicle need not be turned."""
         if self._commander.armed or self._running is not None:

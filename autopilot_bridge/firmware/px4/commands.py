@@ -4,53 +4,32 @@ import math
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import CommandDenied, ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands import handlers as handlers
+from autopilot_bridge.services.commands.command import FORCE_NUMBER, Command, flags, on_earth, whole
+from autopilot_bridge.services.commands.handlers import CommandHandlers
 
 _CUSTOM_MODE_FLAG = 1
+_PROTOCOL_VERSION = 300
 
 
-class Px4Commands(handlers.CommandHandlers):
+class Px4Commands(CommandHandlers):
     """PX4's commands. Everything not in the table is UNSUPPORTED, as in the firmware."""
 
     double_ack = frozenset({mavlink.MAV_CMD_DO_SET_MODE})
-
-    def __init__(self, commander: Commander, hooks: handlers.CommandHooks) -> None:
-        super().__init__(commander, hooks)
-        self.table = {
-            **self.table,
-            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self.arm_disarm,
-            mavlink.MAV_CMD_DO_SET_MODE: self.set_mode,
-            mavlink.MAV_CMD_NAV_TAKEOFF: self.takeoff,
-            mavlink.MAV_CMD_DO_REPOSITION: self.reposition,
-            mavlink.MAV_CMD_DO_ORBIT: self.orbit,
-            mavlink.MAV_CMD_DO_CHANGE_SPEED: self.change_speed,
-            mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
-            mavlink.MAV_CMD_MISSION_START: self.start_mission,
-            mavlink.MAV_CMD_DO_LAND_START: self.land_start,
-            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
-            mavlink.MAV_CMD_INJECT_FAILURE: self.inject_failure,
-            mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self.request_protocol_version,
-            mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self.silence,
-            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self.silence,
-            mavlink.MAV_CMD_DO_VTOL_TRANSITION: self.silence,
-            mavlink.MAV_CMD_SET_CAMERA_MODE: self.silence,
-        }
 
     def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> Result:
         """SET_MODE: acknowledged once, with the actual result."""
         return self._set_mode(base_mode, custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF, source)
 
-    def set_mode(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SET_MODE)
+    def set_mode(self, command: Command, source: Source) -> Result:
         """DO_SET_MODE: p1 base mode, p2 main mode, p3 sub mode."""
-        return self._set_mode(
-            handlers.flags(command.p1), handlers.flags(command.p2), handlers.flags(command.p3), source
-        )
+        return self._set_mode(flags(command.p1), flags(command.p2), flags(command.p3), source)
 
     def _set_mode(self, base_mode: int, main: int, sub: int, source: Source) -> Result:
         if not base_mode & _CUSTOM_MODE_FLAG:
@@ -71,10 +50,11 @@ class Px4Commands(handlers.CommandHandlers):
         )
         return Result.TEMPORARILY_REJECTED
 
-    def arm_disarm(self, command: handlers.Command, source: Source) -> Result | None:
+    @command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+    def arm_disarm(self, command: Command, source: Source) -> Result | None:
         """COMPONENT_ARM_DISARM: p1 rounded to 1 or 0; any other value is answered with a text only."""
-        action = handlers.whole(command.p1)
-        forced = handlers.whole(command.p2) == handlers.FORCE_NUMBER
+        action = whole(command.p1)
+        forced = whole(command.p2) == FORCE_NUMBER
         if action == 1:
             return self.commander.arm(forced=forced).result
         if action == 0:
@@ -82,42 +62,52 @@ class Px4Commands(handlers.CommandHandlers):
         self.deny(command, Reason.BAD_PARAMETER, Result.DENIED)
         return None
 
-    def takeoff(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_NAV_TAKEOFF)
+    def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: p4 yaw deg, altitude over mean sea level (not set: MIS_TAKEOFF_ALT over home)."""
         down_m = self.down_from(command.z, relative=False)
         return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.radians(command.p4)).result
 
-    def reposition(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_NAV_LAND)
+    def land(self, command: Command, source: Source) -> Result:
+        """NAV_LAND: land at the current position."""
+        return self.commander.guidance.land().result
+
+    @command(mavlink.MAV_CMD_DO_REPOSITION)
+    def reposition(self, command: Command, source: Source) -> Result:
         """DO_REPOSITION: p1 speed, p2 = 1 change mode, p4 yaw rad, altitude over mean sea level."""
-        if handlers.flags(command.p2) != mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
+        if flags(command.p2) != mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
             return Result.UNSUPPORTED
-        if not handlers.on_earth(command):
+        if not on_earth(command):
             return Result.DENIED
         north_m, east_m, down_m = self.ned_from(command, relative=False)
         return self.commander.guidance.reposition(
             north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=command.p4, speed_m_s=command.p1
         ).result
 
-    def orbit(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_ORBIT)
+    def orbit(self, command: Command, source: Source) -> Result:
         """DO_ORBIT: p1 radius (negative: counter-clockwise), p2 speed, p3 ORBIT_YAW_BEHAVIOUR, centre."""
-        if not handlers.on_earth(command):
+        if not on_earth(command):
             return Result.DENIED
         north_m, east_m, down_m = self.ned_from(command, relative=False)
         return self.commander.guidance.orbit(
             radius_m=command.p1,
             speed_m_s=command.p2,
-            yaw_behaviour=handlers.whole(command.p3, 0) or 0,
+            yaw_behaviour=whole(command.p3, 0) or 0,
             north_m=north_m,
             east_m=east_m,
             down_m=down_m,
         ).result
 
-    def change_speed(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_CHANGE_SPEED)
+    def change_speed(self, command: Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed; -1: back to the parameter's speed."""
-        self.commander.guidance.change_speed(command.p2, kind=handlers.whole(command.p1, 1) or 0)
+        self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
         return Result.ACCEPTED
 
-    def set_home(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_SET_HOME)
+    def set_home(self, command: Command, source: Source) -> Result:
         """DO_SET_HOME: p1 = 1: the current position, else the given one."""
         if command.p1 > 0.5:
             here = self.commander.set_home_here()
@@ -127,11 +117,12 @@ class Px4Commands(handlers.CommandHandlers):
         placed = self.commander.home.command(command.x, command.y, command.z)
         return Result.ACCEPTED if placed else Result.TEMPORARILY_REJECTED
 
-    def start_mission(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_MISSION_START)
+    def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: p1 first item. Changes the mode and arms the vehicle."""
         if self.commander.mission_problem is not None:
             return self.deny(command, Reason.MISSION_MISSING, Result.DENIED)
-        first = handlers.whole(command.p1)
+        first = whole(command.p1)
         if first is None or not -1 <= first < self.hooks.mission_item_count():
             return Result.DENIED
         if first > 0 and not self.hooks.set_current_item(first):
@@ -147,7 +138,8 @@ class Px4Commands(handlers.CommandHandlers):
         )
         return Result.TEMPORARILY_REJECTED
 
-    def land_start(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_LAND_START)
+    def land_start(self, command: Command, source: Source) -> Result:
         """DO_LAND_START: go to the landing sequence of the mission; CANCELLED when it has none."""
         items = self.commander.missions.items
         start = next(
@@ -157,13 +149,10 @@ class Px4Commands(handlers.CommandHandlers):
             return Result.CANCELLED
         return self.commander.set_mode(FlightMode.MISSION).result
 
-    def inject_failure(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_INJECT_FAILURE)
+    def inject_failure(self, command: Command, source: Source) -> Result:
         """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all)."""
-        unit, kind, instance = (
-            handlers.whole(command.p1),
-            handlers.whole(command.p2),
-            handlers.whole(command.p3, 0),
-        )
+        unit, kind, instance = (whole(command.p1), whole(command.p2), whole(command.p3, 0))
         if self.hooks.inject_failure is None:
             return Result.UNSUPPORTED
         enabled = bool(self.hooks.parameters.get("SYS_FAILURE_EN"))
@@ -171,7 +160,17 @@ class Px4Commands(handlers.CommandHandlers):
             return Result.DENIED
         return self.hooks.inject_failure(unit, kind, instance)
 
-    def terminate(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION)
+    def request_protocol_version(self, command: Command, source: Source) -> Result:
+        """REQUEST_PROTOCOL_VERSION, the former request."""
+        return self.hooks.intervals.request(source, _PROTOCOL_VERSION)
+
+    @command(mavlink.MAV_CMD_DO_VTOL_TRANSITION, mavlink.MAV_CMD_SET_CAMERA_MODE)
+    def silence(self, command: Command, source: Source) -> None:
+        """No acknowledgement at all, as observed on the firmware."""
+
+    @command(mavlink.MAV_CMD_DO_FLIGHTTERMINATION)
+    def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors of an armed vehicle permanently.
 
         The circuit breaker CBRK_FLIGHTTERM keeps failures from doing so, not the command.
@@ -189,11 +188,7 @@ class Px4PlaneCommands(Px4Commands):
     has a radius and stays in Hold, which circles (`CommanderPolicy.orbit_mode`).
     """
 
-    def __init__(self, commander: Commander, hooks: handlers.CommandHooks) -> None:
-        super().__init__(commander, hooks)
-        self.table = {**self.table, mavlink.MAV_CMD_DO_GO_AROUND: self.go_around}
-
-    def takeoff(self, command: handlers.Command, source: Source) -> Result:
+    def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: altitude over mean sea level (not set: MIS_TAKEOFF_ALT over home), centre."""
         north_m, east_m, down_m = self.ned_from(command, relative=False)
         verdict = self.commander.guidance.takeoff(
@@ -201,7 +196,8 @@ class Px4PlaneCommands(Px4Commands):
         )
         return verdict.result
 
-    def go_around(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_GO_AROUND)
+    def go_around(self, command: Command, source: Source) -> Result:
         """DO_GO_AROUND: abort a landing."""
         gone = self.commander.guidance.go_around()
         return Result.ACCEPTED if gone.accepted else Result.TEMPORARILY_REJECTED

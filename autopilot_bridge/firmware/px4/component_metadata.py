@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Final
 
+from autopilot_bridge.dispatch import on_request
 from autopilot_bridge.firmware.event_kinds import definitions
 from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.px4.actuators import actuator_metadata, choices
@@ -53,10 +54,6 @@ class ComponentMetadataService(Microservice):
         self._parameters = parameters
         self._time_us = time_us
 
-    @property
-    def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
-        return {COMPONENT_METADATA: self._send}
-
     @cached_property
     def files(self) -> Mapping[str, bytes]:
         """The files by name."""
@@ -83,6 +80,7 @@ class ComponentMetadataService(Microservice):
     def _content(self, name: str) -> Callable[[Mapping[str, str]], bytes]:
         return lambda query: self.files[name]
 
+    @on_request(COMPONENT_METADATA)
     def _send(self, channel: Channel, parameter: float) -> None:
         time_ms = self._time_us() // 1000 & 0xFFFFFFFF
         channel.send(ComponentMetadata(time_ms, crc32(self.files[GENERAL]), _uri(GENERAL).encode()))

@@ -9,13 +9,14 @@ connects, bring the report also when nothing has changed).
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.arming import arming_reasons, shortfalls
 from autopilot_bridge.commander.events import ArmingDenied, Event
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.dispatch import command, receives, streams
 from autopilot_bridge.firmware.event_kinds import Occurrence
 from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.texts import Notice
@@ -26,10 +27,10 @@ from autopilot_bridge.mavlink.event_messages import (
     EventMessage,
     ResponseEventError,
 )
-from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Receiver, Source, send_to_all
-from autopilot_bridge.services.commands.handlers import Command, Handler
+from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.microservice import Microservice
-from autopilot_bridge.telemetry.streams import Builder
+from autopilot_bridge.telemetry.streams import Values
 
 KEPT: Final = 64
 """Number of events that clients can request again."""
@@ -61,18 +62,11 @@ class EventService(Microservice):
         self._reported: tuple[Occurrence, ...] = ()
         self._station_connected = False
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        return {mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
+    @streams(CURRENT_EVENT_SEQUENCE)
+    def _current(self) -> Values:
+        return (self._sequence, 0)
 
-    @property
-    def builders(self) -> Mapping[int, Builder]:
-        return {CURRENT_EVENT_SEQUENCE: lambda: (self._sequence, 0)}
-
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        return {REQUEST_EVENT: self._on_request}
-
+    @receives(REQUEST_EVENT)
     def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """REQUEST_EVENT: ranges may wrap. An event that is no longer kept gets one error reply."""
         count = (message.last_sequence - message.first_sequence) % _MODULO + 1
@@ -102,6 +96,7 @@ class EventService(Microservice):
         self._station_connected = situation.gcs_age_s < self._commander.parameters.gcs_loss_s
         return self._station_connected and not before and not self._commander.armed
 
+    @command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
     def _run_checks(self, command: Command, source: Source) -> Result:
         """RUN_PREARM_CHECKS; failed checks are sent as texts too, which brings the report."""
         if not self._commander.check_arming():

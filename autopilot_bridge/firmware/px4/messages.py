@@ -7,12 +7,13 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_rates
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.common import NAN, CommonMessages, TelemetrySources
-from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 
 _M = mavlink
@@ -49,35 +50,24 @@ class Px4Messages(CommonMessages):
         super().__init__(sources)
         self._ping_sequence = -1
 
-    def builders(self) -> Mapping[int, Builder]:
-        """Message id -> builder."""
-        return {
-            **super().builders(),
-            _M.MAVLINK_MSG_ID_PING: self.ping,
-            _M.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
-            _M.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: self.actuator_output_status,
-            _M.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
-            _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
-            _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: self.orbit_execution_status,
-            _M.MAVLINK_MSG_ID_CURRENT_MODE: self.sources.current_mode,
-            _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: self.open_drone_id_location,
-            _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: self.open_drone_id_system,
-        }
-
+    @streams(_M.MAVLINK_MSG_ID_PING)
     def ping(self) -> Values:
         """PING (4), to all systems."""
         self._ping_sequence += 1
         return (self.view.time_us, self._ping_sequence, 0, 0)
 
+    @streams(_M.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS)
     def actuator_output_status(self) -> Values:
         """ACTUATOR_OUTPUT_STATUS (375): the pulses of SERVO_OUTPUT_RAW."""
         _, _, *pulses = self.servo_output_raw()
         return (self.view.time_us, len(pulses), (*pulses, *(0.0,) * (_ACTUATOR_OUTPUTS - len(pulses))))
 
+    @streams(_M.MAVLINK_MSG_ID_TIMESYNC)
     def timesync(self) -> Values:
         """TIMESYNC (111) request, nanoseconds since boot."""
         return (0, self.view.time_us * 1000, 0, 0)
 
+    @streams(_M.MAVLINK_MSG_ID_ALTITUDE)
     def altitude(self) -> Values | None:
         """ALTITUDE (141): monotonic is the barometer's, terrain is relative to the local origin."""
         v = self.view.refreshed()
@@ -123,6 +113,7 @@ class Px4Messages(CommonMessages):
         mask = sum(bit for bit, value in zip(_TARGET_BITS, target, strict=True) if math.isnan(value))
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
+    @streams(_M.MAVLINK_MSG_ID_ESTIMATOR_STATUS)
     def estimator_status(self) -> Values:
         """ESTIMATOR_STATUS (230). PX4's ratios are squared: (innovation / gate)^2."""
         health = self.sources.navigation.health
@@ -139,6 +130,7 @@ class Px4Messages(CommonMessages):
             health.position_vertical_accuracy_m,
         )
 
+    @streams(_M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS)
     def orbit_execution_status(self) -> Values | None:
         """ORBIT_EXECUTION_STATUS (360), while circling."""
         orbit = self.sources.orbit()
@@ -156,6 +148,12 @@ class Px4Messages(CommonMessages):
             alt_m,
         )
 
+    @streams(_M.MAVLINK_MSG_ID_CURRENT_MODE)
+    def current_mode(self) -> Values:
+        """CURRENT_MODE (436)."""
+        return self.sources.current_mode()
+
+    @streams(_M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION)
     def open_drone_id_location(self) -> Values | None:
         """OPEN_DRONE_ID_LOCATION (12901), ASTM F3411."""
         v = self.view.refreshed()
@@ -186,6 +184,7 @@ class Px4Messages(CommonMessages):
             0,
         )
 
+    @streams(_M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM)
     def open_drone_id_system(self) -> Values | None:
         """OPEN_DRONE_ID_SYSTEM (12904): the operator is assumed at home."""
         home = self.home_place()

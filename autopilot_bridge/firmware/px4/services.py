@@ -48,7 +48,7 @@ from autopilot_bridge.services.inputs.manual import ManualRules, ManualService
 from autopilot_bridge.services.inputs.obstacles import ObstacleService
 from autopilot_bridge.services.inputs.traffic import TrafficRules, TrafficService
 from autopilot_bridge.services.inputs.transmitter import GestureRules, ModeSwitchRules
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.protocol import ParameterPolicy
 from autopilot_bridge.services.parameters.storage import (
     LOAD,
@@ -58,6 +58,7 @@ from autopilot_bridge.services.parameters.storage import (
     SAVE,
     StoragePolicy,
 )
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.equipment import MissionEquipment
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerAction
 from autopilot_bridge.telemetry.line import MICROSECONDS, FlowControl

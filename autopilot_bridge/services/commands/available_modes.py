@@ -1,10 +1,11 @@
 """AVAILABLE_MODES: the modes of the vehicle and their names (standard modes protocol; PX4)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import on_request
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.microservice import Microservice
 
@@ -35,10 +36,7 @@ class AvailableModes(Microservice):
     def __init__(self, modes: Sequence[ListedMode]) -> None:
         self._modes = modes
 
-    @property
-    def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
-        return {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES: self._send}
-
+    @on_request(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES)
     def _send(self, channel: Channel, index: float) -> None:
         """Send the mode with this index (from 1), or all modes for 0."""
         for number, mode in enumerate(self._modes, start=1):

@@ -12,8 +12,10 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 
@@ -48,7 +50,7 @@ class IntervalPolicy:
     too_fast_text: str = ""
 
 
-class MessageIntervalService:
+class MessageIntervalService(Microservice):
     """Changes the streams of every channel, and answers requests about them.
 
     Args:
@@ -75,11 +77,7 @@ class MessageIntervalService:
         self._pending: dict[tuple[Channel, int, float], None] = {}  # two equal requests get one answer
         self._time_us = 0
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """REQUEST_DATA_STREAM; the commands come through the methods below."""
-        return {mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._on_data_stream}
-
+    @receives(mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM)
     def _on_data_stream(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._time_us = time_us
         table = self._tables.get(source.channel.name)

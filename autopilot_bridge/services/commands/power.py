@@ -13,8 +13,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import RebootRequested
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command, Handler, whole
+from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.vehicle_memory import PowerAction, PowerHook
 
@@ -58,10 +59,6 @@ class PowerService(Microservice):
         self._time_us = 0
         self._wanted: tuple[int, PowerAction, bool] | None = None
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        return {mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._command}
-
     def tick(self, time_us: int) -> None:
         """Execute the action when its delay is over."""
         self._time_us = time_us
@@ -72,6 +69,7 @@ class PowerService(Microservice):
         if self._act is not None and (forced or not self._commander.armed):  # not if armed since
             self._act(action)
 
+    @command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
     def _command(self, command: Command, source: Source) -> Result:
         policy, requested = self._policy, whole(command.p1, 0)
         action = policy.actions.get(requested or 0)

@@ -5,22 +5,20 @@ from collections.abc import Mapping
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.services.channel import NO_CLIENT, AddressRule, MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.commands.handlers import (
-    Command,
-    CommandHandlers,
-    Handler,
-    command_from_message,
-)
+from autopilot_bridge.dispatch import receives
+from autopilot_bridge.services.channel import NO_CLIENT, AddressRule, MavlinkMessage, Source
+from autopilot_bridge.services.commands.command import Command, Handler, command_from_message
+from autopilot_bridge.services.commands.handlers import CommandHandlers
+from autopilot_bridge.services.microservice import Microservice
 
 
-class CommandService:
+class CommandService(Microservice):
     """Executes commands and acknowledges them, on the requesting channel only.
 
     Args:
         handlers: the flavour's commands.
         address: the target ids of this autopilot.
-        more: commands of other services, by MAV_CMD; they take precedence over the flavour's own commands.
+        more: commands of other services, by MAV_CMD.
     """
 
     def __init__(
@@ -28,17 +26,9 @@ class CommandService:
     ) -> None:
         self._handlers = handlers
         self._address = address
-        self._more = dict(more or {})
+        self._table = {**handlers.commands, **(more or {})}
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """COMMAND_LONG, COMMAND_INT, SET_MODE. No command takes long enough for a COMMAND_CANCEL."""
-        return {
-            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
-            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
-            mavlink.MAVLINK_MSG_ID_SET_MODE: self._on_set_mode,
-        }
-
+    @receives(mavlink.MAVLINK_MSG_ID_SET_MODE)
     def _on_set_mode(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if self._address.accepts(message):
             result = self._handlers.set_mode_message(message.base_mode, message.custom_mode, source)
@@ -47,14 +37,15 @@ class CommandService:
 
     def knows(self, command: int) -> bool:
         """A handler for this MAV_CMD exists."""
-        return command in self._more or command in self._handlers.table
+        return command in self._table
 
     def carry_out(self, command: Command, source: Source | None = None) -> Result | None:
         """Execute a command without an acknowledgement; without a source, replies are dropped."""
         sender = NO_CLIENT if source is None else source
-        handler = self._more.get(command.id)
-        return self._handlers.execute(command, sender) if handler is None else handler(command, sender)
+        handler = self._table.get(command.id)
+        return Result.UNSUPPORTED if handler is None else handler(command, sender)
 
+    @receives(mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT)
     def _on_command(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if not self._address.accepts(message):
             return

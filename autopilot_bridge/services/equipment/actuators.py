@@ -4,16 +4,17 @@ The simulated vehicle carries none of these devices. It accepts and refuses thei
 does with its default configuration, and the commands drive nothing.
 """
 
-from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command, Handler, flags, whole
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.commands.command import Command, flags, whole
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
 _WARNING: Final = mavlink.MAV_SEVERITY_WARNING
@@ -34,18 +35,6 @@ class Px4Actuators(Microservice):
         self._parameters = parts.parameters
         self._moving: list[tuple[int, Source]] = []
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """DO_GRIPPER, DO_WINCH, DO_SET_ACTUATOR, ACTUATOR_TEST, CONFIGURE_ACTUATOR, DO_AUTOTUNE_ENABLE."""
-        return {
-            mavlink.MAV_CMD_DO_GRIPPER: self._gripper,
-            mavlink.MAV_CMD_DO_WINCH: lambda command, source: None,  # no winch: no acknowledgement
-            mavlink.MAV_CMD_DO_SET_ACTUATOR: lambda command, source: Result.ACCEPTED,
-            mavlink.MAV_CMD_ACTUATOR_TEST: self._test,
-            mavlink.MAV_CMD_CONFIGURE_ACTUATOR: lambda command, source: None,
-            mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE: lambda command, source: Result.IN_PROGRESS,
-        }
-
     def tick(self, time_us: int) -> None:
         """Acknowledge a gripper action that has ended."""
         while self._moving and time_us >= self._moving[0][0]:
@@ -61,6 +50,19 @@ class Px4Actuators(Microservice):
                 )
             )
 
+    @command(mavlink.MAV_CMD_DO_WINCH, mavlink.MAV_CMD_CONFIGURE_ACTUATOR)
+    def _silence(self, command: Command, source: Source) -> None:
+        """No acknowledgement: there is no winch, and no output can be configured."""
+
+    @command(mavlink.MAV_CMD_DO_SET_ACTUATOR)
+    def _accept(self, command: Command, source: Source) -> Result:
+        return Result.ACCEPTED
+
+    @command(mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE)
+    def _begin(self, command: Command, source: Source) -> Result:
+        return Result.IN_PROGRESS
+
+    @command(mavlink.MAV_CMD_DO_GRIPPER)
     def _gripper(self, command: Command, source: Source) -> Result | None:
         """DO_GRIPPER: p2 GRIPPER_ACTIONS; acknowledged when it is done, after PD_GRIPPER_TO seconds."""
         if self._parameters.get("PD_GRIPPER_TYPE") < 0 or whole(command.p2) not in _GRIPPER_ACTIONS:
@@ -71,6 +73,7 @@ class Px4Actuators(Microservice):
             self._moving.sort(key=lambda entry: entry[0])
         return None
 
+    @command(mavlink.MAV_CMD_ACTUATOR_TEST)
     def _test(self, command: Command, source: Source) -> Result:
         """ACTUATOR_TEST: p5 ACTUATOR_OUTPUT_FUNCTION; disarmed only."""
         if self._commander.armed or self._parameters.get("COM_MOT_TEST_EN") != 1:
@@ -91,16 +94,7 @@ class ArdupilotActuators(Microservice):
         self._parts = parts
         self._commander = parts.commander
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """DO_GRIPPER, DO_SET_RELAY, DO_REPEAT_RELAY, DO_REPEAT_SERVO."""
-        return {
-            mavlink.MAV_CMD_DO_GRIPPER: self._gripper,
-            mavlink.MAV_CMD_DO_SET_RELAY: self._relay,
-            mavlink.MAV_CMD_DO_REPEAT_RELAY: self._relay,
-            mavlink.MAV_CMD_DO_REPEAT_SERVO: self._repeat_servo,
-        }
-
+    @command(mavlink.MAV_CMD_DO_GRIPPER)
     def _gripper(self, command: Command, source: Source) -> Result:
         """DO_GRIPPER: p2 GRIPPER_ACTIONS, with GRIP_ENABLE."""
         action = whole(command.p2)
@@ -110,6 +104,7 @@ class ArdupilotActuators(Microservice):
         self._parts.announce(_INFO, f"Gripper load {words}")
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_SET_RELAY, mavlink.MAV_CMD_DO_REPEAT_RELAY)
     def _relay(self, command: Command, source: Source) -> Result:
         """DO_SET_RELAY: p1 relay from 0, p2 off or on; a relay without RELAYn_FUNCTION 1 does not exist."""
         relay, state = whole(command.p1), whole(command.p2)
@@ -121,6 +116,7 @@ class ArdupilotActuators(Microservice):
         there = name in self._parts.parameters and self._parts.parameters.get(name) == 1
         return Result.ACCEPTED if there else Result.FAILED
 
+    @command(mavlink.MAV_CMD_DO_REPEAT_SERVO)
     def _repeat_servo(self, command: Command, source: Source) -> Result:
         """DO_REPEAT_SERVO: p1 output without a function, p3 how often."""
         channel = whole(command.p1)
@@ -153,22 +149,18 @@ class ArducopterActuators(ArdupilotActuators):
         super().__init__(parts)
         self._test_end_us: int | None = None
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """The commands of the base class, and DO_WINCH, DO_MOTOR_TEST, DO_AUX_FUNCTION."""
-        return {
-            **super().commands,
-            mavlink.MAV_CMD_DO_WINCH: lambda command, source: Result.FAILED,
-            mavlink.MAV_CMD_DO_MOTOR_TEST: self._motor_test,
-            mavlink.MAV_CMD_DO_AUX_FUNCTION: self._auxiliary,
-        }
-
     def tick(self, time_us: int) -> None:
         """End a motor test when its time is over."""
         if self._test_end_us is not None and (time_us >= self._test_end_us or self._commander.armed):
             self._test_end_us = None
             self._parts.announce(_INFO, "finished motor test")
 
+    @command(mavlink.MAV_CMD_DO_WINCH)
+    def _fail(self, command: Command, source: Source) -> Result:
+        """There is no such device."""
+        return Result.FAILED
+
+    @command(mavlink.MAV_CMD_DO_MOTOR_TEST)
     def _motor_test(self, command: Command, source: Source) -> Result:
         """DO_MOTOR_TEST: p1 motor from 1, p2 kind of throttle, p3 throttle, p4 seconds; disarmed."""
         motor, kind = whole(command.p1), whole(command.p2)
@@ -184,6 +176,7 @@ class ArducopterActuators(ArdupilotActuators):
         self._test_end_us = self._commander.time_us + round(command.p4 * 1e6)
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_AUX_FUNCTION)
     def _auxiliary(self, command: Command, source: Source) -> Result:
         """DO_AUX_FUNCTION: p1 function, p2 switch position 0 low, 1 middle, 2 high."""
         function, position = whole(command.p1), whole(command.p2)
@@ -203,15 +196,12 @@ class ArducopterActuators(ArdupilotActuators):
 class ArduplaneActuators(ArdupilotActuators):
     """The additional answers of a plane."""
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """The commands of the base class, and DO_MOTOR_TEST, DO_AUTOTUNE_ENABLE."""
-        return {
-            **super().commands,
-            mavlink.MAV_CMD_DO_MOTOR_TEST: lambda command, source: Result.FAILED,  # for quadplanes
-            mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE: self._autotune,
-        }
+    @command(mavlink.MAV_CMD_DO_MOTOR_TEST)
+    def _fail(self, command: Command, source: Source) -> Result:
+        """Motor tests are for quadplanes."""
+        return Result.FAILED
 
+    @command(mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE)
     def _autotune(self, command: Command, source: Source) -> Result:
         """DO_AUTOTUNE_ENABLE: accepted; the gains are not changed."""
         self._parts.announce(_INFO, f"{'Started' if flags(command.p1) else 'Stopped'} autotune")

@@ -16,12 +16,14 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
-from autopilot_bridge.services.commands.handlers import Command, Handler
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.commands.command import Command, Handler
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.equipment import GIMBAL_COMMANDS
 
 _CAMERA: Final = int(mavlink.MAV_COMP_ID_CAMERA)
@@ -77,27 +79,20 @@ class PayloadCommands(Microservice):
     def commands(self) -> Mapping[int, Handler]:
         """The forwarded commands. Regions of interest are accepted without a gimbal too."""
         return {
+            **super().commands,
             **dict.fromkeys(self._policy.camera, self._to_camera),
-            **dict.fromkeys(GIMBAL_COMMANDS, self._to_gimbal),
-            **dict.fromkeys(_ROI, self._look),
             **({_NEXT_WAYPOINT: self._look} if self._policy.kinds_of_roi else {}),
-        }
-
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """HEARTBEAT and GIMBAL_MANAGER_STATUS of this vehicle's devices."""
-        return {
-            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
-            mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: self._on_manager_status,
         }
 
     def _is_own(self, source: Source) -> bool:
         return source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL)
 
+    @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if self._is_own(source):
             self._received_us[source.component_id] = time_us
 
+    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
     def _on_manager_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if self._is_own(source):
             primary = (message.primary_control_sysid, message.primary_control_compid)
@@ -117,6 +112,7 @@ class PayloadCommands(Microservice):
         self._pass_on(_CAMERA, command)
         return Result.ACCEPTED
 
+    @command(*GIMBAL_COMMANDS)
     def _to_gimbal(self, command: Command, source: Source) -> Result | None:
         if not self._is_there(_GIMBAL):
             return self._policy.absent
@@ -127,6 +123,7 @@ class PayloadCommands(Microservice):
         self._pass_on(_GIMBAL, command)
         return Result.ACCEPTED
 
+    @command(*_ROI)
     def _look(self, command: Command, source: Source) -> Result | None:
         item = _roi_item(command, kinds=self._policy.kinds_of_roi)
         if item is not None and not (abs(item.x) <= 90.0 and abs(item.y) <= 180.0):

@@ -16,7 +16,8 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, is_congested
+from autopilot_bridge.dispatch import receives
+from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
 from autopilot_bridge.services.files.ftp_protocol import (
     HEADER,
     MAX_DATA,
@@ -107,11 +108,7 @@ class FileTransferService(Microservice):
             Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """FILE_TRANSFER_PROTOCOL."""
-        return {mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self.on_transfer}
-
+    @receives(mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL)
     def on_transfer(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """Answer a request; replies (ACK, NAK) of other systems are ignored."""
         payload = bytes(message.payload)

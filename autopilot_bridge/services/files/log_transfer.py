@@ -8,13 +8,14 @@ Source: MAVLink log download (mavlink.io/en/messages/common.html, LOG_ENTRY, LOG
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, is_congested
+from autopilot_bridge.dispatch import receives
+from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
 from autopilot_bridge.services.files.log_book import LogBook, LogFile
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.storage import OpenFile, VehiclePath
@@ -90,11 +91,7 @@ class LogTransferService(Microservice):
         self._logs: list[LogFile] = []  # as listed, so that the numbers stay valid
         self._downloads: dict[tuple[str, int, int], _Download] = {}
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """The requests of the log protocol."""
-        return dict.fromkeys(_REQUESTS, self._on_request)
-
+    @receives(*_REQUESTS)
     def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if self._waits:
             self._refuse(source)

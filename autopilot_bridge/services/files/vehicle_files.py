@@ -8,8 +8,9 @@ from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.services.files.log_transfer import LogTransferService
 from autopilot_bridge.services.files.onboard_log import OnboardLog
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.storage import ParameterStorageService, StoragePolicy
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.stored_plans import StoredPlans
 from autopilot_bridge.storage import FileStore, MountTable, VehiclePath
 

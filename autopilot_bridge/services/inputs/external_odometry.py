@@ -16,12 +16,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import external as external
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, conjugate, from_euler, product
 
@@ -102,10 +104,7 @@ class ExternalOdometryService(Microservice):
     @property
     def receivers(self) -> Mapping[int, Receiver]:
         """SET_GPS_GLOBAL_ORIGIN, and the messages with odometry that the firmware uses."""
-        return {
-            mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin,
-            **dict.fromkeys(self._policy.messages, self._on_sample),
-        }
+        return {**super().receivers, **dict.fromkeys(self._policy.messages, self._on_sample)}
 
     def _on_sample(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """Another vehicle's own ODOMETRY that arrives here is ignored."""
@@ -119,6 +118,7 @@ class ExternalOdometryService(Microservice):
         elif self._simulation is None or self._simulation.apply_failure(_VIO, sample.values):
             self._navigation.take_external(sample)
 
+    @receives(mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN)
     def _set_origin(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
         if self._navigation.frame is not None or message.target_system != self._system_id:

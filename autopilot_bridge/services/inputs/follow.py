@@ -10,9 +10,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _AUTOPILOT: Final = 1
 _HAS_POSITION: Final = 1  # of est_capabilities
@@ -45,8 +47,9 @@ class FollowService(Microservice):
         positions = (
             {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._on_position} if self._by_position else {}
         )
-        return {mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET: self._on_follow_target, **positions}
+        return {**super().receivers, **positions}
 
+    @receives(mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET)
     def _on_follow_target(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._take(message, source, time_us, *_of_follow(message))
 

@@ -15,11 +15,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 from flightsim.airframe import AirframeKind
 from flightsim.foundation.vectors import from_euler, rotate, yaw_of
 
@@ -56,11 +58,9 @@ class LandingTargetService(Microservice):
         """LANDING_TARGET, and GIMBAL_DEVICE_ATTITUDE_STATUS of the vehicle's own gimbal."""
         if not self._lands_there:
             return {}
-        return {
-            mavlink.MAVLINK_MSG_ID_LANDING_TARGET: self._on_target,
-            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: self._on_gimbal,
-        }
+        return super().receivers
 
+    @receives(mavlink.MAVLINK_MSG_ID_LANDING_TARGET)
     def _on_target(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """A landing target from the vehicle's own payload or from any other system."""
         place = self._place(message, source, time_us)
@@ -68,6 +68,7 @@ class LandingTargetService(Microservice):
         if place is None or not track.take(place[0], place[1], sigma_m=place[2]):
             self.refused += 1
 
+    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
     def _on_gimbal(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if source.system_id != self._system_id or source.component_id != _GIMBAL_COMPONENT:
             return

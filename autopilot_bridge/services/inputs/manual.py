@@ -1,13 +1,14 @@
 """Manual control: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, heartbeats of ground stations."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Source
 from autopilot_bridge.services.inputs.transmitter import (
     CHANNELS,
     ArmingGesture,
@@ -16,8 +17,9 @@ from autopilot_bridge.services.inputs.transmitter import (
     ModeSwitchRules,
     Radio,
 )
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
+from autopilot_bridge.telemetry.streams import Values
 
 _UNUSED: Final = 65535  # RC_CHANNELS_OVERRIDE: this channel is not changed
 _RELEASE: Final = 0  # back to the radio, for channels 1 to 8
@@ -80,20 +82,6 @@ class ManualService(Microservice):
         self._steering = False
         self._time_us = 0
 
-    @property
-    def builders(self) -> Mapping[int, Builder]:
-        """RC_CHANNELS."""
-        return {mavlink.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels}
-
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """HEARTBEAT of a ground station, MANUAL_CONTROL, RC_CHANNELS_OVERRIDE."""
-        return {
-            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
-            mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL: self._on_manual,
-            mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: self._on_override,
-        }
-
     def tick(self, time_us: int) -> None:
         """Expire overrides; check mode switch and arming gesture once the sticks have been used."""
         if not self._used:
@@ -106,6 +94,7 @@ class ManualService(Microservice):
             self._switch.tick(time_us)
         self._gesture.tick(time_us)
 
+    @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
         if gcs:
@@ -115,6 +104,7 @@ class ManualService(Microservice):
         only = self._rules.gcs_only
         return not only or source.system_id == round(self._parameters.get(only))
 
+    @receives(mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL)
     def _on_manual(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """MANUAL_CONTROL: x forward, y right, r clockwise in -1000..1000; z throttle in 0..1000."""
         if message.target not in (0, self._system_id) or not self._may_steer(source):
@@ -141,6 +131,7 @@ class ManualService(Microservice):
                 time_us=time_us,
             )
 
+    @receives(mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
     def _on_override(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """RC_CHANNELS_OVERRIDE: pulses of channels 1 to 18."""
         if message.target_system not in (0, self._system_id) or not self._may_steer(source):
@@ -184,6 +175,7 @@ class ManualService(Microservice):
             self._steering = False
             self._commander.pilot.release()
 
+    @streams(mavlink.MAVLINK_MSG_ID_RC_CHANNELS)
     def _rc_channels(self) -> Values | None:
         """RC_CHANNELS (65); None without a radio."""
         pulses_us = self._radio.pulses_us

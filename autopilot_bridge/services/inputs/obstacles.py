@@ -5,17 +5,19 @@ and horizontal DISTANCE_SENSORs; ArduPilot 4.6 accepts both, with PRX1_TYPE 2.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _AVOIDANCE: Final = int(mavlink.FAILURE_UNIT_SYSTEM_AVOIDANCE)
 _UNKNOWN_CM: Final = 65535
@@ -43,14 +45,7 @@ class ObstacleService(Microservice):
         self._enabled = enabled
         self.refused = 0
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """OBSTACLE_DISTANCE and DISTANCE_SENSOR."""
-        return {
-            mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE: self._on_obstacles,
-            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self._on_obstacles,
-        }
-
+    @receives(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
     def _on_obstacles(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """A DISTANCE_SENSOR of another vehicle is ignored."""
         if not self._enabled(self._parameters) or source.component_id == _AUTOPILOT:

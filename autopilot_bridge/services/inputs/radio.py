@@ -1,14 +1,16 @@
 """RADIO_STATUS: a telemetry radio reports how full its transmit buffer is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Receiver, Source
+from autopilot_bridge.dispatch import receives
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.throttle import StreamThrottle
 
 
-class RadioService:
+class RadioService(Microservice):
     """Reduces the rates of a channel's streams while the transmit buffer of its radio fills up.
 
     Args:
@@ -18,14 +20,7 @@ class RadioService:
     def __init__(self, throttle: Callable[[Channel], StreamThrottle | None]) -> None:
         self._throttle = throttle
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """RADIO_STATUS (109), and RADIO (166) of older radios."""
-        return {
-            mavlink.MAVLINK_MSG_ID_RADIO_STATUS: self._on_status,
-            mavlink.MAVLINK_MSG_ID_RADIO: self._on_status,
-        }
-
+    @receives(mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO)
     def _on_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         throttle = self._throttle(source.channel)
         if throttle is not None:

@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver
+from autopilot_bridge.services.microservice import Microservice
 from flightsim.foundation.rotations import rotate
 
 Triple = tuple[float, float, float]
@@ -191,7 +192,7 @@ class SetpointRules(Protocol):
     def on_attitude(self, message: MavlinkMessage, time_us: int) -> None: ...
 
 
-class SetpointService:
+class SetpointService(Microservice):
     """Passes setpoints to the firmware's rules.
 
     Args:

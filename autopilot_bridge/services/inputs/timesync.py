@@ -5,12 +5,13 @@ and the requester's ts1, both in nanoseconds) and ping protocol (target 0/0 is a
 addressed to its sender).
 """
 
-from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
+from autopilot_bridge.dispatch import receives
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
 
 _NS_PER_US: Final = 1000
 _INT64_MAX: Final = 2**63 - 1
@@ -30,7 +31,7 @@ def in_vehicle_time(stamp_us: int, time_us: int) -> int:
     return stamp_us if -_NEWEST_US <= time_us - stamp_us <= _OLDEST_US else time_us
 
 
-class TimeSyncService:
+class TimeSyncService(Microservice):
     """Answers TIMESYNC and PING requests. The autopilot's own TIMESYNC requests are a stream.
 
     Args:
@@ -40,19 +41,13 @@ class TimeSyncService:
     def __init__(self, *, answers_ping: bool) -> None:
         self._answers_ping = answers_ping
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """TIMESYNC and PING."""
-        return {
-            mavlink.MAVLINK_MSG_ID_TIMESYNC: self._on_timesync,
-            mavlink.MAVLINK_MSG_ID_PING: self._on_ping,
-        }
-
+    @receives(mavlink.MAVLINK_MSG_ID_TIMESYNC)
     def _on_timesync(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if message.tc1 == 0:
             now_ns = min(time_us * _NS_PER_US, _INT64_MAX)
             source.channel.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
 
+    @receives(mavlink.MAVLINK_MSG_ID_PING)
     def _on_ping(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if self._answers_ping and message.target_system == 0 and message.target_component == 0:
             source.channel.send(

@@ -11,10 +11,11 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from autopilot_bridge.telemetry.streams import Builder
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _ADSB_VEHICLE: Final = mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE
 _AUTOPILOT: Final = 1
@@ -68,16 +69,11 @@ class TrafficService(Microservice):
         """ICAO addresses of the aircraft received recently."""
         return tuple(self._aircraft)
 
-    @property
-    def builders(self) -> Mapping[int, Builder]:
-        """ADSB_VEHICLE can be requested; it is sent when it is received, whatever the interval."""
-        return {_ADSB_VEHICLE: lambda: None}
+    @streams(_ADSB_VEHICLE)
+    def _no_report(self) -> None:
+        """ADSB_VEHICLE can be requested, and is not sent."""
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """ADSB_VEHICLE."""
-        return {_ADSB_VEHICLE: self._on_report}
-
+    @receives(_ADSB_VEHICLE)
     def _on_report(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """A report forwarded by another autopilot is not forwarded again."""
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0

@@ -8,12 +8,13 @@ deviate from the document (no answer instead of an error, no range check), their
 import math
 import struct
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.parameters import (
     INTEGER_LIMITS,
     ParameterDefinition,
@@ -25,11 +26,11 @@ from autopilot_bridge.services.channel import (
     Broadcast,
     Channel,
     MavlinkMessage,
-    Receiver,
     Source,
     is_congested,
     send_to_all,
 )
+from autopilot_bridge.services.microservice import Microservice
 
 HASH_NAME: Final = "_HASH_CHECK"
 NO_INDEX: Final = 65535
@@ -86,7 +87,7 @@ class _Listing:
         self.next_index = next_index  # -1: the hash comes first
 
 
-class ParameterService:
+class ParameterService(Microservice):
     """Answers PARAM_REQUEST_READ, PARAM_REQUEST_LIST and PARAM_SET from a `ParameterStore`.
 
     A changed parameter is announced on every channel, whether a client or the autopilot has changed it.
@@ -128,15 +129,6 @@ class ParameterService:
             crc = zlib.crc32(packed, zlib.crc32(name.encode(), crc))
         return crc
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """PARAM_REQUEST_READ, PARAM_REQUEST_LIST, PARAM_SET."""
-        return {
-            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._on_read,
-            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._on_list_request,
-            mavlink.MAVLINK_MSG_ID_PARAM_SET: self._on_set,
-        }
-
     def tick(self, time_us: int) -> None:
         """Send the next parameters of every running list."""
         if not self._listings:
@@ -145,9 +137,11 @@ class ParameterService:
             self._continue_list(listing)
         self._listings = [listing for listing in self._listings if listing.next_index < self._store.count]
 
+    @receives(mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST)
     def _on_list_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self.list_on(source.channel)
 
+    @receives(mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ)
     def _on_read(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         channel = source.channel
         if message.param_index >= 0:
@@ -184,6 +178,7 @@ class ParameterService:
                 listing.channel.send(self._value_message(definition, index=listing.next_index))
             listing.next_index += 1
 
+    @receives(mavlink.MAVLINK_MSG_ID_PARAM_SET)
     def _on_set(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         channel = source.channel
         name = _name_of(message)

@@ -4,7 +4,6 @@ The values that clients or the autopilot have changed are stored; values that an
 sets at the start are not stored. PX4 stores a short time after a change, ArduPilot at once.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,9 +11,10 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Source
-from autopilot_bridge.services.commands.handlers import Command, Handler, whole
+from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.files.card_layout import CardLayout
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.parameter_file import StoredParameters
@@ -78,10 +78,6 @@ class ParameterStorageService(Microservice):
         self._reported = False
         store.subscribe(self._changed)
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        return {mavlink.MAV_CMD_PREFLIGHT_STORAGE: self._command}
-
     def tick(self, time_us: int) -> None:
         """Store changed values when it is time."""
         self._time_us = time_us
@@ -112,6 +108,7 @@ class ParameterStorageService(Microservice):
         self._reported = False
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_PREFLIGHT_STORAGE)
     def _command(self, command: Command, source: Source) -> Result | None:
         action = whole(command.p1, 0)
         if action not in self._policy.actions:

@@ -17,8 +17,9 @@ from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import TERRAIN_FRAMES, UNSET_INT, is_geodetic
 from autopilot_bridge.services.channel import MavlinkMessage, send_to_all
-from autopilot_bridge.services.commands.handlers import Command
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.commands.command import Command
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 CAMERA_COMMANDS: Final = frozenset(
     (

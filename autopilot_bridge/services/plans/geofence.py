@@ -5,7 +5,6 @@ the message nor the command.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -14,14 +13,15 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event, FenceBreached
 from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, FenceType
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command, streams
 from autopilot_bridge.flight.plan_reading import target_of
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
-from autopilot_bridge.services.commands.handlers import Command, Handler, whole
+from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.rules import PLACED_COMMANDS
-from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.streams import Values
 
 _STATUS: Final = mavlink.MAVLINK_MSG_ID_FENCE_STATUS
 _OFF, _ON, _FLOOR_OFF = 0, 1, 2  # of DO_FENCE_ENABLE
@@ -41,16 +41,6 @@ class ArdupilotGeofence(Microservice):
         self._parameters = parameters
         self._broadcast = broadcast
 
-    @property
-    def commands(self) -> Mapping[int, Handler]:
-        """DO_FENCE_ENABLE."""
-        return {mavlink.MAV_CMD_DO_FENCE_ENABLE: self._enable}
-
-    @property
-    def builders(self) -> Mapping[int, Builder]:
-        """FENCE_STATUS."""
-        return {_STATUS: self._status}
-
     def follow(self, event: Event) -> None:
         """Send the status at once when the fence is breached."""
         if isinstance(event, FenceBreached):
@@ -58,6 +48,7 @@ class ArdupilotGeofence(Microservice):
             if values is not None:
                 send_to_all(self._broadcast, mavlink.MAVLink_fence_status_message(*values))
 
+    @streams(_STATUS)
     def _status(self) -> Values | None:
         """FENCE_STATUS (162), while the fence is on."""
         watch = self._commander.fence
@@ -73,6 +64,7 @@ class ArdupilotGeofence(Microservice):
         time_ms = (watch.breach_time_us // 1000) & 0xFFFFFFFF
         return (int(bool(watch.broken)), watch.breaches, kind, time_ms, mavlink.FENCE_MITIGATE_NONE)
 
+    @command(mavlink.MAV_CMD_DO_FENCE_ENABLE)
     def _enable(self, command: Command, source: Source) -> Result:
         """DO_FENCE_ENABLE: p1 0 off, 1 on, 2 the floor off; p2 FENCE_TYPE bits, 0: all."""
         action, bits = whole(command.p1), whole(command.p2, 0) or 0

@@ -10,10 +10,12 @@ from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.download import MissionDownloads
 from autopilot_bridge.services.plans.messages import ack_message, plan_checksum, send_extended
 from autopilot_bridge.services.plans.policy import CRITICAL, INFO, MissionPolicy, Text
@@ -56,7 +58,7 @@ def new_stores() -> dict[MissionType, MissionStore]:
     return {mission_type: MissionStore() for mission_type in MissionType}
 
 
-class MissionService:
+class MissionService(Microservice):
     """Uploads, downloads, clearing and progress of an autopilot's plans.
 
     Args:
@@ -162,45 +164,39 @@ class MissionService:
         store.current = seq
         return True
 
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """The mission protocol. Neither firmware answers MISSION_REQUEST_PARTIAL_LIST."""
-        return {
-            mavlink.MAVLINK_MSG_ID_MISSION_COUNT: self._on_count,
-            mavlink.MAVLINK_MSG_ID_MISSION_ITEM: self._on_item,
-            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: self._on_item,
-            mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: self._uploads.on_partial,
-            mavlink.MAVLINK_MSG_ID_MISSION_ACK: self._on_ack,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: self._on_list,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: self._on_request,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: self._on_request,
-            mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._on_clear,
-            mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._on_set_current,
-        }
-
     def tick(self, time_us: int) -> None:
         self._uploads.tick(time_us)
         self._downloads.tick(time_us)
         self._report.tick(time_us)
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_COUNT)
     def _on_count(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._report.forget_reached()
         self._uploads.on_count(message, source, time_us)
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_ITEM, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT)
     def _on_item(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         if not self._take_guided_item(message, source):
             self._uploads.on_item(message, source, time_us)
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST)
+    def _on_partial(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._uploads.on_partial(message, source, time_us)
+
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_ACK)
     def _on_ack(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._downloads.on_ack(message, source)
         self._uploads.on_ack(message, source, time_us)
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST)
     def _on_list(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._downloads.on_list(message, source, time_us, uploader=self._uploads.partner)
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT)
     def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._downloads.on_request(message, source, time_us, uploader=self._uploads.partner)
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL)
     def _on_clear(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         uploader = self._uploads.partner
         mission_type = mission_type_of(message.mission_type)
@@ -227,6 +223,7 @@ class MissionService:
             self._replace(kind, (), 0)
         source.channel.send(ack_message(source, result, message.mission_type))
 
+    @receives(mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT)
     def _on_set_current(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         uploader = self._uploads.partner
         texts = self._policy.texts

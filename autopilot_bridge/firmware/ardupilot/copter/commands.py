@@ -4,15 +4,15 @@ import math
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import Command, CommandHooks, whole
+from autopilot_bridge.services.commands.command import Command, whole
 
 
 class ArduCopterCommands(ArduPilotCommands):
@@ -20,19 +20,11 @@ class ArduCopterCommands(ArduPilotCommands):
 
     reposition_denied = Result.DENIED
 
-    def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
-        super().__init__(commander, hooks)
-        self.table = {
-            **self.table,
-            mavlink.MAV_CMD_NAV_TAKEOFF: self.takeoff,
-            mavlink.MAV_CMD_CONDITION_YAW: self.turn,
-            mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self.pause_continue,
-        }
-
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
         return ardupilot_modes.commanded_mode(number)
 
+    @command(mavlink.MAV_CMD_NAV_TAKEOFF)
     def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: altitude over home; in GUIDED, armed, on the ground."""
         if command.is_int and command.frame not in RELATIVE_FRAMES:
@@ -49,6 +41,12 @@ class ArduCopterCommands(ArduPilotCommands):
         self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_NAV_LAND)
+    def land(self, command: Command, source: Source) -> Result:
+        """NAV_LAND: land at the current position."""
+        return self.commander.guidance.land().result
+
+    @command(mavlink.MAV_CMD_CONDITION_YAW)
     def turn(self, command: Command, source: Source) -> Result:
         """CONDITION_YAW: p1 deg, p2 deg/s (0: ATC_SLEW_YAW), p3 direction, p4 1 = relative."""
         if not 0.0 <= command.p1 <= 360.0 or command.p4 not in (0.0, 1.0):
@@ -63,6 +61,7 @@ class ArduCopterCommands(ArduPilotCommands):
         )
         return Result.ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
     def pause_continue(self, command: Command, source: Source) -> Result:
         """DO_PAUSE_CONTINUE: 0 holds, 1 goes on; in AUTO and GUIDED."""
         action = whole(command.p1)

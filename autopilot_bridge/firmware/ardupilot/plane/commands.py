@@ -5,16 +5,16 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.flight.plan_reading import in_landing_sequence, landing_start
 from autopilot_bridge.mission_feasibility.ardupilot import PLANE_PARAMETERS, plane_problems
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands import handlers as handlers
+from autopilot_bridge.services.commands.command import Command, whole
 
 _CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
@@ -43,26 +43,13 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     reposition_denied = Result.FAILED
 
-    def __init__(self, commander: Commander, hooks: handlers.CommandHooks) -> None:
-        super().__init__(commander, hooks)
-        self.table = {
-            **{command: take for command, take in self.table.items() if command != mavlink.MAV_CMD_NAV_LAND},
-            mavlink.MAV_CMD_NAV_TAKEOFF: self.fail,
-            mavlink.MAV_CMD_DO_LAND_START: self.land_start,
-            mavlink.MAV_CMD_DO_GO_AROUND: self.go_around,
-            mavlink.MAV_CMD_DO_AUX_FUNCTION: self.auxiliary,
-            mavlink.MAV_CMD_GUIDED_CHANGE_SPEED: self.change_airspeed,
-            mavlink.MAV_CMD_GUIDED_CHANGE_ALTITUDE: self.change_altitude,
-            mavlink.MAV_CMD_GUIDED_CHANGE_HEADING: self.change_heading,
-        }
-
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
         return ardupilot_plane_modes.commanded_mode(number)
 
     # arming and modes
 
-    def arm_disarm(self, command: handlers.Command, source: Source) -> Result:
+    def arm_disarm(self, command: Command, source: Source) -> Result:
         """COMPONENT_ARM_DISARM: arming is refused if a landing sequence would not be flown."""
         checked = not self.is_forced(command) and self.commander.parameters.check_arming
         if command.p1 == 1.0 and checked and not self.commander.armed:
@@ -95,7 +82,7 @@ class ArduPlaneCommands(ArduPilotCommands):
             self._leave_empty_mission(result)
         return result
 
-    def start_mission(self, command: handlers.Command, source: Source) -> Result:
+    def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: AUTO from the current item."""
         result = super().start_mission(command, source)
         self._leave_empty_mission(result)
@@ -107,21 +94,29 @@ class ArduPlaneCommands(ArduPilotCommands):
             self.hooks.announce(_INFO, "Mission complete, changing mode to RTL")
             self.commander.set_mode(FlightMode.RETURN)
 
-    def land_start(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_LAND_START)
+    def land_start(self, command: Command, source: Source) -> Result:
         """DO_LAND_START: jump to the mission's landing sequence, in AUTO."""
         start = landing_start(self.commander.missions.items)
         if start is None or not self.commander.situation.position or not self.hooks.set_current_item(start):
             return Result.FAILED
         return self.commander.set_mode(FlightMode.MISSION).result
 
-    def go_around(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_NAV_TAKEOFF)
+    def take_off(self, command: Command, source: Source) -> Result:
+        """NAV_TAKEOFF: aircraft take off in a mission, or in mode TAKEOFF."""
+        return Result.FAILED
+
+    @command(mavlink.MAV_CMD_DO_GO_AROUND)
+    def go_around(self, command: Command, source: Source) -> Result:
         """DO_GO_AROUND: p1 height over home to climb to; not positive: the landing item's height."""
         height_m = command.p1 if 0.0 < command.p1 < math.inf else math.nan
         return Result.ACCEPTED if self.commander.guidance.go_around(height_m).accepted else Result.FAILED
 
-    def auxiliary(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_DO_AUX_FUNCTION)
+    def auxiliary(self, command: Command, source: Source) -> Result:
         """DO_AUX_FUNCTION: p1 function, p2 switch position; the functions that choose a mode."""
-        mode, position = _SWITCHES.get(handlers.whole(command.p1, -1) or 0), handlers.whole(command.p2)
+        mode, position = _SWITCHES.get(whole(command.p1, -1) or 0), whole(command.p2)
         if position not in (0, 1, 2):
             return Result.DENIED
         if mode is None:
@@ -130,17 +125,17 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     # where and how fast to fly
 
-    def radius_of(self, command: handlers.Command) -> float:
+    def radius_of(self, command: Command) -> float:
         """DO_REPOSITION: p3 radius (not positive: WP_LOITER_RAD); p4 not 0: counter-clockwise."""
         radius_m = command.p3 if command.p3 > 0.0 else abs(self.hooks.parameters.get("WP_LOITER_RAD"))
         counter_clockwise = math.isfinite(command.p4) and command.p4 != 0.0
         return -radius_m if counter_clockwise else radius_m
 
-    def change_speed(self, command: handlers.Command, source: Source) -> Result:
+    def change_speed(self, command: Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 m/s (-2: the parameter's), p3 throttle %; AUTO and GUIDED."""
         if self.commander.mode not in (FlightMode.MISSION, FlightMode.GUIDED):
             return Result.FAILED
-        parameters, kind, speed = self.hooks.parameters, handlers.whole(command.p1, 0), command.p2
+        parameters, kind, speed = self.hooks.parameters, whole(command.p1, 0), command.p2
         guidance = self.commander.guidance
         if kind == _AIRSPEED and speed == _DEFAULT_SPEED:
             guidance.change_speed(-1.0, kind=_AIRSPEED)
@@ -153,26 +148,28 @@ class ArduPlaneCommands(ArduPilotCommands):
             parameters.set("MIN_GROUNDSPEED", speed, check_range=False)
             self.hooks.announce(_INFO, f"Set groundspeed {speed:.0f} m/s")
             return Result.ACCEPTED
-        throttle = handlers.whole(command.p3, 0) or 0
+        throttle = whole(command.p3, 0) or 0
         if 0 < throttle <= 100:
             parameters.set("TRIM_THROTTLE", throttle)
             self.hooks.announce(_INFO, f"Set throttle {throttle}")
             return Result.ACCEPTED
         return Result.FAILED
 
-    def change_airspeed(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_GUIDED_CHANGE_SPEED)
+    def change_airspeed(self, command: Command, source: Source) -> Result:
         """GUIDED_CHANGE_SPEED: p1 airspeed only, p2 m/s, p3 m/s^2 (0: at once)."""
         if self.commander.mode is not FlightMode.GUIDED:
             return Result.FAILED
         parameters = self.hooks.parameters
         low, high = parameters.get("AIRSPEED_MIN"), parameters.get("AIRSPEED_MAX")
-        if handlers.whole(command.p1) != _AIRSPEED or not low <= command.p2 <= high:
+        if whole(command.p1) != _AIRSPEED or not low <= command.p2 <= high:
             return Result.DENIED
         acceleration = _magnitude(command.p3)
         self.commander.guidance.change_airspeed(command.p2, acceleration_m_s2=acceleration)
         return Result.ACCEPTED
 
-    def change_altitude(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_GUIDED_CHANGE_ALTITUDE)
+    def change_altitude(self, command: Command, source: Source) -> Result:
         """GUIDED_CHANGE_ALTITUDE: p7 altitude, p3 m/s (0: at once); a COMMAND_LONG's is over home."""
         if self.commander.mode is not FlightMode.GUIDED:
             return Result.FAILED
@@ -187,11 +184,12 @@ class ArduPlaneCommands(ArduPilotCommands):
         self.commander.guidance.change_altitude(down_m, rate_m_s=_magnitude(command.p3))
         return Result.ACCEPTED
 
-    def change_heading(self, command: handlers.Command, source: Source) -> Result:
+    @command(mavlink.MAV_CMD_GUIDED_CHANGE_HEADING)
+    def change_heading(self, command: Command, source: Source) -> Result:
         """GUIDED_CHANGE_HEADING: p1 HEADING_TYPE, p2 deg, p3 lateral acceleration m/s^2, at least 0.05."""
         if self.commander.mode is not FlightMode.GUIDED:
             return Result.FAILED
-        kind = handlers.whole(command.p1)
+        kind = whole(command.p1)
         if kind not in (_COURSE, _HEADING) or not 0.0 <= command.p2 < 360.0:
             return Result.DENIED
         self.commander.guidance.change_heading(
@@ -203,7 +201,7 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     # devices
 
-    def terminate(self, command: handlers.Command, source: Source) -> Result:
+    def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: only with the advanced failsafe switched on."""
         if not self.hooks.parameters.get("AFS_ENABLE"):
             self.hooks.announce(_INFO, "AFS not enabled, can't terminate the vehicle")

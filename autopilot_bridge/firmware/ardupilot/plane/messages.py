@@ -7,12 +7,13 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.ardupilot import messages as ardupilot
 from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_flags
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
 from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.telemetry.common import TelemetrySources
-from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.streams import Values
 from flightsim import interface
 
 _M = mavlink
@@ -50,14 +51,6 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
         super().__init__(sources)
         self._aircraft = AircraftState(sources)
 
-    def builders(self) -> Mapping[int, Builder]:
-        """Message id -> builder."""
-        return {
-            **super().builders(),
-            _M.MAVLINK_MSG_ID_AIRSPEED: self.airspeed,
-            _M.MAVLINK_MSG_ID_AOA_SSA: self.flow_angles,
-        }
-
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, throttle, rudder; disarmed neutral and throttle off."""
         pulses = [_NEUTRAL_US, _NEUTRAL_US, _THROTTLE_OFF_US, _NEUTRAL_US]
@@ -71,6 +64,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             ]
         return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
 
+    @streams(_M.MAVLINK_MSG_ID_AIRSPEED)
     def airspeed(self) -> Values | None:
         """AIRSPEED (295); the raw pressure is in Pa, as the firmware sends it."""
         pressure_pa = self._aircraft.pitot_pressure_pa
@@ -87,6 +81,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             _SENSOR_UNHEALTHY if rejected else _SENSOR_USED,
         )
 
+    @streams(_M.MAVLINK_MSG_ID_AOA_SSA)
     def flow_angles(self) -> Values:
         """AOA_SSA (11020): angle of attack and sideslip by velocity and wind, degrees; 0 on the ground."""
         forward, right, down = self._aircraft.air_velocity_frd_m_s

@@ -7,12 +7,13 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.px4 import messages as px4
 from autopilot_bridge.firmware.px4.messages import Px4Messages
 from autopilot_bridge.flight.context import LandedState
 from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.telemetry.common import NAN, TelemetrySources
-from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.streams import Values
 
 _M = mavlink
 
@@ -47,14 +48,6 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         self._aircraft = AircraftState(sources)
         self._has_flown = False
 
-    def builders(self) -> Mapping[int, Builder]:
-        """Message id -> builder."""
-        return {
-            **super().builders(),
-            _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self.nav_controller_output,
-            _M.MAVLINK_MSG_ID_WIND_COV: self.wind_cov,
-        }
-
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, rudder, motor; 900 us for outputs without an actuator."""
         aileron = elevator = rudder = motor = _STOPPED_US
@@ -68,6 +61,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         unused = (self.servo_unused_us,) * 12
         return (self.view.time_us & 0xFFFFFFFF, 0, aileron, elevator, rudder, motor, *unused)
 
+    @streams(_M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT)
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62): nav_roll and nav_pitch stay 0, bearings are signed, as in PX4.
 
@@ -101,6 +95,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         error_m_s = self._aircraft.controller.airspeed_error_m_s if self._aircraft.powered else 0.0
         return -error_m_s if math.isfinite(error_m_s) else 0.0
 
+    @streams(_M.MAVLINK_MSG_ID_WIND_COV)
     def wind_cov(self) -> Values | None:
         """WIND_COV (231), from the first flight on; horizontal."""
         if self.sources.context.landed_state is LandedState.IN_AIR:

@@ -1,0 +1,100 @@
+"""A MAV_CMD in one form for COMMAND_LONG and COMMAND_INT, and the numbers in its parameters.
+
+Source: MAVLink command protocol (mavlink.io/en/services/command.html).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.mission_wire import UNSET_INT
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+
+FORCE_NUMBER: Final = 21196
+_LOCAL_FRAMES: Final = frozenset(
+    {
+        mavlink.MAV_FRAME_LOCAL_NED,
+        mavlink.MAV_FRAME_LOCAL_ENU,
+        mavlink.MAV_FRAME_LOCAL_OFFSET_NED,
+        mavlink.MAV_FRAME_BODY_NED,
+        mavlink.MAV_FRAME_BODY_OFFSET_NED,
+        mavlink.MAV_FRAME_BODY_FRD,
+        mavlink.MAV_FRAME_LOCAL_FRD,
+        mavlink.MAV_FRAME_LOCAL_FLU,
+    }
+)
+
+
+class Command(NamedTuple):
+    """One MAV_CMD with its parameters in natural units.
+
+    Attributes:
+        id: MAV_CMD.
+        p1..p4: as the command defines; NaN: not set.
+        x, y: latitude and longitude in degrees, or metres in local frames; NaN: not set.
+        z: altitude or metres; NaN: not set.
+        frame: MAV_FRAME; None for a COMMAND_LONG, which carries none.
+    """
+
+    id: int
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    x: float
+    y: float
+    z: float
+    frame: int | None
+
+    @property
+    def is_int(self) -> bool:
+        """The command came as COMMAND_INT."""
+        return self.frame is not None
+
+
+def command_from_message(message: MavlinkMessage) -> Command:
+    """A `Command` from a COMMAND_LONG or COMMAND_INT."""
+    if message.get_msgId() == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
+        x, y, z, frame = message.param5, message.param6, message.param7, None
+    else:
+        scale = 1e-4 if message.frame in _LOCAL_FRAMES else 1e-7
+        x = math.nan if message.x == UNSET_INT else message.x * scale
+        y = math.nan if message.y == UNSET_INT else message.y * scale
+        z, frame = message.z, int(message.frame)
+    return Command(
+        int(message.command),
+        float(message.param1),
+        float(message.param2),
+        float(message.param3),
+        float(message.param4),
+        float(x),
+        float(y),
+        float(z),
+        frame,
+    )
+
+
+def whole(value: float, default: int | None = None) -> int | None:
+    """A whole number in a parameter, rounded half away from zero; `default` if it is not finite."""
+    if not math.isfinite(value):
+        return default
+    return math.floor(value + 0.5) if value >= 0.0 else math.ceil(value - 0.5)
+
+
+def flags(value: float) -> int:
+    """A bit mask in a parameter; 0 for NaN and values that are no bit mask."""
+    return int(value) if math.isfinite(value) and 0.0 <= value <= 0xFFFFFFFF else 0
+
+
+def on_earth(command: Command) -> bool:
+    """Latitude and longitude are valid, or not set."""
+    if not (math.isfinite(command.x) and math.isfinite(command.y)):
+        return True
+    return abs(command.x) <= 90.0 and abs(command.y) <= 180.0
+
+
+Handler = Callable[[Command, Source], Result | None]
+"""Executes a command; the result for the COMMAND_ACK, or None where the firmware sends none."""
