@@ -1,5 +1,6 @@
 """Parameters of the vision search."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -23,10 +24,10 @@ class BeliefKind(StrEnum):
 class VisionSearchParameters(Options):
     """Parameters of `VisionSearchEstimator`. Places are metres from the home of the centre vehicle."""
 
-    south_m: float = option(-200.0, help="Southern edge of the searched area; the target is in it.")
-    west_m: float = option(-200.0, help="Western edge of the searched area.")
-    north_m: float = option(200.0, help="Northern edge of the searched area.")
-    east_m: float = option(200.0, help="Eastern edge of the searched area.")
+    south_m: float = option(-150.0, help="Southern edge of the searched area; the target is in it.")
+    west_m: float = option(-150.0, help="Western edge of the searched area.")
+    north_m: float = option(150.0, help="Northern edge of the searched area.")
+    east_m: float = option(150.0, help="Eastern edge of the searched area.")
     tag_id: int = option(
         0,
         least=0,
@@ -62,20 +63,26 @@ class VisionSearchParameters(Options):
         0.65, least=0.0, most=10.0, help="Border of the picture without detections, in sides of the tag."
     )
     forward_sigma_m: float = option(
-        0.3, least=0.0, help="Standard deviation of the vehicles' places along the heading."
+        0.15, least=0.0, help="Standard deviation of the vehicles' places along the heading."
     )
     right_sigma_m: float = option(
-        0.3, least=0.0, help="Standard deviation of the vehicles' places across the heading."
+        0.15, least=0.0, help="Standard deviation of the vehicles' places across the heading."
     )
-    height_sigma_m: float = option(0.6, least=0.0, help="Standard deviation of the vehicles' heights.")
-    yaw_sigma_rad: float = option(0.02, least=0.0, help="Standard deviation of the vehicles' yaw.")
-    pitch_sigma_rad: float = option(0.01, least=0.0, help="Standard deviation of the vehicles' pitch.")
-    roll_sigma_rad: float = option(0.01, least=0.0, help="Standard deviation of the vehicles' roll.")
+    height_sigma_m: float = option(0.4, least=0.0, help="Standard deviation of the vehicles' heights.")
+    yaw_sigma_rad: float = option(
+        math.radians(0.6), least=0.0, help="Standard deviation of the vehicles' yaw."
+    )
+    pitch_sigma_rad: float = option(
+        math.radians(0.23), least=0.0, help="Standard deviation of the vehicles' pitch."
+    )
+    roll_sigma_rad: float = option(
+        math.radians(0.23), least=0.0, help="Standard deviation of the vehicles' roll."
+    )
     mount_sigma_rad: float = option(
-        0.0, least=0.0, help="Standard deviation of the angles of the cameras' mounts."
+        math.radians(0.29), least=0.0, help="Standard deviation of the angles of the cameras' mounts."
     )
-    place_time_s: float = option(20.0, least=0.0, help="Correlation time of the places' errors.")
-    attitude_time_s: float = option(5.0, least=0.0, help="Correlation time of the attitudes' errors.")
+    place_time_s: float = option(60.0, least=0.0, help="Correlation time of the places' errors.")
+    attitude_time_s: float = option(60.0, least=0.0, help="Correlation time of the attitudes' errors.")
     frame_period_s: float = option(
         0.25, least=0.0, help="Shortest time between frames that are used (paper: 0.25 s)."
     )

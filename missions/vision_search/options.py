@@ -113,9 +113,9 @@ class VisionSearchOptions(MissionOptions):
     target_walk_m_sqrt_s: float = 0.0
     place_sigma_m: float = 0.15
     height_sigma_m: float = 0.4
-    yaw_sigma_rad: float = 0.01
-    tilt_sigma_rad: float = 0.004
-    mount_sigma_rad: float = 0.005
+    yaw_sigma_rad: float = math.radians(0.6)
+    tilt_sigma_rad: float = math.radians(0.23)
+    mount_sigma_rad: float = math.radians(0.29)
     place_time_s: float = 60.0
     attitude_time_s: float = 60.0
     link_loss: float = 0.0
