@@ -22,7 +22,7 @@ from typing import Any
 
 from flightsim.environment import Environment
 from flightsim.world_spec import WorldSpec
-from missions.base.options import parse_wind
+from missions.base.given_text import parse_wind
 from missions.errors import PlanError
 from missions.library import find_mission
 from missions.orbit.options import OrbitOptions

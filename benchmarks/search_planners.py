@@ -25,12 +25,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.multi_target.parameters import REACH
+from estimators.multi_target.parameters import MultiTargetParameters
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.search import planner_of
-from missions.multi_target.world import TargetField
+from missions.multi_target.target_field import TargetField
+from missions.multi_target.world import places_of
+from missions.search.area import edges
 from missions.search.planner_parameters import Exploration
 from missions.studies.multi_target_trial import EXPERIMENTS, STEP_S
 from missions.studies.statistics import paired_difference
@@ -65,16 +67,19 @@ class Searched:
 def search(name: str, experiment: str, seed: int) -> Searched:
     """One search."""
     tried = EXPERIMENTS[experiment]
-    options = replace(
-        MultiTargetOptions(
-            area_m=tried.area_m, steps=tried.steps, expected_targets=float(tried.targets), search_seed=seed
+    changes = dict(_PLANNERS[name])
+    options = MultiTargetOptions(
+        steps=tried.steps,
+        planner=changes.pop("planner", PlannerKind.EXPLORING),
+        planning=replace(MultiTargetOptions().planning, **changes),
+        estimator=MultiTargetParameters(
+            **edges(tried.area_m), expected_targets=float(tried.targets), seed=seed
         ),
-        **_PLANNERS[name],
     )
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
     field = TargetField(count=tried.targets, clusters=tried.clusters)
-    targets = np.array(field.places(options.area, rng))
-    belief, planner = SearchBelief(options.estimator_parameters), planner_of(options)
+    targets = np.array(places_of(field, options.area, rng))
+    belief, planner = SearchBelief(options.estimator), planner_of(options)
     here, direction_rad = options.own_start_ne_m, None
     counts, plan_s = [], 0.0
     for step in range(options.steps):
@@ -91,12 +96,13 @@ def search(name: str, experiment: str, seed: int) -> Searched:
 def _scan(offsets_m: Array, options: MultiTargetOptions, rng: np.random.Generator) -> Array:
     """Range and bearing of the detected targets, by the paper's sensor (its equation 3)."""
     distance_m = np.hypot(*offsets_m.T)
-    scaled = np.hypot(*(offsets_m / options.field_of_view_m).T)
-    seen = rng.random(len(offsets_m)) < options.gain * np.exp(-0.5 * scaled)
-    seen &= distance_m <= REACH * max(options.field_of_view_m)
+    known = options.estimator
+    scaled = np.hypot(*(offsets_m / (known.forward_scale_m, known.right_scale_m)).T)
+    seen = rng.random(len(offsets_m)) < known.gain * np.exp(-0.5 * scaled)
+    seen &= distance_m <= known.range_m
     noise = rng.standard_normal((len(offsets_m), 2))
-    ranges_m = np.abs(distance_m + options.range_sigma_m * noise[:, 0])
-    bearings_rad = np.arctan2(offsets_m[:, 1], offsets_m[:, 0]) + options.bearing_sigma_rad * noise[:, 1]
+    ranges_m = np.abs(distance_m + known.range_sigma_m * noise[:, 0])
+    bearings_rad = np.arctan2(offsets_m[:, 1], offsets_m[:, 0]) + known.bearing_sigma_rad * noise[:, 1]
     return np.column_stack((ranges_m, bearings_rad))[seen]
 
 

@@ -17,3 +17,7 @@ from estimators.logs.log import Log as Log
 from estimators.logs.report import LogReport as LogReport
 from estimators.logs.report import report_of as report_of
 from estimators.logs.table import Table as Table
+from estimators.magnetic_identification.parameters import IdentificationParameters as IdentificationParameters
+from estimators.multi_target.parameters import MultiTargetParameters as MultiTargetParameters
+from estimators.survey.parameters import ProcessingParameters as ProcessingParameters
+from estimators.vision_search.parameters import VisionSearchParameters as VisionSearchParameters

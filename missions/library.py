@@ -22,6 +22,7 @@ from missions.pattern_search.curves import (
     square_size,
     sweep_size,
 )
+from missions.pattern_search.for_vehicle import flight_for_vehicle
 from missions.pattern_search.mission import PatternMission
 from missions.plan_files.mission import FileMission
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
@@ -130,6 +131,9 @@ class ScriptMission(Mission[FlightOptions]):
         self._file = str(path)
         self._resolved = path.resolve()
         self._check = getattr(holder, "check", None)
+
+    def adapted(self, options: FlightOptions, limits: Limits) -> FlightOptions:
+        return flight_for_vehicle(options, limits)
 
     def check(self, options: FlightOptions, limits: Limits) -> None:
         if self._check is not None:

@@ -45,7 +45,7 @@ FLOORS = (
     ("base", "search"),
     ("flown", "planning", "teams", "preflight"),
     ("vehicle", "patterns"),
-    ("errors", "how_left", "kind", "process"),
+    ("errors", "gps_off", "how_left", "kind", "process"),
 )
 # Where the wall clock, sockets and files may be met.
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")

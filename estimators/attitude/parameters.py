@@ -54,7 +54,7 @@ class AttitudeParameters(Options):
     vehicle: VehicleKind = option(VehicleKind.AUTO, help="Form of the filter.")
     imu: ImuSource = option(ImuSource.AUTO, help="Inertial message.")
     imu_instance: int = option(
-        0, least=0, most=255, help="`id` of the inertial message, of those that have one."
+        0, least=0, most=255, help="Number of the inertial message, of those that have an id."
     )
     airspeed: AirspeedSource = option(AirspeedSource.AUTO, help="Source of the airspeed.")
     gain_1_s: float = option(

@@ -1,9 +1,5 @@
 """Magnetic targets: which anomalies of the field are one (Lum, Rysdyk and Pongpunwattana 2005)."""
 
-from estimators.magnetic_identification.estimate import IdentificationEstimate
-from estimators.magnetic_identification.estimator import (
-    MagneticIdentificationEstimator,
-    MagneticIdentificationParameters,
-)
+from flightsim.foundation.lazy_exports import lazy_exports
 
-__all__ = ["IdentificationEstimate", "MagneticIdentificationEstimator", "MagneticIdentificationParameters"]
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -25,7 +25,8 @@ from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.survey_magnetometer import COMPONENT, TOTAL_FIELD_NAME
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.foundation.magnetics import magnetic_field_ned_gauss, require_wmm_year
+from flightsim.foundation.magnetics import magnetic_field_ned_gauss
+from flightsim.foundation.options import option
 
 __all__ = ["MagneticIdentificationEstimator", "MagneticIdentificationParameters", "field_direction"]
 
@@ -38,20 +39,20 @@ _PUBLISHED: Final = b"MAGTGT_P"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MagneticIdentificationParameters(IdentificationParameters):
-    """Parameters of `MagneticIdentificationEstimator`.
+    """Parameters of `MagneticIdentificationEstimator`."""
 
-    Attributes:
-        map_file: published magnetic map (`.npz`); without one, no reading can be compared.
-        decimal_year: date of the main field, whose direction dipoles need; 2025..2030.
-    """
+    map_file: Path | None = option(
+        None, help="Published magnetic map (.npz); without one, no reading can be compared."
+    )
+    decimal_year: float = option(
+        2026.0,
+        least=2025.0,
+        most=2030.0,
+        help="Date of the main field (WMM-2025), whose direction dipoles need.",
+    )
 
-    map_file: Path | None = None
-    decimal_year: float = 2026.0
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not reach the base of a dataclass with slots
-        IdentificationParameters.__post_init__(self)
-        require_wmm_year(self.decimal_year)
+    def check_together(self) -> None:
+        self.require_detectable()
 
 
 class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters]):

@@ -2,7 +2,7 @@
 
 import math
 
-from estimators.multi_target.parameters import REACH, MultiTargetParameters
+from estimators.multi_target.parameters import MultiTargetParameters
 from estimators.tracking.grid import GridLayout
 from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor
@@ -28,7 +28,7 @@ def sensor_of(parameters: MultiTargetParameters) -> RangeBearingSensor:
         gain=parameters.gain,
         forward_scale_m=parameters.forward_scale_m,
         right_scale_m=parameters.right_scale_m,
-        reach_m=parameters.reach_m or REACH * max(parameters.forward_scale_m, parameters.right_scale_m),
+        reach_m=parameters.range_m,
         range_sigma_m=math.hypot(parameters.range_sigma_m, parameters.place_sigma_m),
         bearing_sigma_rad=math.hypot(parameters.bearing_sigma_rad, parameters.heading_sigma_rad),
         clutter_per_scan=parameters.clutter_per_scan,

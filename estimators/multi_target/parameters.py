@@ -11,7 +11,7 @@ from flightsim.foundation.options import Options, option
 
 __all__ = ["Belief", "MultiTargetParameters"]
 
-REACH: Final = 100.0 / 15.0
+_REACH: Final = 100.0 / 15.0
 """Radius of the field of view, in scales of its fall: there the probability of detection is 0.035."""
 _CELLS: Final = 60  # of the exploration map along the longer side
 _LEAST_CELL_M: Final = 5.0
@@ -126,6 +126,11 @@ class MultiTargetParameters(Options):
         """Side of a cell of the exploration map."""
         longer_m = max(self.north_m - self.south_m, self.east_m - self.west_m)
         return self.cell_m or max(_LEAST_CELL_M, longer_m / _CELLS)
+
+    @property
+    def range_m(self) -> float:
+        """Radius of the field of view."""
+        return self.reach_m or _REACH * max(self.forward_scale_m, self.right_scale_m)
 
     @property
     def birth_per_m2(self) -> float:

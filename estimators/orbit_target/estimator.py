@@ -22,8 +22,8 @@ from estimators.pressure_height import PressureHeight
 from estimators.tracking.line_of_sight import detection, gimbal_attitude
 from estimators.vehicle_time import UNIX_TIME_US
 from flightsim.foundation.atmosphere import air_density_ratio
-from flightsim.foundation.checks import require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.options import option
 
 _AUTOPILOT: Final = 1
 _GROUND_SAMPLES: Final = 20
@@ -37,38 +37,37 @@ _STATUSES: Final = tuple(TargetStatus)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitTargetParameters(TrackerParameters):
-    """Parameters of `OrbitTargetEstimator`.
+    """Parameters of `OrbitTargetEstimator`."""
 
-    Attributes:
-        attitude: source of roll and pitch: the autopilot, or the filter of the estimator `attitude`; the yaw
-            is the autopilot's.
-        target_north_m, target_east_m: place from home where the target is expected when the vehicle is first
-            received; None: it is not known, and the first detection is taken for the target.
-        target_speed_m_s, target_heading_rad: expected motion of the target, along a straight line.
-        target_sigma_m, drift_sigma_m_s: standard deviations of the expected place, and of its velocity
-            relative to the air (paper: 20 m).
-        target_ground_m: height of the target's ground above that of the start.
-        ground_pa: pressure on the ground; None: measured before the vehicle is armed.
-    """
+    attitude: Literal["autopilot", "filter"] = option(
+        "autopilot", help="Source of roll and pitch: the autopilot, or the filter of attitude."
+    )
+    target_north_m: float | None = option(
+        None, varies="the first detection", help="Place north of home where the target is expected."
+    )
+    target_east_m: float | None = option(
+        None, varies="the first detection", help="Place east of home where the target is expected."
+    )
+    target_speed_m_s: float = option(0.0, help="Expected speed of the target.")
+    target_heading_rad: float = option(0.0, help="Direction in which the target is expected to move.")
+    target_sigma_m: float = option(
+        20.0, above=0.0, help="Standard deviation of the expected place (paper: 20 m)."
+    )
+    drift_sigma_m_s: float = option(
+        2.0, above=0.0, help="Standard deviation of the target's velocity relative to the air."
+    )
+    target_ground_m: float = option(0.0, help="Height of the target's ground above that of the start.")
+    ground_pa: float | None = option(
+        None,
+        above=_PRESSURES_PA[0],
+        below=_PRESSURES_PA[1],
+        varies="measured before it is armed",
+        help="Pressure on the ground.",
+    )
 
-    attitude: Literal["autopilot", "filter"] = "autopilot"
-    target_north_m: float | None = None
-    target_east_m: float | None = None
-    target_speed_m_s: float = 0.0
-    target_heading_rad: float = 0.0
-    target_sigma_m: float = 20.0
-    drift_sigma_m_s: float = 2.0
-    target_ground_m: float = 0.0
-    ground_pa: float | None = None
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not reach the base of a dataclass with slots
-        TrackerParameters.__post_init__(self)
+    def check_together(self) -> None:
         if (self.target_north_m is None) != (self.target_east_m is None):
             raise ValueError("target_north_m and target_east_m make a place together; give both, or neither")
-        if self.ground_pa is not None and not _PRESSURES_PA[0] < self.ground_pa < _PRESSURES_PA[1]:
-            raise ValueError(f"ground_pa {self.ground_pa:g} is not in 10000..120000 Pa")
-        require_positive(target_sigma_m=self.target_sigma_m, drift_sigma_m_s=self.drift_sigma_m_s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

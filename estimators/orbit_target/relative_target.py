@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from estimators.tracking.gaussian import Gaussian, Innovation
 from estimators.tracking.line_of_sight import LineOfSight
+from flightsim.foundation.options import Options, option
 
 Array = NDArray[np.float64]
 
@@ -37,27 +38,21 @@ _LEAST_OFFSET_M: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RelativeTargetParameters:
-    """Noise of the filter; standard deviations.
+class RelativeTargetParameters(Options):
+    """Noise of the filter; standard deviations."""
 
-    Attributes:
-        angle_rad: of a line of sight: pixels, gimbal, attitude.
-        drift_acceleration_m_s2_per_root_hz: random walk of u: gusts, and a target that turns.
-        offset_rate_m_per_root_s: random walk of the offset: sideslip, compass, time stamps.
-        gate: largest normalized innovation squared of an accepted detection (chi-square, 2 degrees of
-            freedom; 13.8: one true one in a thousand is lost).
-    """
-
-    angle_rad: float = math.radians(0.5)
-    drift_acceleration_m_s2_per_root_hz: float = 0.7
-    offset_rate_m_per_root_s: float = 0.3
-    gate: float = 13.8
-
-    def __post_init__(self) -> None:
-        for name in RelativeTargetParameters.__slots__:
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} = {value} is not possible; it must be more than 0")
+    angle_rad: float = option(
+        math.radians(0.5), above=0.0, help="Standard deviation of a line of sight: pixels, gimbal, attitude."
+    )
+    drift_acceleration_m_s2_per_root_hz: float = option(
+        0.7, above=0.0, help="Random walk of the target against the air: gusts, and a target that turns."
+    )
+    offset_rate_m_per_root_s: float = option(
+        0.3, above=0.0, help="Random walk of the offset: sideslip, compass, time stamps."
+    )
+    gate: float = option(
+        13.8, above=0.0, help="Largest normalized innovation squared of an accepted detection."
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from estimators.tracking.line_of_sight import (
     line_of_sight_of_gimbal,
     pointing_angles,
 )
+from flightsim.foundation.options import option
 from flightsim.foundation.vectors import between, yaw_of
 
 _GIMBALS_KEPT: Final = 128
@@ -39,26 +40,14 @@ class TargetStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerParameters(RelativeTargetParameters):
-    """Parameters of the tracker and of its filter.
+    """Parameters of the tracker and of its filter."""
 
-    Attributes:
-        acquired_after: number of accepted detections, each less than `lost_after_s` after the previous one,
-            with which the target counts as acquired. Beyond the range of its detector a camera still reads a
-            tag occasionally; such a single detection is not an acquisition, and no detection after it is not
-            a loss.
-        lost_after_s: time without an accepted detection after which an acquired target counts as lost.
-    """
-
-    acquired_after: int = 3
-    lost_after_s: float = 3.0
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not reach the base of a dataclass with slots
-        RelativeTargetParameters.__post_init__(self)
-        if self.acquired_after < 1:
-            raise ValueError(f"acquired_after = {self.acquired_after} is not possible; it must be 1 or more")
-        if not self.lost_after_s > 0.0:
-            raise ValueError(f"lost_after_s = {self.lost_after_s} is not possible; it must be more than 0")
+    acquired_after: int = option(
+        3, least=1, help="Number of accepted detections in a row with which the target is acquired."
+    )
+    lost_after_s: float = option(
+        3.0, above=0.0, help="Time without an accepted detection after which an acquired target is lost."
+    )
 
 
 class TargetTracker:

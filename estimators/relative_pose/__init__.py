@@ -2,9 +2,9 @@
 
 from estimators.relative_pose.belief import LevelMotion, PoseMeasurement, PoseMode, RelativePoseBelief
 from estimators.relative_pose.estimate import RelativePoseEstimate
-from estimators.relative_pose.estimator import RelativePoseEstimator, RelativePoseSettings
+from estimators.relative_pose.estimator import RelativePoseEstimator
 from estimators.relative_pose.gaussian_bank import GaussianBank
-from estimators.relative_pose.parameters import RelativePoseParameters
+from estimators.relative_pose.parameters import RelativePoseParameters, RelativePoseSettings
 from estimators.relative_pose.particle_belief import ParticlePose
 
 __all__ = [

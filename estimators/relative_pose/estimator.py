@@ -4,8 +4,7 @@ GPS (Tolman et al. 2021, section III; docs/handoff.md).
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink.vehicle_range import read_range_payload
 from estimators.input_guard import InputGuard
@@ -15,40 +14,12 @@ from estimators.relative_pose.aircraft import AircraftState
 from estimators.relative_pose.belief import PoseMeasurement, RelativePoseBelief
 from estimators.relative_pose.estimate import RelativePoseEstimate
 from estimators.relative_pose.gaussian_bank import GaussianBank
-from estimators.relative_pose.parameters import RelativePoseParameters
+from estimators.relative_pose.parameters import RelativePoseSettings
 from estimators.relative_pose.particle_belief import ParticlePose
 from estimators.relative_pose.reported_aircraft import ReportedAircraft
 
 _RANGE: Final = "range"
 _STEP_US: Final = 200_000  # between ranges the pose is moved at this interval
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RelativePoseSettings(RelativePoseParameters):
-    """Parameters of the estimator. Their noise is that of flights, whose errors are not white: magnetic
-    headings inherit the errors of roll and pitch, airspeeds those of the pitot tube.
-
-    Attributes:
-        vehicle: system id of the aircraft in whose level frame the pose is (the handoff aircraft).
-        other: system id of the other aircraft (the tracker).
-        belief: particles, or a bank of Gaussians.
-    """
-
-    heading_sigma_rad: float = 0.1
-    walk_m_sqrt_s: float = 2.0
-    reset_nis: float = 6.0
-    vehicle: int = 1
-    other: int = 2
-    belief: Literal["particles", "gaussians"] = "gaussians"
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not reach the base of a dataclass with slots
-        RelativePoseParameters.__post_init__(self)
-        for name in ("vehicle", "other"):
-            if not 1 <= getattr(self, name) <= 255:
-                raise ValueError(f"{name} = {getattr(self, name)} is not accepted: 1 to 255 are")
-        if self.vehicle == self.other:
-            raise ValueError(f"other = {self.other} is not accepted: it is the vehicle itself")
 
 
 class RelativePoseEstimator(Estimator[RelativePoseSettings]):

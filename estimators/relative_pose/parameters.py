@@ -1,85 +1,94 @@
 """Parameters of the beliefs about the relative pose."""
 
-from dataclasses import dataclass, fields
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Literal
 
-from flightsim.foundation.checks import (
-    check_fields,
-    require_not_negative,
-    require_positive,
-    require_probability,
-)
+from flightsim.foundation.options import Options, option, other_default
 
 _MOST: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RelativePoseParameters:
+class RelativePoseParameters(Options):
     """Noise, numbers and limits of the beliefs about a relative pose.
 
     Range and heading have the noise of the paper's study (section VII); the paper does not give the others.
-
-    Attributes:
-        range_sigma_m: standard deviation of the slant range.
-        height_sigma_m: of the difference of both pressure altitudes.
-        heading_sigma_rad: of the difference of both magnetic headings (paper: 0.01 rad each).
-        walk_m_sqrt_s: standard deviation of the horizontal relative position per axis that one second of
-            motion adds: errors of both airspeeds, sideslip, differences of the wind.
-        climb_walk_m_sqrt_s: the same vertically.
-        heading_walk_rad_sqrt_s: the same of the relative heading, from both gyros.
-        particles: number of particles of a converged pose.
-        start_particles: number of particles before. The first measurements select by range, depth and
-            heading, and leave some 6 % of the particles: too few of a thousand to cover all bearings.
-        resample_below: share of effective particles below which they are resampled.
-        jitter: standard deviation of the noise that resampled particles get, over the belief's own: of depth,
-            heading and range. Copies that differ in nothing but the noise of later steps lose bearings before
-            the range has decided between them (Musso, Oudjane and Le Gland 2001, "Improving regularised
-            particle filters").
-        components: number of Gaussians around the first range.
-        seed: of the random numbers of the particles.
-        reset_nis: limit of the mean squared innovation of the range over its predicted variance.
-        reset_after: number of ranges over which that mean is taken.
-        apart_sigmas: two groups are two modes when their distance is above this many standard deviations of
-            both.
-        converged_weight: least weight of the mode of a converged pose.
-        converged_sigma_m: largest horizontal standard deviation of the mode of a converged pose (paper: the
-            error "remains near or below 20 m").
     """
 
-    range_sigma_m: float = 3.0
-    height_sigma_m: float = 1.5
-    heading_sigma_rad: float = 0.0141
-    walk_m_sqrt_s: float = 0.5
-    climb_walk_m_sqrt_s: float = 1.0
-    heading_walk_rad_sqrt_s: float = 0.01
-    particles: int = 1000
-    start_particles: int = 50_000
-    resample_below: float = 0.5
-    jitter: float = 0.2
-    components: int = 64
-    seed: int = 0
-    reset_nis: float = 4.0
-    reset_after: float = 50.0
-    apart_sigmas: float = 2.0
-    converged_weight: float = 0.95
-    converged_sigma_m: float = 20.0
+    range_sigma_m: float = option(3.0, above=0.0, help="Standard deviation of the slant range.")
+    height_sigma_m: float = option(
+        1.5, above=0.0, help="Standard deviation of the difference of both pressure altitudes."
+    )
+    heading_sigma_rad: float = option(
+        0.0141, above=0.0, help="Standard deviation of the difference of both magnetic headings."
+    )
+    walk_m_sqrt_s: float = option(
+        0.5,
+        above=0.0,
+        help="Standard deviation of the horizontal position that a second of motion adds, per axis.",
+    )
+    climb_walk_m_sqrt_s: float = option(
+        1.0, above=0.0, help="Standard deviation of the height that a second of motion adds."
+    )
+    heading_walk_rad_sqrt_s: float = option(
+        0.01, above=0.0, help="Standard deviation of the relative heading that a second adds, of both gyros."
+    )
+    particles: int = option(1000, least=10, most=_MOST, help="Number of particles of a converged pose.")
+    start_particles: int = option(
+        50_000,
+        least=10,
+        most=_MOST,
+        help="Number of particles before: the first measurements leave some 6 % of them.",
+    )
+    resample_below: float = option(
+        0.5, least=0.0, most=1.0, help="Share of effective particles below which they are resampled."
+    )
+    jitter: float = option(
+        0.2, least=0.0, help="Noise of resampled particles over the belief's own (Musso et al. 2001)."
+    )
+    components: int = option(64, least=8, most=_MOST, help="Number of Gaussians around the first range.")
+    seed: int = option(0, least=0, help="Seed of the random numbers of the particles.")
+    reset_nis: float = option(
+        4.0, above=0.0, help="Limit of the mean squared innovation of the range over its variance."
+    )
+    reset_after: float = option(50.0, least=1.0, help="Number of ranges over which that mean is taken.")
+    apart_sigmas: float = option(
+        2.0, above=0.0, help="Distance of two modes, in standard deviations of both."
+    )
+    converged_weight: float = option(
+        0.95, least=0.0, most=1.0, help="Least weight of the mode of a converged pose."
+    )
+    converged_sigma_m: float = option(
+        20.0, above=0.0, help="Largest horizontal standard deviation of a converged pose (paper: 20 m)."
+    )
 
-    def __post_init__(self) -> None:
-        own = {field.name for field in fields(RelativePoseParameters)}  # derived classes check theirs
-        check_fields(
-            self,
-            require_positive,
-            but={
-                "resample_below": require_probability,
-                "converged_weight": require_probability,
-                "jitter": require_not_negative,
-            },
-            unchecked=("seed", *(field.name for field in fields(self) if field.name not in own)),
-        )
-        for name, least in (("particles", 10), ("start_particles", self.particles), ("components", 8)):
-            if not least <= getattr(self, name) <= _MOST:
-                raise ValueError(f"{name} = {getattr(self, name)} is not accepted: {least} to {_MOST} are")
-        if self.reset_after < 1.0:
-            raise ValueError(f"reset_after = {self.reset_after:g} is not accepted: a number from 1 is")
-        if self.seed < 0:
-            raise ValueError(f"seed = {self.seed} is not accepted: a number from 0 is")
+    def check_together(self) -> None:
+        if self.start_particles < self.particles:
+            raise ValueError(
+                f"start_particles {self.start_particles} is fewer than particles {self.particles}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RelativePoseSettings(RelativePoseParameters):
+    """Parameters of the estimator. Their noise is that of flights, whose errors are not white: magnetic
+    headings inherit the errors of roll and pitch, airspeeds those of the pitot tube.
+    """
+
+    heading_sigma_rad: float = other_default(0.1)
+    walk_m_sqrt_s: float = other_default(2.0)
+    reset_nis: float = other_default(6.0)
+    vehicle: int = option(
+        1,
+        least=1,
+        most=255,
+        help="System id of the aircraft in whose level frame the pose is: the handoff aircraft.",
+    )
+    other: int = option(2, least=1, most=255, help="System id of the other aircraft, the tracker.")
+    belief: Literal["particles", "gaussians"] = option(
+        "gaussians", help="Representation of the relative pose."
+    )
+
+    def check_together(self) -> None:
+        if self.vehicle == self.other:
+            raise ValueError(f"other = {self.other} is not accepted: it is the vehicle itself")

@@ -1,6 +1,5 @@
 """Magnetic surveys: compensation, lines, levels, anomalies and the map (docs/magnetic_survey.md)."""
 
-from estimators.survey.estimate import SurveyEstimate
-from estimators.survey.estimator import SurveyEstimator, SurveyEstimatorParameters
+from flightsim.foundation.lazy_exports import lazy_exports
 
-__all__ = ["SurveyEstimate", "SurveyEstimator", "SurveyEstimatorParameters"]
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

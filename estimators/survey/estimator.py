@@ -24,18 +24,13 @@ from estimators.survey.estimate import SurveyEstimate
 from estimators.survey.export import MAP, survey_files
 from estimators.survey.gridding import block_means
 from estimators.survey.lines import LinePlan, detected_lines, load_lines
-from estimators.survey.processing import (
-    ProcessingParameters,
-    SurveyResult,
-    aircraft_field_nt,
-    check_grid,
-    process_survey,
-)
+from estimators.survey.parameters import ProcessingParameters
+from estimators.survey.processing import SurveyResult, aircraft_field_nt, check_grid, process_survey
 from estimators.survey.readings import SurveyReadings, joined, placed_readings
 from estimators.survey_magnetometer import COMPONENT, TOTAL_FIELD_NAME
-from flightsim.foundation.checks import require_positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
+from flightsim.foundation.options import option
 
 __all__ = ["SurveyEstimator", "SurveyEstimatorParameters"]
 
@@ -49,24 +44,20 @@ _TRACK_M: Final = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurveyEstimatorParameters(ProcessingParameters):
-    """Parameters of `SurveyEstimator`.
+    """Parameters of `SurveyEstimator`."""
 
-    Attributes:
-        map_file: published magnetic map (`.npz`) to compare with; None: the main field.
-        lines_file: lines that were commanded (`lines.csv` of a survey); None: straight flight makes lines.
-        compensation_file: coefficients of the aircraft; None: readings are compensated already.
-        least_line_m: shortest straight flight that is a line, without `lines_file`.
-    """
-
-    map_file: Path | None = None
-    lines_file: Path | None = None
-    compensation_file: Path | None = None
-    least_line_m: float = 500.0
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not reach the base of a dataclass with slots
-        ProcessingParameters.__post_init__(self)
-        require_positive(least_line_m=self.least_line_m)
+    map_file: Path | None = option(
+        None, varies="the main field", help="Published magnetic map (.npz) to compare with."
+    )
+    lines_file: Path | None = option(
+        None, varies="straight flight", help="Lines that were commanded (lines.csv of a survey)."
+    )
+    compensation_file: Path | None = option(
+        None, varies="readings are compensated", help="Coefficients of the aircraft."
+    )
+    least_line_m: float = option(
+        500.0, above=0.0, help="Shortest straight flight that is a line, without lines_file."
+    )
 
     @property
     def processing(self) -> ProcessingParameters:

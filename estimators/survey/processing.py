@@ -20,20 +20,12 @@ from estimators.survey.compensation import Compensation, direction_cosines
 from estimators.survey.gridding import SurveyGrid, block_means, grid_axes, grid_lines, interpolated
 from estimators.survey.levelling import Levelling, crossings, levelled
 from estimators.survey.lines import LineKind, LinePlan
+from estimators.survey.parameters import BLOCKS, ProcessingParameters
 from estimators.survey.readings import SurveyReadings
-from flightsim.foundation.checks import require_not_negative, require_positive
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.foundation.magnetics import require_wmm_year
 from flightsim.foundation.main_field import MainField
 
-__all__ = [
-    "LEAST_SPACING_M",
-    "ProcessingParameters",
-    "SurveyResult",
-    "check_grid",
-    "process_survey",
-    "white_noise_nt",
-]
+__all__ = ["SurveyResult", "check_grid", "process_survey", "white_noise_nt"]
 
 Array = NDArray[np.float64]
 
@@ -42,50 +34,6 @@ _AWAY_M: Final = 3.0  # widths of an anomaly within which readings are not "wher
 _LEAST_REACH_M: Final = 150.0
 _NORMAL: Final = 1.4826  # standard deviation over median absolute deviation
 _CONFIDENCE: Final = 0.9  # that the error of the grid is not larger than stated
-_BLOCKS: Final = 4.0  # of a line spacing: blocks along a line, and cells of the grid
-_USUAL_SPACING_M: Final = 200.0
-LEAST_SPACING_M: Final = 1.0
-"""Smallest distance of lines that is processed."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ProcessingParameters:
-    """How a survey is processed.
-
-    Attributes:
-        line_spacing_m: distance of the survey lines, 1 m or more; None: that of the plan, else 200 m.
-        grid_m: distance of the grid's lines; None: a quarter of the line spacing.
-        map_error_nt: standard deviation of the published map; None: as the map states it, else 1 nT.
-        level: estimate the levels of the lines from the crossings with tie lines.
-        decimal_year: date of the main field (WMM-2025), 2025 to 2030.
-    """
-
-    line_spacing_m: float | None = None
-    grid_m: float | None = None
-    map_error_nt: float | None = None
-    level: bool = True
-    decimal_year: float = 2026.0
-
-    def __post_init__(self) -> None:
-        spacing_m = self.line_spacing_m
-        if spacing_m is not None and not (math.isfinite(spacing_m) and spacing_m >= LEAST_SPACING_M):
-            raise ValueError(
-                f"line_spacing_m = {spacing_m!r} is not accepted: a finite number of at least "
-                f"{LEAST_SPACING_M:g} is"
-            )
-        if self.grid_m is not None:
-            require_positive(grid_m=self.grid_m)
-        if self.map_error_nt is not None:
-            require_not_negative(map_error_nt=self.map_error_nt)
-        require_wmm_year(self.decimal_year)
-
-    def spacing_m(self, plan: LinePlan) -> float:
-        """Distance of the survey lines of a plan."""
-        return self.line_spacing_m or plan.spacing_m or _USUAL_SPACING_M
-
-    def cell_m(self, plan: LinePlan) -> float:
-        """Distance of the grid's lines of a plan."""
-        return self.grid_m or self.spacing_m(plan) / _BLOCKS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -321,7 +269,7 @@ def _grid(
     """The grid of total field from all lines or why there is none, and how well the survey lines predict the
     tie lines.
     """
-    block_m = p.spacing_m(plan) / _BLOCKS
+    block_m = p.spacing_m(plan) / BLOCKS
     blocks: dict[LineKind, list[tuple[Array, Array]]] = {kind: [] for kind in LineKind}
     for number, line in enumerate(plan.lines):
         own = line_of == number

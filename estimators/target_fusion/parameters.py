@@ -7,13 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from estimators.lissajous.parameters import LissajousParameters
-from flightsim.foundation.checks import (
-    named,
-    require_finite,
-    require_members,
-    require_not_negative,
-    require_positive,
-)
+from flightsim.foundation.options import option
 
 
 class Heading(StrEnum):
@@ -49,73 +43,65 @@ class Range(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetFusionParameters(LissajousParameters):
-    """Parameters of `TargetFusionEstimator`; those of `LissajousParameters` apply to every drone.
+    """Parameters of `TargetFusionEstimator`; those of `LissajousParameters` apply to every drone."""
 
-    Attributes:
-        centre_vehicle: system id of the vehicle whose home is the origin of the pattern's centre, unless the
-            centre is specified by coordinates.
-        heading: source of a drone's heading.
-        min_speed_m_s: with `heading=course`, detections of a slower drone are not placed: a drone that
-            hovers, climbs or lands may have any heading, and its course is noise.
-        mount: mount of the camera.
-        mount_roll_rad, mount_pitch_rad, mount_yaw_rad: attitude of a fixed camera relative to the body; pitch
-            -pi/2: down.
-        distance: source of the range.
-        target_size_m: true size of the target, for `distance=size`; 0: not known.
-        bearing_sigma_rad: one sigma of a direction across the line of sight, camera and gimbal together.
-        tilt_sigma_rad: one sigma of the camera's pitch against the horizon.
-        size_sigma_rad: one sigma of an apparent size, from pixel noise.
-        range_sigma: one sigma of a distance that comes without an apparent size, as a fraction of the
-            distance.
-        height_sigma_m: one sigma of the height above the target.
-        yaw_sigma_rad: one sigma of ATTITUDE's yaw, and with `heading=course` of the nose from the course.
-        walk_m_sqrt_s: one sigma per axis that a target may wander in a second, growing with the square root
-            of time; it is the uncertainty that an old estimate gains.
-        gate: largest squared Mahalanobis distance of a detection that belongs to the target; 13.8 rejects one
-            valid detection in a thousand.
-        confirmations: number of agreeing detections before a target is reported, or moved to another place.
-        wait_s: time for which a detection waits for the data needed to place it.
-        max_delay_s: detections that are older than the estimate by more than this are rejected.
-    """
+    centre_vehicle: int = option(
+        1,
+        least=1,
+        most=255,
+        help="System id of the vehicle whose home is the origin of the pattern's centre.",
+    )
+    heading: Heading = option(Heading.COURSE, help="Source of a drone's heading.")
+    min_speed_m_s: float = option(
+        0.5,
+        least=0.0,
+        help="Speed below which a course is noise: detections of a slower drone are not placed.",
+    )
+    mount: Mount = option(Mount.GIMBAL, help="Mount of the camera.")
+    mount_roll_rad: float = option(0.0, help="Roll of a fixed camera relative to the body.")
+    mount_pitch_rad: float = option(
+        -0.5 * math.pi, help="Pitch of a fixed camera relative to the body; -pi/2: down."
+    )
+    mount_yaw_rad: float = option(0.0, help="Yaw of a fixed camera relative to the body.")
+    distance: Range = option(Range.AUTO, help="Source of the distance to a target.")
+    target_size_m: float = option(
+        0.0, least=0.0, help="True size of the target, for distance=size; 0: not known."
+    )
+    bearing_sigma_rad: float = option(
+        0.003,
+        above=0.0,
+        help="Standard deviation of a direction across the line of sight, with the gimbal's.",
+    )
+    tilt_sigma_rad: float = option(
+        0.003, above=0.0, help="Standard deviation of the camera's pitch against the horizon."
+    )
+    size_sigma_rad: float = option(
+        0.00064, above=0.0, help="Standard deviation of an apparent size, from pixel noise."
+    )
+    range_sigma: float = option(
+        0.05, above=0.0, help="Standard deviation of a distance without apparent size, over the distance."
+    )
+    height_sigma_m: float = option(1.0, least=0.0, help="Standard deviation of the height above the target.")
+    yaw_sigma_rad: float = option(
+        0.02, least=0.0, help="Standard deviation of ATTITUDE's yaw, or of the nose from the course."
+    )
+    walk_m_sqrt_s: float = option(
+        1.0, least=0.0, help="Standard deviation of a target's walk in a second, per axis."
+    )
+    gate: float = option(
+        13.8,
+        above=0.0,
+        help="Largest squared Mahalanobis distance of a detection that belongs to the target.",
+    )
+    confirmations: int = option(
+        3, least=1, help="Number of agreeing detections before a target is reported, or moved."
+    )
+    wait_s: float = option(
+        0.5, above=0.0, help="Time for which a detection waits for the data needed to place it."
+    )
+    max_delay_s: float = option(2.0, least=0.0, help="Largest age of a detection before the estimate.")
 
-    centre_vehicle: int = 1
-    heading: Heading = Heading.COURSE
-    min_speed_m_s: float = 0.5
-    mount: Mount = Mount.GIMBAL
-    mount_roll_rad: float = 0.0
-    mount_pitch_rad: float = -0.5 * math.pi
-    mount_yaw_rad: float = 0.0
-    distance: Range = Range.AUTO
-    target_size_m: float = 0.0
-    bearing_sigma_rad: float = 0.003
-    tilt_sigma_rad: float = 0.003
-    size_sigma_rad: float = 0.00064
-    range_sigma: float = 0.05
-    height_sigma_m: float = 1.0
-    yaw_sigma_rad: float = 0.02
-    walk_m_sqrt_s: float = 1.0
-    gate: float = 13.8
-    confirmations: int = 3
-    wait_s: float = 0.5
-    max_delay_s: float = 2.0
-
-    def __post_init__(self) -> None:
-        # zero-argument super() does not reach the base of a dataclass with slots
-        LissajousParameters.__post_init__(self)
-        require_members(self, heading=Heading, mount=Mount, distance=Range)
-        if not 1 <= self.centre_vehicle <= 255:
-            raise ValueError(f"centre_vehicle {self.centre_vehicle} is not a system id, 1..255")
-        if self.confirmations < 1:
-            raise ValueError(f"confirmations {self.confirmations} is not accepted: 1 or more is")
-        require_positive(
-            **named(self, "bearing_sigma_rad", "tilt_sigma_rad", "size_sigma_rad", "range_sigma", "gate"),
-            wait_s=self.wait_s,
-        )
-        require_not_negative(
-            **named(self, "min_speed_m_s", "target_size_m", "height_sigma_m", "yaw_sigma_rad"),
-            **named(self, "walk_m_sqrt_s", "max_delay_s"),
-        )
-        require_finite(**named(self, "mount_roll_rad", "mount_pitch_rad", "mount_yaw_rad"))
+    def check_together(self) -> None:
         if self.distance is Range.SIZE and not self.target_size_m:
             raise ValueError("distance=size needs target_size_m, the true size of the target")
         if self.wait_s > self.history_s:

@@ -17,7 +17,7 @@ def layout_of(parameters: VisionSearchParameters) -> GridLayout:
     return GridLayout.over(
         width_m=parameters.east_m - parameters.west_m,
         height_m=parameters.north_m - parameters.south_m,
-        cell_m=parameters.cell_m,
+        cell_m=parameters.cell_side_m,
         centre_ne_m=(
             0.5 * (parameters.north_m + parameters.south_m),
             0.5 * (parameters.east_m + parameters.west_m),

@@ -11,6 +11,8 @@ from flightsim.foundation.options import Options, option
 __all__ = ["BeliefKind", "VisionSearchParameters"]
 
 MOST_CELLS: Final = 16_000_000
+_CELLS: Final = 400  # along the longer side
+_LEAST_CELL_M: Final = 0.5
 
 
 class BeliefKind(StrEnum):
@@ -35,7 +37,12 @@ class VisionSearchParameters(Options):
         help="Number of the tag (AprilTag 36h11) that is searched for; others are counted only.",
     )
     belief: BeliefKind = option(BeliefKind.GRID, help="Representation of the belief.")
-    cell_m: float = option(1.0, above=0.0, help="Side of a cell of the grid (paper: 12.5 and 0.67 m).")
+    cell_m: float | None = option(
+        None,
+        above=0.0,
+        varies="1/400 of the longer side",
+        help="Side of a cell of the grid (paper: 12.5 and 0.67 m).",
+    )
     log_scale: bool = option(False, help="Logarithms of the cells' probabilities are stored.")
     single_precision: bool = option(False, help="Cells are stored as float32.")
     particles: int = option(6400, least=10, most=10_000_000, help="Number of particles (paper: 6400).")
@@ -107,4 +114,10 @@ class VisionSearchParameters(Options):
     def check_together(self) -> None:
         if not (self.north_m > self.south_m and self.east_m > self.west_m):
             raise ValueError("north_m must be above south_m, and east_m above west_m")
-        cells_over(self.east_m - self.west_m, self.north_m - self.south_m, self.cell_m, MOST_CELLS)
+        cells_over(self.east_m - self.west_m, self.north_m - self.south_m, self.cell_side_m, MOST_CELLS)
+
+    @property
+    def cell_side_m(self) -> float:
+        """Side of a cell of the grid."""
+        longer_m = max(self.north_m - self.south_m, self.east_m - self.west_m)
+        return self.cell_m or max(_LEAST_CELL_M, longer_m / _CELLS)

@@ -209,8 +209,8 @@ class Conversion:
         return _chosen(value, {str(each): each for each in get_args(kind)})
 
     def _member(self, value: Any, kind: Any) -> Any:
-        """A member of an enumeration, by its value or, for numbers of MAVLink in files, by its name."""
-        by_name = issubclass(kind, IntEnum) and not self._text
+        """A member of an enumeration, by its value or, where that is a number, by its name."""
+        by_name = issubclass(kind, IntEnum)
         return _chosen(
             value, {member.name.lower() if by_name else str(member.value): member for member in kind}
         )

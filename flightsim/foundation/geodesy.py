@@ -5,11 +5,11 @@ true tangent plane (`pymap3d`) it is off by 1 mm at 100 m, 0.1 m at 1 km, 10 m a
 """
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from flightsim.foundation.geodetic_position import GeodeticPosition as GeodeticPosition
 from flightsim.foundation.vectors import Angle, wrap_180
 
 WGS84_A_M: Final = 6378137.0
@@ -57,23 +57,6 @@ def longitude_near(lon_deg: Angle, middle_deg: float = 0.0) -> Angle:
     One that is within stays exactly as it is; `wrap_180` rounds.
     """
     return lon_deg - 360.0 * np.round((lon_deg - middle_deg) / 360.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GeodeticPosition:
-    """A point on or above the WGS84 ellipsoid: degrees, degrees, metres above mean sea level."""
-
-    lat_deg: float
-    lon_deg: float
-    alt_m: float
-
-    def __post_init__(self) -> None:
-        if not -90.0 <= self.lat_deg <= 90.0:
-            raise ValueError(f"latitude {self.lat_deg} deg is not in -90..90")
-        if not -180.0 <= self.lon_deg <= 180.0:
-            raise ValueError(f"longitude {self.lon_deg} deg is not in -180..180")
-        if not math.isfinite(self.alt_m):
-            raise ValueError(f"altitude {self.alt_m} m is not finite")
 
 
 class LocalFrame:

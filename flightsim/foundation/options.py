@@ -14,16 +14,17 @@ one that declares options with it, costs nothing: neither loads NumPy or compile
 import math
 import types
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields
-from enum import Enum
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from enum import Enum, IntEnum
 from functools import cache
 from types import MappingProxyType
-from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 T = TypeVar("T")
 
 _OPTION: Final = "option"
 _HELD: Final = "held"
+_OF_BASE: Final = "of base"
 
 UNITS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -118,24 +119,52 @@ def option(
     return field(default=default, metadata={_OPTION: stated})
 
 
+def other_default(default: T, *, above: float | None = None, varies: str = "") -> T:
+    """Declare another default for a field of the base class; the rest is what the base declares.
+
+    Args:
+        default: default of the field.
+        above: as of `Option`, where the base states none.
+        varies: as of `Option`.
+    """
+    return field(default=default, metadata={_OF_BASE: {"above": above, "varies": varies}})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """How a field of held parameters is shown to users.
+    """How fields of held parameters are shown to users: as one option.
 
     Attributes:
-        fields: names of the fields that it sets, all to the same value.
-        help: help where those of the fields do not say what they are together.
-        varies: as of `Option`.
+        fields: names of the fields.
+        together: the fields get one part of the value each; otherwise all get the same value.
+        help, metavar, varies, needs, separators, lone: as of `Option`, where those of the first field do not
+            say what the fields are together.
     """
 
     fields: tuple[str, ...]
+    together: bool = False
     help: str = ""
+    metavar: str = ""
     varies: str = ""
+    needs: tuple[str, tuple[str, ...]] | None = None
+    separators: str = ","
+    lone: float | str | None = None
+
+    def over(self, declared: Option) -> Option:
+        """The option that users see."""
+        return replace(
+            declared,
+            help=self.help or declared.help,
+            metavar=self.metavar or declared.metavar,
+            varies=self.varies or declared.varies,
+            needs=self.needs,
+            separators=self.separators,
+            lone=self.lone,
+        )
 
 
-def held(default: T, **shown: "str | Shown") -> T:
-    """Declare a field that holds other options, with their own fields and checks: the parameters of an
-    estimator.
+def held(default: T, **shown: str | Shown) -> T:
+    """Declare a field that holds other options, with their own fields and checks.
 
     Args:
         default: default of the field, an instance of a class on `Options`.
@@ -228,24 +257,23 @@ class Declared:
     def _reason(self, number: float, shown: Any, unit: str) -> str:
         o = self.option
         low, high = o.least if o.above is None else o.above, o.most if o.below is None else o.below
-        value = f"{shown(float(number)):.6g}"
+        value = _shown(shown(number))
         if low is None and high is None:
             return f"{value} is not a finite number"
         if low is not None and high is not None and o.above is None and o.below is None:
-            return f"{value}{unit} is not in {shown(float(low)):.6g}..{shown(float(high)):.6g}{unit}"
+            return f"{value}{unit} is not in {_shown(shown(low))}..{_shown(shown(high))}{unit}"
         ends = []
         if low is not None:
-            ends.append(
-                f"more than {shown(float(low)):.6g}"
-                if o.least is None
-                else f"{shown(float(low)):.6g} or more"
-            )
+            least = f"{_shown(shown(low))}{unit if low else ''}"
+            ends.append(f"more than {least}" if o.least is None else f"{least} or more")
         if high is not None:
-            ends.append(
-                f"less than {shown(float(high)):.6g}" if o.most is None else f"up to {shown(float(high)):.6g}"
-            )
-        elsewhere = unit if high is not None or low else ""
-        return f"{value} is not possible; ask for {', '.join(ends)}{elsewhere}"
+            most = f"{_shown(shown(high))}{unit}"
+            ends.append(f"less than {most}" if o.most is None else f"up to {most}")
+        return f"{value} is not possible; ask for {', '.join(ends)}"
+
+
+def _shown(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:.6g}"
 
 
 class Options:
@@ -297,10 +325,26 @@ def declared(kind: type) -> Sequence[Declared]:
 @cache
 def _declared_fields(kind: Any) -> Sequence[Declared]:
     hints = get_type_hints(kind, include_extras=True)
-    return tuple(_declared(each, hints[each.name]) for each in fields(kind) if each.init)
+    return tuple(_declared(kind, each, hints[each.name]) for each in fields(kind) if each.init)
 
 
-def _declared(each: Any, hint: Any) -> Declared:
+def _option_of(kind: type, each: Any) -> Option:
+    """What a field declares, or the one of the base class that it is another default for."""
+    changes = each.metadata.get(_OF_BASE)
+    if changes is None:
+        return each.metadata.get(_OPTION, _PLAIN)
+    stated = next(
+        _option_of(base, found)
+        for base in kind.__mro__[1:]
+        if is_dataclass(base)
+        for found in fields(base)
+        if found.name == each.name and found is not each
+    )
+    above = stated.above if changes["above"] is None else changes["above"]
+    return replace(stated, above=above, varies=changes["varies"])
+
+
+def _declared(kind: type, each: Any, hint: Any) -> Declared:
     stated, optional = without_none(hint)
     if get_origin(stated) is Annotated:
         stated = get_args(stated)[0]
@@ -308,7 +352,7 @@ def _declared(each: Any, hint: Any) -> Declared:
     shown = each.metadata.get(_HELD)
     return Declared(
         name=each.name, kind=stated, optional=optional, default=default,
-        option=each.metadata.get(_OPTION, _PLAIN), shown=shown,
+        option=_option_of(kind, each), shown=shown,
     )  # fmt: skip
 
 
@@ -343,31 +387,83 @@ def _suffix(name: str) -> str:
     return next((ending for ending in endings if ending in UNITS), "")
 
 
+def choices_of(kind: Any) -> Sequence[str]:
+    """What users may write for a type that is a choice; (): it is none."""
+    if get_origin(kind) is Literal:
+        return tuple(map(str, get_args(kind)))
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return tuple(map(written, kind))
+    return ()
+
+
+_KINDS: Final[Mapping[Any, str]] = MappingProxyType({int: "integer", float: "number"})
+
+
+def written(value: Any) -> str:
+    """A value as users write it; "" for None, or a tuple with one."""
+    if isinstance(value, tuple):
+        return "" if None in value else ",".join(map(written, value))
+    if value is None or isinstance(value, bool):
+        return "" if value is None else str(value).lower()
+    if isinstance(value, IntEnum):
+        return value.name.lower()
+    return (
+        str(value.value)
+        if isinstance(value, Enum)
+        else f"{value:.6g}"
+        if isinstance(value, float)
+        else str(value)
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UserOption:
     """One option as users see it: a field, several fields of one name, or fields of held options.
 
     Attributes:
         name: name for users, with - between words.
-        path: names of the fields that hold the options that have the fields; (): the class itself has them.
+        path: name of the field that holds the options that have the fields; "": the class itself has them.
         fields: the fields that it sets.
         together: the fields get one part of the value each; otherwise all get the same value.
         default: its default: a tuple of the fields' defaults if `together`.
-        help, varies: as of `Option`.
+        option: what it declares.
     """
 
     name: str
-    path: tuple[str, ...]
+    path: str
     fields: tuple[Declared, ...]
     together: bool
     default: Any
-    help: str
-    varies: str
+    option: Option
 
     @property
     def declared(self) -> Declared:
         """The first of its fields."""
         return self.fields[0]
+
+    @property
+    def default_text(self) -> str:
+        """Its default as users would write it, and what varies of it; "": it has none, or is off."""
+        shown = "" if self.default is False else self._written_default()
+        return "; ".join(part for part in (shown, self.option.varies) if part)
+
+    def _written_default(self) -> str:
+        value = self.declared.for_users(self.default)
+        if not isinstance(value, tuple):
+            return written(value)
+        parts = value[:1] if self.option.lone == "same" and len(set(value)) == 1 else value
+        return "" if None in parts else self.option.separators[0].join(map(written, parts))
+
+    @property
+    def placeholder(self) -> str:
+        """What stands for its value: its own placeholder, its unit, or its kind; "": it has no value."""
+        kind = self.declared.kind
+        if kind is bool:
+            return ""
+        if choices := choices_of(kind):
+            return "|".join(choices)
+        unit = self.declared.unit.replace(" ", "")
+        return self.option.metavar or (unit or _KINDS.get(kind, "TEXT")).upper()
 
 
 def user_options(kind: type) -> Sequence[UserOption]:
@@ -395,10 +491,13 @@ def _user_options(kind: Any) -> Iterator[UserOption]:
         members = tuple(named[name])
         defaults = tuple(member.default for member in members)
         yield UserOption(
-            name=name, path=(), fields=members, together=len(members) > 1,
+            name=name,
+            path="",
+            fields=members,
+            together=len(members) > 1,
             default=defaults if len(members) > 1 else each.default,
-            help=each.option.help, varies=each.option.varies,
-        )  # fmt: skip
+            option=each.option,
+        )
 
 
 def _held_options(holder: Declared) -> Iterator[UserOption]:
@@ -407,8 +506,12 @@ def _held_options(holder: Declared) -> Iterator[UserOption]:
     for name, given in holder.shown.items():
         shown = Shown(fields=(given,)) if isinstance(given, str) else given
         members = tuple(inner[each] for each in shown.fields)
+        defaults = tuple(getattr(holder.default, each) for each in shown.fields)
         yield UserOption(
-            name=name.replace("_", "-"), path=(holder.name,), fields=members, together=False,
-            default=getattr(holder.default, members[0].name),
-            help=shown.help or members[0].option.help, varies=shown.varies or members[0].option.varies,
-        )  # fmt: skip
+            name=name.replace("_", "-"),
+            path=holder.name,
+            fields=members,
+            together=shown.together,
+            default=defaults if shown.together else defaults[0],
+            option=shown.over(members[0].option) if isinstance(given, Shown) else members[0].option,
+        )

@@ -98,7 +98,7 @@ class Mission(Generic[AnyOptions]):
         """The options as one vehicle flies them: options that were not specified get values that suit the
         vehicle.
         """
-        return options.for_vehicle(limits)
+        return options
 
     def check(self, options: AnyOptions, limits: Limits) -> None:
         """Raise PlanError if one vehicle can't fly the mission.

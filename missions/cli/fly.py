@@ -1,5 +1,6 @@
 """`flightstack fly`: flies a mission with one command."""
 
+import math
 import sys
 from dataclasses import replace
 from functools import partial
@@ -191,7 +192,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
     Raises:
         click.UsageError, PlanError: a value is not accepted.
     """
-    from missions.base.options import check_positive, parameters_from_file
+    from missions.base.given_text import parameters_from_file
     from missions.library import find_mission
 
     given = context.params
@@ -203,8 +204,14 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
     count = len(given["connect"]) if world is None else len(world.vehicles)
     options = declared.build(given, chosen, vehicles=given["vehicles"] or count)
     if world is not None:
-        world = declared.world(given, options, world)
-    check_positive(expect_wind=given["expect_wind"] or None, max_error=given["max_error"])
+        world = declared.with_world(given, chosen, options, world)
+    for name in ("expect_wind", "max_error"):
+        value = given[name]
+        zero = name == "expect_wind" and value == 0.0
+        if value is not None and not zero and not (math.isfinite(value) and value > 0.0):
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} {value:g} is not possible; ask for more than 0"
+            )
     if given["system_id"] and len(given["system_id"]) != len(given["connect"]):
         raise click.UsageError(
             f"{len(given['system_id'])} --system-id for {len(given['connect'])} --connect; give one for each"

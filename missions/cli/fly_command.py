@@ -2,50 +2,23 @@
 combinations.
 """
 
-import importlib
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
-from missions.cli.mission_command import MISSION_GROUP, FlightOption, Scope
+from missions.cli.mission_command import MISSION_GROUP, FlightOption, MissionCommand, Scope
+from missions.cli.mission_commands import COMMANDS, FILE, OWN
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 
-if TYPE_CHECKING:
-    from missions.cli.mission_command import MissionCommand
-
-_PATTERNS: Final = "missions.cli.pattern_command"
-_MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
-    "lissajous": (_PATTERNS, "LISSAJOUS"),
-    "sector": (_PATTERNS, "SECTOR"),
-    "parallel-sweep": (_PATTERNS, "PARALLEL_SWEEP"),
-    "expanding-square": (_PATTERNS, "EXPANDING_SQUARE"),
-    "orbit": ("missions.cli.orbit_command", "COMMAND"),
-    "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
-    "multi-target": ("missions.cli.multi_target_command", "COMMAND"),
-    "handoff": ("missions.cli.handoff_command", "COMMAND"),
-    "survey": ("missions.cli.survey_command", "COMMAND"),
-    "vision-search": ("missions.cli.vision_search_command", "COMMAND"),
-}
-_FILES_OF_USERS: Final = "missions.cli.file_command"
 _OWN: Final = "a mission of your own"
 _FILE: Final = "a mission file"
-_FILES: Final[Mapping[str, tuple[str, str]]] = {
-    _OWN: (_FILES_OF_USERS, "OWN"),
-    _FILE: (_FILES_OF_USERS, "FILE"),
-}
-"""The module in which each mission declares its options."""
-
-
-def _command_of(mission: str) -> "MissionCommand":
-    module, name = {**_MISSIONS, **_FILES}[mission]
-    command: MissionCommand = getattr(importlib.import_module(module), name)
-    return command
+_COMMANDS: Final[Mapping[str, MissionCommand]] = {**COMMANDS, _OWN: OWN, _FILE: FILE}
 
 
 def _declaring(mission: str) -> str:
     """Name of the mission whose options apply, from the mission argument of the command line."""
-    if mission in _MISSIONS:
+    if mission in COMMANDS:
         return mission
     return _OWN if mission.endswith(".py") else _FILE
 
@@ -58,8 +31,8 @@ def _owners(option_name: str) -> list[str]:
     """The missions that have an option."""
     return [
         mission
-        for mission in (*_MISSIONS, *_FILES)
-        if any(option_name in option.opts for option in _command_of(mission).options)
+        for mission, command in _COMMANDS.items()
+        if any(option_name in option.opts for option in command.options)
     ]
 
 
@@ -69,7 +42,7 @@ class FlyCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         named = self._mission_named(args)
         if named is not None:
-            ctx.meta["mission command"] = _command_of(_declaring(named))
+            ctx.meta["mission command"] = _COMMANDS[_declaring(named)]
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -89,7 +62,7 @@ class FlyCommand(click.Command):
             for name in parameter.opts
         }
         words = [a for a, before in zip(args, ["", *args], strict=False) if before not in valued]
-        return next((a for a in words if a in _MISSIONS or _is_file(a)), None)
+        return next((a for a in words if a in COMMANDS or _is_file(a)), None)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         declared = ctx.meta.get("mission command")

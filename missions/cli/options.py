@@ -4,9 +4,11 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import click
+
+from flightsim.foundation.options import UserOption
 
 
 class FiniteRange(click.FloatRange):
@@ -26,6 +28,83 @@ SPEEDUP: Final = FiniteRange(min=SLOWEST, max=1e6)
 
 SECONDS: Final = FiniteRange(min=0.0, max=86_400.0)
 """A time of up to a day."""
+
+
+if TYPE_CHECKING:
+    from flightsim.foundation.conversion import Conversion
+
+if TYPE_CHECKING:  # click makes it generic in its stubs, and not everywhere when it runs
+    _ParamType = click.ParamType[Any]
+else:
+    _ParamType = click.ParamType
+
+
+class DeclaredType(_ParamType):
+    """The type of the option of a field that declares itself: its values are those of the field.
+
+    Args:
+        user: the option as users see it.
+    """
+
+    def __init__(self, user: UserOption) -> None:
+        self.name = user.placeholder or "flag"
+        self._user = user
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value, or a usage error that names it."""
+        from flightsim.foundation.conversion import Conversion, Refused
+
+        if not isinstance(value, str):
+            return value
+        count = self._count
+        texts = Conversion(text=True)
+        try:
+            if count == 1:
+                found = self._in_radians(self._one(texts, value))
+                if found is None:
+                    raise Refused(value, "an angle")
+                return found
+            parts = re.split(f"[{self._user.option.separators}]", value.lower())
+            numbers = [self._in_radians(texts.value(float, part)) for part in parts]
+            if not all(map(math.isfinite, numbers)):
+                raise Refused(value, "finite numbers")
+        except Refused as error:
+            self.fail(self._refusal(value, str(error)), param, ctx)
+        if len(numbers) == 1 and count > 1 and self._user.option.lone is not None:
+            lone = numbers[0] if self._user.option.lone == "same" else float(self._user.option.lone)
+            numbers += [lone] * (count - 1)
+        if len(numbers) != count:
+            self.fail(self._refusal(value, ""), param, ctx)
+        return tuple(numbers)
+
+    @property
+    def _count(self) -> int:
+        """How many numbers it takes."""
+        kind = self._user.declared.kind
+        return len(self._user.fields) if self._user.together else len(get_args(kind) or (kind,))
+
+    def _one(self, texts: "Conversion", value: str) -> Any:
+        kind = self._user.declared.kind
+        if kind is float and value.strip().lower() == "nan":
+            return math.nan  # the field refuses it, and says what it accepts
+        return texts.value(kind, value)
+
+    def _in_radians(self, value: Any) -> Any:
+        if not self._user.declared.in_degrees:
+            return value
+        return math.radians(value) if math.isfinite(value) else None
+
+    def _refusal(self, value: str, reason: str) -> str:
+        declared = self._user.declared
+        if self._count == 1:
+            return (
+                f"{value} is not an angle; give degrees, such as 90." if declared.in_degrees else f"{reason}."
+            )
+        if self._user.option.lone is None:
+            return f"{value!r} is not a place; give {self._user.placeholder} in metres."
+        return (
+            f"{value!r} is not one or two numbers without units, such as 3{self._user.option.separators[0]}4."
+        )
 
 
 def degrees(value: str | float) -> float:

@@ -246,8 +246,8 @@ def sitl(
     from autopilot_bridge.firmware.simulator import simulator_defaults
     from autopilot_bridge.parameter_files import left_out
     from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
+    from missions.base.given_text import parameters_from_file
     from missions.base.mission import WorldDefaults
-    from missions.base.options import parameters_from_file
 
     context = click.get_current_context()
     chosen = chosen_names(context)

@@ -348,7 +348,7 @@ def file_command() -> StudyCommand:
 
 
 def _study_in(path: Path, pairs: tuple[str, ...]) -> "Study[Any, Any]":
-    from missions.cli.file_command import arguments_of
+    from missions.cli.mission_commands import arguments_of
     from missions.errors import PlanError
     from missions.studies.job import load_study_module
     from missions.studies.study import Study

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.mission_command import Given
+from missions.cli.mission_command import Given, declared_options, made
 from missions.cli.options import FiniteRange
 from missions.cli.study_command import StudyCommand
+from missions.multi_target.options import MultiTargetOptions
 
 if TYPE_CHECKING:
     from missions.studies.study import Study
@@ -47,17 +48,17 @@ def _magnetic_identification(given: Given) -> "Study[Any, Any]":
 
 
 def _magnetic_search(given: Given) -> "Study[Any, Any]":
-    from missions.occupancy.suspect import Identify
+    from missions.occupancy.parameters import Identify
     from missions.studies.magnetic_search import study
 
     return study([Identify(way) for way in given["identify"]], flights=given["flights"])
 
 
 def _multi_target(given: Given) -> "Study[Any, Any]":
-    from missions.search.planner_parameters import Exploration
     from missions.studies.multi_target_search import study
 
-    return study(given["horizon"], given["alpha"], Exploration(given["exploration"]))
+    specified = {name for name, value in given.items() if value is not None}
+    return study(made(MultiTargetOptions, _PLANNING, given, specified).planning)
 
 
 def _vision_search(given: Given) -> "Study[Any, Any]":
@@ -65,6 +66,13 @@ def _vision_search(given: Given) -> "Study[Any, Any]":
 
     return study(given["model"], given["side"], given["passes"])
 
+
+_PLANNING: Final = tuple(
+    option
+    for option in declared_options(MultiTargetOptions)
+    if option.user.path == "planning" and option.name != "beam"
+)
+"""Options of the planner of `fly multi-target`."""
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
     {
@@ -207,23 +215,7 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "Busoniu, as flights on SITL.\n\n"
                 "The proposed planner beside a lawnmower and information alone. The folder gets found.png."
             ),
-            options=(
-                click.Option(
-                    ["--horizon"],
-                    type=click.IntRange(1, 8),
-                    default=3,
-                    help="Steps that are planned; the paper plans 1.",
-                ),
-                click.Option(
-                    ["--alpha"], type=FiniteRange(min=0.0), default=0.3, help="Weight of exploration, nats."
-                ),
-                click.Option(
-                    ["--exploration"],
-                    type=click.Choice(["view", "place"]),
-                    default="view",
-                    help="What a scan sees, or the map at its place (the paper's).",
-                ),
-            ),
+            options=_PLANNING,
             build=_multi_target,
         ),
         "vision-search": StudyCommand(

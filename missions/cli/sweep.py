@@ -135,7 +135,7 @@ def sweep_study(
     Raises:
         click.UsageError, PlanError: an option or a value is not accepted.
     """
-    from missions.base.options import parse_wind
+    from missions.base.given_text import parse_wind
     from missions.library import find_mission
     from missions.runs.limits_before_flight import check_request
     from missions.runs.vehicle_opening import VehicleOpener

@@ -87,7 +87,7 @@ def _air(given: Given, chosen: frozenset[str], file: "WorldSpec | None", default
     """The air with the options' values; what no option gives is the file's."""
     from flightsim.environment import Environment
     from flightsim.wind_profile import WindLaw, WindProfile
-    from missions.base.options import parse_wind
+    from missions.base.given_text import parse_wind
 
     before = Environment() if file is None else file.air
     speed_m_s, from_deg = before.wind_speed_m_s, before.wind_from_deg
@@ -159,7 +159,8 @@ def equipped(
 
 def _target(text: str, tag: int) -> "GroundTargetParameters":
     from flightsim.payload import GroundTargetParameters
-    from missions.worlds.motions import MotionKind, motion_of
+    from missions.worlds.motion_kind import MotionKind
+    from missions.worlds.motions import motion_of
 
     numbers = _numbers(text, "--target", (2, 4))
     speed_m_s, heading_deg = numbers[2:] or (0.0, 0.0)

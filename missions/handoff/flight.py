@@ -12,8 +12,9 @@ from estimators.orbit_target.relative_target import RelativeState
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.handoff.camera import GIMBAL_HZ, GimbalPointing
+from missions.handoff.checks import check_vehicle
 from missions.handoff.operator import TrackOperator
-from missions.handoff.options import HandoffOptions, check_vehicle
+from missions.handoff.options import HandoffOptions
 from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
 from missions.vehicle.gps_switch import GpsSwitch
 from missions.vehicle.limits import FixedWingLimits

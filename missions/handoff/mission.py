@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from missions.base.mission import Debriefing, WorldDefaults
 from missions.base.team_mission import TeamMission
 from missions.flown.camera_picture import PicturesOf
-from missions.handoff.options import HandoffOptions, check_vehicle
+from missions.handoff.checks import check_vehicle
+from missions.handoff.options import HandoffOptions
 from missions.handoff.team import HandoffTeam
 from missions.kind import VehicleKind
 from missions.vehicle.limits import Limits

@@ -1,7 +1,7 @@
 """The embedded world of a handoff: two aircraft with radios and moving-point cameras, and walking targets."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -19,51 +19,23 @@ from flightsim.payload import (
 )
 from flightsim.world_spec import WorldSpec
 from missions.embedded.rendered_points import RenderedPoints
-from missions.errors import PlanError
 from missions.handoff.options import HandoffOptions
+from missions.handoff.walking_targets import PointSource, WalkingTargets
 from missions.worlds.payloads import carrying
 
-__all__ = ["WalkingTargets", "handoff_world"]
+__all__ = ["handoff_world"]
 
 _SIZE_M: Final = 2.0
 _PERSON_M: Final = 1.75
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WalkingTargets:
-    """The targets as they truly are, and how the cameras see them.
-
-    Attributes:
-        count: number of targets (paper: 5).
-        area_m: sides of the area in which they walk, north and east (paper: 140 m by 270 m), around the place
-            that the operator has reported.
-        walk_m_s: least and greatest speed.
-        pixels: the cameras' points are found in rendered pictures, in which the targets are persons;
-            otherwise they come from a model.
-        film: keep all pictures of each camera as a video.
-    """
-
-    count: int = 5
-    area_m: tuple[float, float] = (140.0, 270.0)
-    walk_m_s: tuple[float, float] = (0.8, 2.0)
-    pixels: bool = False
-    film: bool = False
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.count <= 50:
-            raise PlanError(f"`count` {self.count} of targets is not in 1..50")
-        if not all(10.0 <= side <= 10_000.0 for side in self.area_m):
-            raise PlanError(f"`area_m` {self.area_m} is not possible; ask for sides of 10..10000 m")
-        if self.film and not self.pixels:
-            raise PlanError("`film` keeps pictures, and the cameras take none; ask for `camera=pixels`")
-
-    def cameras(self, world: WorldSpec) -> MovingPointParameters:
-        """The moving-point camera of each aircraft."""
-        if not self.pixels:
-            return MovingPointParameters()
-        terrain = world.terrain.made(world.seed) if isinstance(world.terrain, TerrainSpec) else world.terrain
-        reader = RenderedPoints(terrain=terrain, film=self.film)
-        return MovingPointParameters(pixel_rad=reader.sigma, reader=reader)
+def cameras(walking: WalkingTargets, world: WorldSpec) -> MovingPointParameters:
+    """The moving-point camera of each aircraft."""
+    if walking.camera is not PointSource.PIXELS:
+        return MovingPointParameters()
+    terrain = world.terrain.made(world.seed) if isinstance(world.terrain, TerrainSpec) else world.terrain
+    reader = RenderedPoints(terrain=terrain, film=walking.film)
+    return MovingPointParameters(pixel_rad=reader.sigma, reader=reader)
 
 
 def handoff_world(
@@ -78,12 +50,16 @@ def handoff_world(
     """
     walking = walking or WalkingTargets()
     payload = PayloadParameters(
-        gimbal=GimbalParameters(), moving_points=walking.cameras(world), range_radio=RangeRadioParameters()
+        gimbal=GimbalParameters(), moving_points=cameras(walking, world), range_radio=RangeRadioParameters()
     )
     world = carrying(world, payload)
     if world.targets:
         return world
-    size_m, shape = (_PERSON_M, TargetShape.PERSON) if walking.pixels else (_SIZE_M, TargetShape.BALL)
+    size_m, shape = (
+        (_PERSON_M, TargetShape.PERSON)
+        if walking.camera is PointSource.PIXELS
+        else (_SIZE_M, TargetShape.BALL)
+    )
     rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("handoff", "targets")))
     north_m, east_m = options.target_ne_m
     half_n, half_e = 0.5 * walking.area_m[0], 0.5 * walking.area_m[1]

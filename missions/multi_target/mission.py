@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from missions.base.mission import Debriefing, WorldDefaults
 from missions.base.team_mission import TeamMission
-from missions.multi_target.options import MultiTargetOptions, check_vehicle
+from missions.multi_target.for_vehicle import check_vehicle, for_vehicle
+from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.team import TargetSearchTeam
 from missions.vehicle.limits import Limits
 
@@ -23,12 +24,15 @@ class MultiTargetMission(TeamMission[MultiTargetOptions, TargetSearchTeam]):
     lands_without_sensors = True
     world_defaults = WorldDefaults(model="iris")
 
+    def adapted(self, options: MultiTargetOptions, limits: Limits) -> MultiTargetOptions:
+        return for_vehicle(options, limits)
+
     def check(self, options: MultiTargetOptions, limits: Limits) -> None:
         self.refuse_arguments(options)
         check_vehicle(options, limits)
 
     def estimator_settings(self, options: MultiTargetOptions) -> Mapping[str, float | str]:
-        parameters = options.estimator_parameters
+        parameters = options.estimator
         settings = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
         return {**settings, "centre_vehicle": 1 if options.vehicles > 1 else 0}
 

@@ -76,7 +76,7 @@ def planner_of(options: MultiTargetOptions) -> SearchPlanner:
         return SweepPlanner(path, parameters.step_m)
     heading_rad = HEADING_RAD if options.turn_limit_rad is None else None  # an aircraft flies where it looks
     return ExploringPlanner(
-        parameters, area, heading_rad=heading_rad, seed=options.search_seed * 256 + options.index
+        parameters, area, heading_rad=heading_rad, seed=options.estimator.seed * 256 + options.index
     )
 
 

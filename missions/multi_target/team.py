@@ -5,7 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from estimators.multi_target.estimate import TargetRow
-from missions.multi_target.options import MultiTargetOptions, check_vehicle
+from missions.multi_target.for_vehicle import check_vehicle
+from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.search import TargetSearch
 from missions.multi_target.sensor_watch import SensorWatch
 from missions.search.team import SearchTeam
@@ -34,7 +35,7 @@ class TargetSearchTeam(SearchTeam[MultiTargetOptions]):
     def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[MultiTargetOptions]) -> None:
         super().__init__(vehicles, options, check=check_vehicle)
         centre = vehicles[0].system_id if len(vehicles) > 1 else 0
-        parameters = replace(options[0].estimator_parameters, centre_vehicle=centre)
+        parameters = replace(options[0].estimator, centre_vehicle=centre)
         self.watch = SensorWatch(vehicles, parameters, self._on_scan)
         self.search = TargetSearch(self.watch.belief, options)
 

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from estimators.multi_target.parameters import REACH
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import (
     GroundTargetParameters,
@@ -22,10 +21,11 @@ from flightsim.payload import (
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.multi_target.options import MultiTargetOptions
+from missions.multi_target.target_field import TargetField
 from missions.search.area import Area
 from missions.worlds.payloads import carrying
 
-__all__ = ["TargetField", "multi_target_world", "terrain_targets_world"]
+__all__ = ["multi_target_world", "places_of", "terrain_targets_world"]
 
 MAX_TARGETS: Final = 250
 _APART_M: Final = 6.0  # least distance of two targets of a cluster
@@ -38,60 +38,31 @@ _TERRAIN_APART_M: Final = 90.0
 _TERRAIN_EDGE_M: Final = 35.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TargetField:
-    """The true targets.
+def places_of(field: TargetField, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Places of the targets: the clusters have equal numbers, apart from a remainder.
 
-    Attributes:
-        count: number of targets (paper: 18, and 14).
-        clusters: number of clusters; 0: the targets are uniform over the area.
-        cluster_sigma_m: standard deviation of a cluster, per axis.
-        speed_m_s: speed of targets that walk about in the area; 0: they stay where they are.
+    Raises:
+        PlanError: the area is too small for them.
     """
+    return _around(_centres(field.clusters, area, rng), field.count, field.cluster_sigma_m, area, rng)
 
-    count: int = 18
-    clusters: int = 3
-    cluster_sigma_m: float = 14.0
-    speed_m_s: float = 0.0
 
-    def __post_init__(self) -> None:
-        if not 0 <= self.count <= MAX_TARGETS:
-            raise PlanError(f"`targets` {self.count} is not in 0..{MAX_TARGETS}")
-        if not 0 <= self.clusters <= max(self.count, 0):
-            raise PlanError(f"`clusters` {self.clusters} is not in 0..{self.count}, the number of targets")
-        if not (math.isfinite(self.cluster_sigma_m) and self.cluster_sigma_m > 0.0):
-            raise PlanError(
-                f"`cluster_sigma_m` {self.cluster_sigma_m:g} m is not possible; ask for more than 0"
-            )
-        if not 0.0 <= self.speed_m_s <= 15.0:
-            raise PlanError(f"`target_speed_m_s` {self.speed_m_s:g} m/s is not in 0..15 m/s")
-
-    def places(self, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
-        """Places of the targets: the clusters have equal numbers, apart from a remainder.
-
-        Raises:
-            PlanError: the area is too small for them.
-        """
-        return _around(self._centres(area, rng), self.count, self.cluster_sigma_m, area, rng)
-
-    def _centres(self, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
-        apart_m = _CENTRES_APART * min(area.height_m, area.width_m)
-        edge_n, edge_e = _EDGE * area.height_m, _EDGE * area.width_m
-        for shrink in range(_TRIES):
-            centres: list[tuple[float, float]] = []
-            for _ in range(self.clusters):
-                centres.append(
-                    (
-                        float(rng.uniform(area.south_m + edge_n, area.north_m - edge_n)),
-                        float(rng.uniform(area.west_m + edge_e, area.east_m - edge_e)),
-                    )
+def _centres(clusters: int, area: Area, rng: np.random.Generator) -> list[tuple[float, float]]:
+    apart_m = _CENTRES_APART * min(area.height_m, area.width_m)
+    edge_n, edge_e = _EDGE * area.height_m, _EDGE * area.width_m
+    for shrink in range(_TRIES):
+        centres: list[tuple[float, float]] = []
+        for _ in range(clusters):
+            centres.append(
+                (
+                    float(rng.uniform(area.south_m + edge_n, area.north_m - edge_n)),
+                    float(rng.uniform(area.west_m + edge_e, area.east_m - edge_e)),
                 )
-            nearest = min(
-                (math.dist(a, b) for k, a in enumerate(centres) for b in centres[:k]), default=math.inf
             )
-            if nearest >= apart_m * 0.995**shrink:
-                return centres
-        raise AssertionError("the distance falls until the centres have room")
+        nearest = min((math.dist(a, b) for k, a in enumerate(centres) for b in centres[:k]), default=math.inf)
+        if nearest >= apart_m * 0.995**shrink:
+            return centres
+    raise AssertionError("the distance falls until the centres have room")
 
 
 def multi_target_world(
@@ -99,9 +70,7 @@ def multi_target_world(
     options: MultiTargetOptions,
     field: TargetField | None = None,
     *,
-    terrain_relief_m: float | None = None,
     disturbances: tuple[ScanDisturbance, ...] = (),
-    scan_period_s: float = 1.0,
 ) -> WorldSpec:
     """The world of a search: a target sensor on each vehicle, with the properties that the operator knows,
     and targets.
@@ -110,30 +79,28 @@ def multi_target_world(
         world: the rest of the world; targets that it has stay, and no other is added.
         options: the search.
         field: the targets, drawn from the world's seed.
-        terrain_relief_m: standard deviation of generated terrain that hides targets; None: level ground.
         disturbances: of the sensors.
-        scan_period_s: time between scans.
 
     Raises:
         PlanError: targets or sensor are impossible.
     """
-    area = options.area
+    field, area, known = field or TargetField(), options.area, options.estimator
     try:
         sensor = TargetSensorParameters(
-            period_s=scan_period_s,
-            gain=options.gain,
-            forward_scale_m=options.field_of_view_m[0],
-            right_scale_m=options.field_of_view_m[1],
-            reach_m=REACH * max(options.field_of_view_m),
-            range_sigma_m=options.range_sigma_m,
-            bearing_sigma_rad=options.bearing_sigma_rad,
-            clutter_per_scan=options.clutter_per_scan,
+            period_s=field.scan_period_s,
+            gain=known.gain,
+            forward_scale_m=known.forward_scale_m,
+            right_scale_m=known.right_scale_m,
+            reach_m=known.range_m,
+            range_sigma_m=known.range_sigma_m,
+            bearing_sigma_rad=known.bearing_sigma_rad,
+            clutter_per_scan=known.clutter_per_scan,
             disturbances=disturbances,
         )
     except ValueError as error:
         raise PlanError(f"the target sensor can't be made: {error}") from None
     world = carrying(world, PayloadParameters(target_sensor=sensor))
-    if terrain_relief_m is not None and world.terrain is None:
+    if field.terrain_relief_m is not None and world.terrain is None:
         margin_m = sensor.reach_m
         try:
             terrain = TerrainSpec(
@@ -141,18 +108,17 @@ def multi_target_world(
                 west_m=area.west_m - margin_m,
                 north_m=area.north_m + margin_m,
                 east_m=area.east_m + margin_m,
-                relief_m=terrain_relief_m,
+                relief_m=field.terrain_relief_m,
             )
         except ValueError as error:
             raise PlanError(f"the terrain can't be made: {error}") from None
         world = replace(world, terrain=terrain)
     if world.targets:
         return world
-    field = field or TargetField()
     rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("multi_target", "field")))
     targets = tuple(
         GroundTargetParameters(motion=_motion(place, area, field.speed_m_s))
-        for place in field.places(area, rng)
+        for place in places_of(field, area, rng)
     )
     return replace(world, targets=targets)
 

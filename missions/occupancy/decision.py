@@ -7,32 +7,7 @@ from dataclasses import dataclass
 from estimators.occupancy.occupancy_map import OccupancyMap
 from estimators.tracking.grid import Cell
 from missions.errors import PlanError
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DecisionParameters:
-    """Parameters of one searcher's decisions.
-
-    Attributes:
-        neighbourhood: number of cells considered in each direction; 1 gives the paper's eight cells.
-        heading_penalty: alpha of equation 9, in mean prior scores of a cell for a turn by pi: large for
-            aircraft with wide turns, small for a helicopter; more than 0, so that equal scores can be
-            decided.
-
-    Raises:
-        PlanError: a value is out of its range.
-    """
-
-    neighbourhood: int = 1
-    heading_penalty: float = 0.3
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.neighbourhood <= 20:
-            raise PlanError(f"`neighbourhood` {self.neighbourhood} is not in 1..20 cells")
-        if not (math.isfinite(self.heading_penalty) and self.heading_penalty > 0.0):
-            raise PlanError(
-                f"`heading_penalty` {self.heading_penalty:g} is not possible; ask for more than 0"
-            )
+from missions.occupancy.parameters import DecisionParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,8 @@ from estimators.occupancy.detection import MapError
 from estimators.occupancy.placed_readings import PlacedReading
 from estimators.tracking.grid import GridLayout
 from missions.occupancy.assignment import PassAssignment
-from missions.occupancy.suspect import ACCEPT, Identify, Suspect, Verdict
+from missions.occupancy.parameters import Identify
+from missions.occupancy.suspect import ACCEPT, Suspect, Verdict
 
 __all__ = ["Investigation"]
 

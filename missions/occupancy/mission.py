@@ -9,7 +9,8 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from missions.base.mission import Debriefing, WorldDefaults
 from missions.base.team_mission import TeamMission
 from missions.errors import PlanError
-from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle, read_map
+from missions.occupancy.checks import check_map, check_reach, check_vehicle, for_vehicle, read_map
+from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.team import SearchTeam
 from missions.vehicle.limits import Limits
 
@@ -25,6 +26,9 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
     lands_without_sensors = True
     world_defaults = WorldDefaults(model="aerosonde", wind="5@270", turbulence="light")
 
+    def adapted(self, options: OccupancyOptions, limits: Limits) -> OccupancyOptions:
+        return for_vehicle(options, limits)
+
     def check(self, options: OccupancyOptions, limits: Limits) -> None:
         self.refuse_arguments(options)
         check_vehicle(options, limits)
@@ -39,15 +43,11 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
         return options if options.map_file is not None else replace(options, map_file=str(published))
 
     def estimator_settings(self, options: OccupancyOptions) -> Mapping[str, float | str]:
-        known: dict[str, float | str] = {
-            "threshold_nt": options.threshold_nt,
-            "noise_nt": options.noise_nt,
-            "particles": options.particles,
-            "targets": ",".join(options.targets),
-            "false_anomalies": ",".join(options.false_anomalies),
-        }
-        if options.map_error_nt is not None:
-            known["map_error_nt"] = options.map_error_nt
+        known: dict[str, float | str]
+        names = ("threshold_nt", "noise_nt", "particles", "map_error_nt")
+        of = options.identification
+        known = {name: value for name in names if (value := getattr(of, name)) is not None}
+        known |= {"targets": ",".join(of.targets), "false_anomalies": ",".join(of.false_anomalies)}
         if options.map_file is not None:
             known["map_file"] = options.map_file
         return known

@@ -4,7 +4,6 @@ report to it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -16,49 +15,16 @@ from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.occupancy_map import OccupancyMap
 from estimators.occupancy.placed_readings import PlacedReading
 from estimators.tracking.grid import Cell, GridLayout
-from missions.errors import PlanError
 from missions.occupancy.candidate import Candidate
-from missions.occupancy.decision import Decision, DecisionParameters, decide
+from missions.occupancy.decision import Decision, decide
 from missions.occupancy.investigation import Investigation
+from missions.occupancy.parameters import DecisionParameters, SearchParameters
 from missions.occupancy.snapshots import Snapshot, Snapshots
 from missions.occupancy.suspect import Suspect, Verdict
 
 Array = NDArray[np.float64]
 
 _STEP_M: Final = 5.0  # shortest stretch of track for an update
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SearchParameters:
-    """Parameters of a team's search.
-
-    Attributes:
-        detection: model of the detection of a target in a pass.
-        raise_radius_m: scores are raised within this distance of an anomaly.
-        raise_height: increase of the scores at its centre, in mean prior scores.
-        confirmations: number of passes that must detect an anomaly at one place before it counts as the
-            target.
-        same_place_m: anomalies within this distance count as one.
-        noise_nt: standard deviation of a reading, for the fit of a target's place.
-
-    Raises:
-        PlanError: a value is out of its range.
-    """
-
-    detection: DetectionModel = field(default_factory=DetectionModel)
-    raise_radius_m: float = 300.0
-    raise_height: float = 4.0
-    confirmations: int = 2
-    same_place_m: float = 180.0
-    noise_nt: float = 0.5
-
-    def __post_init__(self) -> None:
-        for name in ("raise_radius_m", "raise_height", "same_place_m", "noise_nt"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise PlanError(f"`{name}` {value:g} is not more than 0")
-        if self.confirmations < 1:
-            raise PlanError(f"`confirmations` {self.confirmations} is not 1 or more")
 
 
 class Search:
@@ -79,6 +45,7 @@ class Search:
         parameters: SearchParameters,
         decisions: Sequence[DecisionParameters],
         *,
+        noise_nt: float,
         prior: Array | None = None,
         investigation: Investigation | None = None,
         snapshot_interval_s: float = 2.0,
@@ -89,12 +56,17 @@ class Search:
             layout: the cells.
             parameters: parameters of the team's search.
             decisions: parameters of each searcher's decisions.
+            noise_nt: standard deviation of a reading, for the fit of a target's place.
             prior: see `OccupancyMap`.
             investigation: see the attribute.
             snapshot_interval_s: interval between the maps that are kept for pictures.
         """
         self.map = OccupancyMap(layout, prior)
         self.parameters = parameters
+        self._noise_nt = noise_nt
+        self._detection = DetectionModel(
+            probability_overhead=parameters.detection_probability, range_m=parameters.detection_range_m
+        )
         self.investigation = investigation
         self.candidates: list[Candidate | Suspect] = []
         self.found: Candidate | Suspect | None = None
@@ -124,7 +96,7 @@ class Search:
             self._searched[searcher] = place
         elif math.dist(last, place) >= _STEP_M:
             self._searched[searcher] = place
-            self.map.search(last, place, self.parameters.detection)
+            self.map.search(last, place, self._detection)
             self.detection_curve.append((time_us, self.map.probability_of_detection))
         if self._snapshots.due(time_us):
             self._keep_snapshot(time_us, event=False)
@@ -214,7 +186,7 @@ class Search:
             self.candidates.append(suspect)
         parameters = self.parameters
         if suspect.verdict is Verdict.DISMISSED:
-            self.map.dismiss(north_m, east_m, parameters.detection)
+            self.map.dismiss(north_m, east_m, self._detection)
         else:
             self.map.raise_around(
                 north_m,
@@ -264,6 +236,6 @@ class Search:
         near = [(math.dist(candidate.place_ne_m, place), index) for index, candidate in enumerate(known)]
         if near and min(near)[0] <= self.parameters.same_place_m:
             return known[min(near)[1]]
-        candidate = Candidate(anomalies=[], noise_nt=self.parameters.noise_nt)
+        candidate = Candidate(anomalies=[], noise_nt=self._noise_nt)
         self.candidates.append(candidate)
         return candidate

@@ -8,21 +8,10 @@ from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.samples import Place
 from estimators.occupancy import detection
 
-__all__ = ["ACCEPT", "Identify", "Suspect", "Verdict"]
+__all__ = ["ACCEPT", "Suspect", "Verdict"]
 
 ACCEPT: Final = 0.97
 """From this probability on a suspect is the target, if its place is known."""
-
-
-class Identify(StrEnum):
-    """How a search decides that an anomaly is the target."""
-
-    THRESHOLD = "threshold"
-    """Enough passes have detected an anomaly at one place."""
-    TRACE = "trace"
-    """By a classifier on the trace of the paper's confidence."""
-    BAYES = "bayes"
-    """By the evidence of all classes."""
 
 
 class Verdict(StrEnum):

@@ -12,13 +12,14 @@ from estimators.occupancy.placed_readings import PlacedReading
 from estimators.occupancy.survey_map import SurveyMap
 from missions.errors import MissionError
 from missions.kind import VehicleKind
+from missions.occupancy.checks import check_map, check_reach, check_vehicle, layout_of, stated_map_error
 from missions.occupancy.field_watch import FieldWatch
 from missions.occupancy.investigation import Investigation
 from missions.occupancy.noise_check import require_quiet
-from missions.occupancy.options import OccupancyOptions, check_map, check_reach, check_vehicle
+from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.parameters import Identify
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
-from missions.occupancy.suspect import Identify
 from missions.teams.layers import Layers
 from missions.teams.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
@@ -82,9 +83,10 @@ class SearchTeam:
         first = options[0]
         check_map(first, survey_map)
         self.search = Search(
-            first.layout,
-            first.search_parameters,
+            layout_of(first),
+            first.search,
             [own.decision_parameters for own in options],
+            noise_nt=first.identification.noise_nt,
             investigation=investigation_of(options, survey_map),
         )
         self.searchers = [
@@ -104,7 +106,7 @@ class SearchTeam:
     @property
     def map_error(self) -> MapError:
         """Error of the published map that the team uses."""
-        return self._options[0].map_error(self._map)
+        return stated_map_error(self._options[0], self._map)
 
     @property
     def stopped(self) -> str:
@@ -145,7 +147,7 @@ class SearchTeam:
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
         check_reach(own, limits, self._frame, vehicle.home)
-        await require_quiet(vehicle, threshold_nt=own.threshold_nt)
+        await require_quiet(vehicle, threshold_nt=own.identification.threshold_nt)
         if vehicle.kind is VehicleKind.FIXED_WING:
             await vehicle.wing.prepare_piloting()
 
@@ -204,9 +206,9 @@ class SearchTeam:
             self._vehicles[index],
             self._map,
             AnomalyDetector(
-                threshold_nt=self._options[index].threshold_nt,
-                noise_nt=self._options[index].noise_nt,
-                map_error=self._options[index].map_error(self._map),
+                threshold_nt=self._options[index].identification.threshold_nt,
+                noise_nt=self._options[index].identification.noise_nt,
+                map_error=self.map_error,
             ),
             on_sample=on_sample,
             on_anomaly=on_anomaly,
@@ -237,15 +239,15 @@ def investigation_of(options: Sequence[OccupancyOptions], survey_map: SurveyMap)
     first = options[0]
     if first.identify is Identify.THRESHOLD:
         return None
-    map_error = first.map_error(survey_map)
+    map_error = stated_map_error(first, survey_map)
     return Investigation(
         first.identify,
         Identifier(
             first.identification, map_error=map_error, field_ned=field_direction(survey_map.home, _FIELD_YEAR)
         ),
         searchers=len(options),
-        layout=first.layout,
-        noise_nt=first.noise_nt,
+        layout=layout_of(first),
+        noise_nt=first.identification.noise_nt,
         map_error=map_error,
     )
 

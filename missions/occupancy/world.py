@@ -10,6 +10,8 @@ import numpy as np
 from flightsim.payload import DipoleSignature, GaussianSignature, InducedDipole, MagneticSpec
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
+from missions.occupancy.checks import layout_of
+from missions.occupancy.magnetic_target import MagneticTarget
 from missions.occupancy.options import OccupancyOptions
 from missions.worlds.payloads import MAGNETOMETER, carrying
 
@@ -21,31 +23,17 @@ _APART_M: Final = 500.0  # between anomalies
 _PLACE_TRIES: Final = 1000
 _LEAST_MOMENT_A_M2: Final = 3e4
 _MOST_MOMENT_A_M2: Final = 1.2e5
-_LARGEST_DEPTH_M: Final = 1000.0
 
 
 def occupancy_world(
-    world: WorldSpec,
-    options: OccupancyOptions,
-    *,
-    target_ne_m: tuple[float, float] | None = None,
-    amplitude_nt: float = 30.0,
-    sigma_along_m: float = 80.0,
-    sigma_across_m: float = 60.0,
-    moment_a_m2: float | None = None,
-    depth_m: float = 10.0,
-    false_count: int = 0,
+    world: WorldSpec, options: OccupancyOptions, hidden: MagneticTarget | None = None
 ) -> WorldSpec:
     """The world of a search with an occupancy map: survey magnetometers, and a field with a target in it.
 
     Args:
         world: the rest of the world; a magnetic field that it has stays as it is.
         options: the search. Its map is the world's; without one, a map is generated around the area.
-        target_ne_m: place of the target, from the map's home; None: drawn from the seed.
-        amplitude_nt, sigma_along_m, sigma_across_m: Gaussian signature of the target.
-        moment_a_m2, depth_m: moment of a target that is a dipole along the Earth's field, and its depth below
-            home; None: the target is a Gaussian.
-        false_count: number of boats and wrecks besides the target, drawn from the seed.
+        hidden: the target, and what else lies in the area.
 
     Raises:
         PlanError: a target that is impossible, outside the area, or too weak to be found.
@@ -53,18 +41,21 @@ def occupancy_world(
     world = carrying(world, MAGNETOMETER)
     if world.magnetic_field is not None:
         return world
-    _check_signature(options, amplitude_nt, sigma_along_m, sigma_across_m, moment_a_m2, depth_m)
-    (north_m, east_m), orientation_rad = drawn_target(options, world.seed, target_ne_m)
+    hidden = hidden or MagneticTarget()
+    _check_signature(options, hidden)
+    (north_m, east_m), orientation_rad = drawn_target(options, world.seed, hidden.place_ne_m)
     signature: GaussianSignature | InducedDipole
-    if moment_a_m2 is not None:
-        signature = InducedDipole(north_m=north_m, east_m=east_m, moment_a_m2=moment_a_m2, depth_m=depth_m)
+    if hidden.moment_a_m2 is not None:
+        signature = InducedDipole(
+            north_m=north_m, east_m=east_m, moment_a_m2=hidden.moment_a_m2, depth_m=hidden.depth_m
+        )
     else:
         signature = GaussianSignature(
             north_m=north_m,
             east_m=east_m,
-            amplitude_nt=amplitude_nt,
-            sigma_along_m=sigma_along_m,
-            sigma_across_m=sigma_across_m,
+            amplitude_nt=hidden.amplitude_nt,
+            sigma_along_m=hidden.sigma_along_m,
+            sigma_across_m=hidden.sigma_across_m,
             heading_rad=orientation_rad,
         )
     centre_n_m, centre_e_m = options.area_ne_m
@@ -74,7 +65,10 @@ def occupancy_world(
         width_m=options.width_m + 2.0 * (abs(centre_e_m) + margin_m),
         height_m=options.height_m + 2.0 * (abs(centre_n_m) + margin_m),
         survey_height_m=options.altitude_m,
-        signatures=(signature, *drawn_false_anomalies(options, world.seed, false_count, (north_m, east_m))),
+        signatures=(
+            signature,
+            *drawn_false_anomalies(options, world.seed, hidden.false_count, (north_m, east_m)),
+        ),
     )
     return replace(world, magnetic_field=field)
 
@@ -91,7 +85,7 @@ def drawn_false_anomalies(
         PlanError: the area is too small for so many.
     """
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_FALSE_STREAM,)))
-    layout = options.layout
+    layout = layout_of(options)
     places = [target_ne_m]
     found: list[DipoleSignature | GaussianSignature] = []
     for number in range(count):
@@ -132,32 +126,17 @@ def drawn_false_anomalies(
     return tuple(found)
 
 
-def _check_signature(
-    options: OccupancyOptions,
-    amplitude_nt: float,
-    sigma_along_m: float,
-    sigma_across_m: float,
-    moment_a_m2: float | None,
-    depth_m: float,
-) -> None:
-    for name, value, unit in (
-        ("sigma_along_m", sigma_along_m, "m"),
-        ("sigma_across_m", sigma_across_m, "m"),
-        ("moment_a_m2", moment_a_m2, "A m2"),
-    ):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise PlanError(f"`{name}` {value:g} {unit} of the target is not possible; ask for more than 0")
-    if not (math.isfinite(amplitude_nt) and abs(amplitude_nt) > options.threshold_nt):
+def _check_signature(options: OccupancyOptions, hidden: MagneticTarget) -> None:
+    threshold_nt = options.identification.threshold_nt
+    if not abs(hidden.amplitude_nt) > threshold_nt:
         raise PlanError(
-            f"`amplitude_nt` {amplitude_nt:g} nT of the target is not beyond `threshold_nt` "
-            f"{options.threshold_nt:g} nT: no pass could see it; lower the threshold"
+            f"`amplitude_nt` {hidden.amplitude_nt:g} nT of the target is not beyond `threshold_nt` "
+            f"{threshold_nt:g} nT: no pass could see it; lower the threshold"
         )
-    if not (math.isfinite(depth_m) and abs(depth_m) <= _LARGEST_DEPTH_M):
-        raise PlanError(f"`depth_m` {depth_m:g} m of the target is not within {_LARGEST_DEPTH_M:g} m of home")
-    if moment_a_m2 is not None and -depth_m >= options.altitude_m:
+    if hidden.moment_a_m2 is not None and -hidden.depth_m >= options.altitude_m:
         raise PlanError(
-            f"`depth_m` {depth_m:g} m puts the target {-depth_m:g} m above home, and the vehicles fly at "
-            f"`altitude_m` {options.altitude_m:g} m; ask for a target below them"
+            f"`depth_m` {hidden.depth_m:g} m puts the target {-hidden.depth_m:g} m above home, and the "
+            f"vehicles fly at `altitude_m` {options.altitude_m:g} m; ask for a target below them"
         )
 
 
@@ -174,7 +153,7 @@ def drawn_target(
     """
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_TARGET_STREAM,)))
     north, east, turn = (float(value) for value in rng.uniform(-0.5, 0.5, 3))
-    layout = options.layout
+    layout = layout_of(options)
     if target_ne_m is not None:
         if not layout.contains(*target_ne_m):
             raise PlanError(

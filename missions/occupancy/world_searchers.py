@@ -18,6 +18,8 @@ from flightsim.home import Home
 from flightsim.payload import MagneticField, MagneticSpec, magnetic_field_of
 from flightsim.world_spec import WorldSpec
 from missions.embedded.magnetic_encounters import as_published
+from missions.occupancy.checks import layout_of, stated_map_error
+from missions.occupancy.magnetic_target import MagneticTarget
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
@@ -83,9 +85,9 @@ class _Point:
         self._height_m = options.own_altitude_m
         self._pilot = Pilot(search, index, start_ne_m=start_place(options))
         self._detector = AnomalyDetector(
-            threshold_nt=options.threshold_nt,
-            noise_nt=options.noise_nt,
-            map_error=options.map_error(survey_map),
+            threshold_nt=options.identification.threshold_nt,
+            noise_nt=options.identification.noise_nt,
+            map_error=stated_map_error(options, survey_map),
         )
         self._north_m, self._east_m = 0.0, _APART_M * index
         self._heading_rad = self._wanted_rad = 0.0
@@ -153,15 +155,16 @@ def search_with_points(options: OccupancyOptions, seed: int, *, false_count: int
         for k in range(options.vehicles)
     ]
     spec = occupancy_world(
-        WorldSpec.of_team(options.vehicles, seed=seed), options, false_count=false_count
+        WorldSpec.of_team(options.vehicles, seed=seed), options, MagneticTarget(false_count=false_count)
     ).magnetic_field
     assert isinstance(spec, MagneticSpec)
     field, published = magnetic_field_of(spec, home=Home(), seed=seed, decimal_year=_YEAR)
     survey_map = as_published(published)
     search = Search(
-        options.layout,
-        options.search_parameters,
+        layout_of(options),
+        options.search,
         [own.decision_parameters for own in team],
+        noise_nt=options.identification.noise_nt,
         investigation=investigation_of(team, survey_map),
     )
     points = [

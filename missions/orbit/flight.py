@@ -9,6 +9,7 @@ from typing import Final
 from estimators.orbit_target.tracker import TargetStatus
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
+from missions.orbit.checks import airspeed_of, check_camera
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
 from missions.orbit.target_observer import TICK_HZ, TargetObserver
@@ -73,7 +74,7 @@ class OrbitFlight:
         vehicle, options = self._vehicle, self._options
         self._begin("preparation")
         pitch_min, pitch_max, _, _ = await vehicle.payload.request_gimbal_information()
-        options.check_camera(self._limits, pitch_min, pitch_max)
+        check_camera(options, self._limits, pitch_min, pitch_max)
         if options.gps_fault:
             self._gps = await GpsSwitch.find(vehicle, options.gps_off)
         vehicle.payload.take_gimbal_control()
@@ -110,7 +111,7 @@ class OrbitFlight:
         """
         vehicle, options = self._vehicle, self._options
         course = options.entry_course_rad
-        radius_m = max(80.0, self._limits.turn_radius_m(options.airspeed(self._limits)))
+        radius_m = max(80.0, self._limits.turn_radius_m(airspeed_of(options, self._limits)))
         home = vehicle.home
         reached_us: list[int] = []
         await self._circle_for_entry(home, course, radius_m)

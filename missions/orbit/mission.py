@@ -7,6 +7,7 @@ from typing import Any, Final
 from missions.base.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.errors import PlanError
 from missions.kind import VehicleKind
+from missions.orbit.checks import check_vehicle
 from missions.orbit.options import WANDERING_M, OrbitOptions
 from missions.orbit.score import ORBIT
 from missions.vehicle.limits import FixedWingLimits, Limits
@@ -56,7 +57,7 @@ class OrbitMission(Mission[OrbitOptions]):
     def check(self, options: OrbitOptions, limits: Limits) -> None:
         for name in options.arguments:
             raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
-        options.check(limits)
+        check_vehicle(options, limits)
 
     def estimator_settings(self, options: OrbitOptions) -> Mapping[str, float | str]:
         north_m, east_m = options.target_ne_m
@@ -76,7 +77,7 @@ class OrbitMission(Mission[OrbitOptions]):
         from missions.orbit.flight import OrbitFlight
 
         limits = await vehicle.limits(options.own_altitude_m)
-        options.check(limits)
+        check_vehicle(options, limits)
         assert isinstance(limits, FixedWingLimits)
         await OrbitFlight(vehicle, options, limits).fly()
 

@@ -7,8 +7,11 @@ from typing import Final
 from flightsim.payload import GroundTargetParameters
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
-from missions.orbit.options import LEAST_DEPRESSION_RAD, WANDERING_M, OrbitOptions
-from missions.worlds.motions import MotionKind, motion_of
+from missions.orbit.checks import LEAST_DEPRESSION_RAD
+from missions.orbit.options import WANDERING_M, OrbitOptions
+from missions.orbit.target_motion import TargetMotion
+from missions.worlds.motion_kind import MotionKind
+from missions.worlds.motions import motion_of
 from missions.worlds.payloads import CAMERA, carrying
 
 _TAG_PX: Final = 24.0  # size seen from above; half of the tags with 11 pixels are read
@@ -17,18 +20,18 @@ _FOCAL_PX: Final = 1108.5  # focal length of the camera, 1280 pixels over 60 deg
 _LEAST_TAG_M: Final = 4.0
 
 
-def orbit_world(world: WorldSpec, options: OrbitOptions, *, motion: MotionKind | None = None) -> WorldSpec:
+def orbit_world(world: WorldSpec, options: OrbitOptions, target: TargetMotion | None = None) -> WorldSpec:
     """The world of an orbit: cameras, and a target with a tag that is where the operator reports it.
 
     Args:
         world: the rest of the world; targets that it has stay, and no other is added.
         options: what the operator reports.
-        motion: how the target really moves; None: straight on if its reported speed is not 0, else static.
+        target: how the target really moves.
 
     Raises:
         PlanError: the motion does not go with the reported speed.
     """
-    speed_m_s = options.target_speed_m_s
+    speed_m_s, motion = options.target_speed_m_s, (target or TargetMotion()).kind
     if motion is None:
         motion = MotionKind.STRAIGHT if speed_m_s > 0.0 else MotionKind.STATIC
     if motion is not MotionKind.STATIC and speed_m_s == 0.0:
@@ -38,7 +41,7 @@ def orbit_world(world: WorldSpec, options: OrbitOptions, *, motion: MotionKind |
     world = carrying(world, CAMERA)
     if world.targets:
         return world
-    target = GroundTargetParameters(
+    tagged = GroundTargetParameters(
         motion=motion_of(
             motion,
             place_ne_m=options.target_ne_m,
@@ -49,7 +52,7 @@ def orbit_world(world: WorldSpec, options: OrbitOptions, *, motion: MotionKind |
         size_m=_tag_size_m(options),
         tag_id=0,
     )
-    return replace(world, targets=(target,))
+    return replace(world, targets=(tagged,))
 
 
 def _tag_size_m(options: OrbitOptions) -> float:

@@ -14,6 +14,7 @@ from missions.pattern_search.flight import (
     pattern_items,
     pattern_outline,
 )
+from missions.pattern_search.for_vehicle import flight_for_vehicle
 from missions.patterns import Curve
 from missions.planning.outline import Outline
 from missions.vehicle.limits import FixedWingLimits, Limits
@@ -61,7 +62,7 @@ class PatternMission(Mission[FlightOptions]):
         self._size = size
 
     def adapted(self, options: FlightOptions, limits: Limits) -> FlightOptions:
-        options = options.for_vehicle(limits)
+        options = flight_for_vehicle(options, limits)
         return self._size(options, limits) if isinstance(limits, FixedWingLimits) else options
 
     def check(self, options: FlightOptions, limits: Limits) -> None:

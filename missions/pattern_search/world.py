@@ -5,9 +5,7 @@ not give is chosen here: the lens (70 degrees across, a mild barrel), the frame 
 the speed of the target.
 """
 
-import math
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,67 +14,40 @@ from flightsim.payload import GroundTargetParameters, PayloadParameters, RandomW
 from flightsim.world_spec import WorldSpec
 from missions.base.options import FlightOptions
 from missions.errors import PlanError
+from missions.pattern_search.tag_target import TagTarget
 from missions.worlds.payloads import carrying
 from missions.worlds.search_camera import search_camera
 
-__all__ = ["TagTarget", "tag_search_world"]
-
-_FREE_M: Final = 10.0
-_MAX_SPEED_M_S: Final = 15.0
+__all__ = ["motion_of", "tag_search_world"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TagTarget:
-    """The target: a vehicle with a tag on top.
-
-    Attributes:
-        speed_m_s: of its random walk in the searched area; 0: it stays where it is.
-        size_m: side of the tag's black square.
-        free_m: side of the square around the centre in which it does not start (paper: 10 m).
+def motion_of(target: TagTarget, options: FlightOptions, rng: np.random.Generator) -> TargetMotion:
+    """Its motion in the area of a pattern: the start is uniform in it, but for the free square.
 
     Raises:
-        PlanError: a value is not possible.
+        PlanError: the area is not larger than the free square.
     """
-
-    speed_m_s: float = 0.3
-    size_m: float = 0.3
-    free_m: float = _FREE_M
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.speed_m_s <= _MAX_SPEED_M_S:
-            raise PlanError(f"`target_speed_m_s` {self.speed_m_s:g} m/s is not in 0..{_MAX_SPEED_M_S:g} m/s")
-        if not 0.01 <= self.size_m <= 100.0:
-            raise PlanError(f"`tag_size_m` {self.size_m:g} m is not in 0.01..100 m")
-        if not (math.isfinite(self.free_m) and self.free_m >= 0.0):
-            raise PlanError(f"free_m {self.free_m:g} m is not possible; ask for 0 or more")
-
-    def motion(self, options: FlightOptions, rng: np.random.Generator) -> TargetMotion:
-        """Its motion in the area of a pattern: the start is uniform in it, but for the free square.
-
-        Raises:
-            PlanError: the area is not larger than the free square.
-        """
-        half_n, half_e = 0.5 * options.height_m, 0.5 * options.width_m
-        free = 0.5 * self.free_m
-        if half_n <= free and half_e <= free:
-            raise PlanError(
-                f"`width_m, height_m` {options.width_m:g} m x {options.height_m:g} m have no room for a "
-                f"target outside the central {self.free_m:g} m; ask for a larger area"
-            )
-        while True:
-            north_m, east_m = float(rng.uniform(-half_n, half_n)), float(rng.uniform(-half_e, half_e))
-            if abs(north_m) > free or abs(east_m) > free:
-                break
-        if self.speed_m_s == 0.0:
-            return Static(north_m=north_m, east_m=east_m)
-        return RandomWalk(
-            south_m=-half_n,
-            west_m=-half_e,
-            north_m=half_n,
-            east_m=half_e,
-            speed_m_s=self.speed_m_s,
-            start_m=(north_m, east_m),
+    half_n, half_e = 0.5 * options.height_m, 0.5 * options.width_m
+    free = 0.5 * target.free_m
+    if half_n <= free and half_e <= free:
+        raise PlanError(
+            f"`width_m, height_m` {options.width_m:g} m x {options.height_m:g} m have no room for a "
+            f"target outside the central {target.free_m:g} m; ask for a larger area"
         )
+    while True:
+        north_m, east_m = float(rng.uniform(-half_n, half_n)), float(rng.uniform(-half_e, half_e))
+        if abs(north_m) > free or abs(east_m) > free:
+            break
+    if target.speed_m_s == 0.0:
+        return Static(north_m=north_m, east_m=east_m)
+    return RandomWalk(
+        south_m=-half_n,
+        west_m=-half_e,
+        north_m=half_n,
+        east_m=half_e,
+        speed_m_s=target.speed_m_s,
+        start_m=(north_m, east_m),
+    )
 
 
 def tag_search_world(
@@ -100,12 +71,14 @@ def tag_search_world(
     Raises:
         PlanError: the target is not possible.
     """
+    if not options.search:
+        return world
     target = target or TagTarget()
     world = carrying(world, PayloadParameters(camera=search_camera(target.size_m, skip=skip, film=film)))
     if world.targets:
         return world
     rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("tag_search", "target")))
     walking = GroundTargetParameters(
-        motion=target.motion(options, rng), size_m=target.size_m, tag_id=options.tag_id
+        motion=motion_of(target, options, rng), size_m=target.size_m, tag_id=options.tag_id
     )
     return replace(world, targets=(walking,))

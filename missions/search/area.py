@@ -2,11 +2,40 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any, Final, Protocol
 
+from flightsim.foundation.options import Shown
 from missions.errors import PlanError
 
 Place = tuple[float, float]
 """North and east of the origin, metres."""
+
+
+EDGES: Final = Shown(
+    fields=("south_m", "west_m", "north_m", "east_m"),
+    together=True,
+    metavar="SOUTH,WEST,NORTH,EAST",
+    help="Edges of the searched area, m from the first vehicle's home.",
+)
+"""The edges of an area that an estimator's parameters have, as one option."""
+
+
+def edges(area_m: tuple[float, float, float, float]) -> dict[str, Any]:
+    """The edges south, west, north and east as fields of an estimator's parameters."""
+    return dict(zip(EDGES.fields, area_m, strict=True))
+
+
+class Edges(Protocol):
+    """Parameters that have the edges of an area."""
+
+    @property
+    def south_m(self) -> float: ...
+    @property
+    def west_m(self) -> float: ...
+    @property
+    def north_m(self) -> float: ...
+    @property
+    def east_m(self) -> float: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +54,17 @@ class Area:
                 f"`area_m` {','.join(f'{edge:g}' for edge in edges)} is not an area; "
                 "give SOUTH,WEST,NORTH,EAST"
             )
+
+    @classmethod
+    def of(cls, edges: Edges) -> "Area":
+        """The area of parameters that have its edges."""
+        return cls(south_m=edges.south_m, west_m=edges.west_m, north_m=edges.north_m, east_m=edges.east_m)
+
+    def check_sides(self, largest_m: float) -> None:
+        """Refuse sides that are longer."""
+        for side_m in (self.height_m, self.width_m):
+            if not side_m <= largest_m:
+                raise PlanError(f"`area_m` has a side of {side_m:g} m; accepted: up to {largest_m:g} m")
 
     def contains(self, north_m: float, east_m: float) -> bool:
         """Whether a place is inside, edges included."""

@@ -16,7 +16,8 @@ from scipy import stats
 from flightsim.world_spec import WorldSpec
 from missions.base.options import FlightOptions
 from missions.base.request import RunRequest
-from missions.pattern_search.world import TagTarget, tag_search_world
+from missions.pattern_search.tag_target import TagTarget
+from missions.pattern_search.world import tag_search_world
 from missions.studies.design import grid
 from missions.studies.flights import fly_trial
 from missions.studies.results import Results

@@ -14,9 +14,10 @@ import numpy as np
 
 from missions.base.request import RunRequest
 from missions.occupancy.figures import NAMED_WITHIN_M
+from missions.occupancy.magnetic_target import MagneticTarget
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.options import OccupancyOptions
-from missions.occupancy.suspect import Identify
+from missions.occupancy.parameters import Identify
 from missions.occupancy.world import occupancy_world
 from missions.occupancy.world_searchers import search_with_points
 from missions.studies.design import grid
@@ -81,7 +82,7 @@ def flight(cell: Cell, seed: int) -> SearchRow:
     """One search by aircraft."""
     options = _options(cell)
     world = default_world(OccupancyMission.world_defaults, count=VEHICLES, seed=seed)
-    world = occupancy_world(world, options, false_count=FALSE_ANOMALIES)
+    world = occupancy_world(world, options, MagneticTarget(false_count=FALSE_ANOMALIES))
     result = fly_trial(OccupancyMission(), RunRequest(options=options, world=world))
     summary = result.summary
     time_s, error_m = summary["time_to_find_s"], summary["target_error_m"]

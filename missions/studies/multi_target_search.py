@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from missions.search.planner_parameters import Exploration
+from missions.multi_target.options import MultiTargetOptions
+from missions.search.planner_parameters import PlannerParameters
 from missions.studies.design import grid
 from missions.studies.multi_target_trial import EXPERIMENTS, MAPS, PLANNERS, Cell, Found, SearchTrial
 from missions.studies.results import Results
@@ -26,30 +27,31 @@ _FIRST: Final = 0.1  # share of the time in which the planners are not compared
 _COLOURS: Final = {"proposed": "#15803d", "lawnmower": "#c2410c", "information": "#1769aa"}
 
 
-def study(
-    horizon: int = 3, alpha: float = 0.3, exploration: Exploration = Exploration.VIEW
-) -> Study[Cell, Found]:
+def study(planning: PlannerParameters | None = None) -> Study[Cell, Found]:
     """The study.
 
     Args:
-        horizon: steps that the exploring planner plans (paper: 1).
-        alpha: weight of its exploration, nats.
-        exploration: what its exploration is (paper: the map at the vehicle's place).
+        planning: of the exploring planner; None: that of the mission.
     """
+    planning = planning or MultiTargetOptions().planning
     return Study(
         name="multi-target",
         description=(
             "An unknown number of targets: the experiments of Yousuf, Lendek and Busoniu with the proposed "
             "planner, a lawnmower, and information alone."
         ),
-        trial=SearchTrial(horizon=horizon, alpha=alpha, exploration=exploration),
+        trial=SearchTrial(planning=planning),
         parameters=Cell,
         row=Found,
         design=grid(experiment=tuple(EXPERIMENTS)) * grid(planner=tuple(PLANNERS)),
         runs=50,
         success="completed",
         metrics=(),
-        options={"horizon": horizon, "alpha": alpha, "exploration": exploration.value},
+        options={
+            "horizon": planning.horizon,
+            "alpha": planning.alpha,
+            "exploration": planning.exploration.value,
+        },
         summarise=summarise,
         report=lines_of,
         draw=draw,

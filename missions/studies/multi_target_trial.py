@@ -6,18 +6,21 @@ named in docs/multi_target.md: places of the targets, terrain, noise.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.multi_target.parameters import MultiTargetParameters
 from flightsim.world_spec import WorldSpec
 from missions.base.request import RunRequest
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
-from missions.multi_target.world import TargetField, multi_target_world, terrain_targets_world
-from missions.search.planner_parameters import Exploration
+from missions.multi_target.target_field import TargetField
+from missions.multi_target.world import multi_target_world, terrain_targets_world
+from missions.search.area import edges
+from missions.search.planner_parameters import PlannerParameters
 from missions.studies.flights import fly_trial
 from missions.studies.study import run_of
 
@@ -115,28 +118,23 @@ class SearchTrial:
     """One search of an experiment by a planner.
 
     Attributes:
-        horizon: steps that the exploring planner plans.
-        alpha: weight of its exploration, nats.
-        exploration: what its exploration is.
+        planning: of the exploring planner.
     """
 
-    horizon: int = 3
-    alpha: float = 0.3
-    exploration: Exploration = Exploration.VIEW
+    planning: PlannerParameters = MultiTargetOptions().planning
 
     def __call__(self, cell: Cell, seed: int) -> Found:
         """Fly the search. The same seed has the same targets and the same sensor noise for all planners."""
         experiment, planner = EXPERIMENTS[cell.experiment], PLANNERS[cell.planner]
         _, run = run_of(seed)
         options = MultiTargetOptions(
-            area_m=experiment.area_m,
             steps=experiment.steps,
             planner=planner,
-            horizon=self.horizon if planner is PlannerKind.EXPLORING else 1,  # a baseline is the paper's
-            alpha=self.alpha,
-            exploration=self.exploration,
-            expected_targets=float(experiment.targets),
-            search_seed=run,
+            # the baselines plan as the paper's
+            planning=self.planning if planner is PlannerKind.EXPLORING else replace(self.planning, horizon=1),
+            estimator=MultiTargetParameters(
+                **edges(experiment.area_m), expected_targets=float(experiment.targets), seed=run
+            ),
         )
         world = WorldSpec.of_team(1, seed=seed)
         number = 0
@@ -145,8 +143,8 @@ class SearchTrial:
             world = terrain_targets_world(
                 world, options, number, count=experiment.targets, clusters=experiment.clusters
             )
-        field = TargetField(count=experiment.targets, clusters=experiment.clusters)
-        world = multi_target_world(world, options, field, scan_period_s=STEP_S)
+        field = TargetField(count=experiment.targets, clusters=experiment.clusters, scan_period_s=STEP_S)
+        world = multi_target_world(world, options, field)
         result = fly_trial("multi-target", RunRequest(options=options, world=world))
         return _row(experiment, result.summary, result.outcome == "completed", result.reason, number)
 

@@ -6,7 +6,7 @@ afterwards: a fine grid, a coarse one, and particles.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from estimators.library import make_estimator
 from estimators.log_replay import replay
 from estimators.logs import open_log
+from estimators.vision_search.parameters import VisionSearchParameters
 from flightsim.world_spec import WorldSpec
 from missions.base.request import RunRequest
 from missions.studies.flights import fly_trial
@@ -45,16 +46,16 @@ MOMENTS_S: Final = (30, 60, 120, 180, 240, 300)
 """Times from the begin of the search at which the belief of a flight is recorded."""
 
 _ESTIMATE_PERIOD: Final = "estimate_period_s=10"
-_ERRORS: Final[Mapping[str, Any]] = MappingProxyType(
-    {
-        "place_sigma_m": 0.1,
-        "height_sigma_m": 0.2,
-        "yaw_sigma_rad": 0.005,
-        "tilt_sigma_rad": 0.0016,
-        "mount_sigma_rad": math.radians(0.3),
-        "place_time_s": 30.0,
-        "attitude_time_s": 100.0,
-    }
+_ERRORS: Final = VisionSearchParameters(
+    forward_sigma_m=0.1,
+    right_sigma_m=0.1,
+    height_sigma_m=0.2,
+    yaw_sigma_rad=0.005,
+    pitch_sigma_rad=0.0016,
+    roll_sigma_rad=0.0016,
+    mount_sigma_rad=math.radians(0.3),
+    place_time_s=30.0,
+    attitude_time_s=100.0,
 )
 """Errors that the filter expects: of `pose_errors` in flights with other seeds than the study's, and of the
 cameras' mounts those with which they are drawn.
@@ -121,11 +122,16 @@ class VisionSearchTrial:
         half_m = 0.5 * self.side_m
         options = VisionSearchOptions(
             vehicles=TEAMS[cell.aircraft],
-            area_m=(-half_m, -half_m, half_m, half_m),
             passes=self.passes * TEAMS[cell.aircraft],
-            tag_size_m=3.0,
-            search_seed=run,
-            **_ERRORS,
+            estimator=replace(
+                _ERRORS,
+                south_m=-half_m,
+                west_m=-half_m,
+                north_m=half_m,
+                east_m=half_m,
+                target_size_m=3.0,
+                seed=run,
+            ),
         )
         world = WorldSpec.of_team(options.vehicles, model=self.model, seed=seed)
         world = vision_search_world(world, options)
@@ -168,7 +174,7 @@ def _replayed(
     began_us: int,
 ) -> dict[str, float]:
     """One belief over the log of a flight: at its end, and its width at the moments before."""
-    parameters = options.estimator_parameters
+    parameters = options.estimator
     chosen = {setting.partition("=")[0] for setting in (*settings, _ESTIMATE_PERIOD)}
     own = [
         f"{field.name}={getattr(parameters, field.name)}"

@@ -1,6 +1,8 @@
 """What an aircraft can't survey, refused before anything is flown."""
 
 import math
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -9,12 +11,34 @@ from estimators.survey.processing import check_grid
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.survey.flight import airspeed_m_s, planned_lines
+from missions.survey.inputs import compensation_of, map_frame, survey_map_of, terrain_of
 from missions.survey.manoeuvres import box_side_m
-from missions.survey.options import SurveyOptions, map_frame
+from missions.survey.options import SurveyOptions
 from missions.survey.plan import check_lines
 from missions.vehicle.limits import FixedWingLimits, Limits
 
-__all__ = ["check_reach", "check_survey"]
+__all__ = ["check_reach", "check_survey", "for_vehicle"]
+
+_HIGHEST_M: Final = 3000.0
+
+
+def for_vehicle(options: SurveyOptions, limits: Limits) -> SurveyOptions:
+    """The same options, with the aircraft's own airspeed unless one was specified."""
+    if options.speed_m_s is not None or not isinstance(limits, FixedWingLimits):
+        return options
+    return replace(options, speed_m_s=limits.airspeed_trim_m_s)
+
+
+def check_altitude(options: SurveyOptions, limits: FixedWingLimits) -> None:
+    """Refuse an impossible altitude. Surveys may be higher than `limits` has it, with an authorization.
+
+    Raises:
+        PlanError: the altitude is not possible.
+    """
+    if not limits.altitude_min_m <= options.altitude_m <= _HIGHEST_M:
+        raise PlanError(
+            f"`altitude_m` {options.altitude_m:g} m is not in {limits.altitude_min_m:g}..{_HIGHEST_M:g} m"
+        )
 
 
 def check_survey(options: SurveyOptions, limits: Limits) -> None:
@@ -28,16 +52,16 @@ def check_survey(options: SurveyOptions, limits: Limits) -> None:
     if options.vehicles > 1:
         raise PlanError(f"a survey is flown by one aircraft; `vehicles` {options.vehicles} is not accepted")
     limits.check_airspeed(airspeed_m_s(options, limits))
-    options.check_altitude(limits)
-    options.compensation()  # a file that can't be read is refused before the flight
-    survey_map = options.survey_map()
-    terrain = options.terrain()
+    check_altitude(options, limits)
+    compensation_of(options)  # a file that can't be read is refused before the flight
+    survey_map = survey_map_of(options)
+    terrain = terrain_of(options)
     if options.calibrate:
         return
     plan = planned_lines(options, limits)
     check_lines(plan)
     try:
-        check_grid(plan, options.processing)
+        check_grid(plan, options.processing_parameters)
     except EstimatorError as error:
         raise PlanError(str(error)) from None
     ends = np.array([end for line in plan.lines for end in (line.start_ne_m, line.end_ne_m)])
@@ -94,7 +118,7 @@ def check_reach(options: SurveyOptions, limits: Limits, home: GeodeticPosition) 
 
 def check_ground(options: SurveyOptions, frame: LocalFrame, home: GeodeticPosition) -> None:
     """Refuse a takeoff height that is below the ground of the terrain at home's place."""
-    terrain = options.terrain()
+    terrain = terrain_of(options)
     if terrain is None:
         return
     north_m, east_m, down_m = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)

@@ -15,8 +15,9 @@ from missions.errors import MissionError
 from missions.planning.outline import Outline
 from missions.planning.way_in import Entry, runway_approach, way_in_items, waypoint_item
 from missions.survey.drape import Drape
+from missions.survey.inputs import map_frame, terrain_of
 from missions.survey.manoeuvres import Programme, manoeuvres
-from missions.survey.options import SurveyOptions, map_frame
+from missions.survey.options import SurveyOptions
 from missions.survey.plan import SurveyPath, line_plan, survey_path
 from missions.vehicle.firmware import Mode
 from missions.vehicle.limits import FixedWingLimits
@@ -97,7 +98,7 @@ def planned_survey(options: SurveyOptions, limits: FixedWingLimits, home: Geodet
     speed_m_s = airspeed_m_s(options, limits)
     origin = map_frame(options, home).origin
     north_m, east_m, down_m = LocalFrame(home).ned_from_geodetic(origin.lat_deg, origin.lon_deg, origin.alt_m)
-    terrain = options.terrain()
+    terrain = terrain_of(options)
     fastest_m_s = limits.true_airspeed_m_s(speed_m_s) + limits.wind_m_s
     radius_m = turn_radius_m(options, limits)
     path = survey_path(

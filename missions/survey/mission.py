@@ -49,6 +49,11 @@ class SurveyMission(Mission[SurveyOptions]):
     def __init__(self) -> None:
         self._flown: _Flown | None = None
 
+    def adapted(self, options: SurveyOptions, limits: Limits) -> SurveyOptions:
+        from missions.survey.checks import for_vehicle
+
+        return for_vehicle(options, limits)
+
     def check(self, options: SurveyOptions, limits: Limits) -> None:
         from missions.survey.checks import check_survey
 
@@ -65,15 +70,16 @@ class SurveyMission(Mission[SurveyOptions]):
         return options if options.map_file is not None else replace(options, map_file=str(published))
 
     def estimator_settings(self, options: SurveyOptions) -> Mapping[str, float | str]:
-        known: dict[str, float | str] = {
+        of = options.processing
+        known = {
             "line_spacing_m": options.spacing_m,
-            "level": "true" if options.level else "false",
+            "map_error_nt": of.map_error_nt,
+            "grid_m": of.grid_m,
+            "level": "true" if of.level else "false",
+            "map_file": options.map_file,
+            "compensation_file": options.compensation_file,
         }
-        for name in ("map_file", "map_error_nt", "compensation_file", "grid_m"):
-            value = getattr(options, name)
-            if value is not None:
-                known[name] = value
-        return known
+        return {name: value for name, value in known.items() if value is not None}
 
     def estimator_files(self, options: SurveyOptions) -> Mapping[str, tuple[str, bytes]]:
         from estimators.survey.export import LINES

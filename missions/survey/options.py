@@ -1,28 +1,19 @@
 """Options of a magnetic survey."""
 
-import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final
 
-from estimators.errors import EstimatorError
-from estimators.occupancy.survey_map import SurveyMap, load_survey_map
-from estimators.survey.compensation import Compensation, load_compensation
-from estimators.survey.processing import LEAST_SPACING_M, ProcessingParameters
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.base.options import MissionOptions, check_positive
+from estimators.survey.parameters import ProcessingParameters
+from flightsim.foundation.options import held, option, other_default
+from missions.base.options import MissionOptions
 from missions.errors import PlanError
-from missions.survey.drape import TerrainModel, load_terrain
-from missions.vehicle.limits import FixedWingLimits, Limits
 
-LARGEST_SIDE_M: Final = 60_000.0
 MAX_LINES: Final = 1000
-ALTITUDE_M: Final = 80.0
 CALIBRATION_ALTITUDE_M: Final = 800.0
 """Height of a compensation flight, unless one is given: there the field of the ground changes slowly."""
-HIGHEST_M: Final = 3000.0
 TIE_SPACING: Final = 5.0
 """Distance of tie lines, in line spacings, unless one is given; survey contracts have 5 to 10."""
+_LARGEST_SIDE_M: Final = 60_000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,78 +21,64 @@ class SurveyOptions(MissionOptions):
     """A survey of a rectangle. Places are metres from the map's home; without a map, from the vehicle's home.
 
     Attributes:
-        altitude_m: height to fly at: above the ground of `terrain_file`, else above home.
-        width_m, height_m: size of the surveyed area: across the lines when they run north, and along them.
-        area_ne_m: centre of the area.
-        direction_rad: direction of the lines, clockwise from north; the area turns with them.
-        spacing_m: distance of the lines.
-        tie_spacing_m: distance of the tie lines; None: five line spacings; 0: no tie lines.
-        speed_m_s: airspeed; None: the aircraft's own.
-        map_file: published map that readings are compared with; None: that of the embedded world, or none.
-        map_error_nt: standard deviation of that map; None: as it states.
-        terrain_file: heights of the ground (`missions.survey.drape`); None: level ground.
-        climb: steepest slope of the drape, height over distance.
-        calibrate: fly the manoeuvres of a compensation instead of lines.
-        compensation_file: coefficients that a calibration flight has written.
-        grid_m: distance of the grid's lines of the map that is made; None: a quarter of the line spacing.
-        level: level the lines by the tie lines.
+        processing: parameters of the processing of the readings, but for the distance of the lines.
     """
 
-    altitude_m: float = ALTITUDE_M
-    separation_m: float = 15.0
-    width_m: float = 2000.0
-    height_m: float = 2000.0
-    area_ne_m: tuple[float, float] = (0.0, 0.0)
-    direction_rad: float = 0.0
-    spacing_m: float = 200.0
-    tie_spacing_m: float | None = None
-    speed_m_s: float | None = None
-    map_file: str | None = None
-    map_error_nt: float | None = None
-    terrain_file: str | None = None
-    climb: float = 0.06
-    calibrate: bool = False
-    compensation_file: str | None = None
-    grid_m: float | None = None
-    level: bool = True
+    altitude_m: float = other_default(80.0, above=0.0, varies=f"with `calibrate`: {CALIBRATION_ALTITUDE_M:g}")
+    separation_m: float = other_default(15.0)
+    width_m: float = option(
+        2000.0,
+        above=0.0,
+        most=_LARGEST_SIDE_M,
+        name="size",
+        metavar="SIDE|WIDTHxHEIGHT",
+        separators="x,",
+        lone="same",
+        help="Size of the area, m, across the lines x along them.",
+    )
+    height_m: float = option(
+        2000.0, above=0.0, most=_LARGEST_SIDE_M, name="size", help="Size of the area along the lines."
+    )
+    area_ne_m: tuple[float, float] = option(
+        (0.0, 0.0), metavar="NORTH,EAST", help="Centre of the area, m from the map's home."
+    )
+    direction_rad: float = option(0.0, help="Direction of the lines, from north; the area turns with them.")
+    spacing_m: float = option(200.0, least=1.0, help="Distance of the lines.")
+    tie_spacing_m: float | None = option(
+        None, least=0.0, varies="five line spacings", help="Distance of the tie lines; 0: none."
+    )
+    speed_m_s: float | None = option(
+        None, above=0.0, varies="the aircraft's own", help="Airspeed of the aircraft."
+    )
+    map_file: str | None = option(
+        None,
+        name="map",
+        metavar="FILE",
+        varies="the embedded world makes one from `seed`; none with `connect`",
+        help="Published magnetic map (.npz) to compare with.",
+    )
+    terrain_file: str | None = option(
+        None,
+        name="terrain",
+        metavar="FILE",
+        varies="level ground",
+        help="Heights of the ground to drape the flight over: CSV north_m,east_m,ground_m, or .npz.",
+    )
+    climb: float = option(
+        0.06, above=0.0, most=0.3, help="Steepest slope of the drape, height over distance."
+    )
+    calibrate: bool = option(False, help="Flight of a compensation, which writes compensation.json.")
+    compensation_file: str | None = option(
+        None,
+        name="compensation",
+        metavar="FILE",
+        help="Coefficients of the aircraft, from the folder of a flight with `calibrate`.",
+    )
+    processing: ProcessingParameters = held(
+        ProcessingParameters(), map_error="map_error_nt", grid="grid_m", no_levelling="level"
+    )
 
-    def __post_init__(self) -> None:
-        super(SurveyOptions, self).__post_init__()
-        check_positive(
-            altitude_m=self.altitude_m,
-            spacing_m=self.spacing_m,
-            speed_m_s=self.speed_m_s,
-            grid_m=self.grid_m,
-            climb=self.climb,
-        )
-        if not self.spacing_m >= LEAST_SPACING_M:
-            raise PlanError(
-                f"`spacing_m` {self.spacing_m:g} m is too small; ask for {LEAST_SPACING_M:g} m or more"
-            )
-        for name, side_m in (("width_m", self.width_m), ("height_m", self.height_m)):
-            if not 0.0 < side_m <= LARGEST_SIDE_M:
-                raise PlanError(
-                    f"`{name}` {side_m:g} m is not possible; ask for more than 0, up to {LARGEST_SIDE_M:g} m"
-                )
-        if not all(math.isfinite(value) for value in self.area_ne_m):
-            raise PlanError(
-                f"`area_ne_m` {self.area_ne_m[0]:g},{self.area_ne_m[1]:g} is not a place; give NORTH,EAST"
-            )
-        if not math.isfinite(self.direction_rad):
-            raise PlanError(f"`direction_rad` {self.direction_rad} is not a direction; give a finite angle")
-        if self.tie_spacing_m is not None and not (
-            math.isfinite(self.tie_spacing_m) and self.tie_spacing_m >= 0.0
-        ):
-            raise PlanError(
-                f"`tie_spacing_m` {self.tie_spacing_m:g} m is not possible; ask for more than 0, or 0 for no "
-                "tie lines"
-            )
-        if self.map_error_nt is not None and not (
-            math.isfinite(self.map_error_nt) and self.map_error_nt >= 0.0
-        ):
-            raise PlanError(f"`map_error_nt` {self.map_error_nt:g} nT is not possible; ask for 0 or more")
-        if not self.climb <= 0.3:
-            raise PlanError(f"`climb` {self.climb:g} is steeper than 0.3, which no survey aircraft follows")
+    def check_together(self) -> None:
         for name, span, step_m, what in (
             ("spacing_m", "width_m", self.spacing_m, "lines"),
             ("tie_spacing_m", "height_m", self.tie_m, "tie lines"),
@@ -121,68 +98,6 @@ class SurveyOptions(MissionOptions):
         return TIE_SPACING * self.spacing_m if self.tie_spacing_m is None else self.tie_spacing_m
 
     @property
-    def processing(self) -> ProcessingParameters:
+    def processing_parameters(self) -> ProcessingParameters:
         """How the readings are processed."""
-        return ProcessingParameters(
-            line_spacing_m=self.spacing_m,
-            grid_m=self.grid_m,
-            map_error_nt=self.map_error_nt,
-            level=self.level,
-        )
-
-    def for_vehicle(self, limits: Limits) -> "SurveyOptions":
-        """The same options, with the aircraft's own airspeed unless one was specified."""
-        if self.speed_m_s is not None or not isinstance(limits, FixedWingLimits):
-            return self
-        return replace(self, speed_m_s=limits.airspeed_trim_m_s)
-
-    def check_altitude(self, limits: FixedWingLimits) -> None:
-        """Refuse an impossible altitude. Surveys may be higher than `limits` has it, with an authorization.
-
-        Raises:
-            PlanError: the altitude is not possible.
-        """
-        if not limits.altitude_min_m <= self.altitude_m <= HIGHEST_M:
-            raise PlanError(
-                f"`altitude_m` {self.altitude_m:g} m is not in {limits.altitude_min_m:g}..{HIGHEST_M:g} m"
-            )
-
-    def survey_map(self) -> SurveyMap | None:
-        """The published map; None: there is none.
-
-        Raises:
-            PlanError: the file does not exist or is not a map.
-        """
-        if self.map_file is None:
-            return None
-        try:
-            return load_survey_map(Path(self.map_file))
-        except EstimatorError as error:
-            raise PlanError(str(error)) from None
-
-    def terrain(self) -> TerrainModel | None:
-        """The heights of the ground; None: it is level.
-
-        Raises:
-            PlanError: the file does not exist or has no heights.
-        """
-        return None if self.terrain_file is None else load_terrain(Path(self.terrain_file))
-
-    def compensation(self) -> Compensation | None:
-        """The coefficients of the aircraft; None: none are given.
-
-        Raises:
-            PlanError: the file does not exist or holds none.
-        """
-        if self.compensation_file is None:
-            return None
-        try:
-            return load_compensation(Path(self.compensation_file))
-        except EstimatorError as error:
-            raise PlanError(str(error)) from None
-
-
-def map_frame(options: SurveyOptions, home: GeodeticPosition) -> LocalFrame:
-    """The frame of the survey: the map's, or that of the vehicle's home."""
-    survey_map = options.survey_map()
-    return LocalFrame(home if survey_map is None else survey_map.home)
+        return replace(self.processing, line_spacing_m=self.spacing_m)

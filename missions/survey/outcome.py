@@ -16,6 +16,7 @@ from estimators.survey.processing import SurveyResult, process_survey
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
 from missions.base.mission import Debriefing
+from missions.survey.inputs import compensation_of, survey_map_of
 from missions.survey.options import SurveyOptions
 from missions.survey.records import Calibration, calibrated, flight_readings
 
@@ -90,9 +91,9 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
     options = debriefing.options
     assert isinstance(options, SurveyOptions)
     notes = debriefing.flights[0][0]
-    survey_map = options.survey_map()
+    survey_map = survey_map_of(options)
     origin = home if survey_map is None else survey_map.home
-    compensation = options.compensation()
+    compensation = compensation_of(options)
     readings = flight_readings(
         debriefing.records,
         notes.system_id,
@@ -120,7 +121,7 @@ def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosi
         home=origin,
         survey_map=survey_map,
         compensation=compensation,
-        parameters=options.processing,
+        parameters=options.processing_parameters,
     )
     coverage = covered(result)
     return Outcome(

@@ -18,6 +18,7 @@ from flightsim.payload import (
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.survey.options import SurveyOptions
+from missions.survey.surveyed_field import SurveyedField
 from missions.worlds.payloads import carrying
 
 __all__ = ["survey_world"]
@@ -36,30 +37,21 @@ _MOST_MOMENT_A_M2: Final = 1.2e5
 _DEEPEST_M: Final = 10.0
 
 
-def survey_world(
-    world: WorldSpec,
-    options: SurveyOptions,
-    *,
-    targets: int = 0,
-    vehicle_field: bool = False,
-    exact_map: bool = False,
-    daily_nt: float | None = None,
-) -> WorldSpec:
+def survey_world(world: WorldSpec, options: SurveyOptions, hidden: SurveyedField | None = None) -> WorldSpec:
     """The world of a survey.
 
     Args:
         world: the rest of the world; a magnetic field that it has stays as it is.
         options: the survey. Its map is the world's; without one, a map is generated around the area.
-        targets: number of dipoles along the Earth's field in the area, drawn from the seed.
-        vehicle_field: the magnetometer feels the whole field of its aircraft, which is the same for a seed.
-        exact_map: the true field is the map's, without the error of a survey.
-        daily_nt: dip of the daily variation at noon; the flight begins at nine o'clock. None: no variation.
+        hidden: what lies in the field, and what the magnetometer feels.
 
     Raises:
         PlanError: the area is too small for so many targets.
     """
+    hidden = hidden or SurveyedField()
+    feels_aircraft = hidden.uncompensated or options.calibrate or options.compensation_file is not None
     parameters = SurveyMagnetometerParameters(
-        vehicle_field=VehicleFieldParameters() if vehicle_field else None
+        vehicle_field=VehicleFieldParameters() if feels_aircraft else None
     )
     world = carrying(world, PayloadParameters(magnetometer=parameters))
     if world.magnetic_field is not None:
@@ -78,9 +70,11 @@ def survey_world(
         spacing_m=max(_LEAST_SPACING_M, max(high_m, wide_m) / _MAP_POINTS_ACROSS),
         survey_height_m=options.altitude_m,
         raised_m=max(0.0, options.altitude_m - _GEOLOGY_LEVEL_M),
-        exact_map=exact_map,
-        daily=None if daily_nt is None else DailyVariationParameters(dip_nt=daily_nt),
-        signatures=drawn_targets(options, world.seed, targets),
+        exact_map=hidden.exact_map,
+        daily=None
+        if hidden.daily_variation_nt is None
+        else DailyVariationParameters(dip_nt=hidden.daily_variation_nt),
+        signatures=drawn_targets(options, world.seed, hidden.targets),
     )
     return replace(world, magnetic_field=field)
 

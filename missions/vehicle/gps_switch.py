@@ -3,24 +3,12 @@ takeoff.
 """
 
 from contextlib import suppress
-from enum import StrEnum
 from typing import Final
 
 from autopilot_bridge.mavlink import command_name, dialect, enum_name
 from missions.errors import MissionError, VehicleTimeout
+from missions.gps_off import GpsOff
 from missions.vehicle.vehicle import Vehicle
-
-
-class GpsOff(StrEnum):
-    """The way in which GPS is switched off for the orbit."""
-
-    AUTO = "auto"
-    """By the command or, for a simulator that does not support it, by its parameter."""
-    FAILURE = "failure"
-    """By MAV_CMD_INJECT_FAILURE."""
-    PARAMETER = "parameter"
-    """By a parameter of the simulator, or of the filter that fuses GPS."""
-
 
 _GPS: Final = dialect.FAILURE_UNIT_SENSOR_GPS
 _INJECT: Final = dialect.MAV_CMD_INJECT_FAILURE

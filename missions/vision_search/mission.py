@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from missions.base.mission import Debriefing, WorldDefaults
 from missions.base.team_mission import TeamMission
 from missions.vehicle.limits import Limits
-from missions.vision_search.options import VisionSearchOptions, check_vehicle
+from missions.vision_search.for_vehicle import check_vehicle, for_vehicle
+from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.team import VisionSearchTeam
 
 if TYPE_CHECKING:
@@ -23,12 +24,15 @@ class VisionSearchMission(TeamMission[VisionSearchOptions, VisionSearchTeam]):
     lands_without_sensors = True
     world_defaults = WorldDefaults(model="iris")
 
+    def adapted(self, options: VisionSearchOptions, limits: Limits) -> VisionSearchOptions:
+        return for_vehicle(options, limits)
+
     def check(self, options: VisionSearchOptions, limits: Limits) -> None:
         self.refuse_arguments(options)
         check_vehicle(options, limits)
 
     def estimator_settings(self, options: VisionSearchOptions) -> Mapping[str, float | str]:
-        parameters = options.estimator_parameters
+        parameters = options.estimator
         settings = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
         return {**settings, "centre_vehicle": 1 if options.vehicles > 1 else 0}
 

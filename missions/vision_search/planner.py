@@ -256,7 +256,7 @@ def planner_of(options: VisionSearchOptions) -> AreaPlanner:
         return HorizonPlanner(
             options.planner_parameters,
             area,
-            sight_model_of(options.estimator_parameters),
+            sight_model_of(options.estimator),
             altitude_m=options.own_altitude_m,
         )
     if options.planner is SearchPlannerKind.LISSAJOUS:

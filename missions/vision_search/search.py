@@ -72,7 +72,7 @@ class VisionSearch:
         self._system_ids = tuple(system_ids)
         self._estimators, self._options = tuple(estimators), tuple(options)
         area = options[0].area
-        cells = _CELLS_OF_PARTICLES if options[0].belief is BeliefKind.PARTICLES else _CELLS
+        cells = _CELLS_OF_PARTICLES if options[0].estimator.belief is BeliefKind.PARTICLES else _CELLS
         self.layout = GridLayout.over(
             width_m=area.width_m,
             height_m=area.height_m,

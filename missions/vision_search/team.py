@@ -9,9 +9,10 @@ from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.random_streams import RandomStreams
 from missions.search.team import SearchTeam
 from missions.vehicle.telemetry import Attitude, Position
-from missions.vision_search.options import VisionSearchOptions, check_vehicle
+from missions.vision_search.for_vehicle import check_vehicle
+from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.search import VisionSearch
-from missions.vision_search.watch import CameraWatch, LinkQuality
+from missions.vision_search.watch import CameraWatch
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -43,7 +44,7 @@ class VisionSearchTeam(SearchTeam[VisionSearchOptions]):
         own = options[0]
         parameters = [
             replace(
-                own.estimator_parameters,
+                own.estimator,
                 own_vehicle=0 if alone else vehicle.system_id,
                 centre_vehicle=0 if alone else vehicles[0].system_id,
             )
@@ -53,9 +54,9 @@ class VisionSearchTeam(SearchTeam[VisionSearchOptions]):
         self.watch = CameraWatch(
             vehicles,
             parameters,
-            LinkQuality(loss=own.link_loss, delay_s=own.link_delay_s, repeats=own.link_repeats),
+            own.link,
             self._on_estimate,
-            seed=RandomStreams(own.search_seed).child("vision_search", "link"),
+            seed=RandomStreams(own.estimator.seed).child("vision_search", "link"),
         )
         self.search = VisionSearch(
             self.watch.estimators, options, [vehicle.system_id for vehicle in vehicles]

@@ -3,7 +3,6 @@
 import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,32 +11,18 @@ from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
 from autopilot_bridge.mavlink.search_likelihood import search_likelihood_message
 from estimators.runner import Runner
 from estimators.vision_search import AreaEstimate, VisionSearchEstimator, VisionSearchParameters
+from missions.vision_search.options import LinkQuality
 
 if TYPE_CHECKING:
     from flightsim.foundation.geodesy import GeodeticPosition
     from missions.vehicle.vehicle import Vehicle
 
-__all__ = ["CameraWatch", "LinkQuality"]
+__all__ = ["CameraWatch"]
 
 _ONBOARD: Final = 191
 _OF_ALL: Final = frozenset({"HOME_POSITION", "GLOBAL_POSITION_INT", "SYSTEM_TIME"})
 """Messages that every vehicle's estimator receives of all vehicles."""
 _REPEAT_US: Final = 1_000_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkQuality:
-    """What happens to likelihoods between the vehicles.
-
-    Attributes:
-        loss: probability that a message is lost.
-        delay_s: mean of the exponentially distributed delay of each message.
-        repeats: how often each is sent, one second apart.
-    """
-
-    loss: float = 0.0
-    delay_s: float = 0.0
-    repeats: int = 1
 
 
 class CameraWatch:

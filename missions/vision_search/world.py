@@ -2,8 +2,7 @@
 area.
 """
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,42 +11,13 @@ from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import GroundTargetParameters, RandomWalk, Static
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
+from missions.vision_search.hidden_tag import HiddenTag
 from missions.vision_search.options import VisionSearchOptions
 from missions.worlds.search_camera import search_camera
 
-__all__ = ["HiddenTag", "vision_search_world"]
+__all__ = ["vision_search_world"]
 
 _EDGE: Final = 0.05  # of a side: the target keeps this distance from the edges
-_MOST_RAD: Final = math.radians(10.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HiddenTag:
-    """The true target, and what is wrong with the cameras.
-
-    Attributes:
-        place_ne_m: its place; None: uniform over the area, 5 % of a side inside of it.
-        speed_m_s: of its random walk in the area; 0: it stays.
-        misalignment_rad: standard deviation, about each axis, of the angles by which each camera is turned on
-            its mount; its vehicle does not know them.
-        film: keep all pictures of each camera as a video.
-
-    Raises:
-        PlanError: a value is not possible.
-    """
-
-    place_ne_m: tuple[float, float] | None = None
-    speed_m_s: float = 0.0
-    misalignment_rad: float = math.radians(0.3)
-    film: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.speed_m_s <= 15.0:
-            raise PlanError(f"`target_speed_m_s` {self.speed_m_s:g} m/s is not in 0..15 m/s")
-        if not 0.0 <= self.misalignment_rad <= _MOST_RAD:
-            raise PlanError(
-                f"`misalignment_rad` {math.degrees(self.misalignment_rad):g} degrees is not in 0..10 degrees"
-            )
 
 
 def vision_search_world(
@@ -66,7 +36,7 @@ def vision_search_world(
     """
     hidden = hidden or HiddenTag()
     streams = RandomStreams(world.seed)
-    camera = search_camera(options.tag_size_m, film=hidden.film)
+    camera = search_camera(options.estimator.target_size_m, film=hidden.film)
     vehicles = []
     for index, vehicle in enumerate(world.vehicles):
         if vehicle.payload.camera is None:
@@ -96,5 +66,7 @@ def vision_search_world(
             speed_m_s=hidden.speed_m_s,
             start_m=place,
         )
-    target = GroundTargetParameters(motion=motion, size_m=options.tag_size_m, tag_id=options.tag_id)
+    target = GroundTargetParameters(
+        motion=motion, size_m=options.estimator.target_size_m, tag_id=options.estimator.tag_id
+    )
     return replace(world, targets=(target,))

@@ -3,8 +3,8 @@
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.world_spec import WorldSpec
+from missions.base.given_text import parse_wind
 from missions.base.mission import WorldDefaults
-from missions.base.options import parse_wind
 
 
 def default_world(defaults: WorldDefaults, *, count: int, seed: int) -> WorldSpec:

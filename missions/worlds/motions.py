@@ -1,23 +1,14 @@
 """How ground targets of embedded worlds move."""
 
 import math
-from enum import StrEnum
 from typing import Final
 
 from flightsim.payload import Circle, ConstantVelocity, RandomWalk, Static, TargetMotion
 from missions.errors import PlanError
+from missions.worlds.motion_kind import MotionKind
 
 _MAX_DISTANCE_M: Final = 50_000.0
 _MAX_SPEED_M_S: Final = 60.0
-
-
-class MotionKind(StrEnum):
-    """Kinds of motion of a ground target."""
-
-    STATIC = "static"
-    STRAIGHT = "straight"
-    CIRCLE = "circle"
-    RANDOM_WALK = "random-walk"
 
 
 def motion_of(

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 import pytest
 
-from missions.cli.fly_command import _FILES, _MISSIONS, _command_of
+from missions.cli.fly_command import _COMMANDS
 from missions.cli.main import command_line
 from missions.cli.options import in_options
 from missions.cli.status_line import StatusLine
@@ -36,7 +36,7 @@ def test_fields_become_options(message, shown):
 def all_options():
     found = set()
     waiting = [command_line.get_command(None, name) for name in command_line.list_commands(None)]
-    waiting += [_command_of(name) for name in (*_MISSIONS, *_FILES)]
+    waiting += _COMMANDS.values()
     while waiting:
         command = waiting.pop()
         parameters = command.params if isinstance(command, click.Command) else command.options

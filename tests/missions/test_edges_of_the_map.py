@@ -24,10 +24,12 @@ from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 from missions.plan_files.options import FileOptions
 from missions.runs.session import RunResult, fly
+from missions.search.area import edges
 from missions.survey.options import SurveyOptions
 from missions.survey.world import survey_world
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.world import vision_search_world
+from tests.missions.held_options import with_fields
 
 LINE = Home(lat_deg=20.0, lon_deg=179.9999, alt_m=100.0)
 NORTH = Home(lat_deg=89.0, lon_deg=-30.0, alt_m=100.0)
@@ -110,10 +112,11 @@ def test_an_occupancy_search(home: Home, tmp_path: Path) -> None:
 @pytest.mark.slow
 @both
 def test_a_search_for_several_targets(home: Home, tmp_path: Path) -> None:
-    options = MultiTargetOptions(
-        altitude_m=8.0, area_m=(-20.0, -20.0, 60.0, 60.0), start_ne_m=(0.0, 0.0), steps=12,
+    options = with_fields(
+        MultiTargetOptions(altitude_m=8.0, start_ne_m=(0.0, 0.0), steps=12),
         expected_targets=4.0,
-    )  # fmt: skip
+        **edges((-20.0, -20.0, 60.0, 60.0)),
+    )
     field = TargetField(count=4, clusters=1, cluster_sigma_m=12.0)
     world = partial(multi_target_world, field=field)
     summary = flown("multi-target", options, tmp_path / "run", home, world).summary
@@ -139,8 +142,10 @@ def test_a_survey(home: Home, tmp_path: Path) -> None:
 @pytest.mark.slow
 @both
 def test_a_vision_search(home: Home, tmp_path: Path) -> None:
-    options = VisionSearchOptions(
-        altitude_m=15.0, area_m=(-20.0, -20.0, 20.0, 20.0), step_m=8.0, tag_size_m=0.6
+    options = with_fields(
+        VisionSearchOptions(altitude_m=15.0, step_m=8.0),
+        **edges((-20.0, -20.0, 20.0, 20.0)),
+        target_size_m=0.6,
     )
     world = partial(vision_search_world, hidden=None)
     summary = flown("vision-search", options, tmp_path / "run", home, world).summary

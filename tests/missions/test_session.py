@@ -19,8 +19,9 @@ from pymavlink import mavutil
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.world_spec import WorldSpec
+from missions.base.given_text import parameters_from_file, parse_wind
 from missions.base.mission import Mission
-from missions.base.options import FlightOptions, Via, parameters_from_file, parse_wind
+from missions.base.options import FlightOptions, Via
 from missions.cli import fly as cli_fly
 from missions.cli import main as cli
 from missions.cli.options import SIDES

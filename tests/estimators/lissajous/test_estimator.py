@@ -265,13 +265,13 @@ def test_a_pattern_that_is_not_flown_is_warned_of() -> None:
     [
         ({"form": "best"}, "form 'best' is not one of measurement, kalman, proposed"),
         ({"source": "vision"}, "source 'vision' is not one of gps, global, local"),
-        ({"omega_x_rad_s": 0.0}, "omega_x_rad_s = 0.0 is not accepted: a finite number above 0"),
-        ({"epsilon_rad_s": -1.0}, "epsilon_rad_s = -1.0 is not accepted"),
+        ({"omega_x_rad_s": 0.0}, "omega_x_rad_s 0 is not possible; ask for more than 0"),
+        ({"epsilon_rad_s": -1.0}, "epsilon_rad_s -1 is not possible; ask for 0 or more"),
         ({"frequency": True, "form": "kalman"}, "needs form=proposed"),
         ({"centre_lat_deg": 47.0}, "go together"),
-        ({"centre_lat_deg": 99.0, "centre_lon_deg": 0.0}, "99,0 deg is not in"),
-        ({"orientation_rad": math.nan}, "orientation_rad = nan is not accepted: a finite number"),
-        ({"position_sigma_m": 0.0}, "position_sigma_m = 0.0 is not accepted"),
+        ({"centre_lat_deg": 99.0, "centre_lon_deg": 0.0}, "centre_lat_deg 99 is not in -90..90"),
+        ({"orientation_rad": math.nan}, "orientation_rad nan is not a finite number"),
+        ({"position_sigma_m": 0.0}, "position_sigma_m 0 is not possible"),
     ],
 )
 def test_wrong_parameters_are_named(wrong, words: str) -> None:

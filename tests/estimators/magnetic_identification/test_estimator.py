@@ -112,7 +112,7 @@ def test_a_map_that_does_not_exist_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("setting", "said"),
-    [("decimal_year=2050", "decimal year 2050.0 is outside"), ("seed=-1", "seed -1 is not accepted")],
+    [("decimal_year=2050", "decimal_year 2050 is not in 2025..2030"), ("seed=-1", "seed -1 is not possible")],
 )
 def test_impossible_settings_are_refused(map_file, setting, said):
     with pytest.raises(EstimatorError, match=said):

@@ -127,16 +127,16 @@ def test_the_confidence_of_the_paper_stays_for_a_target_and_drops_for_a_boat():
         ({"false_anomalies": ("boat:dipole:1e200:50:150",)}, "strength_nt 1e.200 of class boat is not"),
         ({"false_anomalies": ("boat:dipole:15:150:50",)}, "most_m 50 of class boat is not more than least_m"),
         ({"shape_error": 1e300}, "shape_error 1e.300 is not in 0..1"),
-        ({"seed": -1}, "seed -1 is not accepted; 0 or more is"),
+        ({"seed": -1}, "seed -1 is not possible; ask for 0 or more"),
         ({"targets": ("a:gaussian:1:2:3",), "false_anomalies": ("a:dipole:1:2:3",)}, "a name of their own"),
-        ({"target_prior": 1.0}, "target_prior 1 is not between 0 and 1"),
+        ({"target_prior": 1.0}, "target_prior 1 is not possible; ask for more than 0, less than 1"),
         ({"particles": 10}, "particles 10 is not in 100..1000000"),
-        ({"interval_s": math.nan}, "interval_s = nan is not accepted"),
+        ({"interval_s": math.nan}, "interval_s nan is not possible"),
     ],
 )
 def test_impossible_parameters_are_refused(values, said):
     with pytest.raises(ValueError, match=said):
-        IdentificationParameters(**values)
+        IdentificationParameters(**values).require_detectable()
 
 
 def test_another_source_within_reach_of_a_known_anomaly_is_an_anomaly_of_its_own():

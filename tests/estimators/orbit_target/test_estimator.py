@@ -192,9 +192,9 @@ def as_read(message):
     [
         ({"target_north_m": 1.0}, "give both, or neither"),
         ({"ground_pa": 5.0}, "ground_pa 5"),
-        ({"target_sigma_m": 0.0}, "target_sigma_m = 0.0"),
-        ({"acquired_after": 0}, "acquired_after = 0"),
-        ({"angle_rad": 0.0}, "angle_rad = 0"),
+        ({"target_sigma_m": 0.0}, "target_sigma_m 0"),
+        ({"acquired_after": 0}, "acquired_after 0"),
+        ({"angle_rad": 0.0}, "angle_rad 0"),
     ],
 )
 def test_parameters_are_checked(values, reported):

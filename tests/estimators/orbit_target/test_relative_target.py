@@ -103,5 +103,5 @@ def test_images_that_can_not_be_placed_are_left_out():
 
 
 def test_parameters_are_checked():
-    with pytest.raises(ValueError, match=r"angle_rad = 0\.0"):
+    with pytest.raises(ValueError, match=r"angle_rad 0"):
         RelativeTargetParameters(angle_rad=0.0)

@@ -162,7 +162,7 @@ def test_attitude_is_interpolated_and_gets_old():
 
 
 def test_parameters_are_checked():
-    with pytest.raises(ValueError, match="acquired_after = 0"):
+    with pytest.raises(ValueError, match="acquired_after 0"):
         TrackerParameters(acquired_after=0)
-    with pytest.raises(ValueError, match="lost_after_s = 0"):
+    with pytest.raises(ValueError, match="lost_after_s 0"):
         TrackerParameters(lost_after_s=0.0)

@@ -13,7 +13,8 @@ from estimators.survey.estimator import SurveyEstimator, SurveyEstimatorParamete
 from estimators.survey.export import ANOMALIES, LINE_DATA, LINE_DATA_XYZ, LINES, MAP, survey_files
 from estimators.survey.levelling import Crossing, levelled
 from estimators.survey.lines import HEADER, LineKind, LinePlan, SurveyLine, detected_lines, load_lines
-from estimators.survey.processing import ProcessingParameters, process_survey, white_noise_nt
+from estimators.survey.parameters import ProcessingParameters
+from estimators.survey.processing import process_survey, white_noise_nt
 from estimators.survey.readings import SurveyReadings, placed_readings
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.magnetic_map_file import MagneticMapError, read_map_file
@@ -295,11 +296,8 @@ def test_lines_and_their_levels_in_two_separate_nets_are_counted_apart():
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (
-            {"decimal_year": 1e9},
-            "decimal year 1000000000.0 is outside the magnetic model's validity, 2025.0 to 2030.0",
-        ),
-        ({"line_spacing_m": 0.5}, "line_spacing_m = 0.5 is not accepted: a finite number of at least 1 is"),
+        ({"decimal_year": 1e9}, "decimal_year 1e.09 is not in 2025..2030"),
+        ({"line_spacing_m": 0.5}, "line_spacing_m 0.5 is not possible; ask for 1 or more"),
         ({"grid_m": 0.0}, "grid_m"),
     ],
 )

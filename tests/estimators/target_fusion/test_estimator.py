@@ -317,10 +317,10 @@ def test_same_messages_same_bits_and_reset_forgets() -> None:
     [
         ({"heading": "north"}, "heading 'north' is not one of course, yaw"),
         ({"distance": "size"}, "needs target_size_m"),
-        ({"centre_vehicle": 0}, "centre_vehicle 0 is not a system id"),
-        ({"gate": 0.0}, "gate = 0.0 is not accepted"),
+        ({"centre_vehicle": 0}, "centre_vehicle 0 is not in 1..255"),
+        ({"gate": 0.0}, "gate 0 is not possible"),
         ({"confirmations": 0}, "confirmations 0"),
-        ({"omega_x_rad_s": -1.0}, "omega_x_rad_s = -1.0"),
+        ({"omega_x_rad_s": -1.0}, "omega_x_rad_s -1"),
         ({"wait_s": 3.0}, "wait_s 3 is more than history_s 2"),
     ],
 )

@@ -113,11 +113,11 @@ def test_users_see_each_option_once_with_its_unit_and_default():
     assert list(seen) == ["size", "altitude", "yaw-sigma", "spread"]
     assert seen["size"].default == (20.0, 10.0)
     assert [each.name for each in seen["size"].fields] == ["width_m", "height_m"]
-    assert seen["altitude"].varies == "aircraft: 90"
+    assert seen["altitude"].option.varies == "aircraft: 90"
     yaw = seen["yaw-sigma"]
-    assert (yaw.path, yaw.default, yaw.declared.unit) == (("filter",), 0.02, "degrees")
+    assert (yaw.path, yaw.default, yaw.declared.unit) == ("filter", 0.02, "degrees")
     assert yaw.declared.for_users(yaw.default) == pytest.approx(1.14592, abs=1e-5)
-    assert (seen["spread"].help, seen["spread"].varies) == ("Spread.", "half")
+    assert (seen["spread"].option.help, seen["spread"].option.varies) == ("Spread.", "half")
 
 
 def test_defaults_are_those_of_the_dataclass():

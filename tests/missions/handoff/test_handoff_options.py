@@ -9,9 +9,11 @@ from autopilot_bridge.mavlink import dialect
 from flightsim.payload import TargetShape
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
-from missions.handoff.options import HandoffOptions, check_vehicle
+from missions.handoff.checks import check_vehicle
+from missions.handoff.options import HandoffOptions
+from missions.handoff.walking_targets import PointSource, WalkingTargets
 from missions.handoff.watch import RadioLink
-from missions.handoff.world import WalkingTargets, handoff_world
+from missions.handoff.world import handoff_world
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 
 
@@ -19,10 +21,10 @@ from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
     ("changes", "reported"),
     [
         ({"radius_m": 0.0}, "`radius_m` 0"),
-        ({"decision": 1.0}, "`decision` 1 is not a probability between 0.5 and 1"),
-        ({"link_loss": 1.0}, "`link_loss` 1 is not a share"),
+        ({"decision": 1.0}, "`decision` 1 is not possible; ask for more than 0.5, less than 1"),
+        ({"link_loss": 1.0}, "`link_loss` 1 is not possible; ask for 0 or more, less than 1"),
         ({"link_delay_s": 9.0}, "`link_delay_s` 9 s is not in 0..5 s"),
-        ({"target_ne_m": (math.nan, 0.0)}, "`target_ne_m` is not a place"),
+        ({"target_ne_m": (math.nan, 0.0)}, "`target_ne_m` nan is not a finite number"),
         ({"confirm_after_s": -1.0}, "`confirm_after_s` -1"),
         ({"timeout_s": -1.0}, "`timeout_s` -1"),
         ({"estimator_seed": -1}, "`estimator_seed` -1"),
@@ -72,7 +74,9 @@ def test_the_world_has_walking_targets_and_what_both_aircraft_need():
 def test_with_pixels_the_targets_are_persons_and_the_cameras_search_pictures():
     world = WorldSpec.of_team(2, seed=4, model="aerosonde")
     plain = handoff_world(world, HandoffOptions(vehicles=2))
-    seen = handoff_world(world, HandoffOptions(vehicles=2), WalkingTargets(pixels=True, film=True))
+    seen = handoff_world(
+        world, HandoffOptions(vehicles=2), WalkingTargets(camera=PointSource.PIXELS, film=True)
+    )
     assert [target.motion for target in seen.targets] == [target.motion for target in plain.targets]
     assert {target.shape for target in seen.targets} == {TargetShape.PERSON}
     for one, other in zip(plain.vehicles, seen.vehicles, strict=True):

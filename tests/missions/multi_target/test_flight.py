@@ -20,13 +20,17 @@ from missions.multi_target.mission import MultiTargetMission
 from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.world import TargetField, multi_target_world
 from missions.runs.session import fly
+from missions.search.area import edges
 from missions.search.options import StepLawKind
 from tests.clients.sent_again import send_again
 from tests.clients.sitl_process import free_port
+from tests.missions.held_options import with_fields
 from tests.slow import slow
 
-SMALL = MultiTargetOptions(
-    altitude_m=8.0, area_m=(-20.0, -20.0, 60.0, 60.0), start_ne_m=(0.0, 0.0), steps=12, expected_targets=4.0
+SMALL = with_fields(
+    MultiTargetOptions(altitude_m=8.0, start_ne_m=(0.0, 0.0), steps=12),
+    expected_targets=4.0,
+    **edges((-20.0, -20.0, 60.0, 60.0)),
 )
 FIELD = TargetField(count=4, clusters=1, cluster_sigma_m=12.0)
 

@@ -17,6 +17,7 @@ from missions.multi_target.search import TargetSearch
 from missions.search.area import Area
 from missions.search.planner_parameters import Exploration, PlannerParameters
 from missions.search.sweep import SweepPlanner, sweep_path
+from tests.missions.held_options import with_fields
 
 AREA = Area(south_m=0.0, west_m=0.0, north_m=200.0, east_m=200.0)
 PARAMETERS = MultiTargetParameters(south_m=0.0, west_m=0.0, north_m=200.0, east_m=200.0)
@@ -202,7 +203,7 @@ def test_a_sweep_visits_its_path_step_by_step_and_comes_back():
         ({"alpha": -1.0}, "`alpha` -1"),
         ({"horizon": 9}, "`horizon` 9"),
         ({"beam": 0}, "`beam` 0"),
-        ({"discount": 1.5}, "discount 1.5"),
+        ({"discount": 1.5}, "`discount` 1.5"),
         ({"turn_limit_rad": 0.1}, "turn_limit_rad"),
     ],
 )
@@ -220,8 +221,8 @@ class Fixed:
 
 
 def search_of(**values):
-    options = MultiTargetOptions(**values)
-    found = SearchBelief(options.estimator_parameters)
+    options = with_fields(MultiTargetOptions(), **values)
+    found = SearchBelief(options.estimator)
     planners = [Fixed() for _ in range(options.vehicles)]
     return TargetSearch(found, [options] * options.vehicles, planners), found, planners
 

@@ -23,10 +23,11 @@ from missions.base.request import RunRequest
 from missions.cli import main as cli
 from missions.errors import PlanError
 from missions.flown.records import FlightRecords
+from missions.occupancy.magnetic_target import MagneticTarget
 from missions.occupancy.mission import OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
-from missions.occupancy.suspect import Identify
+from missions.occupancy.parameters import Identify, SearchParameters
 from missions.occupancy.world import occupancy_world
 from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
@@ -38,15 +39,14 @@ SMALL = OccupancyOptions(
     width_m=400.0,
     height_m=400.0,
     cell_m=100.0,
-    detection_range_m=60.0,
-    confirmations=1,
+    search=SearchParameters(detection_range_m=60.0, confirmations=1),
 )
 TARGET_NE_M = (110.0, 30.0)
 
 
 def world_of(options=SMALL, *, target_ne_m=TARGET_NE_M, moment_a_m2=None, **values) -> WorldSpec:
     world = WorldSpec.of_team(options.vehicles, **{"seed": 1, **values})
-    return occupancy_world(world, options, target_ne_m=target_ne_m, moment_a_m2=moment_a_m2)
+    return occupancy_world(world, options, MagneticTarget(place_ne_m=target_ne_m, moment_a_m2=moment_a_m2))
 
 
 def request(out, options=SMALL, *, picture=True, **values) -> RunRequest:

@@ -10,11 +10,11 @@ from estimators.magnetic_identification.parameters import IdentificationParamete
 from estimators.occupancy.detection import MapError
 from estimators.tracking.grid import GridLayout
 from missions.occupancy import investigation
-from missions.occupancy.decision import DecisionParameters
 from missions.occupancy.investigation import Investigation
 from missions.occupancy.next_pass import candidate_passes, mixture_information
-from missions.occupancy.search import Search, SearchParameters
-from missions.occupancy.suspect import Identify, Verdict
+from missions.occupancy.parameters import DecisionParameters, Identify, SearchParameters
+from missions.occupancy.search import Search
+from missions.occupancy.suspect import Verdict
 from tests.estimators.magnetic_identification.encounters import (
     CORRELATION_M,
     DIRECTION,
@@ -35,8 +35,9 @@ def search(identify=Identify.BAYES, searchers=2, *, south_m=-800.0):
     layout = GridLayout(south_m=south_m, west_m=-800.0, cell_m=200.0, rows=8, columns=8)
     return Search(
         layout,
-        SearchParameters(noise_nt=0.2),
+        SearchParameters(),
         [DecisionParameters()] * searchers,
+        noise_nt=0.2,
         investigation=Investigation(
             identify, identifier, searchers=searchers, layout=layout, noise_nt=0.2, map_error=MAP_ERROR
         ),

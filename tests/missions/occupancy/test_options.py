@@ -5,13 +5,17 @@ from dataclasses import replace
 
 import pytest
 
+from estimators.magnetic_identification.parameters import IdentificationParameters
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
+from missions.occupancy.checks import check_vehicle, for_vehicle, layout_of
+from missions.occupancy.magnetic_target import MagneticTarget
 from missions.occupancy.mission import OccupancyMission
-from missions.occupancy.options import OccupancyOptions, check_vehicle
-from missions.occupancy.suspect import Identify
+from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.parameters import DecisionParameters, Identify
 from missions.occupancy.world import drawn_false_anomalies, drawn_target, occupancy_world
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
+from tests.missions.held_options import with_fields
 
 WINGS = FixedWingLimits(
     airspeed_min_m_s=18.0,
@@ -45,7 +49,7 @@ WINGS = FixedWingLimits(
 )
 def test_impossible_values_are_refused_by_name(values, words):
     with pytest.raises(PlanError, match=words):
-        OccupancyOptions(**values)
+        with_fields(OccupancyOptions(), **values)
 
 
 @pytest.mark.parametrize(
@@ -61,21 +65,22 @@ def test_impossible_values_are_refused_by_name(values, words):
 )
 def test_what_an_aircraft_cannot_fly_is_refused_by_name(values, words):
     with pytest.raises(PlanError, match=words):
-        check_vehicle(OccupancyOptions(**values).for_vehicle(WINGS), WINGS)
+        check_vehicle(for_vehicle(OccupancyOptions(**values), WINGS), WINGS)
 
 
 def test_cells_an_aircraft_cannot_turn_in_are_reached_by_a_larger_neighbourhood():
-    options = OccupancyOptions(cell_m=60.0, neighbourhood=3).for_vehicle(WINGS)
+    options = for_vehicle(OccupancyOptions(cell_m=60.0, decision=DecisionParameters(neighbourhood=3)), WINGS)
     check_vehicle(options, WINGS)
-    check_vehicle(OccupancyOptions(cell_m=60.0).for_vehicle(MulticopterLimits()), MulticopterLimits())
+    rotors = MulticopterLimits()
+    check_vehicle(for_vehicle(OccupancyOptions(cell_m=60.0), rotors), rotors)
 
 
 def test_each_kind_of_vehicle_has_its_own_habits_and_speed():
     options = OccupancyOptions()
-    wings, rotors = options.for_vehicle(WINGS), options.for_vehicle(MulticopterLimits())
+    wings, rotors = for_vehicle(options, WINGS), for_vehicle(options, MulticopterLimits())
     assert (wings.speed_m_s, rotors.speed_m_s) == (25.0, 10.0)
     assert rotors.decision_parameters.heading_penalty < wings.decision_parameters.heading_penalty
-    chosen = OccupancyOptions(heading_penalty=0.7, speed_m_s=8.0).for_vehicle(MulticopterLimits())
+    chosen = for_vehicle(OccupancyOptions(heading_penalty=0.7, speed_m_s=8.0), MulticopterLimits())
     assert (chosen.heading_penalty, chosen.speed_m_s) == (0.7, 8.0)
 
 
@@ -83,16 +88,16 @@ def test_each_kind_of_vehicle_has_its_own_habits_and_speed():
     ("values", "words"),
     [
         ({"amplitude_nt": 2.0}, "`amplitude_nt` 2 nT of the target is not beyond `threshold_nt`"),
-        ({"sigma_along_m": 0.0}, "`sigma_along_m` 0 m of the target is not possible"),
-        ({"sigma_across_m": math.nan}, "`sigma_across_m` nan m"),
-        ({"moment_a_m2": -1.0}, "`moment_a_m2` -1 A m2"),
-        ({"depth_m": 2000.0}, "`depth_m` 2000 m of the target is not within 1000 m"),
-        ({"target_ne_m": (0.0, 1300.0)}, "`target_ne_m` 0,1300 is outside the searched map"),
+        ({"sigma_along_m": 0.0}, "`sigma_along_m` 0 is not possible"),
+        ({"sigma_across_m": math.nan}, "`sigma_across_m` nan is not possible"),
+        ({"moment_a_m2": -1.0}, "`moment_a_m2` -1 is not possible"),
+        ({"depth_m": 2000.0}, "`depth_m` 2000 m is not in -1000..1000 m"),
+        ({"place_ne_m": (0.0, 1300.0)}, "`target_ne_m` 0,1300 is outside the searched map"),
     ],
 )
 def test_an_impossible_target_is_refused_by_name(values, words):
     with pytest.raises(PlanError, match=words):
-        occupancy_world(WorldSpec(), OccupancyOptions(), **values)
+        occupancy_world(WorldSpec(), OccupancyOptions(), MagneticTarget(**values))
 
 
 def test_the_target_follows_the_seed_and_nothing_else():
@@ -101,7 +106,7 @@ def test_the_target_follows_the_seed_and_nothing_else():
     assert drawn_target(replace(options, vehicles=1, cell_m=100.0), 1)[0] == pytest.approx(first)
     assert drawn_target(options, 2)[0] != first
     for seed in range(50):
-        assert options.layout.contains(*drawn_target(options, seed)[0])
+        assert layout_of(options).contains(*drawn_target(options, seed)[0])
     assert drawn_target(options, 1, (10.0, 20.0))[0] == (10.0, 20.0)
 
 
@@ -113,7 +118,9 @@ def test_the_world_of_a_search_has_magnetometers_and_a_map_with_room_around_the_
     assert 0.5 * field.height_m >= 300.0 + 1200.0 + 200.0
     assert 0.5 * field.width_m >= 100.0 + 1200.0 + 200.0
     assert all(vehicle.payload.magnetometer for vehicle in world.vehicles)
-    assert occupancy_world(world, options, target_ne_m=(0.0, 0.0)) == world  # its own field stays
+    assert (
+        occupancy_world(world, options, MagneticTarget(place_ne_m=(0.0, 0.0))) == world
+    )  # its own field stays
     given = occupancy_world(WorldSpec(), replace(options, map_file=str(tmp_path / "map.npz")))
     assert given.magnetic_field.map_file == tmp_path / "map.npz"
     published = OccupancyMission().with_map(options, tmp_path / "made.npz")
@@ -122,7 +129,7 @@ def test_the_world_of_a_search_has_magnetometers_and_a_map_with_room_around_the_
 
 def test_a_map_that_is_none_is_refused_before_the_flight(tmp_path):
     (tmp_path / "map.npz").write_bytes(b"no map")
-    options = OccupancyOptions(map_file=str(tmp_path / "map.npz")).for_vehicle(WINGS)
+    options = for_vehicle(OccupancyOptions(map_file=str(tmp_path / "map.npz")), WINGS)
     with pytest.raises(PlanError, match="is not a magnetic map"):
         OccupancyMission().check(options, WINGS)
     with pytest.raises(PlanError, match="takes none"):
@@ -130,13 +137,18 @@ def test_a_map_that_is_none_is_refused_before_the_flight(tmp_path):
 
 
 def test_classes_of_an_identification_are_checked_with_the_options():
-    with pytest.raises(PlanError, match=r"`identify=bayes`: targets names no class"):
-        OccupancyOptions(identify=Identify.BAYES, targets=())
-    with pytest.raises(PlanError, match=r"`identify=trace`: class 'x' is not accepted; give NAME:gaussian"):
-        OccupancyOptions(identify=Identify.TRACE, false_anomalies=("x",))
+    with pytest.raises(ValueError, match="targets names no class"):
+        IdentificationParameters(targets=())
+    with pytest.raises(ValueError, match="class 'x' is not accepted; give NAME:gaussian"):
+        IdentificationParameters(false_anomalies=("x",))
+    submarine = IdentificationParameters(targets=("sub:dipole:15:50:150",), false_anomalies=())
     with pytest.raises(PlanError, match=r"`identify=trace`: no class that is sought \(sub\) is Gaussian"):
-        OccupancyOptions(identify=Identify.TRACE, targets=("sub:dipole:15:50:150",))
-    OccupancyOptions(identify=Identify.BAYES, targets=("sub:dipole:15:50:150",), false_anomalies=())
+        OccupancyOptions(identify=Identify.TRACE, identification=submarine)
+    OccupancyOptions(identify=Identify.BAYES, identification=submarine)
+    weak = IdentificationParameters(threshold_nt=40.0)
+    OccupancyOptions(identification=weak)
+    with pytest.raises(PlanError, match="`identify=bayes`: amplitude_nt 30 of class target does not exceed"):
+        OccupancyOptions(identify=Identify.BAYES, identification=weak)
 
 
 def test_false_anomalies_are_apart_and_follow_from_the_seed():
@@ -146,6 +158,6 @@ def test_false_anomalies_are_apart_and_follow_from_the_seed():
     assert found == again != drawn_false_anomalies(options, 4, 5, (0.0, 0.0))
     places = [(0.0, 0.0), *((s.north_m, s.east_m) for s in found)]
     assert min(math.dist(a, b) for k, a in enumerate(places) for b in places[:k]) >= 500.0
-    assert all(options.layout.contains(*place) for place in places)
+    assert all(layout_of(options).contains(*place) for place in places)
     with pytest.raises(PlanError, match="`false_count` 60 does not fit into the area"):
         drawn_false_anomalies(options, 3, 60, (0.0, 0.0))

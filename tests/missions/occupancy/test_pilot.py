@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimators.tracking.grid import GridLayout
-from missions.occupancy.decision import Decision, DecisionParameters
+from missions.occupancy.decision import Decision
+from missions.occupancy.parameters import DecisionParameters, SearchParameters
 from missions.occupancy.pilot import Motion, Pilot, heading_for_course
-from missions.occupancy.search import Search, SearchParameters
+from missions.occupancy.search import Search
 from tests.missions.occupancy.point_mass import Aircraft
 
 
@@ -33,7 +34,9 @@ def test_more_cross_wind_than_airspeed_is_no_error():
 
 def new_search(searchers: int = 1, cell_m: float = 200.0, size_m: float = 2000.0) -> Search:
     layout = GridLayout.over(width_m=size_m, height_m=size_m, cell_m=cell_m, centre_ne_m=(0.0, 0.0))
-    return Search(layout, SearchParameters(), [DecisionParameters(heading_penalty=0.2)] * searchers)
+    return Search(
+        layout, SearchParameters(), [DecisionParameters(heading_penalty=0.2)] * searchers, noise_nt=0.5
+    )
 
 
 def motion(time_s: float, north_m: float, east_m: float, velocity=(25.0, 0.0)) -> Motion:

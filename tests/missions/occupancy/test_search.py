@@ -10,8 +10,9 @@ from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.occupancy_map import OccupancyMap
 from estimators.tracking.grid import GridLayout
 from missions.errors import PlanError
-from missions.occupancy.decision import DecisionParameters, decide
-from missions.occupancy.search import Search, SearchParameters
+from missions.occupancy.decision import decide
+from missions.occupancy.parameters import DecisionParameters, SearchParameters
+from missions.occupancy.search import Search
 
 
 def layout(rows: int = 10, columns: int = 10, cell_m: float = 100.0) -> GridLayout:
@@ -143,7 +144,7 @@ def test_bad_habits_are_refused_by_name(values):
 
 
 def search(searchers: int = 2, **parameters) -> Search:
-    return Search(layout(), SearchParameters(**parameters), [DecisionParameters()] * searchers)
+    return Search(layout(), SearchParameters(**parameters), [DecisionParameters()] * searchers, noise_nt=0.5)
 
 
 def test_two_passes_over_one_place_find_the_target():
@@ -185,7 +186,7 @@ def test_cell_of_another_searcher_is_left_to_it():
 
 
 def test_track_lowers_scores_once_and_not_where_something_is_seen():
-    team = search(1)
+    team = search(1, detection_range_m=60.0)
     for step in range(100):
         team.report_place(0, step * 100_000, 550.0, 10.0 * step, anomalous=400.0 <= 10.0 * step <= 600.0)
     scores = team.map.scores * 100.0
@@ -196,7 +197,7 @@ def test_track_lowers_scores_once_and_not_where_something_is_seen():
 
 def test_team_covers_the_map_with_a_simple_aircraft():
     """Point masses that turn at 20 deg/s: most of a map is searched in the time a sweep would need twice."""
-    team = Search(layout(8, 8), SearchParameters(), [DecisionParameters()] * 2)
+    team = Search(layout(8, 8), SearchParameters(), [DecisionParameters()] * 2, noise_nt=0.5)
     states = [(50.0, 50.0, 0.0), (50.0, 650.0, 0.0)]
     commands = [team.next_cell(k, *state).heading_rad for k, state in enumerate(states)]
     for step in range(2400):

@@ -13,11 +13,11 @@ from flightsim.environment import Environment
 from flightsim.world_spec import WorldSpec
 from missions.flown.records import FlightRecords
 from missions.flown.run_folder import EPOCH_UNIX_US
+from missions.gps_off import GpsOff
 from missions.library import find_mission
 from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 from missions.runs.session import RunRequest, fly
-from missions.vehicle.gps_switch import GpsOff
 from tests.slow import slow
 
 KEYS = {"radius_mean_error_percent", "radius_std_m", "altitude_error_m", "gps_lost_at_s"}

@@ -4,10 +4,11 @@ import pytest
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError
+from missions.gps_off import GpsOff
 from missions.orbit.mission import orbit_verdict
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.vehicle.gps_switch import GpsOff, GpsSwitch
+from missions.vehicle.gps_switch import GpsSwitch
 from missions.vehicle.notes import FlightNotes
 
 INJECT = dialect.MAV_CMD_INJECT_FAILURE

@@ -7,6 +7,7 @@ from click.testing import CliRunner
 
 from missions.cli.fly import fly
 from missions.errors import PlanError
+from missions.orbit.checks import check_camera, check_vehicle
 from missions.orbit.options import OrbitOptions
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 
@@ -35,30 +36,30 @@ WINGS = FixedWingLimits(
 )
 def test_what_can_not_be_flown_is_refused(change, words):
     with pytest.raises(PlanError, match=words):
-        OrbitOptions(**change).check(WINGS)
+        check_vehicle(OrbitOptions(**change), WINGS)
 
 
 def test_the_defaults_can_be_flown_and_hovering_is_no_orbit():
-    OrbitOptions().check(WINGS)
+    check_vehicle(OrbitOptions(), WINGS)
     with pytest.raises(PlanError, match="choose `model=aerosonde`"):
-        OrbitOptions().check(MulticopterLimits())
+        check_vehicle(OrbitOptions(), MulticopterLimits())
 
 
 def test_the_smallest_radius_is_that_of_the_fastest_place_on_the_circle():
     """1.2 (V + w + v)^2 / (g tan(bank)), with true airspeed."""
     fastest = 25.0 * math.sqrt(1.225 / 1.15587) + 4.0 + 2.0  # density of ISO 2533 at 600 m
     least = 1.2 * fastest**2 / (9.80665 * math.tan(math.radians(45.0)))
-    OrbitOptions(radius_m=least + 0.1, target_speed_m_s=2.0).check(WINGS)
+    check_vehicle(OrbitOptions(radius_m=least + 0.1, target_speed_m_s=2.0), WINGS)
     with pytest.raises(PlanError, match="can't be held"):
-        OrbitOptions(radius_m=least - 0.1, target_speed_m_s=2.0).check(WINGS)
+        check_vehicle(OrbitOptions(radius_m=least - 0.1, target_speed_m_s=2.0), WINGS)
 
 
 def test_a_target_outside_what_the_gimbal_reaches_is_refused():
     """Abeam at 34 degrees below the horizon, with 17 to 31 degrees of bank."""
     options = OrbitOptions()
-    options.check_camera(WINGS, math.radians(-90.0), math.radians(30.0))
+    check_camera(options, WINGS, math.radians(-90.0), math.radians(30.0))
     with pytest.raises(PlanError, match="outside what the camera's gimbal reaches"):
-        options.check_camera(WINGS, math.radians(-90.0), math.radians(-20.0))
+        check_camera(options, WINGS, math.radians(-90.0), math.radians(-20.0))
 
 
 @pytest.mark.parametrize(

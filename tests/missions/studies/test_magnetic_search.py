@@ -7,16 +7,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from estimators.magnetic_identification.parameters import IdentificationParameters
 from missions.cli.main import run_command_line
 from missions.occupancy.options import OccupancyOptions
-from missions.occupancy.suspect import Identify
+from missions.occupancy.parameters import Identify
 from missions.occupancy.world import drawn_target
 from missions.occupancy.world_searchers import search_with_points
 from missions.studies import run_study, run_trial
 from missions.studies.magnetic_search import report, study, summarise
 
 SMALL = OccupancyOptions(
-    vehicles=2, width_m=900.0, height_m=900.0, identify=Identify.BAYES, particles=800, search_time_s=200.0
+    vehicles=2,
+    width_m=900.0,
+    height_m=900.0,
+    identify=Identify.BAYES,
+    search_time_s=200.0,
+    identification=IdentificationParameters(particles=800),
 )
 
 

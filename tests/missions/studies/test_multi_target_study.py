@@ -7,14 +7,16 @@ from flightsim.payload import TerrainSpec
 from flightsim.world_spec import WorldSpec
 from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.world import terrain_targets_world
+from missions.search.area import edges
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.design import grid
 from missions.studies.multi_target_search import study, summarise
 from missions.studies.multi_target_trial import EXPERIMENTS, PLANNERS, Found, _row
 from missions.studies.study import Study
+from tests.missions.held_options import with_fields
 
 E2 = EXPERIMENTS["E2"]
-OPTIONS = MultiTargetOptions(area_m=E2.area_m)
+OPTIONS = with_fields(MultiTargetOptions(), **edges(E2.area_m))
 
 
 def places(seed, number):

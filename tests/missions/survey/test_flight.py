@@ -15,6 +15,7 @@ from estimators.occupancy.survey_map import load_survey_map
 from estimators.survey.compensation import direction_cosines, load_compensation
 from estimators.survey.estimator import SurveyEstimator, SurveyEstimatorParameters
 from estimators.survey.export import ANOMALIES, LINE_DATA, LINE_DATA_XYZ, LINES, MAP
+from estimators.survey.parameters import ProcessingParameters
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.magnetic_map_file import read_map_file
@@ -29,21 +30,26 @@ from missions.cli import main as cli
 from missions.flown.records import FlightRecords
 from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
+from missions.survey.inputs import terrain_of
 from missions.survey.mission import SurveyMission
 from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
 from missions.survey.outcome import COMPENSATION
 from missions.survey.records import flight_readings
+from missions.survey.surveyed_field import SurveyedField
 from missions.survey.world import survey_world
 from tests.measured_survey import SURVEY, with_measured_survey
 
-SMALL = SurveyOptions(width_m=500.0, height_m=600.0, spacing_m=250.0, tie_spacing_m=500.0, map_error_nt=0.0)
+SMALL = SurveyOptions(
+    width_m=500.0, height_m=600.0, spacing_m=250.0, tie_spacing_m=500.0,
+    processing=ProcessingParameters(map_error_nt=0.0),
+)  # fmt: skip
 AIR = Environment.from_wind(speed_m_s=5.0, from_deg=270.0, turbulence="light")
 NOISE_NT = 0.2  # of the default magnetometer
 
 
 def request(out, options=SMALL, *, picture=False, seed=8, world=None, autopilot="px4", home=None, **values):
     spec = WorldSpec.of_team(1, model="aerosonde", seed=seed, air=AIR, autopilot=autopilot, home=home)
-    made = survey_world(spec, options, **values) if world is None else world
+    made = survey_world(spec, options, SurveyedField(**values)) if world is None else world
     return RunRequest(options=options, world=made, out=out, picture=picture)
 
 
@@ -119,7 +125,14 @@ def test_a_replay_with_the_files_of_the_flight_makes_its_map(flown, tmp_path):
 
 
 def test_an_estimator_beside_the_flight_agrees_with_the_mission(tmp_path):
-    options = replace(SMALL, width_m=300.0, height_m=300.0, spacing_m=150.0, tie_spacing_m=300.0, level=False)
+    options = replace(
+        SMALL,
+        width_m=300.0,
+        height_m=300.0,
+        spacing_m=150.0,
+        tie_spacing_m=300.0,
+        processing=ProcessingParameters(map_error_nt=0.0, level=False),
+    )
     asked = replace(request(tmp_path / "run", options, exact_map=True), estimator="survey")
     summary = fly(SurveyMission(), asked).summary
     assert (summary["outcome"], summary["reason"]) == ("completed", "")
@@ -192,7 +205,10 @@ def test_a_map_that_does_not_cover_the_lines_is_refused_before_anything_starts(f
             ["replay", "LOG", "--estimator", "survey", "--set", "lines_file=no"],
             "lines_file no can't be read: ",
         ),
-        (["replay", "LOG", "--estimator", "survey", "--set", "decimal_year=1e9"], "2025.0 to 2030.0"),
+        (
+            ["replay", "LOG", "--estimator", "survey", "--set", "decimal_year=1e9"],
+            "decimal_year 1e+09 is not in 2025..2030",
+        ),
         (["replay", "LOG", "--estimator", "survey", "--set", "foo"], "--set 'foo' is not NAME=VALUE"),
         (
             ["fly", "lissajous", "--estimator", "survey", "--set", "map_file=no.npz"],
@@ -250,7 +266,7 @@ def test_a_survey_over_terrain_keeps_its_height(autopilot, tmp_path):
     records = FlightRecords.from_tlog(result.folder / "flight.tlog")
     readings = flight_readings(records, 1, LocalFrame(home), attitude=False)
     table = np.genfromtxt(result.folder / LINE_DATA, delimiter=",", names=True, dtype=None, encoding="utf-8")
-    clearance = table["height_m"] - options.terrain().at(table["north_m"], table["east_m"])
+    clearance = table["height_m"] - terrain_of(options).at(table["north_m"], table["east_m"])
     assert clearance.min() > options.altitude_m - 6.0
     assert np.ptp(table["height_m"]) > 15.0
     assert len(readings) > len(table)
@@ -268,7 +284,7 @@ def test_compensation_takes_out_the_aircraft_at_least_ten_times(seed, autopilot,
     options = SurveyOptions(calibrate=True, altitude_m=CALIBRATION_ALTITUDE_M)
     result = fly(
         SurveyMission(),
-        request(tmp_path / "run", options, picture=True, seed=seed, autopilot=autopilot, vehicle_field=True),
+        request(tmp_path / "run", options, picture=True, seed=seed, autopilot=autopilot, uncompensated=True),
     )
     assert (result.outcome, result.reason) == ("completed", "")
     summary = result.summary
@@ -306,10 +322,10 @@ def true_field_nt(cosines, strength_nt, seed):
 @pytest.mark.timeout(900)
 def test_a_compensated_survey_is_as_good_as_one_without_an_aircraft(tmp_path):
     calibration = SurveyOptions(calibrate=True, altitude_m=CALIBRATION_ALTITUDE_M)
-    made = fly(SurveyMission(), request(tmp_path / "calibration", calibration, vehicle_field=True))
-    raw = fly(SurveyMission(), request(tmp_path / "raw", vehicle_field=True, exact_map=True))
+    made = fly(SurveyMission(), request(tmp_path / "calibration", calibration, uncompensated=True))
+    raw = fly(SurveyMission(), request(tmp_path / "raw", uncompensated=True, exact_map=True))
     options = replace(SMALL, compensation_file=str(made.folder / COMPENSATION))
-    done = fly(SurveyMission(), request(tmp_path / "done", options, vehicle_field=True, exact_map=True))
+    done = fly(SurveyMission(), request(tmp_path / "done", options, uncompensated=True, exact_map=True))
     assert raw.summary["misclosure_before_nt"] > 5.0 * done.summary["misclosure_before_nt"]
     assert done.summary["differential_noise_nt"] < 1.2 * NOISE_NT
     assert not done.summary["anomalies"]
@@ -329,7 +345,7 @@ def test_a_survey_over_the_measured_map(tmp_path):
     source.save(tmp_path / "source.npz")
     options = SurveyOptions(
         width_m=2000.0, height_m=2000.0, altitude_m=100.0, map_file=str(tmp_path / "source.npz"),
-        map_error_nt=0.0,
+        processing=ProcessingParameters(map_error_nt=0.0),
     )  # fmt: skip
     asked = request(tmp_path / "run", options, home=home, targets=4, exact_map=True)
     result = fly(SurveyMission(), asked)

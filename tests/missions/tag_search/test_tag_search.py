@@ -15,7 +15,8 @@ from missions.base.options import FlightOptions, Via
 from missions.base.request import RunRequest
 from missions.errors import PlanError
 from missions.library import find_mission
-from missions.pattern_search.world import TagTarget, tag_search_world
+from missions.pattern_search.tag_target import TagTarget
+from missions.pattern_search.world import motion_of, tag_search_world
 from missions.runs.session import fly
 from missions.worlds.search_camera import search_camera
 
@@ -125,7 +126,7 @@ def test_frames_that_are_not_rendered_have_the_same_detections():
 def test_the_target_starts_outside_the_middle():
     options = FlightOptions(search=True)
     rng = np.random.default_rng(1)
-    starts = np.array([TagTarget().motion(options, rng).start_m for _ in range(500)])
+    starts = np.array([motion_of(TagTarget(), options, rng).start_m for _ in range(500)])
     assert np.abs(starts).max() < 50.0 and (np.abs(starts).max(axis=1) > 5.0).all()
     assert np.abs(starts.mean(axis=0)).max() < 5.0
 
@@ -133,11 +134,13 @@ def test_the_target_starts_outside_the_middle():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: TagTarget(speed_m_s=-1.0), "`target_speed_m_s` -1"),
-        (lambda: TagTarget(size_m=0.0), "`tag_size_m` 0"),
+        (lambda: TagTarget(speed_m_s=-1.0), "`speed_m_s` -1"),
+        (lambda: TagTarget(size_m=0.0), "`size_m` 0"),
         (lambda: FlightOptions(search=True, tag_id=300), "`tag_id` 300"),
         (
-            lambda: TagTarget().motion(FlightOptions(width_m=8.0, height_m=8.0), np.random.default_rng(1)),
+            lambda: motion_of(
+                TagTarget(), FlightOptions(width_m=8.0, height_m=8.0), np.random.default_rng(1)
+            ),
             "`width_m, height_m` 8 m x 8 m",
         ),
     ],

@@ -20,6 +20,7 @@ from flightsim.world_spec import WorldSpec
 from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
 from missions.runs.session import fly
+from missions.search.area import edges
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.world import HiddenTag, vision_search_world
@@ -27,12 +28,13 @@ from missions.worlds.payloads import carrying
 from missions.worlds.search_camera import search_camera
 from tests.clients.sent_again import send_again
 from tests.clients.sitl_process import free_port
+from tests.missions.held_options import with_fields
 
-SMALL = {"altitude_m": 15.0, "area_m": (-20.0, -20.0, 20.0, 20.0), "step_m": 8.0, "tag_size_m": 0.6}
+SMALL = {"altitude_m": 15.0, **edges((-20.0, -20.0, 20.0, 20.0)), "step_m": 8.0, "target_size_m": 0.6}
 
 
 def flown(out, *, hidden=None, picture=False, mission=None, **changes):
-    options = VisionSearchOptions(**{**SMALL, **changes})
+    options = with_fields(VisionSearchOptions(), **{**SMALL, **changes})
     world = vision_search_world(WorldSpec.of_team(options.vehicles, seed=4), options, hidden)
     request = RunRequest(options=options, world=world, out=out, picture=picture, estimator="vision-search")
     return fly(mission or VisionSearchMission(), request)
@@ -111,8 +113,8 @@ def test_vehicles_with_a_lossless_link_agree(tmp_path):
 @pytest.mark.slow
 def test_a_search_without_a_target_ends_with_its_time(tmp_path):
     """The tag of another number is not the target."""
-    options = VisionSearchOptions(**SMALL, search_time_s=60.0, tag_id=3)
-    world = vision_search_world(WorldSpec.of_team(1, seed=4), VisionSearchOptions(**SMALL))
+    options = with_fields(VisionSearchOptions(), **SMALL, search_time_s=60.0, tag_id=3)
+    world = vision_search_world(WorldSpec.of_team(1, seed=4), with_fields(VisionSearchOptions(), **SMALL))
     request = RunRequest(options=options, world=world, out=tmp_path / "run", picture=True)
     result = fly(VisionSearchMission(), request)
     summary = result.summary
@@ -175,7 +177,9 @@ def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
 @pytest.mark.slow
 def test_a_film_of_a_flight_has_the_estimates_of_the_flight(tmp_path):
     """The pictures of the camera, kept without loss, give the same detections and estimates, to the bit."""
-    options = VisionSearchOptions(**{**SMALL, "tag_size_m": 1.5}, passes=1, search_time_s=60.0)
+    options = with_fields(
+        VisionSearchOptions(), **{**SMALL, "target_size_m": 1.5}, passes=1, search_time_s=60.0
+    )
     small = PinholeModel(width_px=320, height_px=180, horizontal_fov_rad=math.radians(70.0))
     camera = replace(search_camera(1.5, film=True), model=small)
     world = carrying(WorldSpec.of_team(1, seed=4), PayloadParameters(camera=camera))

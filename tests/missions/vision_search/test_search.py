@@ -1,31 +1,31 @@
 """Planners and the state of a search, without flights: a camera that is moved from place to place."""
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from estimators.tracking.camera_sight import CameraSight
-from estimators.vision_search import AreaEstimate, VisionSearchEstimator
+from estimators.vision_search import AreaEstimate, VisionSearchEstimator, VisionSearchParameters
 from estimators.vision_search.models import new_belief, pose_errors_of
 from flightsim.foundation.vectors import from_euler, product
+from missions.search.area import edges
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
 from missions.vision_search.figures import search_verdict
+from missions.vision_search.for_vehicle import for_vehicle
 from missions.vision_search.options import LocalizeKind, SearchPlannerKind, VisionSearchOptions
 from missions.vision_search.planner import Localizer, planner_of
 from missions.vision_search.search import VisionSearch
+from tests.missions.held_options import with_fields
 
-OPTIONS = VisionSearchOptions(area_m=(-100.0, -100.0, 100.0, 100.0), cell_m=2.0).for_vehicle(
-    MulticopterLimits()
-)
-PARAMETERS = OPTIONS.estimator_parameters
+PARAMETERS = VisionSearchParameters(**edges((-100.0, -100.0, 100.0, 100.0)), cell_m=2.0)
+OPTIONS = for_vehicle(VisionSearchOptions(estimator=PARAMETERS), MulticopterLimits())
 
 
 def frame(place, heading_rad, options=OPTIONS):
     down = from_euler(0.0, -0.5 * math.pi, 0.0)
-    place_m2, rotation_rad2 = pose_errors_of(options.estimator_parameters).covariances(
+    place_m2, rotation_rad2 = pose_errors_of(options.estimator).covariances(
         from_euler(0.0, 0.0, heading_rad), down
     )
     return CameraSight(
@@ -41,7 +41,7 @@ def frame(place, heading_rad, options=OPTIONS):
 
 def detection_probability_after(planner, steps, options=OPTIONS):
     """Of a search that sees nothing, with a frame in the middle and at the end of each step."""
-    belief = new_belief(options.estimator_parameters)
+    belief = new_belief(options.estimator)
     here, direction, camera = (0.0, 0.0), None, frame((0.0, 0.0), 0.0)
     for _ in range(steps):
         there = planner.next_place(belief, here, direction, camera)
@@ -63,7 +63,7 @@ def test_the_planner_with_a_horizon_detects_sooner_than_the_greedy_one_and_the_c
         "lissajous": {"planner": SearchPlannerKind.LISSAJOUS},
         "sweep": {"planner": SearchPlannerKind.SWEEP},
     }.items():
-        options = replace(OPTIONS, **changes)
+        options = with_fields(OPTIONS, **changes)
         found[name] = detection_probability_after(planner_of(options), 14, options)
     assert found["horizon"] > 0.6
     assert found["horizon"] >= found["greedy"] - 0.02
@@ -72,7 +72,7 @@ def test_the_planner_with_a_horizon_detects_sooner_than_the_greedy_one_and_the_c
 
 
 def test_vehicles_that_plan_by_the_same_belief_part():
-    options = replace(OPTIONS, planner=SearchPlannerKind.HORIZON, horizon=2)
+    options = with_fields(OPTIONS, planner=SearchPlannerKind.HORIZON, horizon=2)
     belief, planner, camera = new_belief(PARAMETERS), planner_of(options), frame((0.0, 0.0), 0.0)
     first = planner.next_place(belief, (0.0, 0.0), None, camera)
     direction = math.atan2(first[1], first[0])
@@ -84,7 +84,7 @@ def test_vehicles_that_plan_by_the_same_belief_part():
 def test_a_sweep_sees_the_whole_area_and_each_vehicle_its_strip():
     assert detection_probability_after(planner_of(OPTIONS), 60) > 0.97
     for index, (low, high) in enumerate(((-100.0, 0.0), (0.0, 100.0))):
-        own = replace(OPTIONS, vehicles=2, index=index)
+        own = with_fields(OPTIONS, vehicles=2, index=index)
         planner, here, places = planner_of(own), (0.0, 0.0), []
         for _ in range(30):
             here = planner.next_place(new_belief(PARAMETERS), here, None, None)
@@ -94,10 +94,13 @@ def test_a_sweep_sees_the_whole_area_and_each_vehicle_its_strip():
 
 
 def test_the_planner_of_an_aircraft_turns_by_90_degrees_at_most():
-    options = VisionSearchOptions(
-        area_m=(-600.0, -600.0, 600.0, 600.0), planner=SearchPlannerKind.HORIZON, horizon=1
-    ).for_vehicle(FixedWingLimits())
-    belief, planner = new_belief(options.estimator_parameters), planner_of(options)
+    chosen = with_fields(
+        VisionSearchOptions(planner=SearchPlannerKind.HORIZON),
+        horizon=1,
+        **edges((-600.0, -600.0, 600.0, 600.0)),
+    )
+    options = for_vehicle(chosen, FixedWingLimits())
+    belief, planner = new_belief(options.estimator), planner_of(options)
     here, direction = (0.0, 0.0), 0.0
     for _ in range(10):
         there = planner.next_place(belief, here, direction, frame(here, direction, options))
@@ -140,7 +143,7 @@ def test_passes_cross_the_estimate_in_spread_directions():
 
 
 def test_an_orbit_keeps_its_distance():
-    localizer = Localizer(replace(OPTIONS, localize=LocalizeKind.ORBIT))
+    localizer = Localizer(with_fields(OPTIONS, localize=LocalizeKind.ORBIT))
     places = [localizer.next_place(estimate(), (40.0, 20.0)) for _ in range(7)]
     radii = [math.dist(place, (10.0, 20.0)) for place in places]
     assert radii == pytest.approx([radii[0]] * 7)
@@ -150,7 +153,7 @@ def test_an_orbit_keeps_its_distance():
 
 
 def search_of(count=1, **changes):
-    options = [replace(OPTIONS, vehicles=count, index=k, **changes) for k in range(count)]
+    options = [with_fields(OPTIONS, vehicles=count, index=k, **changes) for k in range(count)]
     estimators = [VisionSearchEstimator(PARAMETERS) for _ in options]
     return VisionSearch(estimators, options, range(1, count + 1)), estimators
 

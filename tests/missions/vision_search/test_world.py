@@ -8,10 +8,12 @@ import pytest
 from flightsim.payload import RandomWalk
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
+from missions.search.area import edges
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.world import HiddenTag, vision_search_world
+from tests.missions.held_options import with_fields
 
-OPTIONS = VisionSearchOptions(area_m=(0.0, -50.0, 100.0, 50.0))
+OPTIONS = with_fields(VisionSearchOptions(), **edges((0.0, -50.0, 100.0, 50.0)))
 
 
 def made(count=1, seed=3, hidden=None):
@@ -22,7 +24,7 @@ def made(count=1, seed=3, hidden=None):
 def test_the_target_is_that_of_the_seed_for_any_team():
     (one,), (two,) = made().targets, made(2).targets
     assert one == two
-    assert one.tag_id == 0 and one.size_m == OPTIONS.tag_size_m
+    assert one.tag_id == 0 and one.size_m == OPTIONS.estimator.target_size_m
     places = [(t.motion.north_m, t.motion.east_m) for seed in range(40) for t in made(seed=seed).targets]
     assert len(set(places)) == 40
     assert all(5.0 <= n <= 95.0 and -45.0 <= e <= 45.0 for n, e in places)
@@ -53,7 +55,7 @@ def test_a_target_may_be_placed_and_may_walk():
     ("make", "reported"),
     [
         (lambda: made(hidden=HiddenTag(place_ne_m=(-1.0, 0.0))), "`target_ne_m` -1,0 is not in `area_m`"),
-        (lambda: HiddenTag(speed_m_s=99.0), "`target_speed_m_s` 99 m/s"),
+        (lambda: HiddenTag(speed_m_s=99.0), "`speed_m_s` 99 m/s"),
         (lambda: HiddenTag(misalignment_rad=1.0), "`misalignment_rad` 57.2958 degrees"),
     ],
 )

@@ -1,0 +1,86 @@
+"""The tables of docs/options.md, from the declarations of the fields.
+
+python -m missions.cli.options_page docs/options.md
+
+writes the tables into the page, between its two marks.
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from estimators.library import ESTIMATORS, estimator_class
+from flightsim.foundation.options import Declared, choices_of, declared, unit_of, written
+from missions.cli.mission_command import DeclaredOption, Scope
+from missions.cli.mission_commands import COMMANDS
+from missions.cli.options import in_options
+
+BEGIN: Final = "<!-- begin: tables of python -m missions.cli.options_page -->"
+END: Final = "<!-- end -->"
+
+
+def tables() -> str:
+    """All tables, as Markdown."""
+    return "\n".join((*_missions(), *_estimators()))
+
+
+def with_tables(page: str) -> str:
+    """A page with the tables between its marks.
+
+    Raises:
+        ValueError: it has no marks.
+    """
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"the page lacks {BEGIN} or {END}")
+    return f"{before}{begin}\n\n{tables()}\n{end}{after}"
+
+
+def _missions() -> Iterator[str]:
+    yield "## Missions: options of `flightstack fly`\n"
+    for name, command in COMMANDS.items():
+        yield f"### {name}\n"
+        yield "| option | default | what it is |\n|---|---|---|"
+        for option in command.options:
+            if isinstance(option, DeclaredOption):
+                what = in_options(option.user.option.help)
+                if option.scope is Scope.EMBEDDED:
+                    what = f"{what} (embedded world)"
+                default = "" if option.is_flag else in_options(option.user.default_text)
+                words = " ".join((option.opts[0], option.user.placeholder)).strip()
+                yield _row(f"`{words}`", default, what)
+        yield ""
+
+
+def _estimators() -> Iterator[str]:
+    yield "## Estimators: parameters of `--set NAME=VALUE`\n"
+    for name in ESTIMATORS:
+        yield f"### {name}: parameters\n"
+        yield "| parameter | default | what it is |\n|---|---|---|"
+        for each in declared(estimator_class(name).PARAMETERS):
+            yield _row(f"`{each.name}`", _default(each), in_options(_what(each)))
+        yield ""
+
+
+def _default(each: Declared) -> str:
+    """Default of a parameter, in its own unit; in the user's too, where that is another one."""
+    shown = written(each.default)
+    if each.in_degrees and each.default not in (None, 0.0):
+        shown += f" ({written(each.for_users(each.default))} {unit_of(each.name)})"
+    return "; ".join(part for part in (shown, each.option.varies) if part)
+
+
+def _what(each: Declared) -> str:
+    choices = ", ".join(choices_of(each.kind))
+    return f"{each.option.help} [{choices}]" if choices else each.option.help
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+if __name__ == "__main__":
+    path = Path(sys.argv[1])
+    path.write_text(with_tables(path.read_text(encoding="utf-8")), encoding="utf-8")

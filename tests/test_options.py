@@ -1,0 +1,140 @@
+"""Options are declared once: their texts, their defaults, and the page about them."""
+
+import re
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from estimators.library import ESTIMATORS, estimator_class
+from flightsim.foundation.options import Declared, Options, declared, user_options
+from missions.cli import options_page
+from missions.cli.fly import fly
+from missions.cli.fly_command import _COMMANDS, chosen_names
+from missions.cli.mission_command import DeclaredOption, _named
+
+PAGE = Path(__file__).parents[1] / "docs/options.md"
+NO_NOUNS = re.compile(
+    r"(an?|and|as|at|by|don't|for|from|give|how|if|in|its?|of|on|or|so|that|the|their|these|they|this|to|what)"
+    r"|(where|which|with|without|draw|find|fly|keep|leave|look|make|print|run|show|speak|take|use)",
+    re.IGNORECASE,
+)
+"""Words with which a text would begin that can't be read alone, or that is a command."""
+
+MISSIONS = {name: _named(command.made) for name, command in _COMMANDS.items()}
+WORLDS = {name: _named(command.part) for name, command in _COMMANDS.items() if command.part is not None}
+PARAMETERS = {name: estimator_class(name).PARAMETERS for name in ESTIMATORS}
+CLASSES = [*MISSIONS.values(), *WORLDS.values(), *PARAMETERS.values()]
+
+
+def held_by(kind: type) -> list[Declared]:
+    return [each for each in declared(kind) if isinstance(each.default, Options)]
+
+
+def every_declaration() -> dict[tuple[type, str], Declared]:
+    kinds = [*CLASSES, *(held.kind for kind in MISSIONS.values() for held in held_by(kind))]
+    return {(kind, each.name): each for kind in dict.fromkeys(kinds) for each in declared(kind)}
+
+
+def test_the_page_has_what_the_fields_declare():
+    page = PAGE.read_text(encoding="utf-8")
+    written = options_page.with_tables(page)
+    assert page == written, "run python -m missions.cli.options_page docs/options.md"
+
+
+def test_texts_begin_with_a_noun_and_stand_alone():
+    wrong = []
+    for (kind, name), each in every_declaration().items():
+        text = each.option.help
+        if not text:
+            continue
+        sentences = text.endswith(".") and not re.search(r"[a-z]\. [A-Z]", text)
+        if not text[0].isupper() or NO_NOUNS.match(text) or not sentences:
+            wrong.append((kind.__name__, name, text))
+    assert wrong == []
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_each_parameter_of_an_estimator_has_a_text(name):
+    assert issubclass(PARAMETERS[name], Options)
+    assert [each.name for each in declared(PARAMETERS[name]) if not each.option.help] == []
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_the_command_line_makes_the_defaults_of_python(name):
+    file = {"a mission of your own": "mine.py", "a mission file": "field.plan"}.get(name, name)
+    with fly.make_context("fly", [file]) as context:
+        chosen = chosen_names(context)
+        options = context.meta["mission command"].build(context.params, chosen, vehicles=1)
+    plain = MISSIONS[name]()
+    for each in fields(plain):
+        if each.name != "given":
+            assert getattr(options, each.name) == getattr(plain, each.name), each.name
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_a_mission_has_the_defaults_of_the_estimator_whose_parameters_it_holds(name):
+    """All fields, also those of a class on the parameters, which the estimator has for itself."""
+    for holder in held_by(MISSIONS[name]):
+        kinds = [kind for kind in PARAMETERS.values() if issubclass(kind, holder.kind)]
+        for own in (kind() for kind in kinds):
+            for each in declared(holder.kind):
+                assert getattr(holder.default, each.name) == getattr(own, each.name), (holder.name, each.name)
+
+
+def test_missions_hold_the_parameters_of_estimators():
+    holders = {
+        name for name, kind in MISSIONS.items() for held in held_by(kind) if issubclass(held.kind, Options)
+    }
+    assert {"vision-search", "multi-target", "occupancy", "survey"} <= holders
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_a_mission_declares_nothing_that_it_holds(name):
+    """No text stands at two fields of what a mission's options declare, hold or inherit."""
+    kind = MISSIONS[name]
+    texts: dict[str, list[str]] = {}
+    for owner in (kind, *(held.kind for held in held_by(kind))):
+        for each in declared(owner):
+            if each.option.help:
+                texts.setdefault(each.option.help, []).append(f"{owner.__name__}.{each.name}")
+    assert [names for names in texts.values() if len(names) > 1] == []
+
+
+def test_a_derived_class_does_not_repeat_a_declaration():
+    """Another default of a base's field is an `other_default`, which has the text of the base."""
+    repeated = []
+    for kind in dict.fromkeys(CLASSES):
+        line = [
+            base
+            for base in kind.__mro__
+            if issubclass(base, Options) and "__dataclass_fields__" in vars(base)
+        ]
+        for own, base in pairwise(line):
+            texts = {each.name: each.option.help for each in declared(base) if each.option.help}
+            for each in fields(own):
+                mine = each.metadata.get("option")
+                inherited = each is base.__dataclass_fields__.get(each.name)
+                if mine is not None and not inherited and mine.help == texts.get(each.name):
+                    repeated.append((own.__name__, each.name))
+    assert repeated == []
+
+
+def test_the_command_line_states_no_default_of_its_own():
+    further = [
+        option.name
+        for command in _COMMANDS.values()
+        for option in command.options
+        if not isinstance(option, DeclaredOption) and isinstance(option.default, str | int | float)
+    ]
+    assert further == []
+
+
+def test_an_option_of_a_mission_is_one_field():
+    """Each field with a text is an option: nothing else must be edited for it."""
+    for name, command in _COMMANDS.items():
+        shown = {user.name for user in user_options(MISSIONS[name])}
+        options = {o.user.name for o in command.options if isinstance(o, DeclaredOption)}
+        assert shown - set(command.without) <= options
+        assert set(command.without) <= shown, name
