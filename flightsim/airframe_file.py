@@ -19,7 +19,7 @@ from flightsim.airframe_types import (
     LaunchParameters,
     Role,
 )
-from flightsim.foundation.documents import read_toml
+from flightsim.foundation.documents import excerpt, read_toml
 from flightsim.foundation.file_content import FileError
 from flightsim.toml_tables import listed, names_of, number, only, table_of, text
 
@@ -176,12 +176,17 @@ def _described(data: dict[str, Any], vehicle: dict[str, Any], kind: AirframeKind
 
 
 def _jsbsim_file(name: str, path: Path) -> Path:
-    beside = (path.parent / name).with_suffix(".xml")
-    if beside.is_file():
-        return beside
-    packaged = _package_root() / "aircraft" / name / f"{name}.xml"
-    if packaged.is_file():
-        return packaged
+    try:
+        beside = (path.parent / name).with_suffix(".xml")
+        if beside.is_file():
+            return beside
+        packaged = _package_root() / "aircraft" / name / f"{name}.xml"
+        if packaged.is_file():
+            return packaged
+    except (OSError, ValueError) as error:  # a name that no file can have
+        raise AirframeError(
+            f"{path} names the JSBSim model {excerpt(name)}: {getattr(error, 'strerror', None) or error}"
+        ) from None
     raise AirframeError(
         f"{path} names the JSBSim model {beside}, which does not exist; nor has the jsbsim package an "
         f"aircraft '{name}' (it has {', '.join(package_aircraft())})"

@@ -72,7 +72,9 @@ def raster(path: Path, driver: str, crs: str | None, column: str | None, check: 
             rasterio.open(path, driver=driver) as dataset,
         ):
             _require_size(path, dataset.width, dataset.height)
-            band = dataset.read(_band(path, dataset, column), masked=True).astype(np.float64).filled(np.nan)
+            with np.errstate(invalid="ignore"):  # values that are no numbers are counted by `check`
+                band = dataset.read(_band(path, dataset, column), masked=True).astype(np.float64)
+            band = band.filled(np.nan)
             transform, declared = dataset.transform, dataset.crs
     except errors.NotGeoreferencedWarning:
         raise EstimatorError(f"{path} does not say where on the Earth its points are") from None
@@ -206,7 +208,7 @@ def _regular(path: Path, crs: ReferenceSystem, columns: Array, rows: Array, valu
     right, up = np.argsort(columns), np.argsort(rows)
     x, y, grid = columns[right], rows[up], values[up][:, right]
     for name, lines in (("x", x), ("y", y)):
-        if lines.size < 2 or not np.all(np.diff(lines) > 0.0) or not np.all(np.isfinite(lines)):
+        if lines.size < 2 or not np.all(np.isfinite(lines)) or not np.all(np.diff(lines) > 0.0):
             raise EstimatorError(
                 f"{path}: its {name} coordinates are no grid lines; accepted are two or more finite numbers "
                 "without repetition"

@@ -28,6 +28,8 @@ _VALUES: Final = (
 )
 """Usual names of the field, likewise."""
 
+_NAMES_SHOWN: Final = 20
+_LONGEST_NAME: Final = 40
 _ANOMALY_NT: Final = 10_000.0
 _SINGLE: Final = 1e-6  # of a value that was stored in single precision
 
@@ -55,17 +57,23 @@ def chosen(path: Path, found: Mapping[str, Any], column: str | None) -> Any:
         for name in (column, *(name for name in found if name.casefold() == column.casefold())):
             if name in found:
                 return found[name]
-        raise EstimatorError(f"{path} has no `column` {column!r}; there are {', '.join(found) or 'none'}")
+        raise EstimatorError(f"{path} has no `column` {column!r}; there are {_names(found)}")
     names = {name.casefold(): name for name in found}
     for usual in _VALUES:
         if usual in names:
             return found[names[usual]]
     if len(found) != 1:
         raise EstimatorError(
-            f"{path} has {len(found)} candidates for the field ({', '.join(found) or 'none'}); name one with "
-            "`column`"
+            f"{path} has {len(found)} candidates for the field ({_names(found)}); name one with `column`"
         )
     return next(iter(found.values()))
+
+
+def _names(found: Mapping[str, Any]) -> str:
+    """The first of some names, as text."""
+    shown = [name[:_LONGEST_NAME] for name in list(found)[:_NAMES_SHOWN]]
+    more = len(found) - len(shown)
+    return f"{', '.join(shown) or 'none'}{f' and {more} more' if more else ''}"
 
 
 def checked_values(path: Path, values_nt: Array, kind: Values, no_data: float | None) -> Array:

@@ -9,6 +9,7 @@ import yaml
 
 from estimators.errors import EstimatorError
 from estimators.vision.camera import CameraGeometry
+from flightsim.foundation.documents import excerpt
 from flightsim.foundation.file_content import FileError, read_text
 
 __all__ = ["SUFFIXES", "load_calibration"]
@@ -16,6 +17,7 @@ __all__ = ["SUFFIXES", "load_calibration"]
 SUFFIXES: Final = (".yaml", ".yml")
 
 _MOST_BYTES: Final = 1 << 18
+_LONGEST_REASON: Final = 300
 _MODELS: Final = ("plumb_bob", "rational_polynomial")
 """Distortion models of ROS that are OpenCV's k1, k2, p1, p2, k3, and more of it with further terms of 0."""
 
@@ -51,7 +53,7 @@ def load_calibration(path: Path) -> CameraGeometry:
         data = yaml.load(text, Loader=_Loader)  # a safe loader
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         reason = " ".join(str(error).split()) or "it is nested too deep"
-        raise EstimatorError(f"{path} is not YAML: {reason}") from None
+        raise EstimatorError(f"{path} is not YAML: {reason[:_LONGEST_REASON]}") from None
     if not isinstance(data, Mapping):
         raise EstimatorError(f"{path} is no calibration: it has no entries such as camera_matrix")
     width_px, height_px = (_whole(path, data, name) for name in ("image_width", "image_height"))
@@ -61,7 +63,7 @@ def load_calibration(path: Path) -> CameraGeometry:
     model = data.get("distortion_model", _MODELS[0])
     if model not in _MODELS:
         accepted = " and ".join(_MODELS)
-        raise EstimatorError(f"{path}: distortion_model {model!r} is not accepted; {accepted} are")
+        raise EstimatorError(f"{path}: distortion_model {excerpt(model)} is not accepted; {accepted} are")
     coefficients = _numbers(path, data, "distortion_coefficients")
     first, further = coefficients[:5], coefficients[5:]
     if any(further):
@@ -84,7 +86,7 @@ def load_calibration(path: Path) -> CameraGeometry:
 def _whole(path: Path, data: Mapping[Any, Any], name: str) -> int:
     value = data.get(name)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise EstimatorError(f"{path}: {name} {value!r} is not a whole number of pixels")
+        raise EstimatorError(f"{path}: {name} {excerpt(value)} is not a whole number of pixels")
     return value
 
 

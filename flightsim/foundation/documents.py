@@ -14,7 +14,7 @@ from xml.parsers import expat
 
 from flightsim.foundation.file_content import TEXT_BYTES, FileError, read_file, read_text
 
-__all__ = ["read_json", "read_toml", "read_xml"]
+__all__ = ["excerpt", "read_json", "read_toml", "read_xml"]
 
 _DEEPEST: Final = 100
 """Levels of nesting; files of ground stations have 8, JSBSim's aircraft 20."""
@@ -24,6 +24,8 @@ _LONG_KEY: Final = re.compile(r"""(?<![\w-])(?>(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \
 """A dotted key of more than 100 parts: tomllib keeps all beginnings of a key, gigabytes for a long one."""
 
 _LARGEST_WHOLE: Final = 1 << 63
+_LONGEST_TEXT: Final = 1000
+_EXCERPT: Final = 60
 _TOO_DEEP: Final = "it is nested too deep"
 _TOO_LARGE: Final = "is larger than any number here"
 
@@ -32,7 +34,8 @@ def read_toml(path: Path | str) -> dict[str, Any]:
     """The content of a TOML file.
 
     Raises:
-        FileError: it can't be read, is not TOML, or is nested too deep.
+        FileError: it can't be read, is not TOML, is nested too deep, or has a text that is too long for what
+            these files name: paths, models and choices.
     """
     text = read_text(path, max_bytes=_TOML_BYTES, may_be_empty=True)
     if _LONG_KEY.search(text):
@@ -43,7 +46,7 @@ def read_toml(path: Path | str) -> dict[str, Any]:
         raise FileError(path, _TOO_DEEP) from None
     except ValueError as error:  # TOMLDecodeError, and integers of more digits than Python converts
         raise FileError(path, f"it is not TOML: {error}") from None
-    _check(path, found)
+    _check(path, found, longest=_LONGEST_TEXT)
     return found
 
 
@@ -103,18 +106,28 @@ class _Builder(ElementTree.TreeBuilder):
         return super().end(tag)
 
 
-def _check(path: Path | str, found: Any) -> None:
-    """Refuse deep nesting, and whole numbers that are no float."""
+def excerpt(value: object) -> str:
+    """The beginning of a value, for messages about it."""
+    text = repr(value)
+    return text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}..."
+
+
+def _check(path: Path | str, found: Any, *, longest: int | None = None) -> None:
+    """Refuse deep nesting, whole numbers that are no float, and texts that are too long."""
     level = [found]
     for _ in range(_DEEPEST):
         inner: list[Any] = []
         for value in level:
             if isinstance(value, dict):
-                inner += value.values()
+                inner += value.values() if longest is None else (*value, *value.values())
             elif isinstance(value, list):
                 inner += value
             elif isinstance(value, int) and abs(value) >= _LARGEST_WHOLE:
                 raise FileError(path, f"its number {str(value)[:12]}... {_TOO_LARGE}")
+            elif isinstance(value, str) and longest is not None and len(value) > longest:
+                raise FileError(
+                    path, f"its text {excerpt(value)} has {len(value)} characters; accepted are {longest}"
+                )
         level = inner
     if level:
         raise FileError(path, _TOO_DEEP)

@@ -2,10 +2,13 @@
 
 import gzip
 import os
+import warnings
 from pathlib import Path
 
 import pytest
 
+from estimators.errors import EstimatorError
+from estimators.survey.map_values import chosen
 from tests.fuzz.file_campaign import Reader, campaign
 from tests.fuzz.file_readers import readers
 
@@ -53,3 +56,35 @@ def test_a_pipe_is_refused_without_waiting(tmp_path: Path, name: str) -> None:
     path = tmp_path / f"file{reader.suffix}"
     os.mkfifo(path)
     assert "it is a pipe" in _refusal(reader, path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("calibration", "image_width: 640\nimage_height: " + "(" * 5000, "is not a whole number of pixels"),
+        ("world", "x = '" + "{" * 5000 + "'", "has 5000 characters; accepted are 1000"),
+        ("vehicle", f'[vehicle]\nname = "a"\nkind = "fixed_wing"\njsbsim = "{"b" * 400}"', "name too long"),
+        (
+            "esri grid",
+            "ncols 2\nnrows 2\nxllcorner inf\nyllcorner 0\ncellsize 1\n48000 48001\n48002 48003\n",
+            "grid lines",
+        ),
+    ],
+)
+def test_long_texts_and_infinite_places_are_refused_in_one_short_line(
+    tmp_path: Path, name: str, content: str, words: str
+) -> None:
+    """Faults of the slow campaign."""
+    reader = readers()[name]
+    path = tmp_path / f"file{reader.suffix}"
+    path.write_text(content)
+    with warnings.catch_warnings(action="error"):
+        refusal = _refusal(reader, path)
+    assert words in refusal
+    assert len(refusal) < 1500
+
+
+def test_of_many_bands_a_few_are_named(tmp_path: Path) -> None:
+    bands = {str(number): number for number in range(1, 514)}
+    with pytest.raises(EstimatorError, match=r"has 513 candidates .*, 20 and 493 more\)"):
+        chosen(tmp_path / "a.tif", bands, None)
