@@ -1,7 +1,6 @@
 """Reading vehicle descriptions: finding the file a user means, and its TOML."""
 
-import math
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +18,7 @@ from flightsim.airframe_types import (
     LaunchParameters,
     Role,
 )
+from flightsim.foundation.conversion import Conversion, NotMade, Refused
 from flightsim.foundation.documents import excerpt, read_toml
 from flightsim.foundation.file_content import FileError
 from flightsim.toml_tables import listed, names_of, number, only, table_of, text
@@ -221,17 +221,13 @@ def _launch(table: Any, path: Path) -> tuple[LaunchKind, tuple[LaunchParameters,
 
 def _converted(table: Any, name: str, target: Any, path: Path, *left_out: str) -> dict[str, Any]:
     """Fields of a dataclass from a TOML table; degrees become radians."""
-    if not isinstance(table, dict):
-        raise AirframeError(f"{path}: [{name}] is {table!r}; expected is a table")
-    names = tuple(field.name for field in fields(target) if field.name not in left_out)
-    accepted = tuple(key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key for key in names)
-    only(table, accepted, f"keys of [{name}]", path)
-    values: dict[str, Any] = {}
-    for key, fieldname in zip(accepted, names, strict=True):
-        if key in table:
-            value = number(table, key, path)
-            values[fieldname] = math.radians(value) if key != fieldname else value
-    return values
+    try:
+        return Conversion().arguments(target, table, without=left_out)
+    except NotMade as error:
+        raise AirframeError(f"{path}: [{name}] {error.where}{error}") from None
+    except Refused as error:
+        where = error.where or f"[{name}]"
+        raise AirframeError(f"{path}: {where} is {error.value!r}; expected is {error.accepted}") from None
 
 
 def _truth(

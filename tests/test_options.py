@@ -12,7 +12,7 @@ from flightsim.foundation.options import Declared, Options, declared, user_optio
 from missions.cli import options_page
 from missions.cli.fly import fly
 from missions.cli.fly_command import _COMMANDS, chosen_names
-from missions.cli.mission_command import DeclaredOption, _named
+from missions.cli.mission_command import DeclaredOption
 
 PAGE = Path(__file__).parents[1] / "docs/options.md"
 NO_NOUNS = re.compile(
@@ -22,8 +22,8 @@ NO_NOUNS = re.compile(
 )
 """Words with which a text would begin that can't be read alone, or that is a command."""
 
-MISSIONS = {name: _named(command.made) for name, command in _COMMANDS.items()}
-WORLDS = {name: _named(command.part) for name, command in _COMMANDS.items() if command.part is not None}
+MISSIONS = {name: command.options_class for name, command in _COMMANDS.items()}
+WORLDS = {name: command.part_class for name, command in _COMMANDS.items() if command.part is not None}
 PARAMETERS = {name: estimator_class(name).PARAMETERS for name in ESTIMATORS}
 CLASSES = [*MISSIONS.values(), *WORLDS.values(), *PARAMETERS.values()]
 

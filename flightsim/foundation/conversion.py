@@ -10,7 +10,7 @@ the key
 import inspect
 import math
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import is_dataclass
 from enum import Enum, IntEnum, StrEnum
 from functools import partial
@@ -115,26 +115,39 @@ class Conversion:
 
     def called(self, maker: Callable[..., Any], table: Any) -> Any:
         """The result of a class or function with the entries of a table as its arguments."""
-        if not isinstance(table, dict):
-            raise Refused(table, "a table")
-        hints, parameters = get_type_hints(maker), inspect.signature(maker).parameters
-        names = {key_of(name): name for name in parameters}
-        for key in table:
-            if key not in names:
-                _inside(key, _not_made, f"is unknown; accepted are {', '.join(sorted(names))}")
-        for key, name in names.items():
-            if parameters[name].default is inspect.Parameter.empty and key not in table:
-                _inside(key, _not_made, "is missing")
-        values = {}
-        for key, given in table.items():
-            found = _inside(key, partial(self.value, hints[names[key]]), given)
-            values[names[key]] = math.radians(found) if names[key] != key and found is not None else found
+        values = self.arguments(maker, table)
+        for name, parameter in inspect.signature(maker).parameters.items():
+            if parameter.default is inspect.Parameter.empty and name not in values:
+                _inside(key_of(name), _not_made, "is missing")
         try:
             return maker(**values)
         except Refused:
             raise
         except ValueError as error:
             raise NotMade(f": {error}") from error
+
+    def arguments(
+        self, maker: Callable[..., Any], table: Any, *, without: Collection[str] = ()
+    ) -> dict[str, Any]:
+        """The entries of a table as arguments of a class or function; some may be left out.
+
+        Args:
+            maker: the class or function.
+            table: the table.
+            without: arguments that a table can't give.
+        """
+        if not isinstance(table, dict):
+            raise Refused(table, "a table")
+        hints = get_type_hints(maker)
+        names = {key_of(name): name for name in inspect.signature(maker).parameters if name not in without}
+        values = {}
+        for key, given in table.items():
+            if key not in names:
+                _inside(key, _not_made, f"is unknown; accepted are {', '.join(sorted(names))}")
+            name = names[key]
+            found = _inside(key, partial(self.value, hints[name]), given)
+            values[name] = math.radians(found) if name != key and found is not None else found
+        return values
 
     def _made(self, table: Any, kind: Any) -> Any:
         if isinstance(table, str) and kind in self._short:

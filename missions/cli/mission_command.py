@@ -1,6 +1,5 @@
 """Declaration of the command-line options of a mission."""
 
-import importlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -10,7 +9,16 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar, get_args, get_origin
 
 import click
 
-from flightsim.foundation.options import OptionError, UserOption, choices_of, declared, user_options, written
+from flightsim.foundation.options import (
+    OptionError,
+    Options,
+    UserOption,
+    choices_of,
+    declared,
+    user_options,
+    written,
+)
+from missions.cli.option_classes import named
 from missions.cli.options import DeclaredType, in_options
 
 if TYPE_CHECKING:
@@ -196,6 +204,17 @@ class MissionCommand:
     values: Callable[[Given, Collection[str]], Mapping[str, Any]] = lambda _given, _chosen: {}
 
     @property
+    def options_class(self) -> type[Options]:
+        """The class of the mission's options."""
+        return named(self.made)
+
+    @property
+    def part_class(self) -> type[Options]:
+        """The class of what is true in the embedded world; it must have one."""
+        assert self.part is not None
+        return named(self.part)
+
+    @property
     def options(self) -> tuple[FlightOption, ...]:
         """The mission's own options. The mission accepts no others beside those of every mission."""
         return _options_of(self)
@@ -211,7 +230,7 @@ class MissionCommand:
         Raises:
             click.UsageError, PlanError: a value is not accepted.
         """
-        kind = _named(self.made)
+        kind = named(self.made)
         own = declared_options(kind, without=self.without)
         values = dict(self.values(given, chosen))
         mine = [option for option in (*own, *self.further) if option.name in chosen]
@@ -238,22 +257,17 @@ class MissionCommand:
             return world
         parts = []
         if self.part is not None:
-            kind = _named(self.part)
+            kind = named(self.part)
             parts = [made(kind, declared_options(kind, scope=Scope.EMBEDDED), given, chosen)]
-        found: WorldSpec = _named(self.world)(world, options, *parts)
+        found: WorldSpec = named(self.world)(world, options, *parts)
         return found
 
 
 @cache
 def _options_of(command: MissionCommand) -> tuple[FlightOption, ...]:
-    own = declared_options(_named(command.made), without=command.without)
-    world = () if command.part is None else declared_options(_named(command.part), scope=Scope.EMBEDDED)
+    own = declared_options(named(command.made), without=command.without)
+    world = () if command.part is None else declared_options(named(command.part), scope=Scope.EMBEDDED)
     return (*own, *command.further, *world)
-
-
-def _named(place: tuple[str, str]) -> Any:
-    module, name = place
-    return getattr(importlib.import_module(module), name)
 
 
 def option(*declarations: str, **attributes: Any) -> FlightOption:

@@ -7,8 +7,8 @@ from typing import Any, Final
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, option
+from missions.cli.option_classes import MISSION_FILE, OPTIONS, PARTS, PATTERN
 
-_FLIGHT: Final = ("missions.base.options", "FlightOptions")
 _OF_LISSAJOUS: Final = ("pattern", "ratio", "phase", "period")
 _PATTERN_HAS_NOT: Final = ("allow-below-home",)
 _WANDERING: Final = ("circle", "random-walk")
@@ -22,7 +22,7 @@ def _sides(given: Given, _: Collection[str]) -> Mapping[str, Any]:
 def _pattern(help_text: str, *without: str) -> MissionCommand:
     return MissionCommand(
         help=help_text,
-        made=_FLIGHT,
+        made=OPTIONS[PATTERN],
         without=(*without, *_PATTERN_HAS_NOT),
         further=(
             option(
@@ -41,7 +41,7 @@ def _pattern(help_text: str, *without: str) -> MissionCommand:
             ),
         ),
         world=("missions.pattern_search.world", "tag_search_world"),
-        part=("missions.pattern_search.tag_target", "TagTarget"),
+        part=PARTS[PATTERN],
         values=_sides,
     )
 
@@ -103,10 +103,10 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
                 "An aircraft takes off, flies to the entry with GPS, loses it there "
                 "(MAV_CMD_INJECT_FAILURE), orbits, gets GPS back and lands."
             ),
-            made=("missions.orbit.options", "OrbitOptions"),
+            made=OPTIONS["orbit"],
             without=("rate", "allow-below-home"),
             world=("missions.orbit.world", "orbit_world"),
-            part=("missions.orbit.target_motion", "TargetMotion"),
+            part=PARTS["orbit"],
             values=_of_orbit,
         ),
         "occupancy": MissionCommand(
@@ -116,10 +116,10 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
                 "layer of altitude, and all return when the target is found or the search time is over. "
                 "Places are metres from the map's home."
             ),
-            made=("missions.occupancy.options", "OccupancyOptions"),
+            made=OPTIONS["occupancy"],
             without=("allow-below-home",),
             world=("missions.occupancy.world", "occupancy_world"),
-            part=("missions.occupancy.magnetic_target", "MagneticTarget"),
+            part=PARTS["occupancy"],
             values=_of_occupancy,
         ),
         "multi-target": MissionCommand(
@@ -130,10 +130,10 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
                 "vehicles of a team share the belief and plan in turn. Places are metres from the first "
                 "vehicle's home."
             ),
-            made=("missions.multi_target.options", "MultiTargetOptions"),
+            made=OPTIONS["multi-target"],
             without=("allow-below-home",),
             world=("missions.multi_target.world", "multi_target_world"),
-            part=("missions.multi_target.target_field", "TargetField"),
+            part=PARTS["multi-target"],
         ),
         "handoff": MissionCommand(
             help=(
@@ -143,10 +143,10 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
                 "where the other is, tracks what moves on the ground, decides which of its tracks is the "
                 "target, and takes it over. The second goes home when it has received the decision."
             ),
-            made=("missions.handoff.options", "HandoffOptions"),
+            made=OPTIONS["handoff"],
             without=("rate", "allow-below-home"),
             world=("missions.handoff.world", "handoff_world"),
-            part=("missions.handoff.walking_targets", "WalkingTargets"),
+            part=PARTS["handoff"],
             values=_of_handoff,
         ),
         "survey": MissionCommand(
@@ -157,10 +157,10 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
                 "rolls, pitches and yaws on four headings instead, and writes the compensation of the "
                 "aircraft. Places are metres from the map's home."
             ),
-            made=("missions.survey.options", "SurveyOptions"),
+            made=OPTIONS["survey"],
             without=("rate", "allow-below-home"),
             world=("missions.survey.world", "survey_world"),
-            part=("missions.survey.surveyed_field", "SurveyedField"),
+            part=PARTS["survey"],
             values=_of_survey,
         ),
         "vision-search": MissionCommand(
@@ -171,10 +171,10 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
                 "likelihoods of their frames. When the belief is narrow, they fly over the target in several "
                 "directions, or around it. Places are metres from the first vehicle's home."
             ),
-            made=("missions.vision_search.options", "VisionSearchOptions"),
+            made=OPTIONS["vision-search"],
             without=("allow-below-home",),
             world=("missions.vision_search.world", "vision_search_world"),
-            part=("missions.vision_search.hidden_tag", "HiddenTag"),
+            part=PARTS["vision-search"],
         ),
     }
 )
@@ -186,7 +186,7 @@ OWN: Final = MissionCommand(
         "It finds these in its `options` (altitude_m, speed_m_s, rate_hz, ...), and what --arg NAME=VALUE "
         "gives in `options.arguments`; what of it it goes by is its own affair."
     ),
-    made=_FLIGHT,
+    made=OPTIONS[PATTERN],
     without=(
         *(*_OF_LISSAJOUS, "size", "spacing", "heading", "periods", "search-time"),
         *("via", "acceptance", "search", "tag-id"),
@@ -203,6 +203,6 @@ FILE: Final = MissionCommand(
         "is, and has the autopilot and the class of vehicle that the file names, unless --home, --autopilot "
         "and --model say otherwise."
     ),
-    made=("missions.plan_files.options", "FileOptions"),
+    made=OPTIONS[MISSION_FILE],
     without=("altitude", "separation", "rate"),
 )

@@ -2,13 +2,15 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 import click
 
-from flightsim.foundation.options import UserOption
+from flightsim.foundation.options import UserOption, name_for_users, user_options
+from missions.cli.option_classes import OPTIONS, PARTS, named
 
 
 class FiniteRange(click.FloatRange):
@@ -107,87 +109,26 @@ class DeclaredType(_ParamType):
         )
 
 
-def degrees(value: str | float) -> float:
-    """An angle in degrees, as radians: a type of options."""
-    found = _numbers([str(value)])
-    if not found:
-        raise click.BadParameter(f"{value} is not an angle; give degrees, such as 90.")
-    return math.radians(found[0])
-
-
-def coordinates(names: str) -> Callable[[str], tuple[float, ...]]:
-    """The type of options that give so many coordinates, metres, separated by commas."""
-
-    def convert(text: str) -> tuple[float, ...]:
-        found = _numbers(text.split(","))
-        if len(found) != names.count(",") + 1:
-            raise click.BadParameter(f"{text!r} is not a place; give {names} in metres.")
-        return found
-
-    convert.__name__ = names
-    return convert
-
-
-def pair(names: str, separators: str, second: float | None = None) -> Callable[[str], tuple[float, float]]:
-    """The type of options that give two numbers, such as 100x80 or 3:4.
-
-    Args:
-        names: of the numbers, for the help.
-        separators: characters that may separate them.
-        second: the second number where one is given; None: the same as the first.
-    """
-
-    def convert(text: str) -> tuple[float, float]:
-        found = _numbers(re.split(f"[{separators}]", text.lower()))
-        if len(found) not in (1, 2):
-            raise click.BadParameter(
-                f"{text!r} is not one or two numbers without units, such as 3{separators[0]}4."
-            )
-        return found[0], found[1] if len(found) == 2 else found[0] if second is None else second
-
-    convert.__name__ = names
-    return convert
-
-
-def _numbers(texts: Sequence[str]) -> tuple[float, ...]:
-    """The finite numbers that the texts are; none, if one is not."""
-    try:
-        found = tuple(map(float, texts))
-    except ValueError:
-        return ()
-    return found if all(map(math.isfinite, found)) else ()
-
-
-PLACE: Final = coordinates("NORTH,EAST")
-SIDES: Final = pair("SIDE[,SIDE]", "x,")
-
 _FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:-]+))?`")
-_UNIT: Final = re.compile(r"_(ne_m|m_s|a_m2|nt|hz|rad|deg|m|s)$")
-_NAMES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "arguments": "--arg",
-        "clutter_per_scan": "--clutter",
-        "compensation_file": "--compensation",
-        "false_count": "--false-anomalies",
-        "gps_fault=False": "--no-gps-fault",
-        "height_m": "--size",
-        "map_file": "--map",
-        "parameters": "--params",
-        "phase_x_rad": "--phase",
-        "phase_y_rad": "--phase",
-        "settings": "--set",
-        "sigma_across_m": "--sigma",
-        "sigma_along_m": "--sigma",
-        "terrain_file": "--terrain",
-        "width_m": "--size",
-    }
+_OF_REQUESTS: Final[Mapping[str, str]] = MappingProxyType(
+    {"arguments": "arg", "parameters": "params", "seed": "seed", "settings": "set"}
 )
-"""Options of fields that are not the field's name without its unit."""
+"""Names for users of what is no field that declares itself."""
+
+
+@cache
+def _names() -> Mapping[str, str]:
+    """Names for users of the fields of all missions and of their worlds."""
+    classes = [named(place) for place in (*PARTS.values(), *reversed(list(OPTIONS.values())))]
+    names: dict[str, str] = {}
+    for user in (user for kind in classes for user in user_options(kind)):
+        names |= {field.name: user.name for field in user.fields}
+    return MappingProxyType({**names, **_OF_REQUESTS})
 
 
 def option_of(field: str) -> str:
     """The option that sets a field of a request or of a mission's options."""
-    return _NAMES.get(field, "--" + _UNIT.sub("", field).replace("_", "-"))
+    return f"--{_names().get(field, name_for_users(field))}"
 
 
 def in_options(message: object, *, own: bool = False) -> str:
@@ -211,7 +152,7 @@ def in_options(message: object, *, own: bool = False) -> str:
         if value is None:
             shown = list(dict.fromkeys(map(option_of, names.split(", "))))
         else:
-            shown = [_NAMES.get(f"{names}={value}", f"{option_of(names)} {value}")]
+            shown = [f"--no-{name_for_users(names)}" if value == "False" else f"{option_of(names)} {value}"]
         if known is not None and not known.issuperset(text.split(" ")[0] for text in shown):
             return found.group().strip("`")
         return " or ".join(shown)

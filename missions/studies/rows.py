@@ -1,14 +1,14 @@
 """Rows of a study: the columns of a row's dataclass, the outcome of a trial, and both as Arrow tables."""
 
-import types
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum, StrEnum
 from types import MappingProxyType
-from typing import Any, Final, Self, Union, get_args, get_origin, get_type_hints
+from typing import Any, Final, Self, get_origin, get_type_hints
 
 import pyarrow as pa
 
+from flightsim.foundation.options import without_none
 from missions.errors import PlanError
 from missions.studies.design import Value
 
@@ -152,11 +152,8 @@ class RowSchema:
 
 
 def _kind_of(row: type, name: str, hint: Any) -> Kind:
-    origin, arguments = get_origin(hint), get_args(hint)
-    if origin in (Union, types.UnionType):
-        rest = [a for a in arguments if a is not type(None)]
-        if len(rest) == 1:
-            return _kind_of(row, name, rest[0])
+    hint, _ = without_none(hint)
+    origin = get_origin(hint)
     if isinstance(hint, type) and origin is None:
         if issubclass(hint, Enum):
             return str

@@ -203,7 +203,10 @@ pitch_deg = 8
         ("[truth]\nBATTERY_VOLTAGE_V = ['a']\n", "one property fits"),
         ("[truth]\nBATTERY_VOLTAGE_V = true\n", "BATTERY_VOLTAGE_V is True"),
         ("[truth]\nBATTERY_VOLTAGE_V = 'no/such'\n", "no/such"),
-        ("[limits]\nspeed = 3\n", "'speed' is unknown; keys of .limits. are airspeed_min_m_s"),
+        (
+            "[limits]\nspeed = 3\n",
+            ".limits. speed is unknown; accepted are airspeed_max_m_s, airspeed_min_m_s",
+        ),
         ("[limits]\nairspeed_min_m_s = 0.1\n", r"airspeed_min_m_s 0\.1 is not in 1\.\.300"),
         (
             "[limits]\nairspeed_min_m_s = 30\nairspeed_max_m_s = 20\n",
@@ -214,7 +217,7 @@ pitch_deg = 8
         ("[limits]\nthrottle_max = 2\n", r"throttle_max 2\.0"),
         ("[launch]\nkind = 'rocket'\n", "'rocket' is unknown; accepted are runway, catapult, hand"),
         ("[launch]\nspeed = 3\n", "'speed' is unknown; keys of .launch. are kind, catapult, hand"),
-        ("[launch.hand]\nspeed = 3\n", "'speed' is unknown; keys of .launch.hand. are pitch_deg"),
+        ("[launch.hand]\nspeed = 3\n", ".launch.hand. speed is unknown; accepted are acceleration_m_s2"),
         ("[launch.hand]\npitch_deg = 99\n", r"pitch_deg 99 is not in -5\.\.60"),
     ],
 )
