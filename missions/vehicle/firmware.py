@@ -56,6 +56,8 @@ class Firmware:
         failsafe_status_acts: whether MAV_STATE_CRITICAL says that a failsafe flies the vehicle (PX4), not
             only that one was triggered (ArduPilot).
         resting_mode: a mode in which the vehicle may stand on the ground and be armed.
+        altitude_radius: name and default of the parameter with the distance at which the altitude of a
+            take-off is reached, and another mode follows; None: none follows (ArduPilot).
         placeless_in_mission_frame: whether items without a place are accepted in MAV_FRAME_MISSION only
             (PX4).
         unwrapped_fences: whether longitudes of fence polygons are compared without wrap, so that none may lie
@@ -84,6 +86,7 @@ class Firmware:
     goto_mode: Mode
     left_before_arming: frozenset[int]
     resting_mode: Mode
+    altitude_radius: tuple[str, float] | None = None
     placeless_in_mission_frame: bool
     unwrapped_fences: bool
     unset: float

@@ -87,12 +87,17 @@ PX4_COPTER: Final = Firmware(
     placeless_in_mission_frame=True,
     unwrapped_fences=True,
     unset=math.nan,
+    altitude_radius=("NAV_MC_ALT_RAD", 0.8),
     system_id_parameter="MAV_SYS_ID",
     limits_from=_px4_copter_limits,
 )
 
 PX4_PLANE: Final = replace(
-    PX4_COPTER, kind=VehicleKind.FIXED_WING, **_tables("px4_plane"), limits_from=_px4_plane_limits
+    PX4_COPTER,
+    kind=VehicleKind.FIXED_WING,
+    **_tables("px4_plane"),
+    altitude_radius=None,  # its take-off ends above the altitude
+    limits_from=_px4_plane_limits,
 )
 
 # ArduPilot

@@ -15,7 +15,9 @@ from missions.vehicle.firmware import Firmware, Mode
 from missions.vehicle.item_tracker import ItemTracker, MissionStep
 
 _SLACK_M: Final[Mapping[VehicleKind, float]] = {VehicleKind.MULTICOPTER: 1.5, VehicleKind.FIXED_WING: 15.0}
-"""Below a take-off's altitude; PX4 ends it within NAV_MC_ALT_RAD, 0.8 m, or NAV_FW_ALT_RAD, 10 m."""
+"""Below a take-off's altitude, at least."""
+_SLACK_SHARE: Final = 1.5
+"""Of the radius within which a take-off's altitude counts as reached: heights of the estimate differ."""
 _TAKEOFFS: Final = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
 LANDING_PARTS: Final = (dialect.MAV_CMD_DO_LAND_START, dialect.MAV_CMD_DO_RETURN_PATH_START)
 _LANDING_TEXTS: Final = (
@@ -56,6 +58,7 @@ class ModeTasks:
 
     Attributes:
         plan: the stored plan; None: this program has uploaded none.
+        altitude_radius_m: distance within which the autopilot takes the altitude of a take-off for reached.
     """
 
     def __init__(self, firmware: Firmware) -> None:
@@ -68,6 +71,7 @@ class ModeTasks:
         self._current = -1
         self._landing_reported = False
         self._total = 0
+        self.altitude_radius_m = 0.0
         self._takeoff_alt_m: float | None = None
         self._alt_m: float | None = None
         self._on_ground = False
@@ -153,7 +157,7 @@ class ModeTasks:
     def _risen(self) -> bool:
         if self._takeoff_alt_m is None or self._alt_m is None:
             return False
-        slack_m = _SLACK_M[self._firmware.kind]
+        slack_m = max(_SLACK_M[self._firmware.kind], _SLACK_SHARE * self.altitude_radius_m)
         return not self._alt_m < self._takeoff_alt_m - slack_m  # also with the default altitude, NaN
 
     def _mission_done(self, after: int) -> bool:

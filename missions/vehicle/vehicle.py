@@ -280,6 +280,11 @@ class Vehicle:
         wings = self.kind is VehicleKind.FIXED_WING
         if wings:
             self.wing.note_runway()
+        if self.firmware.altitude_radius is not None:
+            # so that the mode after the take-off is not taken for a pilot's
+            radius_m = await self.parameters.read_or(*self.firmware.altitude_radius)
+            low = altitude_m < radius_m  # PX4 1.16.1, mission_block.cpp: is_mission_item_reached_or_completed
+            self.link.tasks.altitude_radius_m = 0.5 * altitude_m if low else radius_m
         if not self.armed:
             await self.arm()
         await self.adapter.take_off(altitude_m)

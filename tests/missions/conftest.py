@@ -72,6 +72,7 @@ class FakeAutopilot:
         self.parameters = {
             "MPC_XY_VEL_MAX": (12.0, 9),
             "MPC_ACC_HOR": (3.0, 9),
+            "NAV_MC_ALT_RAD": (0.8, 9),
             "COM_RC_LOSS_T": (4, 6),
             "WPNAV_SPEED": (1000.0, 9),
             "WPNAV_ACCEL": (250.0, 9),

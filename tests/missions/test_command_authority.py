@@ -1,5 +1,6 @@
 """Who commands a vehicle: modes of our own, modes that follow by themselves, and those of others."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -364,6 +365,21 @@ def test_px4_returns_at_the_end_of_a_mission_only_by_an_item():
         tasks.on_mission_message(mavlink.MAVLink_mission_item_reached_message(1), 1_000_000)
         assert tasks.done(modes[Mode.MISSION], modes[Mode.RETURN]) is returns
         assert tasks.done(modes[Mode.MISSION], modes[Mode.HOLD])
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "missing_m", "done"),
+    [(0.8, 1.2, True), (0.8, 2.0, False), (3.0, 2.9, True), (3.0, 5.0, False), (math.nan, 2.0, False)],
+)
+def test_a_take_off_is_done_within_the_vehicles_own_radius(radius_m, missing_m, done):
+    """PX4's NAV_MC_ALT_RAD: Hold follows so far below the altitude."""
+    tasks = ModeTasks(PX4_COPTER)
+    tasks.altitude_radius_m = radius_m
+    values = (0.0,) * 6
+    tasks.on_sent(mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_NAV_TAKEOFF, 0, *values, 520.0))
+    tasks.on_position(47.4, 8.5, 520.0 - missing_m, 1_000_000)
+    modes = PX4_COPTER.modes
+    assert tasks.done(modes[Mode.TAKEOFF], modes[Mode.HOLD]) is done
 
 
 def plane_in_return(landing, text="", current=None):
