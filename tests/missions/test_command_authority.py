@@ -426,6 +426,7 @@ def test_a_quadplane_returns_by_qrtl():
     flight.command(Mode.RETURN)
     assert flight.heartbeat(21) is Command.OURS
     assert ARDUPLANE.mode_name(21) == "QRTL"
+    assert ARDUPLANE.left_before_arming >= {20, 21}  # "PreArm: QRTL mode not armable"
     assert Flight(ARDUPLANE).in_flight(Mode.GUIDED).heartbeat(21) is Command.TAKEN
 
 
