@@ -4,6 +4,7 @@ from missions.base.mission import Mission as Mission
 from missions.base.options import FlightOptions as FlightOptions
 from missions.base.options import MissionOptions as MissionOptions
 from missions.base.options import Via as Via
+from missions.base.report import Report as Report
 from missions.base.request import RunRequest as RunRequest
 from missions.errors import MissionError as MissionError
 from missions.errors import PlanError as PlanError

@@ -11,6 +11,7 @@ from typing import Any, Final
 from autopilot_bridge.errors import BridgeError
 from missions.base.mission import Mission
 from missions.base.options import FlightOptions
+from missions.base.report import Report
 from missions.errors import MissionError, PlanError
 from missions.pattern_search.curves import (
     expanding_square_curve,
@@ -139,9 +140,9 @@ class ScriptMission(Mission[FlightOptions]):
         if self._check is not None:
             self._check(options)
 
-    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
+    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> Report | None:
         try:
-            await self._fly(vehicle, options)
+            returned: Report | None = await self._fly(vehicle, options)
         except (MissionError, PlanError, BridgeError):
             raise
         except Exception as error:
@@ -150,6 +151,7 @@ class ScriptMission(Mission[FlightOptions]):
                 (f.lineno for f in reversed(frames) if Path(f.filename).resolve() == self._resolved), "?"
             )
             raise MissionError(f"{self._file}, line {line}: {type(error).__name__}: {error}") from error
+        return returned
 
 
 def _load(path: Path) -> Any:

@@ -306,4 +306,4 @@ def _fly(given: dict[str, Any]) -> int:
         leave_closed_terminal()
         line.end()
     line.finish(result)
-    return print_result(result, mission)
+    return print_result(result)

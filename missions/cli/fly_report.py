@@ -13,7 +13,6 @@ from missions.cli.options import report
 from missions.cli.status_line import StatusLine, announce_compiling
 
 if TYPE_CHECKING:
-    from missions.base.mission import Mission
     from missions.runs.session import Flight, RunResult
     from missions.vehicle.vehicle import Vehicle
 
@@ -188,7 +187,7 @@ class Pace:
         return None if passed_s < _PACE_LEAST_S else (vehicle_s - looks[0][1]) / passed_s
 
 
-def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
+def print_result(result: "RunResult") -> int:
     """Print the result of a run; returns the exit code."""
     from missions.flown.run_folder import POOR, wind_words
 
@@ -225,7 +224,7 @@ def print_result(result: "RunResult", mission: "Mission[Any]") -> int:
                 f"{_whose(block, summary)}waypoints passed within {w['acceptance_m']:g} m: "
                 f"{w['passed']} of {w['count']}{unseen}"
             )
-    for line in mission.report_lines(summary):
+    for line in result.report.lines:
         click.echo(line)
     for block in summary["vehicles"]:
         if block["tracking"] == POOR:

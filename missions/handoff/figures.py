@@ -16,7 +16,7 @@ from missions.flown.targets import true_targets
 
 if TYPE_CHECKING:
     from estimators.handoff import HandoffEstimate
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.flown.records import FlightRecords
     from missions.handoff.team import HandoffTeam
 

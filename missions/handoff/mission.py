@@ -2,23 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from missions.base.mission import Debriefing, WorldDefaults
-from missions.base.team_mission import TeamMission
-from missions.flown.camera_picture import PicturesOf
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission, WorldDefaults
+from missions.base.report import Debriefing, Report
 from missions.handoff.checks import check_vehicle
+from missions.handoff.figures import handoff_figures, handoff_verdict
 from missions.handoff.options import HandoffOptions
 from missions.handoff.team import HandoffTeam
 from missions.kind import VehicleKind
 from missions.vehicle.limits import Limits
-
-if TYPE_CHECKING:
-    from missions.vehicle.sensors import Sensor
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.sensors import GIMBAL, MOVING_POINTS, RANGE_RADIO, Sensor
+from missions.vehicle.vehicle import Vehicle
 
 
-class HandoffMission(TeamMission[HandoffOptions, HandoffTeam]):
+class HandoffMission(Mission[HandoffOptions]):
     """Two aircraft: the second orbits a target, the first arrives without GPS and takes it over."""
 
     name = "handoff"
@@ -33,61 +32,69 @@ class HandoffMission(TeamMission[HandoffOptions, HandoffTeam]):
         north_m, east_m = options.target_ne_m
         return {"target_north_m": north_m, "target_east_m": east_m}
 
-    def sensors(self, options: HandoffOptions) -> "Sequence[Sensor]":
-        from missions.vehicle.sensors import GIMBAL, MOVING_POINTS, RANGE_RADIO
-
+    def sensors(self, options: HandoffOptions) -> Sequence[Sensor]:
         return MOVING_POINTS, GIMBAL, RANGE_RADIO
 
-    async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[HandoffOptions]) -> None:
-        await self.flying(vehicles, HandoffTeam(vehicles, options)).fly()
+    def flight(self, vehicles: Sequence[Vehicle], options: Sequence[HandoffOptions]) -> "HandoffFlight":
+        return HandoffFlight(vehicles, options)
 
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        from missions.handoff.figures import handoff_verdict
 
-        team = self.team_of(debriefing)
-        return "" if team is None else handoff_verdict(team, debriefing)
+class HandoffFlight(MissionFlight[HandoffOptions]):
+    """A handoff.
 
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        from missions.handoff.figures import handoff_figures
+    Attributes:
+        team: the vehicles and what they share.
+    """
 
-        team = self.team_of(debriefing)
-        return {} if team is None else handoff_figures(team, debriefing)
+    together = True
 
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        if "decided" not in summary:
-            return ()
-        if not summary["decided"]:
-            return (f"no track was decided for within {self._limit(summary)}",)
-        line = (
-            f"decided {summary['decided_after_s']:.0f} s after GPS was lost, probability "
-            f"{summary['probability']:.4f}"
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[HandoffOptions]) -> None:
+        super().__init__(vehicles, options)
+        self.team = HandoffTeam(vehicles, options)
+
+    async def fly(self) -> None:
+        await self.team.fly()
+
+    def report(self, debriefing: Debriefing) -> Report:
+        team = self.team
+        figures = handoff_figures(team, debriefing)
+
+        def draw(path: Path, title: str) -> None:
+            from missions.handoff.picture import draw_handoff
+
+            draw_handoff(path, title, team, debriefing)
+
+        def pictures() -> Mapping[str, bytes]:
+            from missions.handoff.picture import camera_pictures
+
+            ids = [notes.system_id for notes, _ in debriefing.flights]
+            return camera_pictures(team, ids, debriefing.pictures_of)
+
+        return Report.of(
+            debriefing,
+            verdict=lambda: handoff_verdict(team, debriefing),
+            figures=figures,
+            lines=lambda: _lines(figures),
+            title=_title(self.options[0]),
+            draw=draw if team.watch.moments else None,
+            pictures=pictures,
         )
-        if summary["handed_over_after_s"] is not None:
-            line += f"; the tracker has received it after {summary['handed_over_after_s']:.0f} s"
-        if summary["correct"] is None:
-            return (line,)
-        return (line, "it is the tracker's target" if summary["correct"] else "it is another target")
 
-    @staticmethod
-    def _limit(summary: Mapping[str, Any]) -> str:
-        return f"{summary['timeout_s']:g} s"
 
-    def title(self, options: HandoffOptions) -> str:
-        return f"GPS-denied handoff, orbits of {options.radius_m:.0f} and {options.tracker_radius_m:.0f} m"
+def _title(options: HandoffOptions) -> str:
+    return f"GPS-denied handoff, orbits of {options.radius_m:.0f} and {options.tracker_radius_m:.0f} m"
 
-    def pictures(self, debriefing: Debriefing, pictures_of: PicturesOf) -> Mapping[str, bytes]:
-        team = self.team_of(debriefing)
-        if team is None:
-            return {}
-        from missions.handoff.picture import camera_pictures
 
-        return camera_pictures(team, [flight[0].system_id for flight in debriefing.flights], pictures_of)
-
-    def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
-        team = self.team_of(debriefing)
-        if team is None or not team.watch.moments:
-            super().draw(path, title, debriefing)
-            return
-        from missions.handoff.picture import draw_handoff
-
-        draw_handoff(path, title, team, debriefing)
+def _lines(figures: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    if not figures["decided"]:
+        return (f"no track was decided for within {figures['timeout_s']:g} s",)
+    line = (
+        f"decided {figures['decided_after_s']:.0f} s after GPS was lost, probability "
+        f"{figures['probability']:.4f}"
+    )
+    if figures["handed_over_after_s"] is not None:
+        line += f"; the tracker has received it after {figures['handed_over_after_s']:.0f} s"
+    if figures["correct"] is None:
+        return (line,)
+    return (line, "it is the tracker's target" if figures["correct"] else "it is another target")

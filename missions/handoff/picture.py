@@ -17,7 +17,7 @@ from missions.flown.camera_picture import CameraPicture, PicturesOf, clip, png
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
 
 if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.handoff.team import HandoffTeam
     from missions.handoff.watch import Moment
 

@@ -15,7 +15,7 @@ from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.targets import true_targets
 
 if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.multi_target.search import SearchState
     from missions.multi_target.team import TargetSearchTeam
 

@@ -3,21 +3,21 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from missions.base.mission import Debriefing, WorldDefaults
-from missions.base.team_mission import TeamMission
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission, WorldDefaults
+from missions.base.report import Debriefing, Report
+from missions.multi_target.figures import search_figures, search_verdict
 from missions.multi_target.for_vehicle import check_vehicle, for_vehicle
 from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.team import TargetSearchTeam
 from missions.vehicle.limits import Limits
-
-if TYPE_CHECKING:
-    from missions.vehicle.sensors import Sensor
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.sensors import TARGET_SENSOR, Sensor
+from missions.vehicle.vehicle import Vehicle
 
 
-class MultiTargetMission(TeamMission[MultiTargetOptions, TargetSearchTeam]):
+class MultiTargetMission(Mission[MultiTargetOptions]):
     """A team searches an area with target sensors, and plans each step by what it knows."""
 
     name = "multi-target"
@@ -36,48 +36,66 @@ class MultiTargetMission(TeamMission[MultiTargetOptions, TargetSearchTeam]):
         settings = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
         return {**settings, "centre_vehicle": 1 if options.vehicles > 1 else 0}
 
-    def sensors(self, options: MultiTargetOptions) -> "Sequence[Sensor]":
-        from missions.vehicle.sensors import TARGET_SENSOR
-
+    def sensors(self, options: MultiTargetOptions) -> Sequence[Sensor]:
         return (TARGET_SENSOR.silent_after(options.sensor_limit_s),)
 
-    async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[MultiTargetOptions]) -> None:
-        await self.flying(vehicles, TargetSearchTeam(vehicles, options)).fly()
+    def flight(
+        self, vehicles: Sequence[Vehicle], options: Sequence[MultiTargetOptions]
+    ) -> "MultiTargetFlight":
+        return MultiTargetFlight(vehicles, options)
 
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        from missions.multi_target.figures import search_verdict
 
-        team = self.team_of(debriefing)
-        return "" if team is None else search_verdict(team, debriefing)
+class MultiTargetFlight(MissionFlight[MultiTargetOptions]):
+    """A search for targets.
 
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        from missions.multi_target.figures import search_figures
+    Attributes:
+        team: the vehicles and what they share.
+    """
 
-        team = self.team_of(debriefing)
-        return {} if team is None else search_figures(team, debriefing)
+    together = True
 
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        if "targets_found" not in summary:
-            return ()
-        found, end = summary["targets_found"], summary["search_end"]
-        line = f"{found} targets found in {summary['search_s']:.0f} s and {summary['steps']} steps ({end})"
-        if summary["targets_true"] is None:
-            return (line,)
-        right, true = summary["targets_found_right"], summary["targets_true"]
-        return (
-            f"{line}: {right} of {true} within {summary['match_m']:g} m of a true target, "
-            f"{found - right} false",
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[MultiTargetOptions]) -> None:
+        super().__init__(vehicles, options)
+        self.team = TargetSearchTeam(vehicles, options)
+
+    async def fly(self) -> None:
+        await self.team.fly()
+
+    def report(self, debriefing: Debriefing) -> Report:
+        team = self.team
+        figures = search_figures(team, debriefing)
+
+        def draw(path: Path, title: str) -> None:
+            from missions.multi_target.picture import draw_search
+
+            draw_search(path, title, team, debriefing)
+
+        return Report.of(
+            debriefing,
+            verdict=lambda: search_verdict(team, debriefing),
+            figures=figures,
+            lines=lambda: _lines(figures),
+            title=_title(self.options[0]),
+            draw=draw if team.search.states else None,
         )
 
-    def title(self, options: MultiTargetOptions) -> str:
-        area = options.area
-        return f"{self.name}, {options.planner} planner over {area.width_m:g} m x {area.height_m:g} m"
 
-    def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
-        team = self.team_of(debriefing)
-        if team is None or not team.search.states:
-            super().draw(path, title, debriefing)
-            return
-        from missions.multi_target.picture import draw_search
+def _title(options: MultiTargetOptions) -> str:
+    area = options.area
+    return (
+        f"{MultiTargetMission.name}, {options.planner} planner over {area.width_m:g} m x {area.height_m:g} m"
+    )
 
-        draw_search(path, title, team, debriefing)
+
+def _lines(figures: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    if "targets_found" not in figures:
+        return ()
+    found, end = figures["targets_found"], figures["search_end"]
+    line = f"{found} targets found in {figures['search_s']:.0f} s and {figures['steps']} steps ({end})"
+    if figures["targets_true"] is None:
+        return (line,)
+    right, true = figures["targets_found_right"], figures["targets_true"]
+    return (
+        f"{line}: {right} of {true} within {figures['match_m']:g} m of a true target, {found - right} false",
+    )

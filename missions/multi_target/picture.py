@@ -13,7 +13,7 @@ from estimators.received import broken_at_gaps
 from missions.multi_target.figures import CUTOFF_M, SearchScore, search_score
 
 if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.multi_target.search import Moment
     from missions.multi_target.team import TargetSearchTeam
 

@@ -10,7 +10,7 @@ from missions.occupancy.suspect import Suspect
 
 if TYPE_CHECKING:
     from estimators.occupancy.detection import Anomaly
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.flown.score import FlightScore
     from missions.occupancy.candidate import Candidate
     from missions.occupancy.search import Search

@@ -3,23 +3,23 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.base.mission import Debriefing, WorldDefaults
-from missions.base.team_mission import TeamMission
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission, WorldDefaults
+from missions.base.report import Debriefing, Report
 from missions.errors import PlanError
 from missions.occupancy.checks import check_map, check_reach, check_vehicle, for_vehicle, read_map
+from missions.occupancy.figures import search_figures, search_verdict
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.team import SearchTeam
 from missions.vehicle.limits import Limits
-
-if TYPE_CHECKING:
-    from missions.vehicle.sensors import Sensor
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.sensors import SURVEY_MAGNETOMETER, Sensor
+from missions.vehicle.vehicle import Vehicle
 
 
-class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
+class OccupancyMission(Mission[OccupancyOptions]):
     """A team shares an occupancy map and flies headings from cell to cell until the target is found."""
 
     name = "occupancy"
@@ -52,56 +52,69 @@ class OccupancyMission(TeamMission[OccupancyOptions, SearchTeam]):
             known["map_file"] = options.map_file
         return known
 
-    def sensors(self, options: OccupancyOptions) -> "Sequence[Sensor]":
-        from missions.vehicle.sensors import SURVEY_MAGNETOMETER
-
+    def sensors(self, options: OccupancyOptions) -> Sequence[Sensor]:
         return (SURVEY_MAGNETOMETER,)
 
-    async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions]) -> None:
+    def flight(self, vehicles: Sequence[Vehicle], options: Sequence[OccupancyOptions]) -> "OccupancyFlight":
+        return OccupancyFlight(vehicles, options)
+
+
+class OccupancyFlight(MissionFlight[OccupancyOptions]):
+    """A search with an occupancy map.
+
+    Attributes:
+        team: the vehicles and what they share.
+    """
+
+    together = True
+
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[OccupancyOptions]) -> None:
+        super().__init__(vehicles, options)
         map_file = options[0].map_file
         if map_file is None:
             raise PlanError(
                 "a search needs the published magnetic map of its place: give it with `map_file` FILE"
             )
-        await self.flying(vehicles, SearchTeam(vehicles, options, read_map(map_file))).fly()
+        self.team = SearchTeam(vehicles, options, read_map(map_file))
 
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        from missions.occupancy.figures import search_verdict
+    async def fly(self) -> None:
+        await self.team.fly()
 
-        team = self.team_of(debriefing)
-        return "" if team is None else search_verdict(team, debriefing)
+    def report(self, debriefing: Debriefing) -> Report:
+        team = self.team
+        figures = search_figures(team, debriefing)
 
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        from missions.occupancy.figures import search_figures
+        def draw(path: Path, title: str) -> None:
+            from missions.occupancy.picture import draw_search
 
-        team = self.team_of(debriefing)
-        if team is None:
-            return {"target_found": False, "time_to_find_s": None}
-        return search_figures(team, debriefing)
+            draw_search(path, title, team, debriefing)
 
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        broken = tuple(
-            f"vehicle {searcher['system_id']}: {searcher['readings_implausible']} readings are stuck or no "
-            "field of the Earth, and were not used; check its magnetometer"
-            for searcher in summary.get("searchers", ())
-            if searcher["readings_implausible"]
+        return Report.of(
+            debriefing,
+            verdict=lambda: search_verdict(team, debriefing),
+            figures=figures,
+            lines=lambda: _lines(figures),
+            title=_title(self.options[0]),
+            draw=draw if team.began_us >= 0 else None,
         )
-        detected = f"probability of detection {summary.get('probability_of_detection', 0.0):.2f}"
-        if not summary["target_found"]:
-            return (f"target not found, {detected}", *broken)
-        error_m = summary["target_error_m"]
-        off = "" if error_m is None else f", {error_m:.0f} m off"
-        return (f"target found after {summary['time_to_find_s']:.0f} s{off}, {detected}", *broken)
 
-    def title(self, options: OccupancyOptions) -> str:
-        team = "1 vehicle" if options.vehicles == 1 else f"{options.vehicles} vehicles"
-        return f"{self.name}, {team} over {options.width_m:g} m x {options.height_m:g} m"
 
-    def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
-        team = self.team_of(debriefing)
-        if team is None or team.began_us < 0:
-            super().draw(path, title, debriefing)
-            return
-        from missions.occupancy.picture import draw_search
+def _title(options: OccupancyOptions) -> str:
+    team = "1 vehicle" if options.vehicles == 1 else f"{options.vehicles} vehicles"
+    return f"{OccupancyMission.name}, {team} over {options.width_m:g} m x {options.height_m:g} m"
 
-        draw_search(path, title, team, debriefing)
+
+def _lines(figures: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    broken = tuple(
+        f"vehicle {searcher['system_id']}: {searcher['readings_implausible']} readings are stuck or no "
+        "field of the Earth, and were not used; check its magnetometer"
+        for searcher in figures["searchers"]
+        if searcher["readings_implausible"]
+    )
+    detected = f"probability of detection {figures['probability_of_detection']:.2f}"
+    if not figures["target_found"]:
+        return (f"target not found, {detected}", *broken)
+    error_m = figures["target_error_m"]
+    off = "" if error_m is None else f", {error_m:.0f} m off"
+    return (f"target found after {figures['time_to_find_s']:.0f} s{off}, {detected}", *broken)

@@ -17,7 +17,7 @@ from estimators.received import broken_at_gaps
 from missions.occupancy.suspect import Suspect, Verdict
 
 if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.occupancy.search import Search
     from missions.occupancy.snapshots import Snapshot
     from missions.occupancy.team import SearchTeam

@@ -4,12 +4,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from missions.base.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
-from missions.errors import PlanError
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission, WorldDefaults
+from missions.base.report import Debriefing, Report, verdict_of_all
 from missions.kind import VehicleKind
 from missions.orbit.checks import check_vehicle
+from missions.orbit.flight import OrbitFlight
 from missions.orbit.options import WANDERING_M, OrbitOptions
-from missions.orbit.score import ORBIT
+from missions.orbit.score import ORBIT, orbit_figures
 from missions.vehicle.limits import FixedWingLimits, Limits
 from missions.vehicle.notes import FlightNotes
 from missions.vehicle.sensors import CAMERA, GIMBAL, Sensor
@@ -21,11 +23,9 @@ ALTITUDE_BOUND_M: Final = 20.0
 _DURATION_SHARE: Final = 0.95
 
 
-def orbit_verdict(notes: FlightNotes) -> str:
+def orbit_verdict(notes: FlightNotes, options: OrbitOptions) -> str:
     """The reason why the orbit was not flown, by the mission's measurements in flight; "" if it was flown."""
-    options, marks, phase = notes.options, notes.marks, notes.phase(ORBIT)
-    if not isinstance(options, OrbitOptions):
-        return ""
+    marks, phase = notes.marks, notes.phase(ORBIT)
     if phase is None or "radius_estimate_mean_m" not in marks:
         return "the target was not orbited: the circle was never reached"
     flown_s = (phase.end_us - phase.start_us) * 1e-6
@@ -55,8 +55,7 @@ class OrbitMission(Mission[OrbitOptions]):
     world_defaults = WorldDefaults(model="aerosonde", wind="4", turbulence="light")
 
     def check(self, options: OrbitOptions, limits: Limits) -> None:
-        for name in options.arguments:
-            raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
+        self.refuse_arguments(options)
         check_vehicle(options, limits)
 
     def estimator_settings(self, options: OrbitOptions) -> Mapping[str, float | str]:
@@ -73,47 +72,65 @@ class OrbitMission(Mission[OrbitOptions]):
     def sensors(self, options: OrbitOptions) -> Sequence[Sensor]:
         return CAMERA, GIMBAL
 
-    async def fly(self, vehicle: Vehicle, options: OrbitOptions) -> None:
-        from missions.orbit.flight import OrbitFlight
+    def flight(self, vehicles: Sequence[Vehicle], options: Sequence[OrbitOptions]) -> "OrbitMissionFlight":
+        return OrbitMissionFlight(vehicles, options)
 
+
+class OrbitMissionFlight(MissionFlight[OrbitOptions]):
+    """Orbits, one by each vehicle."""
+
+    async def fly_one(self, index: int) -> None:
+        vehicle, options = self.vehicles[index], self.options[index]
         limits = await vehicle.limits(options.own_altitude_m)
         check_vehicle(options, limits)
         assert isinstance(limits, FixedWingLimits)
         await OrbitFlight(vehicle, options, limits).fly()
 
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        return verdict_of_all(debriefing, lambda notes, _score: orbit_verdict(notes))
+    def report(self, debriefing: Debriefing) -> Report:
+        own = {
+            vehicle.system_id: options for vehicle, options in zip(self.vehicles, self.options, strict=True)
+        }
+        figures = orbit_figures(debriefing, self.options[0])
 
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        from missions.orbit.score import orbit_figures
+        def draw(path: Path, title: str) -> None:
+            from missions.orbit.picture import draw_orbit
 
-        return orbit_figures(debriefing)
+            draw_orbit(path, title, debriefing, self.options[0])
 
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        if summary.get("orbit_s") is None:
-            return ()
-        circle = f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s"
-        if summary.get("orbit_not_received_s"):
-            circle += f" ({summary['orbit_not_received_s']:.0f} s of it not received)"
-        if summary["radius_mean_error_percent"] is not None:
-            return (
-                f"{circle}: mean radius {summary['radius_mean_error_percent']:+.2f} %, standard deviation "
-                f"{summary['radius_std_m']:.1f} m, altitude within {summary['altitude_error_m']:.1f} m",
-            )
-        return (
-            f"{circle}, as the mission estimates: mean radius {summary['radius_estimate_mean_m']:.1f} m, "
-            f"standard deviation {summary['radius_estimate_std_m']:.1f} m, altitude by pressure within "
-            f"{summary['altitude_estimate_error_m']:.1f} m; target lost {summary['target_losses']} times, "
-            f"{summary['detections_used']} detections used",
-            "a vehicle outside the simulation does not report where aircraft and target truly were",
+        return Report.of(
+            debriefing,
+            verdict=lambda: verdict_of_all(
+                debriefing, lambda notes, _score: orbit_verdict(notes, own[notes.system_id])
+            ),
+            figures=figures,
+            lines=lambda: orbit_lines(figures),
+            title=_title(self.options[0]),
+            draw=draw,
         )
 
-    def title(self, options: OrbitOptions) -> str:
-        way = "clockwise" if options.direction > 0 else "counter-clockwise"
-        moving = f", target at {options.target_speed_m_s:g} m/s" if options.target_speed_m_s else ""
-        return f"GPS-denied orbit, {options.radius_m:g} m {way}{moving}"
 
-    def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
-        from missions.orbit.picture import draw_orbit
+def _title(options: OrbitOptions) -> str:
+    way = "clockwise" if options.direction > 0 else "counter-clockwise"
+    moving = f", target at {options.target_speed_m_s:g} m/s" if options.target_speed_m_s else ""
+    return f"GPS-denied orbit, {options.radius_m:g} m {way}{moving}"
 
-        draw_orbit(path, title, debriefing)
+
+def orbit_lines(figures: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    if figures["orbit_s"] is None:
+        return ()
+    circle = f"orbit of {figures['radius_m']:g} m for {figures['orbit_s']:.0f} s"
+    if figures["orbit_not_received_s"]:
+        circle += f" ({figures['orbit_not_received_s']:.0f} s of it not received)"
+    if figures["radius_mean_error_percent"] is not None:
+        return (
+            f"{circle}: mean radius {figures['radius_mean_error_percent']:+.2f} %, standard deviation "
+            f"{figures['radius_std_m']:.1f} m, altitude within {figures['altitude_error_m']:.1f} m",
+        )
+    return (
+        f"{circle}, as the mission estimates: mean radius {figures['radius_estimate_mean_m']:.1f} m, "
+        f"standard deviation {figures['radius_estimate_std_m']:.1f} m, altitude by pressure within "
+        f"{figures['altitude_estimate_error_m']:.1f} m; target lost {figures['target_losses']} times, "
+        f"{figures['detections_used']} detections used",
+        "a vehicle outside the simulation does not report where aircraft and target truly were",
+    )

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimators.reports.picture import tidy
-from missions.base.mission import Debriefing
+from missions.base.report import Debriefing
 from missions.flown.picture import draw_run
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import OrbitTruth, orbit_truth
@@ -20,17 +20,19 @@ _RED: Final = "#c2410c"
 _GPS_LOST: Final = "#fee2e2"
 
 
-def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
+def draw_orbit(path: Path, title: str, debriefing: Debriefing, options: OrbitOptions) -> None:
     """Draw `track.png`. Without truth (a vehicle that is not embedded) the standard picture of a flight is
     drawn.
 
     Args:
         path: the file; it must not exist.
+        title: title above the picture.
+        debriefing: of the flight.
+        options: of the first vehicle.
     """
     notes, _ = debriefing.flights[0]
-    options = debriefing.options
     truth = orbit_truth(debriefing.records, notes.system_id)
-    if truth is None or not isinstance(options, OrbitOptions) or not notes.phases:
+    if truth is None or not notes.phases:
         draw_run(path, title, list(debriefing.flights))
         return
     flown = truth.during(notes.phases[0].start_us, notes.phases[-1].end_us)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimators.received import GAP_S, broken_at_gaps, gaps_of, interpolated
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import LocalFrame
-from missions.base.mission import Debriefing
+from missions.base.report import Debriefing
 from missions.flown.records import FlightRecords, place_of, positions_ned_m
 from missions.flown.targets import TARGET_SYSTEM
 from missions.orbit.options import OrbitOptions
@@ -77,7 +77,7 @@ def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
     )
 
 
-def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
+def orbit_figures(debriefing: Debriefing, options: OrbitOptions) -> Mapping[str, Any]:
     """The figures of the first vehicle's orbit; figures that were not measured are None.
 
     * radius_mean_error_percent: error of the mean distance to the target over the orbit.
@@ -90,9 +90,7 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
       by its filter and by pressure.
     * target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
     """
-    if not debriefing.flights or not isinstance(debriefing.options, OrbitOptions):
-        return {}
-    notes, options = debriefing.flights[0][0], debriefing.options
+    notes = debriefing.flights[0][0]
     marks = notes.marks
     figures: dict[str, Any] = {
         "radius_m": options.radius_m,

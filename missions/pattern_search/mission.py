@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from autopilot_bridge.mission_plan import MissionItem
-from missions.base.mission import Debriefing, Mission
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission
 from missions.base.options import FlightOptions
+from missions.base.report import Debriefing, Report, path_verdict_of_all
 from missions.errors import PlanError
 from missions.pattern_search.flight import (
     check_pattern,
@@ -15,6 +17,8 @@ from missions.pattern_search.flight import (
     pattern_outline,
 )
 from missions.pattern_search.for_vehicle import flight_for_vehicle
+from missions.pattern_search.search_figures import search_figures
+from missions.pattern_search.tag_watch import TagWatch
 from missions.patterns import Curve
 from missions.planning.outline import Outline
 from missions.vehicle.limits import FixedWingLimits, Limits
@@ -66,8 +70,7 @@ class PatternMission(Mission[FlightOptions]):
         return self._size(options, limits) if isinstance(limits, FixedWingLimits) else options
 
     def check(self, options: FlightOptions, limits: Limits) -> None:
-        for name in options.arguments:
-            raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
+        self.refuse_arguments(options)
         if options.search:
             check_search(options, limits)
         check_pattern(self.curve(options), options, limits)
@@ -85,21 +88,8 @@ class PatternMission(Mission[FlightOptions]):
     async def outline(self, vehicle: Vehicle, options: FlightOptions) -> Outline:
         return pattern_outline(vehicle, options, self.curve(options))
 
-    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
-        if not options.search:
-            await fly_pattern(vehicle, options, self.curve(options))
-            return
-        from missions.pattern_search.tag_watch import TagWatch
-
-        search = TagWatch(
-            vehicle, tag_id=options.tag_id, altitude_m=options.own_altitude_m, limit_s=options.search_time_s
-        )
-        search.start()
-        try:
-            await fly_pattern(vehicle, options, self.curve(options), search)
-        finally:
-            search.stop()
-            search.note()
+    def flight(self, vehicles: Sequence[Vehicle], options: Sequence[FlightOptions]) -> "PatternSearchFlight":
+        return PatternSearchFlight(self, vehicles, options)
 
     def estimator_settings(self, options: FlightOptions) -> Mapping[str, float | str]:
         if options.period_s is None:
@@ -107,34 +97,71 @@ class PatternMission(Mission[FlightOptions]):
         x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)
         return {"omega_x_rad_s": x_rad_s, "omega_y_rad_s": y_rad_s}
 
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        assert isinstance(debriefing.options, FlightOptions)
+
+class PatternSearchFlight(MissionFlight[FlightOptions]):
+    """A pattern, flown by each vehicle in its layer.
+
+    Args:
+        mission: the pattern.
+        vehicles: the vehicles, each ready to arm.
+        options: of each, adapted to it.
+    """
+
+    def __init__(
+        self, mission: PatternMission, vehicles: Sequence[Vehicle], options: Sequence[FlightOptions]
+    ) -> None:
+        super().__init__(vehicles, options)
+        self._mission = mission
+
+    async def fly_one(self, index: int) -> None:
+        vehicle, options = self.vehicles[index], self.options[index]
+        curve = self._mission.curve(options)
+        if not options.search:
+            await fly_pattern(vehicle, options, curve)
+            return
+        search = TagWatch(
+            vehicle, tag_id=options.tag_id, altitude_m=options.own_altitude_m, limit_s=options.search_time_s
+        )
+        search.start()
+        try:
+            await fly_pattern(vehicle, options, curve, search)
+        finally:
+            search.stop()
+            search.note()
+
+    def report(self, debriefing: Debriefing) -> Report:
+        options = self.options[0]
+        figures: dict[str, Any] = dict(self._mission.estimator_settings(options))
+        if options.search:
+            figures["search"] = search_figures(debriefing, options)
+        return Report.of(
+            debriefing,
+            verdict=lambda: self._unsearched(debriefing) or path_verdict_of_all(debriefing),
+            figures=figures,
+            lines=lambda: _lines(figures),
+            title=self._title(options),
+        )
+
+    def _unsearched(self, debriefing: Debriefing) -> str:
         frames = sum(notes.marks.get("search_frames_at_altitude", 0.0) for notes, _ in debriefing.flights)
-        if debriefing.options.search and not frames:
+        if self.options[0].search and not frames:
             return "the search ended without a picture that was searched: look at the camera"
-        return super().verdict(debriefing, max_error_m)
+        return ""
 
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        assert isinstance(debriefing.options, FlightOptions)
-        figures: dict[str, Any] = dict(self.estimator_settings(debriefing.options))
-        if debriefing.options.search and debriefing.flights:
-            from missions.pattern_search.search_figures import search_figures
-
-            figures["search"] = search_figures(debriefing)
-        return figures
-
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        lines = []
-        if "omega_x_rad_s" in summary:
-            x, y = summary["omega_x_rad_s"], summary["omega_y_rad_s"]
-            lines.append(f"frequencies: omega_x_rad_s={x:.6g} (east), omega_y_rad_s={y:.6g} (north)")
-        if "search" in summary:
-            lines.append(search_line(summary["search"]))
-        return lines
-
-    def title(self, options: FlightOptions) -> str:
-        parts = [self.name]
-        if self.name == "lissajous":
+    def _title(self, options: FlightOptions) -> str:
+        parts = [self._mission.name]
+        if self._mission.name == "lissajous":
             parts.append(options.pattern if options.ratio is None else "{:g}:{:g}".format(*options.ratio))
         parts += [f"{options.width_m:g} m x {options.height_m:g} m", f"via {options.via}"]
         return ", ".join(parts)
+
+
+def _lines(figures: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    lines = []
+    if "omega_x_rad_s" in figures:
+        x, y = figures["omega_x_rad_s"], figures["omega_y_rad_s"]
+        lines.append(f"frequencies: omega_x_rad_s={x:.6g} (east), omega_y_rad_s={y:.6g} (north)")
+    if "search" in figures:
+        lines.append(search_line(figures["search"]))
+    return lines

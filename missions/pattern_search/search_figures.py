@@ -2,29 +2,26 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from estimators.received import GAP_US, interpolated
 from flightsim.foundation.geodesy import LocalFrame
 from missions.base.options import FlightOptions
+from missions.base.report import Debriefing
 from missions.flown.targets import true_targets
-
-if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
 
 __all__ = ["search_figures"]
 
 
-def search_figures(debriefing: "Debriefing") -> Mapping[str, Any]:
+def search_figures(debriefing: Debriefing, options: FlightOptions) -> Mapping[str, Any]:
     """`search` in `summary.json`.
 
     Its `search_s` is the time from the search altitude to the exposure of the picture with the tag, or to the
     end of the search; `error_m` the distance of the tag's place from the nearest true target at that time.
     """
-    options, notes = debriefing.options, debriefing.flights[0][0]
-    assert isinstance(options, FlightOptions)
+    notes = debriefing.flights[0][0]
     marks = notes.marks
     north_m, east_m = marks.get("search_north_m"), marks.get("search_east_m")
     error_m = None

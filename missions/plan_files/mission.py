@@ -1,35 +1,24 @@
 """The mission from a mission file."""
 
 import math
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
+from typing import Final
 
 from autopilot_bridge.mission_plan import MissionItem
-from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.base.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
+from missions.base.mission import Mission, WorldDefaults
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.plan_files.document import NAV_LAND, MissionDocument, PlannedHome
+from missions.plan_files.document import MissionDocument, PlannedHome
+from missions.plan_files.file_flight import FileFlight
 from missions.plan_files.files import read_mission_file
-from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
+from missions.plan_files.flight import check_distance, own_speed_m_s
 from missions.plan_files.options import FileOptions, Then
-from missions.plan_files.progress import CURVED
-from missions.plan_files.route import Stop, placed, route_of, scored_stops, straight
-from missions.vehicle.item_tracker import THROUGH
-from missions.vehicle.items import FLOWN_TO
+from missions.plan_files.route import placed, route_of
+from missions.planning.outline import Outline
 from missions.vehicle.limits import FixedWingLimits, Limits
-from missions.vehicle.notes import PATTERN, Phase
-
-if TYPE_CHECKING:
-    from missions.flown.score import FlightScore
-    from missions.planning.outline import Outline
-    from missions.vehicle.notes import FlightNotes
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 _MODELS: Final = {VehicleKind.MULTICOPTER: "iris", VehicleKind.FIXED_WING: "aerosonde"}
 
@@ -88,10 +77,10 @@ class FileMission(Mission[FileOptions]):
         check_distance(route_of(self.document, home), self.document.path, home)
         self.document.check_heights(home.alt_m, below_home_allowed=options.allow_below_home)
 
-    async def fly(self, vehicle: "Vehicle", options: FileOptions) -> None:
-        await fly_document(vehicle, options, self.document)
+    def flight(self, vehicles: Sequence[Vehicle], options: Sequence[FileOptions]) -> FileFlight:
+        return FileFlight(self.document, vehicles, options)
 
-    async def remarks(self, vehicle: "Vehicle", options: FileOptions) -> Sequence[str]:
+    async def remarks(self, vehicle: Vehicle, options: FileOptions) -> Sequence[str]:
         if options.then is Then.LAND or (self.document.lands and not self.document.returns):
             return ()
         reason = await vehicle.return_end.stays_because()
@@ -105,12 +94,10 @@ class FileMission(Mission[FileOptions]):
             f"({reason}); `then=land` lands it",
         )
 
-    async def plan_items(self, vehicle: "Vehicle", options: FileOptions) -> Sequence[MissionItem]:
+    async def plan_items(self, vehicle: Vehicle, options: FileOptions) -> Sequence[MissionItem]:
         return self.document.items
 
-    async def outline(self, vehicle: "Vehicle", options: FileOptions) -> "Outline":
-        from missions.planning.outline import Outline
-
+    async def outline(self, vehicle: Vehicle, options: FileOptions) -> Outline:
         route = route_of(self.document, vehicle.home)
         return Outline(
             points_ned_m=tuple(stop.position_ned_m for stop in route.stops),
@@ -122,121 +109,9 @@ class FileMission(Mission[FileOptions]):
         )
 
     @property
-    def _places(self) -> set[int]:
-        """Indices of the items with a place to fly to, without landings."""
-        items = enumerate(self.document.items)
-        return {k for k, item in items if item.command in FLOWN_TO and item.command != NAV_LAND}
-
-    @property
     def _plan_home(self) -> GeodeticPosition:
         home = self.document.home or PlannedHome(lat_deg=0.0, lon_deg=0.0, alt_m=None)
         return home.place
-
-    def title(self, options: FileOptions) -> str:
-        return self.document.path.name
-
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        return verdict_of_all(debriefing, lambda notes, score: self._verdict(notes, score, max_error_m))
-
-    def _verdict(self, notes: "FlightNotes", score: "FlightScore", max_error_m: float | None) -> str:
-        """Check that every waypoint was passed in order; the path between them is chosen by the autopilot."""
-        from missions.flown.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
-
-        commanded = notes.commanded
-        if commanded is None:
-            return ""
-        kind = VehicleKind(notes.kind)
-        stops = scored_stops(
-            route_of(self.document, commanded.origin), with_takeoff=kind is VehicleKind.MULTICOPTER
-        )
-        waypoints = [stop for stop in stops if stop.command in THROUGH]
-        reached_us = [time_us for index, time_us in notes.reached if index in self._places]
-        if self._places and not reached_us:
-            return "no place of the mission was reached"
-        if not waypoints:
-            return ""
-        scored = next((p for p in notes.phases if p.name in (PATTERN, CURVED)), None)
-        end_us = reached_us[-1] if scored is None else scored.end_us  # one place makes no phase
-        track = flown_track(score, Phase(name="", start_us=notes.phases[0].start_us, end_us=end_us))
-        if track is None:
-            return NO_TRACK
-        return waypoint_verdict(
-            track,
-            np.array([stop.position_ned_m for stop in waypoints]),
-            max(commanded.acceptance_m + WAYPOINT_SLACK_M[kind], max_error_m or 0.0),
-            notes.cut_short,
-        )
-
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        notes, score = debriefing.flights[0] if debriefing.flights else (None, None)
-        document = self.document
-        block: dict[str, Any] = {
-            "file": str(document.path),
-            "items": len(document.items),
-            "fence_items": len(document.fence),
-            "rally_points": len(document.rally),
-            "reached": [],
-            "legs": [],
-        }
-        if notes is None or score is None:
-            return {"mission_file": block}
-        block["reached"] = [
-            {"item": index + 1, "command": document.items[index].command, "time_s": time_us / 1e6}
-            for index, time_us in notes.reached
-        ]
-        block["legs"] = legs = list(self._legs(notes, score))
-        worst = [leg["cross_track_max_m"] for leg in legs]
-        squares = [leg["cross_track_rms_m"] ** 2 for leg in legs]
-        block["cross_track_max_m"] = max(worst) if worst else None
-        block["cross_track_rms_m"] = round(math.sqrt(sum(squares) / len(squares)), 3) if squares else None
-        return {"mission_file": block}
-
-    def _legs(self, notes: "FlightNotes", score: "FlightScore") -> Sequence[Mapping[str, Any]]:
-        """Distance of the track from each straight leg, between the times of the leg's ends."""
-        track = score.truth if score.truth is not None else score.estimate
-        if track is None or notes.commanded is None:
-            return ()
-        route = route_of(self.document, notes.commanded.origin)
-        stops = scored_stops(route, with_takeoff=notes.kind == VehicleKind.MULTICOPTER)
-        legs: list[Mapping[str, Any]] = []
-        times = notes.reached
-        place = 0
-        for a, b in pairwise(stops):
-            start = next((k for k in range(place, len(times)) if times[k][0] == a.index), None)
-            if start is None:
-                continue
-            place = start  # items without a place (speed, camera) may be between the two places
-            stop = next((k for k in range(start + 1, len(times)) if times[k][0] == b.index), None)
-            if stop is None or not straight(a, b):
-                continue
-            flown = track.between(times[start][1], times[stop][1]).pos_ned_m
-            if len(flown) > 1:
-                legs.append({"from": a.index + 1, "to": b.index + 1, **_cross_track(a, b, flown)})
-        return legs
-
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        block = summary["mission_file"]
-        reached = {entry["item"] - 1 for entry in block["reached"]}
-        lines = [f"places reached: {len(reached & self._places)} of {len(self._places)}"]
-        if block["cross_track_rms_m"] is not None:
-            lines.append(
-                f"cross-track {block['cross_track_rms_m']:.2f} m RMS, {block['cross_track_max_m']:.2f} m at "
-                f"most, over {len(block['legs'])} legs"
-            )
-        return lines
-
-
-def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, float]:
-    """Horizontal distance from the line of the leg."""
-    start, stop = np.array(a.position_ned_m[:2]), np.array(b.position_ned_m[:2])
-    along = stop - start
-    length = float(np.linalg.norm(along))
-    offset = flown[:, :2] - start
-    if length < 1.0:
-        across = np.linalg.norm(offset, axis=1)
-    else:
-        across = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
-    return {"cross_track_rms_m": round(rms(across), 3), "cross_track_max_m": round(float(across.max()), 3)}
 
 
 def _home_text(document: MissionDocument) -> str | None:

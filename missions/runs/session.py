@@ -6,7 +6,7 @@ This module opens the world or the links, starts the event loop, and reads the w
 import asyncio
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack, nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -15,8 +15,10 @@ from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.parameter_files import left_out
-from missions.base.mission import Debriefing, Mission
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission
 from missions.base.options import MissionOptions
+from missions.base.report import Debriefing, Report
 from missions.base.request import RunRequest
 from missions.errors import MissionError, PlanError, TakenOver
 from missions.estimation.in_flight import estimators_of, refused_in_plan
@@ -32,22 +34,24 @@ from missions.flown.run_folder import (
     wind_words,
     write_summary,
 )
+from missions.flown.score import score
 from missions.how_left import HowLeft
 from missions.library import find_mission
+from missions.preflight.before_flight import PlannedFlight, confirmed, look
 from missions.preflight.endurance import Endurance, too_long
+from missions.preflight.simulation import simulation_proof
 from missions.process.ending import EndingSignals, signal_of
 from missions.runs.claimed_folder import ClaimedFolder, claim_folder
 from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection, Recorder
-from missions.vehicle.notes import FLIGHT, FlightNotes
+from missions.vehicle.notes import FLIGHT
 from missions.vehicle.signing import client_signing, require_key
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators
-    from missions.flown.score import FlightScore
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
 
@@ -68,6 +72,7 @@ class RunResult:
         reason: why it failed; "" otherwise.
         folder: the run folder.
         summary: contents of `summary.json`.
+        report: what the mission reports.
         signal: the signal that interrupted it; 0: none.
         left: how each vehicle that was received was left.
     """
@@ -76,6 +81,7 @@ class RunResult:
     reason: str
     folder: Path
     summary: Mapping[str, Any]
+    report: Report = field(default_factory=Report)
     signal: int = 0
     left: tuple[HowLeft, ...] = ()
 
@@ -86,6 +92,7 @@ class Flight:
     Attributes:
         vehicles: the vehicles, as soon as they are created.
         recorder: recorder of all sent and received frames.
+        mission: the flight of the mission, once the vehicles are ready.
         elsewhere: the vehicles are connected by links, not embedded.
         started_wall_s: wall clock when the run began.
         started_us: vehicle time when the run began: the boot of an embedded vehicle, else the time when the
@@ -99,6 +106,7 @@ class Flight:
         self.started_us = 0
         self.elsewhere = False
         self.recorder: FlightRecorder | None = None
+        self.mission: MissionFlight[Any] | None = None
 
     @property
     def elapsed_s(self) -> float:
@@ -218,33 +226,36 @@ def _fly_interruptible(
         stage.loop.close()
     sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
-    debriefing = _debrief(request, recorder.records(), flight)
+    debriefing = _debrief(request, recorder.records(), flight, stage, completed=outcome == COMPLETED)
+    report = Report.of(debriefing) if flight.mission is None else flight.mission.report(debriefing)
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
-        reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)
+        reason = report.verdict or _missed_check(request, blocks)
         reason = "; ".join(filter(None, (reason, *(_time_stamp_faults(flight) if reason else ()))))
         if recorder.failure:
             reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
         outcome = FAILED if reason else COMPLETED
-    summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
+    summary = _summary(mission, request, debriefing, report, blocks, outcome, reason, sim_time_s, wall_s)
     if estimators is not None:
         summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
     written = False
     try:
         write_summary(folder, summary)
         written = True
-        for name, contents in mission.files(debriefing).items():
-            with whole(folder / name):
-                (folder / name).write_bytes(contents)
+        for name, contents in report.files.items():
+            with whole(folder / name), (folder / name).open("xb") as file:
+                file.write(contents)
         if request.picture and debriefing.flights:
             with whole(folder / PICTURE_NAME):
-                mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
-            drawn = {**stage.pictures(), **mission.pictures(debriefing, stage.pictures_of)}
+                _draw(folder / PICTURE_NAME, title(mission, report, summary), report, debriefing)
+            drawn = {**stage.pictures(), **report.pictures()}
             for name, data in drawn.items():
                 with whole(folder / name), (folder / name).open("xb") as file:
                     file.write(data)
-    except OSError as error:
-        missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
+    except (OSError, MissionError) as error:
+        missed = str(error)
+        if isinstance(error, OSError):
+            missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
         summary |= {"outcome": outcome, "reason": reason}
         if written:
@@ -254,6 +265,7 @@ def _fly_interruptible(
         reason=reason,
         folder=folder,
         summary=summary,
+        report=report,
         signal=by_signal,
         left=tuple(notes.left for notes, _ in debriefing.flights if notes.left is not None),
     )
@@ -315,7 +327,7 @@ async def _fly(
                 [_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles]
             )
             flight.require_log()
-            await _fly_all(mission, flight.vehicles, request, stage)
+            await _fly_all(mission, flight, request, stage)
         finally:
             for vehicle in flight.vehicles:
                 vehicle.notes.end(vehicle.clock.stamp_us)
@@ -361,9 +373,8 @@ async def _set_parameters(vehicle: Vehicle, request: RunRequest) -> None:
         request.on_remark(f"vehicle {vehicle.system_id}: {left_out(names, _NAMES_SHOWN)}")
 
 
-async def _fly_all(
-    mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest, stage: Stage
-) -> None:
+async def _fly_all(mission: Mission[Any], flight: Flight, request: RunRequest, stage: Stage) -> None:
+    vehicles = flight.vehicles
     centre = vehicles[0].home if len(vehicles) > 1 else request.options.centre
     options: list[MissionOptions] = []
     for index, vehicle in enumerate(vehicles):
@@ -372,7 +383,6 @@ async def _fly_all(
         own_options = replace(vehicle_options(request.options, index), centre=centre)
         own, own_limits = adapted(mission, own_options, limits, home.alt_m)
         options.append(own)
-        vehicle.notes.options = own
         vehicle.allow_below_home = own.allow_below_home
         if request.connect:  # before a question is asked and before anything is uploaded
             mission.check_place(own, own_limits, home)
@@ -384,20 +394,19 @@ async def _fly_all(
             await _remark_endurance(mission, vehicle, own, request, stage)
     if request.confirm is not None:
         await _confirm(mission, vehicles, options, request)
+    made = flight.mission = mission.flight(vehicles, options)
     if not mission.commands:
-        await run_concurrently(
-            [mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)]
-        )
+        await made.fly()
         return
-    if not mission.flies_as_team:
+    if not made.together:
         await run_concurrently(
             [
-                _fly_one(mission.fly(vehicle, own), vehicle, request, watched=True)
-                for vehicle, own in zip(vehicles, options, strict=True)
+                _fly_one(made.fly_one(index), vehicle, request, watched=True)
+                for index, vehicle in enumerate(vehicles)
             ]
         )
         return
-    flying = mission.fly_team(vehicles, options)
+    flying = made.fly()
     for vehicle in vehicles:
         flying = _fly_one(flying, vehicle, request, watched=not mission.lands_without_sensors)
     await flying
@@ -407,9 +416,6 @@ async def _confirm(
     mission: Mission[Any], vehicles: Sequence[Vehicle], options: Sequence[MissionOptions], request: RunRequest
 ) -> None:
     """Check the vehicles and ask for confirmation, unless all prove to be simulations."""
-    from missions.preflight.before_flight import PlannedFlight, confirmed, look
-    from missions.preflight.simulation import simulation_proof
-
     proofs = [await simulation_proof(vehicle) for vehicle in vehicles]
     if request.confirm is None or (all(proofs) and not request.confirm_simulations):
         return
@@ -476,21 +482,31 @@ async def _report(flight: Flight, on_progress: ProgressListener | None) -> None:
         await flight.clock.sleep(1.0)
 
 
-def _debrief(request: RunRequest, records: FlightRecords, flight: Flight) -> Debriefing:
-    from missions.flown.score import score
-
+def _debrief(
+    request: RunRequest, records: FlightRecords, flight: Flight, stage: Stage, *, completed: bool
+) -> Debriefing:
     notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
-    flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
-    flown = notes[0].options if notes else None
-    options = flown if isinstance(flown, MissionOptions) else request.options
     targets_ne_m = None if request.world is None else request.world.magnetic_targets_ne_m
     return Debriefing(
         records=records,
-        flights=flights,
-        options=options,
+        flights=[(n, score(records, n)) for n in notes],
+        options=request.options if flight.mission is None else flight.mission.options[0],
+        completed=completed,
+        max_error_m=request.max_error_m,
         target_ne_m=targets_ne_m[0] if targets_ne_m else None,
         targets_ne_m=targets_ne_m,
+        pictures_of=stage.pictures_of,
     )
+
+
+def _draw(path: Path, text: str, report: Report, debriefing: Debriefing) -> None:
+    """Draw `track.png`."""
+    if report.draw is not None:
+        report.draw(path, text)
+        return
+    from missions.flown.picture import draw_run  # Matplotlib
+
+    draw_run(path, text, list(debriefing.flights))
 
 
 def _time_stamp_faults(flight: Flight) -> list[str]:
@@ -522,6 +538,7 @@ def _summary(
     mission: Mission[Any],
     request: RunRequest,
     debriefing: Debriefing,
+    report: Report,
     blocks: list[dict[str, Any]],
     outcome: str,
     reason: str,
@@ -552,7 +569,6 @@ def _summary(
         "wall_time_s": round(wall_time, 3),
         "speedup": round(sim_time_s / max(wall_time, 1e-9), 2),
         **team_figures(blocks),
-        **mission.figures(debriefing),
         "vehicles": blocks,
         "message_counts": debriefing.records.message_counts,
         "versions": versions(),
@@ -571,12 +587,12 @@ def _summary(
             "turbulence": world.air.turbulence.value,
         }
         summary["gps"] = ",".join(dict.fromkeys(spec.gps for spec in vehicles))
-    return summary
+    return summary | {name: value for name, value in report.figures.items() if name not in summary}
 
 
-def title(mission: Mission[Any], debriefing: Debriefing, summary: Mapping[str, Any]) -> str:
+def title(mission: Mission[Any], report: Report, summary: Mapping[str, Any]) -> str:
     """Title of the picture of a run: mission, result, and wind if known."""
-    parts = [mission.title(debriefing.options), summary["autopilot"]]
+    parts = [report.title or mission.name, summary["autopilot"]]
     rms = summary["path_rms_error_m"]
     figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"
     if rms is not None:

@@ -15,7 +15,7 @@ from estimators.survey.lines import LineKind, LinePlan
 from estimators.survey.processing import SurveyResult, process_survey
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
-from missions.base.mission import Debriefing
+from missions.base.report import Debriefing
 from missions.survey.inputs import compensation_of, survey_map_of
 from missions.survey.options import SurveyOptions
 from missions.survey.records import Calibration, calibrated, flight_readings
@@ -56,12 +56,8 @@ class Outcome:
         """Whether there is something of the mission's own to be drawn."""
         return self.survey is not None or self.calibration is not None
 
-    def verdict(self, max_error_m: float | None) -> str:
-        """Why the survey was not flown as commanded; "" if it was. By the vehicle's own messages alone.
-
-        Args:
-            max_error_m: the user's bound of the path error, which is checked apart from this.
-        """
+    def verdict(self) -> str:
+        """Why the survey was not flown as commanded; "" if it was. By the vehicle's own messages alone."""
         if self.failure:
             return self.failure
         if self.survey is None:
@@ -80,16 +76,17 @@ class Outcome:
         )
 
 
-def outcome_of(debriefing: Debriefing, plan: LinePlan | None, home: GeodeticPosition) -> Outcome:
+def outcome_of(
+    debriefing: Debriefing, options: SurveyOptions, plan: LinePlan | None, home: GeodeticPosition
+) -> Outcome:
     """Process the readings of a flight.
 
     Args:
         debriefing: of the flight.
+        options: of the vehicle.
         plan: lines that were commanded; None: a calibration.
         home: the vehicle's home.
     """
-    options = debriefing.options
-    assert isinstance(options, SurveyOptions)
     notes = debriefing.flights[0][0]
     survey_map = survey_map_of(options)
     origin = home if survey_map is None else survey_map.home
@@ -204,47 +201,47 @@ def _calibration_figures(made: Calibration) -> dict[str, Any]:
     }
 
 
-def report_lines(summary: Mapping[str, Any]) -> Sequence[str]:
+def report_lines(figures: Mapping[str, Any]) -> Sequence[str]:
     """Lines for the terminal."""
-    if "figure_of_merit_nt" in summary:
+    if "figure_of_merit_nt" in figures:
         return (
-            f"figure of merit {summary['figure_of_merit_before_nt']:.1f} nT before compensation, "
-            f"{summary['figure_of_merit_nt']:.2f} nT after ({summary['figure_of_merit_noise_nt']:.2f} nT by "
-            f"noise alone), improvement ratio {summary['improvement']:.1f}: "
+            f"figure of merit {figures['figure_of_merit_before_nt']:.1f} nT before compensation, "
+            f"{figures['figure_of_merit_nt']:.2f} nT after ({figures['figure_of_merit_noise_nt']:.2f} nT by "
+            f"noise alone), improvement ratio {figures['improvement']:.1f}: "
             f"{COMPENSATION}",
         )
-    if "lines" not in summary:
+    if "lines" not in figures:
         return ()
     lines = [
-        f"{summary['lines']} lines and {summary['tie_lines']} tie "
-        f"{'line' if summary['tie_lines'] == 1 else 'lines'}, {summary['line_km']:.1f} km, "
-        f"{summary['readings_on_lines']} readings with {_nt(summary['noise_nt'])} of noise"
+        f"{figures['lines']} lines and {figures['tie_lines']} tie "
+        f"{'line' if figures['tie_lines'] == 1 else 'lines'}, {figures['line_km']:.1f} km, "
+        f"{figures['readings_on_lines']} readings with {_nt(figures['noise_nt'])} of noise"
     ]
-    if summary["crossings"]:
-        after_nt = summary["misclosure_after_nt"]
+    if figures["crossings"]:
+        after_nt = figures["misclosure_after_nt"]
         after = "unknown (the levels explain all crossings)" if after_nt is None else _nt(after_nt)
         lines.append(
-            f"{summary['crossings']} crossings: misclosure {_nt(summary['misclosure_before_nt'])} before "
-            f"levelling, after it {after}; map by the lines within {_nt(summary['grid_error_nt'])} of the "
+            f"{figures['crossings']} crossings: misclosure {_nt(figures['misclosure_before_nt'])} before "
+            f"levelling, after it {after}; map by the lines within {_nt(figures['grid_error_nt'])} of the "
             "tie lines"
         )
-    if summary["no_map"] is not None:
-        lines.append(f"warning: there is no {MAP}: {summary['no_map']}")
-    elif summary["highest_height_m"] - summary["lowest_height_m"] > _ONE_HEIGHT_M:
+    if figures["no_map"] is not None:
+        lines.append(f"warning: there is no {MAP}: {figures['no_map']}")
+    elif figures["highest_height_m"] - figures["lowest_height_m"] > _ONE_HEIGHT_M:
         lines.append(
-            f"the map is stated for {summary['map_height_m']:.0f} m above home, the mean height of readings "
-            f"at {summary['lowest_height_m']:.0f} to {summary['highest_height_m']:.0f} m"
+            f"the map is stated for {figures['map_height_m']:.0f} m above home, the mean height of readings "
+            f"at {figures['lowest_height_m']:.0f} to {figures['highest_height_m']:.0f} m"
         )
-    if summary["compared_with_map"]:
-        count = len(summary["anomalies"])
+    if figures["compared_with_map"]:
+        count = len(figures["anomalies"])
         of_targets = (
-            f"; {summary['targets_found']} of {len(summary['targets'])} targets are among them"
-            if summary.get("targets")
+            f"; {figures['targets_found']} of {len(figures['targets'])} targets are among them"
+            if figures.get("targets")
             else ""
         )
         lines.append(
             f"{count} {'anomaly' if count == 1 else 'anomalies'} against the published map, "
-            f"{_nt(summary['differential_noise_nt'])} elsewhere{of_targets}"
+            f"{_nt(figures['differential_noise_nt'])} elsewhere{of_targets}"
         )
     else:
         lines.append("there is no published map to compare with: no anomalies are listed")

@@ -65,7 +65,6 @@ class FlightNotes:
         commanded: the commanded path.
         progress: flown share of the pattern, 0..1.
         system_id, autopilot, kind: properties of the vehicle.
-        options: as the vehicle flies them.
         aloft: where and how the vehicle stays in the air after its return, by its parameters; "": it does
             not.
         left_out_parameters: parameters that were to be set, and that the vehicle does not have.
@@ -87,7 +86,6 @@ class FlightNotes:
     system_id: int = 0
     autopilot: str = ""
     kind: str = ""
-    options: object = None
     aloft: str = ""
     left_out_parameters: tuple[str, ...] = ()
     safety_commands: list[SafetyCommand] = field(default_factory=list)

@@ -11,7 +11,7 @@ from missions.flown.targets import true_targets
 from missions.vision_search.pose_errors import pose_errors
 
 if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.vision_search.team import VisionSearchTeam
 
 __all__ = ["ELLIPSE_95", "search_figures", "search_verdict", "true_place"]

@@ -3,21 +3,21 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from missions.base.mission import Debriefing, WorldDefaults
-from missions.base.team_mission import TeamMission
+from missions.base.flight import MissionFlight
+from missions.base.mission import Mission, WorldDefaults
+from missions.base.report import Debriefing, Report
 from missions.vehicle.limits import Limits
+from missions.vehicle.sensors import TAG_CAMERA, Sensor
+from missions.vehicle.vehicle import Vehicle
+from missions.vision_search.figures import search_figures, search_verdict
 from missions.vision_search.for_vehicle import check_vehicle, for_vehicle
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.team import VisionSearchTeam
 
-if TYPE_CHECKING:
-    from missions.vehicle.sensors import Sensor
-    from missions.vehicle.vehicle import Vehicle
 
-
-class VisionSearchMission(TeamMission[VisionSearchOptions, VisionSearchTeam]):
+class VisionSearchMission(Mission[VisionSearchOptions]):
     """A team searches an area with cameras for one tag, and localizes it."""
 
     name = "vision-search"
@@ -36,54 +36,71 @@ class VisionSearchMission(TeamMission[VisionSearchOptions, VisionSearchTeam]):
         settings = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
         return {**settings, "centre_vehicle": 1 if options.vehicles > 1 else 0}
 
-    def sensors(self, options: VisionSearchOptions) -> "Sequence[Sensor]":
-        from missions.vehicle.sensors import TAG_CAMERA
-
+    def sensors(self, options: VisionSearchOptions) -> Sequence[Sensor]:
         return (TAG_CAMERA.silent_after(options.sensor_limit_s),)
 
-    async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[VisionSearchOptions]) -> None:
-        await self.flying(vehicles, VisionSearchTeam(vehicles, options)).fly()
+    def flight(
+        self, vehicles: Sequence[Vehicle], options: Sequence[VisionSearchOptions]
+    ) -> "VisionSearchFlight":
+        return VisionSearchFlight(vehicles, options)
 
-    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
-        from missions.vision_search.figures import search_verdict
 
-        team = self.team_of(debriefing)
-        return "" if team is None else search_verdict(team, debriefing)
+class VisionSearchFlight(MissionFlight[VisionSearchOptions]):
+    """A search for a tag.
 
-    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
-        from missions.vision_search.figures import search_figures
+    Attributes:
+        team: the vehicles and what they share.
+    """
 
-        team = self.team_of(debriefing)
-        return {} if team is None else search_figures(team, debriefing)
+    together = True
 
-    def report_lines(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        if "localized" not in summary:
-            return ()
-        if not summary["localized"]:
-            pod = summary["beliefs"][0]["probability_of_detection"] if summary["beliefs"] else 0.0
-            return (
-                f"not found in {summary['search_s']:.0f} s ({summary['search_end']}); "
-                f"a target in the area would have been detected with {pod:.0%}",
-            )
-        line = (
-            f"localized after {summary['localized_s']:.0f} s; after {summary['passes']} passes at "
-            f"{summary['north_m']:.2f} m north, {summary['east_m']:.2f} m east, "
-            f"sigma {summary['sigma_m']:.2f} m"
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[VisionSearchOptions]) -> None:
+        super().__init__(vehicles, options)
+        self.team = VisionSearchTeam(vehicles, options)
+
+    async def fly(self) -> None:
+        await self.team.fly()
+
+    def report(self, debriefing: Debriefing) -> Report:
+        team = self.team
+        figures = search_figures(team, debriefing)
+
+        def draw(path: Path, title: str) -> None:
+            from missions.vision_search.picture import draw_search
+
+            draw_search(path, title, team, debriefing)
+
+        return Report.of(
+            debriefing,
+            verdict=lambda: search_verdict(team, debriefing),
+            figures=figures,
+            lines=lambda: _lines(figures),
+            title=_title(self.options[0]),
+            draw=draw if team.search.moments else None,
         )
-        if summary["error_m"] is None:
-            return (line,)
-        where = "inside" if summary["inside_ellipse"] else "outside"
-        return (line, f"{summary['error_m']:.2f} m from its true place, {where} the 95 % ellipse")
 
-    def title(self, options: VisionSearchOptions) -> str:
-        area = options.area
-        return f"{self.name}, {options.planner} over {area.width_m:g} m x {area.height_m:g} m"
 
-    def draw(self, path: Path, title: str, debriefing: Debriefing) -> None:
-        team = self.team_of(debriefing)
-        if team is None or not team.search.moments:
-            super().draw(path, title, debriefing)
-            return
-        from missions.vision_search.picture import draw_search
+def _title(options: VisionSearchOptions) -> str:
+    area = options.area
+    return f"{VisionSearchMission.name}, {options.planner} over {area.width_m:g} m x {area.height_m:g} m"
 
-        draw_search(path, title, team, debriefing)
+
+def _lines(figures: Mapping[str, Any]) -> Sequence[str]:
+    """Lines for the terminal."""
+    if "localized" not in figures:
+        return ()
+    if not figures["localized"]:
+        pod = figures["beliefs"][0]["probability_of_detection"] if figures["beliefs"] else 0.0
+        return (
+            f"not found in {figures['search_s']:.0f} s ({figures['search_end']}); "
+            f"a target in the area would have been detected with {pod:.0%}",
+        )
+    line = (
+        f"localized after {figures['localized_s']:.0f} s; after {figures['passes']} passes at "
+        f"{figures['north_m']:.2f} m north, {figures['east_m']:.2f} m east, "
+        f"sigma {figures['sigma_m']:.2f} m"
+    )
+    if figures["error_m"] is None:
+        return (line,)
+    where = "inside" if figures["inside_ellipse"] else "outside"
+    return (line, f"{figures['error_m']:.2f} m from its true place, {where} the 95 % ellipse")

@@ -16,7 +16,7 @@ from estimators.vision_search import AreaEstimate
 from missions.vision_search.figures import ELLIPSE_95, true_place
 
 if TYPE_CHECKING:
-    from missions.base.mission import Debriefing
+    from missions.base.report import Debriefing
     from missions.vision_search.search import Moment
     from missions.vision_search.team import VisionSearchTeam
 

@@ -10,14 +10,12 @@ import pytest
 from click.testing import CliRunner
 
 from autopilot_bridge.clock import Clock
-from missions.base.mission import Debriefing
-from missions.base.options import FlightOptions
+from missions.base.report import Report
 from missions.base.request import RunRequest
 from missions.cli.fly import flight_of, fly
 from missions.cli.fly_report import Pace, print_result
 from missions.cli.mission_command import FlightOption
 from missions.errors import PlanError
-from missions.flown.records import FlightRecords
 from missions.flown.run_folder import wind_words
 from missions.library import MISSIONS
 from missions.runs.session import Flight, RunResult
@@ -273,11 +271,10 @@ def test_the_wind_that_was_flown_is_in_the_last_lines_and_above_the_picture(
     wind = {"speed_m_s": 5.0, "from_deg": 270.0, "profile": "uniform", "turbulence": "light"}
     summary = flown_summary(wind=wind)
     result = RunResult(outcome="completed", reason="", folder=tmp_path, summary=summary)
-    assert print_result(result, MISSIONS["sector"]) == 0
+    assert print_result(result) == 0
     reported = capsys.readouterr().out.splitlines()
     assert reported[0].endswith("139.0 s, 1.01 times real time")
     assert reported[1] == "wind 5 m/s from 270 degrees, light turbulence"
-    debriefing = Debriefing(records=cast(FlightRecords, None), flights=[], options=FlightOptions())
-    title = run_title(MISSIONS["sector"], debriefing, summary)
+    title = run_title(MISSIONS["sector"], Report(), summary)
     assert title.splitlines()[-1] == "wind 5 m/s from 270 degrees, light turbulence"
-    assert "wind" not in run_title(MISSIONS["sector"], debriefing, flown_summary())  # elsewhere: not known
+    assert "wind" not in run_title(MISSIONS["sector"], Report(), flown_summary())  # elsewhere: not known

@@ -30,7 +30,7 @@ def fly_in_a_row(flavour: str, model: str, flights: list[FlightOptions]) -> list
             vehicle = Vehicle(connection)
             await vehicle.wait_ready()
             own, _ = adapted(mission, options, await vehicle.limits(), vehicle.home.alt_m)
-            await mission.fly(vehicle, own)
+            await mission.flight([vehicle], [own]).fly()
             return vehicle
 
     async def main() -> list[Vehicle]:

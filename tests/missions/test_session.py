@@ -312,11 +312,11 @@ def test_a_summary_that_finds_no_room_is_reported(scripted, tmp_path, monkeypatc
 
 
 def test_a_picture_that_finds_no_room_is_reported_in_the_summary_too(scripted, tmp_path, monkeypatch):
-    def full(_mission, path, _title, _debriefing):
+    def full(path, _title, _flights):
         path.write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Mission, "draw", full)
+    monkeypatch.setattr("missions.flown.picture.draw_run", full)
     result = session.fly("lissajous", RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk" in result.reason

@@ -35,19 +35,19 @@ SMALL = with_fields(
 FIELD = TargetField(count=4, clusters=1, cluster_sigma_m=12.0)
 
 
-def flown(out, options=SMALL, *, picture=False, disturbances=(), mission=None, **values):
+def flown(out, options=SMALL, *, picture=False, disturbances=(), flights=None, **values):
     world = multi_target_world(
         WorldSpec.of_team(options.vehicles, seed=2, **values), options, FIELD, disturbances=disturbances
     )
     request = RunRequest(options=options, world=world, out=out, picture=picture, estimator="multi-target")
-    return fly(mission or MultiTargetMission(), request)
+    return fly(MultiTargetMission(), request, None if flights is None else flights.append)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    mission = MultiTargetMission()
-    result = flown(tmp_path_factory.mktemp("runs") / "run", picture=True, mission=mission)
-    return result, mission
+    flights = []
+    result = flown(tmp_path_factory.mktemp("runs") / "run", picture=True, flights=flights)
+    return result, flights[-1]
 
 
 def test_targets_are_found_and_the_vehicle_is_home(run):
@@ -65,10 +65,10 @@ def test_targets_are_found_and_the_vehicle_is_home(run):
 
 
 def test_the_mission_and_the_estimator_beside_it_have_the_same_numbers(run):
-    result, mission = run
+    result, flight = run
     with np.load(result.folder / "estimates-MultiTargetEstimate.npz") as file:
         recorded = {name: file[name] for name in file.files}
-    states = mission._flown.team.search.states
+    states = flight.mission.team.search.states
     for state in states:
         rows = recorded["time_us"] == state.time_us
         kept = rows & (recorded["target_index"] >= 0)

@@ -110,7 +110,7 @@ def test_a_parameter_that_is_not_restored_is_reported(flown) -> None:
 
 
 def orbited(*, mean_m=150.0, std_m=3.0, height_m=2.0, flown_s=60.0) -> FlightNotes:
-    notes = FlightNotes(options=OrbitOptions(duration_s=60.0))
+    notes = FlightNotes()
     notes.marks |= {
         "radius_estimate_mean_m": mean_m,
         "radius_estimate_std_m": std_m,
@@ -132,6 +132,6 @@ def orbited(*, mean_m=150.0, std_m=3.0, height_m=2.0, flown_s=60.0) -> FlightNot
     ],
 )
 def test_an_orbit_is_judged_by_what_was_measured_in_flight(figures, said) -> None:
-    verdict = orbit_verdict(orbited(**figures))
+    verdict = orbit_verdict(orbited(**figures), OrbitOptions(duration_s=60.0))
     assert said in verdict and bool(said) == bool(verdict)
-    assert "never reached" in orbit_verdict(FlightNotes(options=OrbitOptions()))
+    assert "never reached" in orbit_verdict(FlightNotes(), OrbitOptions())

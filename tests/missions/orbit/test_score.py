@@ -7,16 +7,19 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.base.mission import Debriefing
+from missions.base.report import Debriefing
 from missions.flown.records import FlightRecords
 from missions.flown.score import score
 from missions.flown.targets import TARGET_SYSTEM
-from missions.orbit.mission import OrbitMission
+from missions.orbit.mission import orbit_lines
 from missions.orbit.options import OrbitOptions
-from missions.orbit.score import ORBIT, orbit_truth
+from missions.orbit.picture import draw_orbit
+from missions.orbit.score import ORBIT, orbit_figures, orbit_truth
 from missions.vehicle.notes import FlightNotes
 
 START = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=0.0)
+OPTIONS = OrbitOptions(radius_m=150.0)
+OPTIONS = OrbitOptions(radius_m=150.0)
 MARKS = {
     "radius_estimate_mean_m": 150.4,
     "radius_estimate_std_m": 1.9,
@@ -34,18 +37,15 @@ def debriefing(*phases, marks=MARKS, records=None):
         notes.begin(name, start_us)
         notes.end(end_us)
     records = FlightRecords.of_frames(()) if records is None else records
-    return Debriefing(
-        records=records, flights=[(notes, score(records, notes))], options=OrbitOptions(radius_m=150.0)
-    )
+    return Debriefing(records=records, flights=[(notes, score(records, notes))], options=OPTIONS)
 
 
 def test_a_vehicle_elsewhere_is_reported_with_the_position_that_the_mission_assumed():
-    mission = OrbitMission()
-    figures = mission.figures(debriefing((ORBIT, 100_000_000, 700_000_000)))
+    figures = orbit_figures(debriefing((ORBIT, 100_000_000, 700_000_000)), OPTIONS)
     assert figures["orbit_s"] == pytest.approx(600.0)
     assert figures["radius_mean_error_percent"] is None
     assert (figures["detections_used"], figures["detections_rejected"]) == (5900, 12)
-    circle, unknown = mission.report_lines(figures)
+    circle, unknown = orbit_lines(figures)
     assert circle.startswith("orbit of 150 m for 600 s, as the mission estimates: mean radius 150.4 m")
     for words in ("standard deviation 1.9 m", "within 3.2 m", "target lost 1 times", "5900 detections"):
         assert words in circle
@@ -53,10 +53,9 @@ def test_a_vehicle_elsewhere_is_reported_with_the_position_that_the_mission_assu
 
 
 def test_of_an_orbit_that_was_never_reached_nothing_is_said():
-    mission = OrbitMission()
-    figures = mission.figures(debriefing(("entry", 100_000_000, 300_000_000), marks={}))
+    figures = orbit_figures(debriefing(("entry", 100_000_000, 300_000_000), marks={}), OPTIONS)
     assert figures["orbit_s"] is None
-    assert mission.report_lines(figures) == ()
+    assert orbit_lines(figures) == ()
 
 
 def truth_frames(system_id, component_id, seconds, place_ne_m):
@@ -91,12 +90,11 @@ def test_of_a_gap_of_the_link_no_distance_is_stated_and_no_line_is_drawn(lost, t
     own = known if lost == "both" else everything
     frames = [*truth_frames(1, 25, own, aircraft), *truth_frames(TARGET_SYSTEM, 1, known, target)]
     flown = debriefing((ORBIT, 10_000_000, 90_000_000), records=FlightRecords.of_frames(frames))
-    mission = OrbitMission()
-    figures = mission.figures(flown)
+    figures = orbit_figures(flown, OPTIONS)
     assert figures["radius_max_error_m"] < 0.1
     assert figures["orbit_not_received_s"] == pytest.approx(10.0, abs=0.2)
-    assert "orbit of 150 m for 80 s (10 s of it not received)" in mission.report_lines(figures)[0]
+    assert "orbit of 150 m for 80 s (10 s of it not received)" in orbit_lines(figures)[0]
     shown = orbit_truth(flown.records, 1).broken_at_gaps(7)
     steps = np.diff(shown.time_s)
     assert np.nanmax(steps) < 2.0 and np.count_nonzero(np.isnan(shown.time_s)) == 1
-    mission.draw(tmp_path / "track.png", "gap", flown)
+    draw_orbit(tmp_path / "track.png", "gap", flown, OPTIONS)

@@ -33,7 +33,7 @@ from missions.runs.vehicle_opening import MAP_NAME
 from missions.survey.inputs import terrain_of
 from missions.survey.mission import SurveyMission
 from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
-from missions.survey.outcome import COMPENSATION
+from missions.survey.outcome import COMPENSATION, report_lines
 from missions.survey.records import flight_readings
 from missions.survey.surveyed_field import SurveyedField
 from missions.survey.world import survey_world
@@ -241,7 +241,7 @@ def test_parameters_of_the_estimator_keep_their_names_where_no_option_sets_them(
     ],
 )
 def test_the_report_has_what_is_unknown_or_missing_in_words(flown, changed, words):
-    lines = "\n".join(SurveyMission().report_lines({**flown.summary, **changed}))
+    lines = "\n".join(report_lines({**flown.summary, **changed}))
     assert words in lines
     assert "0 of 0" not in lines
 

@@ -33,19 +33,19 @@ from tests.missions.held_options import with_fields
 SMALL = {"altitude_m": 15.0, **edges((-20.0, -20.0, 20.0, 20.0)), "step_m": 8.0, "target_size_m": 0.6}
 
 
-def flown(out, *, hidden=None, picture=False, mission=None, **changes):
+def flown(out, *, hidden=None, picture=False, flights=None, **changes):
     options = with_fields(VisionSearchOptions(), **{**SMALL, **changes})
     world = vision_search_world(WorldSpec.of_team(options.vehicles, seed=4), options, hidden)
     request = RunRequest(options=options, world=world, out=out, picture=picture, estimator="vision-search")
-    return fly(mission or VisionSearchMission(), request)
+    return fly(VisionSearchMission(), request, None if flights is None else flights.append)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    mission = VisionSearchMission()
+    flights = []
     hidden = HiddenTag(place_ne_m=(8.0, -5.0))
     out = tmp_path_factory.mktemp("runs") / "run"
-    return flown(out, hidden=hidden, picture=True, mission=mission, passes=2), mission
+    return flown(out, hidden=hidden, picture=True, flights=flights, passes=2), flights[-1]
 
 
 def test_the_target_is_found_and_localized(run):
@@ -63,10 +63,10 @@ def test_the_target_is_found_and_localized(run):
 
 
 def test_the_mission_and_the_estimator_beside_it_and_a_replay_have_the_same_numbers(run):
-    result, mission = run
+    result, flight = run
     with np.load(result.folder / "estimates.npz") as file:
         recorded = {name: file[name] for name in file.files}
-    states = mission._flown.team.search.states[0]
+    states = flight.mission.team.search.states[0]
     rows = np.array([state.row() for state in states])
     names = states[0].COLUMNS
     index = np.searchsorted(recorded["time_us"], [state.time_us for state in states])
@@ -146,8 +146,8 @@ def test_live_on_a_link_and_replayed_it_has_the_same_numbers_too(run, tmp_path):
 @pytest.mark.slow
 def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
     """A replay as one of the vehicles has the belief that it had, to the bit, over a lossy link too."""
-    mission = VisionSearchMission()
-    result = flown(tmp_path / "run", mission=mission, vehicles=2, passes=2, link_loss=0.3, link_delay_s=0.5)
+    flights = []
+    result = flown(tmp_path / "run", flights=flights, vehicles=2, passes=2, link_loss=0.3, link_delay_s=0.5)
     log = result.folder / "flight.tlog"
     received = [
         (message.src_system, message.target_system, read_search_likelihood(
@@ -165,7 +165,7 @@ def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
         settings += [f"own_vehicle={index + 1}"]
         done = replay(open_log(log), partial(make_estimator, "vision-search", settings))
         (table,) = next(iter(done.fleet.runners.values())).tables.values()
-        states = mission._flown.team.search.states[index]
+        states = flights[-1].mission.team.search.states[index]
         rows = np.array([state.row() for state in states])
         assert len(rows) > 20
         for name, values in zip(states[0].COLUMNS, rows.T, strict=True):
