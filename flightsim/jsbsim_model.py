@@ -4,6 +4,7 @@ import logging
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import get_ident
 from typing import Any, Final
 from xml.etree import ElementTree
 
@@ -73,6 +74,21 @@ class _Messages(jsbsim.FGLogger):
             _LOG.debug("%s", text)
 
 
+_messages: Final[dict[int, _Messages]] = {}  # by thread
+
+
+def _messages_of_thread() -> _Messages:
+    """The logger of the calling thread, empty.
+
+    JSBSim gives up a thread's logger when the thread has ended, without Python's lock: if that reference were
+    the last one, Python would abort. Threads that begin later get the numbers of those that have ended, so
+    there are no more loggers than there were threads at a time.
+    """
+    messages = _messages.setdefault(get_ident(), _Messages())
+    messages.warnings = []
+    return messages
+
+
 def load_fdm(
     airframe: Airframe, physics_rate_hz: int, *, launcher: bool = False
 ) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
@@ -105,7 +121,7 @@ def load_fdm(
 
 
 def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
-    messages = _Messages()
+    messages = _messages_of_thread()
     jsbsim.set_logger(messages)
     fdm = jsbsim.FGFDMExec(str(folder))
     fdm.set_debug_level(0)

@@ -26,7 +26,7 @@ def code_blocks(text: str) -> list[str]:
 
 
 SQUARE, RECEIVER = code_blocks(README)
-(HEADINGS,) = code_blocks(EXTENDING)
+REPORTING, HEADINGS = code_blocks(EXTENDING)
 COMMANDS = [line for page in PAGES for line in commands_in(page.read_text(encoding="utf-8"))]
 LINKS = [
     (page.relative_to(ROOT).as_posix(), link)
@@ -80,6 +80,11 @@ def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
     fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
+
+
+@pytest.mark.slow
+def test_the_mission_that_reports_flies(tmp_path: Path) -> None:
+    assert re.search(r"^1[12]\.\d V in hover$", fly(REPORTING, tmp_path), re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -5,11 +5,13 @@ one mission, one after another or at the same time, do not know each other.
 import json
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
-from typing import Any, Generic, ParamSpec, TypeVar
+from pathlib import Path
+from typing import Generic, ParamSpec, TypeVar
 
 from missions.base.options import MissionOptions
 from missions.base.report import Debriefing, Report, path_verdict_of_all
 from missions.errors import MissionError
+from missions.flown.run_folder import LOG_NAME, PICTURE_NAME, SUMMARY_NAME
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.vehicle import Vehicle
 
@@ -70,9 +72,12 @@ class FunctionFlight(MissionFlight[AnyOptions]):
         self._reports: dict[int, Report] = {}
 
     async def fly_one(self, index: int) -> None:
-        returned = await self._function(self.vehicles[index], self.options[index])
-        if returned is not None:
-            self._reports[self.vehicles[index].system_id] = _checked(returned)
+        vehicle = self.vehicles[index]
+        returned: object = await self._function(vehicle, self.options[index])
+        if isinstance(returned, Report):
+            self._reports[vehicle.system_id] = _checked(returned)
+        elif returned is not None:
+            vehicle.notes.warn(f"the mission returned {returned!r:.60}, which is no Report, and is left out")
 
     def report(self, debriefing: Debriefing) -> Report:
         """What was returned: as it is for one vehicle, by system id for a team."""
@@ -100,25 +105,24 @@ class FunctionFlight(MissionFlight[AnyOptions]):
         )
 
 
-def _checked(returned: Any) -> Report:
+def _checked(returned: Report) -> Report:
     """A report of a user.
 
     Raises:
-        MissionError: it is none, or its figures can't be written.
+        MissionError: its figures or files can't be written.
     """
-    if not isinstance(returned, Report):
-        raise MissionError(
-            f"`fly` returned {type(returned).__name__} {returned!r:.80}; return a `Report`, or nothing"
-        )
+    for name in returned.files:
+        if name in (LOG_NAME, SUMMARY_NAME, PICTURE_NAME) or Path(name).name != name:
+            raise MissionError(f"the report's file {name!r} can't be written; give it a name of its own")
     try:
         json.dumps(dict(returned.figures))
     except (TypeError, ValueError) as error:
         raise MissionError(
-            f"`figures` of the report can't be written: {error}; use numbers, texts, lists and dicts"
+            f"the report's figures can't be written: {error}; use numbers, texts, lists and dicts"
         ) from error
     return replace(
         returned,
-        draw=None if returned.draw is None else _named("draw", returned.draw),
+        draw=None if returned.draw is None else _named("drawing", returned.draw),
         pictures=_named("pictures", returned.pictures),
     )
 
@@ -132,6 +136,6 @@ def _named(name: str, function: Callable[Arguments, Result]) -> Callable[Argumen
         except OSError:
             raise
         except Exception as error:
-            raise MissionError(f"`{name}` of the report failed: {type(error).__name__}: {error}") from error
+            raise MissionError(f"the report's {name} failed: {type(error).__name__}: {error}") from error
 
     return called

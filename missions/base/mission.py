@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic
+from types import MappingProxyType
+from typing import Any, Generic
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -53,6 +54,7 @@ class Mission(Generic[AnyOptions]):
         lands_without_sensors: the mission itself ends when one of its sensors stops
             (`vehicle.sensors.stopped`), so that a team lands in its layers; otherwise the run ends it, and
             the vehicle returns.
+        unflown: figures of a run that ended before the mission's flight began.
     """
 
     name: str = "mission"
@@ -60,6 +62,7 @@ class Mission(Generic[AnyOptions]):
     kinds: tuple[VehicleKind, ...] = (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
     commands = True
     lands_without_sensors = False
+    unflown: Mapping[str, Any] = MappingProxyType({})
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
         """The options as one vehicle flies them: options that were not specified get values that suit the

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -24,6 +25,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
 
     name = "occupancy"
     lands_without_sensors = True
+    unflown: Mapping[str, Any] = MappingProxyType({"target_found": False, "time_to_find_s": None})
     world_defaults = WorldDefaults(model="aerosonde", wind="5@270", turbulence="light")
 
     def adapted(self, options: OccupancyOptions, limits: Limits) -> OccupancyOptions:

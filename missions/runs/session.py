@@ -227,7 +227,8 @@ def _fly_interruptible(
     sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
     debriefing = _debrief(request, recorder.records(), flight, stage, completed=outcome == COMPLETED)
-    report = Report.of(debriefing) if flight.mission is None else flight.mission.report(debriefing)
+    made = flight.mission
+    report = Report(figures=mission.unflown) if made is None else made.report(debriefing)
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
         reason = report.verdict or _missed_check(request, blocks)
@@ -243,8 +244,8 @@ def _fly_interruptible(
         write_summary(folder, summary)
         written = True
         for name, contents in report.files.items():
-            with whole(folder / name), (folder / name).open("xb") as file:
-                file.write(contents)
+            with whole(folder / name):
+                (folder / name).write_bytes(contents)
         if request.picture and debriefing.flights:
             with whole(folder / PICTURE_NAME):
                 _draw(folder / PICTURE_NAME, title(mission, report, summary), report, debriefing)

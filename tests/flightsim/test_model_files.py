@@ -3,6 +3,8 @@
 import re
 import shutil
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import jsbsim
@@ -124,3 +126,15 @@ def test_a_control_that_is_not_wired_is_measured(tmp_path: Path, control: str, u
     words = rf"the {control} moves nothing: commands of -0\.5 and 0\.5 at .* written to {unit}"
     with pytest.raises(AirframeError, match=words):
         flight_envelope(path)
+
+
+def test_models_are_loaded_in_threads_that_end() -> None:
+    """JSBSim holds a thread's logger until the thread is gone, and gives it up without Python's lock."""
+    code = (
+        "from threading import Thread; from flightsim.airframe import load_airframe;"
+        "from flightsim.jsbsim_model import load_fdm;"
+        "threads = [Thread(target=load_fdm, args=(load_airframe('iris'), 250)) for _ in range(4)];"
+        "[thread.start() for thread in threads]; [thread.join() for thread in threads]"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -22,10 +22,12 @@ from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 from missions.runs.session import Flight, RunResult, fly
+from missions.search.area import edges
 from missions.survey.options import SurveyOptions
 from missions.survey.world import survey_world
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.world import vision_search_world
+from tests.missions.held_options import with_fields
 
 AIR = Environment.from_wind(speed_m_s=3.0, from_deg=270.0, turbulence="light")
 PATTERN = FlightOptions(width_m=20.0, height_m=20.0, spacing_m=10.0)
@@ -52,12 +54,13 @@ def occupancy(seed: int) -> tuple[MissionOptions, WorldSpec]:
 
 
 def multi_target(seed: int) -> tuple[MissionOptions, WorldSpec]:
-    options = MultiTargetOptions(
+    options = with_fields(
+        MultiTargetOptions(),
         altitude_m=8.0,
-        area_m=(-20.0, -20.0, 60.0, 60.0),
         start_ne_m=(0.0, 0.0),
         steps=3,
         expected_targets=4.0,
+        **edges((-20.0, -20.0, 60.0, 60.0)),
     )
     return options, multi_target_world(team(1, seed), options, TargetField(count=4, clusters=1))
 
@@ -73,8 +76,9 @@ def survey(seed: int) -> tuple[MissionOptions, WorldSpec]:
 
 
 def vision_search(seed: int) -> tuple[MissionOptions, WorldSpec]:
-    options = VisionSearchOptions(
-        altitude_m=15.0, area_m=(-15.0, -15.0, 15.0, 15.0), search_time_s=10.0, tag_size_m=0.8
+    area = edges((-15.0, -15.0, 15.0, 15.0))
+    options = with_fields(
+        VisionSearchOptions(), altitude_m=15.0, search_time_s=10.0, target_size_m=0.8, **area
     )
     return options, vision_search_world(team(1, seed), options)
 
@@ -89,6 +93,9 @@ SMALL = {
 }
 
 
+QUICK = ("multi-target", "sector")  # of the default suite: a team object, and a vehicle for itself
+
+
 def request(name: str, seed: int, out: Path) -> RunRequest:
     options, world = SMALL.get(name, pattern)(seed)
     return RunRequest(options=options, world=world, out=out, picture=False)
@@ -101,7 +108,9 @@ def told(result: RunResult) -> Any:
     return result.outcome, result.reason, summary, result.report.lines
 
 
-@pytest.mark.parametrize("name", MISSIONS)
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in MISSIONS]
+)
 def test_a_flight_within_a_flight_changes_neither(name: str, tmp_path: Path) -> None:
     """The second flight begins and ends while the first one is under way."""
     alone = [told(fly(name, request(name, seed, tmp_path / f"alone{seed}"))) for seed in (1, 2)]

@@ -189,6 +189,62 @@ def test_users_own_mission(scripted, tmp_path):
     assert summary["distance_m"] > 25.0
 
 
+def reporting(tmp_path, report):
+    script = tmp_path / "reports.py"
+    script.write_text(
+        "from missions import Report\n\n\n"
+        "async def fly(vehicle, options):\n"
+        "    await vehicle.clock.sleep(1.0)\n"
+        f"    return {report}\n"
+    )
+    return script
+
+
+def test_a_users_mission_returns_a_report(scripted, tmp_path, capsys):
+    report = (
+        "Report(figures={'walls_seen': 3, 'outcome': 'great'}, lines=['3 walls seen'], "
+        "files={'walls.csv': b'3'}, title='walls', pictures=lambda: {'wall.png': b'png'})"
+    )
+    code, out, _err = command_line(
+        capsys, "fly", str(reporting(tmp_path, report)), "--out", str(tmp_path / "run")
+    )
+    assert code == 0 and "3 walls seen" in out.splitlines()
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["walls_seen"], summary["outcome"]) == (3, "completed")
+    assert {name.name for name in (tmp_path / "run").iterdir()} >= {"walls.csv", "wall.png", "track.png"}
+
+
+@pytest.mark.parametrize(
+    ("report", "code", "message"),
+    [
+        ("Report(verdict='2 walls were missed')", 1, "mission reports failed: 2 walls were missed"),
+        ("Report(figures={'walls': {1, 2}})", 1, "the report's figures can't be written: Object of type set"),
+        ("Report(pictures=lambda: 1 / 0)", 1, "the report's pictures failed: ZeroDivisionError"),
+        ("Report(files={'flight.tlog': b''})", 1, "the report's file 'flight.tlog' can't be written"),
+        ("True", 0, "the mission returned True, which is no Report, and is left out"),
+    ],
+)
+def test_what_is_wrong_with_a_users_report_is_one_line(scripted, tmp_path, capsys, report, code, message):
+    script = reporting(tmp_path, report)
+    exit_code, _out, err = command_line(capsys, "fly", str(script), "--out", str(tmp_path / "run"))
+    assert exit_code == code
+    assert message in " ".join(err.split())
+    assert "Traceback" not in err
+    assert (tmp_path / "run" / "flight.tlog").stat().st_size > 1000
+
+
+def test_reports_of_a_team_are_by_vehicle(scripted, tmp_path):
+    script = reporting(
+        tmp_path, "Report(figures={'walls': options.index}, lines=['seen'], files={'w.csv': b''})"
+    )
+    options = small(vehicles=2)
+    result = session.fly(str(script), RunRequest(options=options, out=tmp_path / "run", picture=False))
+    assert result.outcome == "completed"
+    assert result.summary["reports"] == {"1": {"walls": 0}, "2": {"walls": 1}}
+    assert list(result.report.lines) == ["vehicle 1: seen", "vehicle 2: seen"]
+    assert (tmp_path / "run" / "1_w.csv").exists() and (tmp_path / "run" / "2_w.csv").exists()
+
+
 def test_a_mistake_in_a_users_mission_is_one_line_and_the_vehicle_returns(scripted, tmp_path, capsys):
     script = tmp_path / "mine.py"
     script.write_text("async def fly(vehicle, options):\n    await vehicle.takeoff(8.0)\n    1 / 0\n")

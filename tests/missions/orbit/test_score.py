@@ -19,7 +19,6 @@ from missions.vehicle.notes import FlightNotes
 
 START = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=0.0)
 OPTIONS = OrbitOptions(radius_m=150.0)
-OPTIONS = OrbitOptions(radius_m=150.0)
 MARKS = {
     "radius_estimate_mean_m": 150.4,
     "radius_estimate_std_m": 1.9,
