@@ -18,13 +18,14 @@ from pymavlink import mavutil
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
+from flightsim.foundation.options import user_options
 from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parameters_from_file, parse_wind
 from missions.base.mission import Mission
 from missions.base.options import FlightOptions, Via
 from missions.cli import fly as cli_fly
 from missions.cli import main as cli
-from missions.cli.options import SIDES
+from missions.cli.options import DeclaredType
 from missions.errors import MissionError, PlanError
 from missions.flown.records import FlightRecords
 from missions.flown.run_folder import create_run_folder
@@ -553,9 +554,9 @@ def test_bad_parameter_files_name_the_line(tmp_path, text):
 def test_small_parsers():
     assert parse_wind("5@270") == (5.0, 270.0)
     assert parse_wind("3.5") == (3.5, 0.0)
-    assert SIDES("100x80") == (100.0, 80.0)
-    assert SIDES(" 100 X 80") == (100.0, 80.0)
-    assert SIDES("60") == (60.0, 60.0)
+    size = DeclaredType(next(user for user in user_options(FlightOptions) if user.name == "size"))
+    for text, sides in (("100x80", (100.0, 80.0)), (" 100 X 80", (100.0, 80.0)), ("60", (60.0, 60.0))):
+        assert size.convert(text, None, None) == sides
 
 
 def test_help_does_not_import_what_flying_needs():
