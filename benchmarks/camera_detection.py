@@ -1,10 +1,11 @@
-"""The camera's probability of detection beside what OpenCV finds in the renderer's own pictures.
+"""The camera's probability of detection beside what the tag detector reads in the renderer's own pictures.
 
     python benchmarks/camera_detection.py [--pictures 40] [--seed 1]
 
 Every picture has one target at a random place and heading, at the focal length of the default camera and
-stream (1280 pixels over 60 degrees), off the middle by some pixels. Tags are read by `cv2.aruco`, balls
-found by their colour. Motion blur is a line of that length in any direction. For tags by size and
+stream (1280 pixels over 60 degrees), off the middle by some pixels. Tags are read by
+`estimators.vision.TagDetector`, balls found by their colour. Motion blur is a line of that length in any
+direction. For tags by size and
 depression, tags by size and blur, and balls by size, the share that is found is printed above what
 `PictureDetection` says; then the constants that fit best (maximum likelihood), the error of the places, and
 how many detections were of something else. Large tags at flat angles come first: they show the depression
@@ -22,6 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.vision import CameraGeometry, TagDetector
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.payload import PictureDetection, PinholeModel, SeenTargets
 from flightsim.payload.camera_view import CameraView, TargetView
@@ -33,9 +35,9 @@ Picture = NDArray[np.uint8]
 FOCAL_PX: Final = PinholeModel().focal_px
 CROP: Final = PinholeModel(width_px=320, height_px=240, horizontal_fov_rad=2.0 * math.atan(160.0 / FOCAL_PX))
 SIZE_M: Final = 2.0
-TAG_SIZES_PX: Final = (10.0, 12.0, 14.0, 16.0, 20.0, 24.0, 28.0, 36.0)
+TAG_SIZES_PX: Final = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 20.0, 24.0, 28.0, 36.0)
 FLAT_SIZES_PX: Final = (50.0, 70.0, 100.0)
-FLAT_DEPRESSIONS_DEG: Final = (5.0, 6.0, 7.0, 8.0, 10.0)
+FLAT_DEPRESSIONS_DEG: Final = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 DEPRESSIONS_DEG: Final = (15.0, 20.0, 35.0, 50.0, 90.0)
 BLURS_PX: Final = (1.0, 2.0, 4.0)
 BLURRED_FROM_DEG: Final = 50.0
@@ -65,14 +67,6 @@ class Trial:
     error_px: tuple[float, float]
 
 
-def tag_detector() -> cv2.aruco.ArucoDetector:
-    """OpenCV's, for tags as large as the picture's."""
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.adaptiveThreshWinSizeMax = 53  # the default is for smaller tags
-    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-    return cv2.aruco.ArucoDetector(family, parameters)
-
-
 class Bench:
     """Renders and detects.
 
@@ -83,7 +77,14 @@ class Bench:
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
         self._renderer = Renderer(CROP)
-        self._tags = tag_detector()
+        self._tags = TagDetector(
+            CameraGeometry.of_view(
+                width_px=CROP.width_px,
+                height_px=CROP.height_px,
+                horizontal_fov_rad=CROP.horizontal_fov_rad,
+                distortion=(),
+            )
+        )
 
     def trial(
         self, size_px: float, depression_deg: float = 50.0, blur_px: float = 0.0, *, tagged: bool = True
@@ -130,14 +131,7 @@ class Bench:
         return self._renderer.render(view), _pixels(view, target)
 
     def _tags_in(self, picture: Picture) -> list[tuple[int, float, float]]:
-        corners, ids, _ = self._tags.detectMarkers(picture)
-        if ids is None:
-            return []
-        # OpenCV counts from the middle of the first pixel
-        middles = [corner.reshape(4, 2).mean(axis=0) + 0.5 for corner in corners]
-        return [
-            (int(number), float(u), float(v)) for number, (u, v) in zip(ids.ravel(), middles, strict=True)
-        ]
+        return [(found.tag_id, *found.centre_px) for found in self._tags.detect(picture)]
 
 
 def balls_in(picture: Picture) -> list[tuple[int, float, float]]:
@@ -217,12 +211,12 @@ def table(title: str, trials: Sequence[Trial]) -> str:
     """Found above said, by size."""
     sizes = sorted({trial.size_px for trial in trials})
     lines = [f"{title:30s}" + "".join(f"{size:7.1f}" for size in sizes) + "  px"]
-    for name in ("OpenCV", "model"):
+    for name in ("detector", "model"):
         shares = []
         for size in sizes:
             own = [trial for trial in trials if trial.size_px == size]
             said = probabilities(PictureDetection(), own)
-            share = np.mean([trial.found for trial in own] if name == "OpenCV" else said)
+            share = np.mean([trial.found for trial in own] if name == "detector" else said)
             shares.append(f"{share:7.2f}")
         lines.append(f"{'  ' + name:30s}" + "".join(shares))
     return "\n".join(lines) + "\n"

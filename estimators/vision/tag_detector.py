@@ -1,4 +1,4 @@
-"""Detector of AprilTags of the family 36h11 (Olson 2011) in pictures, by OpenCV's ArUco module.
+"""Detector of AprilTags of the family 36h11 in pictures, by the AprilTag 3 library (Wang and Olson 2016).
 
 The corners are refined to fractions of a pixel, freed of the lens distortion, and give the tag's pose by the
 solution for squares of Collins and Bartoli (2014, IPPE).
@@ -10,6 +10,7 @@ from typing import Final
 
 import cv2
 import numpy as np
+from apriltag import apriltag
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
@@ -20,8 +21,11 @@ Picture = NDArray[np.uint8]
 
 TAGS: Final = 587
 """Number of tags in the family."""
-_REFINE_PX: Final = 5
-_LEAST_SIDE_PX: Final = 4.0
+_LEAST_SIDE_PX: Final = 8
+"""A tag is eight cells across, so in less none is read; below 3 pixels the library ends the process."""
+_CORNERS: Final = "lb-rb-rt-lt"  # the library's name for the corners and their order
+_FROM_TOP_LEFT: Final = [1, 0, 3, 2]
+"""Of those corners, in our order: the printed tag's top is the library's bottom."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,13 +102,7 @@ class TagDetector:
     def __init__(self, camera: CameraGeometry, parameters: TagDetectorParameters | None = None) -> None:
         self.camera = camera
         p = self.parameters = parameters or TagDetectorParameters()
-        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-        settings = cv2.aruco.DetectorParameters()
-        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        settings.cornerRefinementWinSize = _REFINE_PX
-        most_corrected = (11 - 1) // 2
-        settings.errorCorrectionRate = p.corrected_bits / most_corrected
-        self._detector = cv2.aruco.ArucoDetector(dictionary, settings)
+        self._detector = apriltag("tag36h11", threads=1, maxhamming=p.corrected_bits, decimate=1.0)
         self._wanted = frozenset(p.tag_ids)
         self._sizes_m = dict(p.sizes_m)
 
@@ -122,21 +120,16 @@ class TagDetector:
         """
         if corner_px is None:
             self.camera.check_size(picture)
-        height, width = picture.shape[:2]
         grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
-        settings = self._detector.getDetectorParameters()
-        settings.minMarkerPerimeterRate = 4.0 * _LEAST_SIDE_PX / max(width, height)
-        settings.maxMarkerPerimeterRate = 4.0
-        self._detector.setDetectorParameters(settings)
-        corners, numbers, _ = self._detector.detectMarkers(grey)
-        left_top = np.array(corner_px or (0, 0)) + 0.5  # OpenCV counts from the middle of the first pixel
+        if min(grey.shape) < _LEAST_SIDE_PX:
+            return ()
+        left_top = np.array(corner_px or (0, 0))
         found = []
-        for tag_corners, tag_id in zip(
-            corners, () if numbers is None else numbers.ravel().tolist(), strict=True
-        ):
+        for seen in self._detector.detect(np.ascontiguousarray(grey)):
+            tag_id, corners_px = int(seen["id"]), np.asarray(seen[_CORNERS])[_FROM_TOP_LEFT] + left_top
             if self._wanted and tag_id not in self._wanted:
                 continue
-            detection = self._measured(int(tag_id), tag_corners.reshape(4, 2).astype(np.float64) + left_top)
+            detection = self._measured(tag_id, corners_px)
             if detection is not None:
                 found.append(detection)
         found.sort(key=lambda detection: detection.centre_px)

@@ -112,15 +112,14 @@ class DetectionModel(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureDetection:
-    """Detection as OpenCV's detectors do it in pictures of the size of the model: a logistic curve over the
-    size.
+    """Detection as detectors do it in pictures of the size of the model: a logistic curve over the size.
 
-    Tags of the family 36h11 by `cv2.aruco`, balls by their colour. A tag on the ground is foreshortened, so
-    the effective size is size_px * sine^foreshortening; with blur b, a size of sqrt(half_size_px^2 +
-    (blur_factor b)^2) is needed for half of the tags to be read. A target that the edge of the picture cuts
-    off, or that another one covers, is not detected. A tag is not read below min_depression_rad: `cv2.aruco`
-    drops quadrilaterals with two corners closer than a twentieth of the outline. The defaults are fits to
-    rendered pictures, by `python benchmarks/camera_detection.py`.
+    Tags of the family 36h11 by the AprilTag 3 library, balls by their colour. A tag on the ground is
+    foreshortened, so the effective size is size_px * sine^foreshortening; with blur b, a size of
+    sqrt(half_size_px^2 + (blur_factor b)^2) is needed for half of the tags to be read. A target that the edge
+    of the picture cuts off, or that another one covers, is not detected. A tag is not read below
+    min_depression_rad, whatever its size. The defaults are fits to rendered pictures, by
+    `python -m benchmarks.camera_detection`.
 
     Attributes:
         max_probability: of a target that fills many pixels.
@@ -132,11 +131,11 @@ class PictureDetection:
     """
 
     max_probability: float = 0.998
-    half_size_px: float = 10.7
-    slope_px: float = 1.03
-    foreshortening: float = 0.742
-    min_depression_rad: float = math.radians(6.4)
-    blur_factor: float = 3.4
+    half_size_px: float = 8.65
+    slope_px: float = 0.505
+    foreshortening: float = 0.844
+    min_depression_rad: float = math.radians(4.5)
+    blur_factor: float = 2.95
     ball_half_size_px: float = 2.01
     ball_slope_px: float = 0.042
 

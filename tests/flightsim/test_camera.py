@@ -308,7 +308,7 @@ def test_frame_rate_and_latency() -> None:
 
 @pytest.mark.parametrize(
     ("size_m", "tag", "half_px", "slope_px"),
-    [(0.1, NO_TAG, 2.01, 0.042), (0.5, NO_TAG, 2.01, 0.042), (0.9, 3, 10.7, 1.03), (1.05, 3, 10.7, 1.03)],
+    [(0.1, NO_TAG, 2.01, 0.042), (0.5, NO_TAG, 2.01, 0.042), (0.76, 3, 8.65, 0.505), (0.82, 3, 8.65, 0.505)],
 )
 def test_detection_follows_its_curve(size_m: float, tag: int, half_px: float, slope_px: float) -> None:
     model = PinholeModel()
@@ -336,7 +336,7 @@ def test_detection_in_pictures_falls_with_foreshortening_blur_edges_and_cover() 
     changes: list[dict[str, object]] = [
         {"sine": np.array([math.sin(math.radians(10.0))])},
         {"blur_px": np.array([12.0])},
-        {"sine": np.array([math.sin(math.radians(6.0))]), "size_px": np.array([200.0])},
+        {"sine": np.array([math.sin(math.radians(4.0))]), "size_px": np.array([200.0])},
         {"edge_px": np.array([-1.0])},
         {"covered": np.array([True])},
     ]
@@ -408,18 +408,18 @@ def test_streams_of_targets_and_clutter_are_their_own() -> None:
     def of_first(bench: Bench) -> list[Detection]:
         return [d for d in bench.detections(200) if d.target_id == 1]
 
-    alone = of_first(Bench((0.0, 5.0), tags=(1,), size_m=1.2, latency_s=0.0))
+    alone = of_first(Bench((0.0, 5.0), tags=(1,), size_m=0.85, latency_s=0.0))
     assert 150 < len(alone) < 200
     crowd = Bench(
-        (0.0, 5.0), (10.0, -5.0), tags=(1, 2), size_m=1.2, latency_s=0.0, false_detections_per_frame=2.0
+        (0.0, 5.0), (10.0, -5.0), tags=(1, 2), size_m=0.85, latency_s=0.0, false_detections_per_frame=2.0
     )
     assert of_first(crowd) == alone
-    away = Bench((0.0, 5.0), tags=(1,), size_m=1.2, latency_s=0.0)
+    away = Bench((0.0, 5.0), tags=(1,), size_m=0.85, latency_s=0.0)
     place(away.truth, 0.0, 500.0, 100.0)
     assert away.frames(50)[-1].detections == ()
     place(away.truth, 0.0, 0.0, 100.0)
     assert away.detections(150) == [d for d in alone if d.time_us >= 50 * FRAME_STEPS * STEP_US]
-    assert of_first(Bench((0.0, 5.0), tags=(1,), size_m=1.2, latency_s=0.0, seed=2)) != alone
+    assert of_first(Bench((0.0, 5.0), tags=(1,), size_m=0.85, latency_s=0.0, seed=2)) != alone
 
 
 @pytest.mark.parametrize(
