@@ -6,7 +6,6 @@ Source: MAVLink mission protocol, https://mavlink.io/en/services/mission.html.
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem
 
@@ -32,10 +31,13 @@ def is_geodetic(item: MissionItem) -> bool:
     return item.frame in GEODETIC_FRAMES
 
 
-def item_from_message(message: MAVLinkMessage) -> MissionItem:
+def item_from_message(
+    message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+) -> MissionItem:
     """The item in a MISSION_ITEM or MISSION_ITEM_INT, unchecked; unset coordinates become NaN."""
-    x, y = message.x, message.y
-    if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
+    x: float = message.x
+    y: float = message.y
+    if isinstance(message, mavlink.MAVLink_mission_item_int_message):
         if message.frame in GEODETIC_FRAMES:
             x, y = (math.nan if value == UNSET_INT else value / _DEG_E7 for value in (x, y))
         elif message.frame != mavlink.MAV_FRAME_MISSION:
@@ -63,7 +65,7 @@ def item_message(
     current: bool,
     as_int: bool = True,
     unset: int = UNSET_INT,
-) -> MAVLinkMessage:
+) -> mavlink.MAVLink_mission_item_int_message | mavlink.MAVLink_mission_item_message:
     """MISSION_ITEM_INT (degrees in 1e-7, local metres in 1e-4), or MISSION_ITEM, for one item.
 
     Args:
@@ -72,30 +74,15 @@ def item_message(
         as_int: MISSION_ITEM_INT.
         unset: value in MISSION_ITEM_INT of an x or y that is not set (NaN).
     """
-    x: float = item.x
-    y: float = item.y
-    if as_int:
-        scale = (
-            _DEG_E7 if is_geodetic(item) else 1.0 if item.frame == mavlink.MAV_FRAME_MISSION else _LOCAL_E4
+    head = (*target, seq, item.frame, item.command, int(current), int(item.autocontinue))
+    parameters = (item.param1, item.param2, item.param3, item.param4)
+    if not as_int:
+        return mavlink.MAVLink_mission_item_message(
+            *head, *parameters, item.x, item.y, item.z, int(mission_type)
         )
-        x, y = _scaled(x, scale, unset), _scaled(y, scale, unset)
-    message = mavlink.MAVLink_mission_item_int_message if as_int else mavlink.MAVLink_mission_item_message
-    return message(
-        *target,
-        seq,
-        item.frame,
-        item.command,
-        int(current),
-        int(item.autocontinue),
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        x,
-        y,
-        item.z,
-        int(mission_type),
-    )
+    scale = _DEG_E7 if is_geodetic(item) else 1.0 if item.frame == mavlink.MAV_FRAME_MISSION else _LOCAL_E4
+    x, y = _scaled(item.x, scale, unset), _scaled(item.y, scale, unset)
+    return mavlink.MAVLink_mission_item_int_message(*head, *parameters, x, y, item.z, int(mission_type))
 
 
 def _scaled(value: float, scale: float, unset: int) -> int:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.channels import AutopilotChannel, ChannelStreams
 from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
@@ -25,6 +24,7 @@ from autopilot_bridge.firmware.external_mapping import connected
 from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -41,6 +41,7 @@ from autopilot_bridge.services.parameters.parameter_file import boot_parameters
 from autopilot_bridge.services.parameters.protocol import ParameterService, fix_identity
 from autopilot_bridge.services.parts import AutopilotParts, Simulation
 from autopilot_bridge.services.plans.geofence import MissionFence
+from autopilot_bridge.services.plans.messages import extended_payload
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
 from autopilot_bridge.storage.memory import MemoryCard
@@ -447,8 +448,8 @@ class Autopilot:
         if mission_type is MissionType.MISSION:
             self._progress.complete = False
 
-    def _mission_current(self) -> bytes:
-        return self.missions.current_message().wire_payload()
+    def _mission_current(self) -> bytes | None:
+        return extended_payload(self.missions.current_message())
 
 
 def merged(*tables: Mapping[int, EntryT]) -> dict[int, EntryT]:

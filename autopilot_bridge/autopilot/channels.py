@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.firmware.services import PAYLOAD_ROLE, FirmwareServices
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE

@@ -2,11 +2,10 @@
 
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
 from autopilot_bridge.firmware.flavour import Flavour, Identity, ModeDisplay
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.streams import Values
 

@@ -2,11 +2,10 @@
 
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.flavour import Flavour
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
 from autopilot_bridge.services.microservice import Microservice
 

@@ -8,9 +8,8 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.mavlink import dialect as mavlink
 
 E = TypeVar("E", bound=Enum)
 T = TypeVar("T")

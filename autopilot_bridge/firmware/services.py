@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import AddressRule
 from autopilot_bridge.services.commands.handlers import CommandHandlers, CommandHooks
 from autopilot_bridge.services.commands.message_interval import IntervalPolicy

@@ -3,9 +3,8 @@
 Messages are pymavlink's own objects of the dialect `all` (`dialect`), made by its classes or by `decode`.
 """
 
-from pymavlink.dialects.v20 import all as dialect
-
-from autopilot_bridge.mavlink.decoder import decode, field_reader
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.decoder import decode, decode_as, field_reader
 from autopilot_bridge.mavlink.definitions import (
     DEFINITIONS,
     MAVLinkMessage,
@@ -39,6 +38,7 @@ __all__ = [
     "WireField",
     "command_name",
     "decode",
+    "decode_as",
     "definition",
     "dialect",
     "enum_name",

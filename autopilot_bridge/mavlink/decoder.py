@@ -3,12 +3,13 @@
 import struct
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
-from pymavlink.dialects.v20 import all as dialect
-
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.definitions import MAVLinkMessage, definition
 from autopilot_bridge.mavlink.frame import CHECKSUM_SIZE, HEADER_SIZE_V1, HEADER_SIZE_V2, Frame
+
+MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
 
 def decode(frame: Frame) -> MAVLinkMessage:
@@ -34,6 +35,13 @@ def decode(frame: Frame) -> MAVLinkMessage:
     message._msgbuf = raw
     message._payload = raw[start:end]
     message._crc = int.from_bytes(raw[end : end + CHECKSUM_SIZE], "little")
+    return message
+
+
+def decode_as(frame: Frame, kind: type[MessageT]) -> MessageT:
+    """The message in a frame whose class the caller knows, because it has selected the frame by its id."""
+    message = decode(frame)
+    assert isinstance(message, kind), f"{kind.msgname} expected, not {message.get_type()}"
     return message
 
 

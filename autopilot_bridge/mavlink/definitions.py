@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from pymavlink.dialects.v20 import all as dialect
-
 from autopilot_bridge.errors import MessageError
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.event_messages import MESSAGES
 
-MAVLinkMessage = Any
-"""A message object of the dialect (`pymavlink.dialects.v20.all.MAVLink_message`); pymavlink carries no
-types.
-"""
+MAVLinkMessage = dialect.MAVLink_message
+"""Base of the messages of the dialect: what a message is before its class is known."""
 
 _STRUCT_CODES: Final = {
     "char": "s",

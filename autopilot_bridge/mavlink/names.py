@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from pymavlink.dialects.v20 import all as dialect
+from autopilot_bridge.mavlink import dialect
 
 _ENUMS: Final = dialect.enums
 

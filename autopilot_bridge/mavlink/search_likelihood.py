@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pymavlink.dialects.v20 import all as dialect
-
+from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.vectors import Quaternion
 
 __all__ = [

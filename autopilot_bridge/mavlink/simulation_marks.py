@@ -8,7 +8,7 @@ version proves nothing; our own emulation of ArduPilot is named in `uid2`.
 
 from typing import Final
 
-from autopilot_bridge.mavlink.definitions import MAVLinkMessage
+from autopilot_bridge.mavlink import dialect
 
 PX4_SITL_UID: Final = int.from_bytes(b"ITALDINO")
 """AUTOPILOT_VERSION.uid of PX4's SITL with system id 1: two words of its board id, each with its last byte
@@ -20,7 +20,7 @@ FLIGHTSTACK_UID2: Final = b"flightstack-sitl".ljust(18, b"\0")
 _MOST_INSTANCES: Final = 255
 
 
-def is_sitl_version(version: MAVLinkMessage) -> bool:
+def is_sitl_version(version: dialect.MAVLink_autopilot_version_message) -> bool:
     """Whether an AUTOPILOT_VERSION is that of PX4's SITL, or of our own."""
     if 0 <= int(version.uid) - PX4_SITL_UID < _MOST_INSTANCES:
         return True

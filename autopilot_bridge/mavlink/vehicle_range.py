@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pymavlink.dialects.v20 import all as dialect
+from autopilot_bridge.mavlink import dialect
 
 __all__ = ["VEHICLE_RANGE_PAYLOAD", "VehicleRange", "range_message", "read_range_payload"]
 

@@ -43,7 +43,7 @@ class VideoStream:
         """VIDEO_STREAM_STATUS."""
         return mavlink.MAVLink_video_stream_status_message(STREAM_ID, *self._picture(fov_deg))
 
-    def _picture(self, fov_deg: float) -> tuple[float, ...]:
+    def _picture(self, fov_deg: float) -> tuple[int, float, int, int, int, int, int]:
         """The common fields of both messages, from the flags to the field of view."""
         flags = int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0
         rotation_deg = 0

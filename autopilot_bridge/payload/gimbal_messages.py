@@ -66,10 +66,12 @@ def attitude_status(gimbal: Gimbal) -> Any:
 
 def mount_orientation(gimbal: Gimbal, time_ms: int) -> Any:
     """MOUNT_ORIENTATION, of the protocol's first version: roll and pitch against the horizon, degrees."""
-    angles = euler_of(gimbal.measured_q_heading_from_gimbal.tolist())
+    roll, pitch, yaw = euler_of(gimbal.measured_q_heading_from_gimbal.tolist())
     return mavlink.MAVLink_mount_orientation_message(
         time_ms,
-        *map(math.degrees, angles),
+        math.degrees(roll),
+        math.degrees(pitch),
+        math.degrees(yaw),
         math.degrees(yaw_of(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
     )
 

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.sitl.received_units import RECEIVED_UNITS
 from autopilot_bridge.sitl.simulator_parameters import SimulatorParameters

@@ -13,11 +13,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.errors import SigningKeyError
 from autopilot_bridge.links import Reach
-from autopilot_bridge.mavlink import Frame, LinkSigning, LinkSigningPolicy, SigningKey, SigningState, decode
+from autopilot_bridge.mavlink import (
+    Frame,
+    LinkSigning,
+    LinkSigningPolicy,
+    SigningKey,
+    SigningState,
+    decode_as,
+)
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.signing import DAY, INTERNAL, MINUTE, RADIO, REQUIRED, TRUSTED, UNSIGNED_TOO
 
 _KEY_REMOVED: Final = "Signing key removed"
@@ -200,7 +206,7 @@ class VehicleSigning:
         Returns:
             A text for the sender; None when the message was addressed to another system or component.
         """
-        message = decode(frame)
+        message = decode_as(frame, mavlink.MAVLink_setup_signing_message)
         if message.target_system != self._system_id or message.target_component not in (0, 1):
             return None
         if self._armed():

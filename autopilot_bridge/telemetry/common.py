@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.dispatch import BUILDERS, streams, table_of
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.motion import MotionMessages
@@ -50,7 +49,7 @@ class TelemetrySources:
     readings: SensorReadings
     heartbeat: Callable[[], Values]
     sys_status: Callable[[], tuple[int, int, int]]
-    mission_current: Callable[[], bytes]
+    mission_current: Callable[[], bytes | None]
     autopilot_version: Callable[[], Values]
     battery_level: Callable[[], int]
     position_ready: Callable[[], bool]
@@ -84,7 +83,7 @@ class CommonMessages:
         return self.sources.heartbeat()
 
     @streams(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
-    def mission_current(self) -> bytes:
+    def mission_current(self) -> bytes | None:
         """MISSION_CURRENT (42)."""
         return self.sources.mission_current()
 

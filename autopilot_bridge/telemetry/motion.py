@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.navigation import NavigationFilter

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from typing import TYPE_CHECKING, Final
 
+from autopilot_bridge.mavlink import dialect
 from estimators.handoff import HandoffEstimator
 from estimators.orbit_target.relative_target import RelativeState
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -112,7 +113,7 @@ class HandoffAircraft(ABC):
         await self._pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
         for name, rate_hz in _RATES_HZ.items():
             await vehicle.commands.set_message_rate(name, rate_hz)
-        await vehicle.commands.request("HOME_POSITION", 3.0)
+        await vehicle.commands.request(dialect.MAVLink_home_position_message, 3.0)
 
     def expected(self) -> Place | None:
         """Forward and right of the reported place of the target, by GPS; None: not known."""

@@ -31,12 +31,12 @@ async def simulation_proof(vehicle: Vehicle) -> str:
     * AUTOPILOT_VERSION of PX4's SITL (jMAVSim, Gazebo, SIH) or of our own.
     * ArduPilot's SIM_SPEEDUP together with SIM_OH_MASK 0: only its simulations have them.
     """
-    heartbeat = vehicle.link.message("HEARTBEAT")
+    heartbeat = vehicle.link.message(dialect.MAVLink_heartbeat_message)
     if heartbeat is not None and heartbeat.base_mode & dialect.MAV_MODE_FLAG_HIL_ENABLED:
         return "its heartbeat reports hardware in the loop"
     for _ in range(_ATTEMPTS):
         with suppress(VehicleTimeout):
-            version = await vehicle.commands.request("AUTOPILOT_VERSION")
+            version = await vehicle.commands.request(dialect.MAVLink_autopilot_version_message)
             if is_sitl_version(version):
                 return "it identifies itself as a SITL"
             break

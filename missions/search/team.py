@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
+from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import wrap_pi
 from missions.errors import MissionError
@@ -212,7 +213,7 @@ class SearchTeam(Generic[Options]):
         await vehicle.commands.set_message_rate("GLOBAL_POSITION_INT", _POSITION_HZ[own.law])
         for name, rate_hz in self._rates_hz.items():
             await vehicle.commands.set_message_rate(name, rate_hz)
-        await vehicle.commands.request("HOME_POSITION", 3.0)
+        await vehicle.commands.request(dialect.MAVLink_home_position_message, 3.0)
         if vehicle.kind is VehicleKind.FIXED_WING:
             await vehicle.wing.prepare_piloting()
         await self._layers.take_off(index)

@@ -36,12 +36,12 @@ class Adapter(ABC):
         messages that every firmware must have sent, and that were not received.
         """
         missing = []
-        status = self._link.message("SYS_STATUS")
+        status = self._link.message(dialect.MAVLink_sys_status_message)
         if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:
             missing.append(PREARM)
-        if self._link.message("HOME_POSITION") is None:
+        if self._link.message(dialect.MAVLink_home_position_message) is None:
             missing.append("home position")
-        if self._link.message("GLOBAL_POSITION_INT") is None:
+        if self._link.message(dialect.MAVLink_global_position_int_message) is None:
             missing.append("position estimate")
         return missing
 
@@ -109,7 +109,7 @@ class ArduPilot(Adapter):
 
     def readiness(self) -> list[str]:
         missing = super().readiness()
-        ekf = self._link.message("EKF_STATUS_REPORT")
+        ekf = self._link.message(dialect.MAVLink_ekf_status_report_message)
         if ekf is None or ekf.flags & _EKF_NEEDED != _EKF_NEEDED or ekf.flags & _EKF_CONST_POS:
             missing.append("navigation filter on GPS")
         return missing

@@ -57,6 +57,7 @@ _PLANS: Final = frozenset(("MISSION_COUNT", "MISSION_CLEAR_ALL", "MISSION_SET_CU
 _ARM: Final = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 _ARMING: Final = (_ARM, dialect.MAV_CMD_MISSION_START)
 """Commands that may arm the vehicle: PX4 arms for MISSION_START too (Commander.cpp)."""
+_CommandMessage = dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message
 _SET_MODE: Final = dialect.MAV_CMD_DO_SET_MODE
 _UNANSWERED: Final = (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS)
 _FAILSAFE_STATES: Final = (dialect.MAV_STATE_CRITICAL, dialect.MAV_STATE_EMERGENCY)
@@ -147,26 +148,27 @@ class CommandAuthority:
         if self.state is not Command.OURS:
             return False
         kind = message.get_type()
-        command = int(message.command) if kind in ("COMMAND_LONG", "COMMAND_INT") else None
-        modes = () if command is None else self._modes_of(command, message)
+        commanding = message if isinstance(message, _CommandMessage) else None
+        command = None if commanding is None else commanding.command
+        modes = () if commanding is None else self._modes_of(commanding)
         moves = bool(modes) or kind in _SETPOINTS or command in _MOTIONS
         if self._armed_by_another and not self.others_may_arm and (moves or kind in _PLANS):
             self._take_over(self._reported or 0, self._time_us, armed=True)
             return False
         self.engaged = self.engaged or (moves and self._armed)
         self.commands += command is not None and (moves or command in _ARMING)
-        if command in _ARMING:
-            self.engaged = self.engaged or command != _ARM or message.param1 > 0.5
+        if commanding is not None and command in _ARMING:
+            self.engaged = self.engaged or command != _ARM or commanding.param1 > 0.5
         if command is not None and modes:
             self._pending = [p for p in self._pending if (p.command, p.modes) != (command, modes)]
             self._pending.append(_Pending(command, modes))
         return True
 
-    def _modes_of(self, command: int, message: MAVLinkMessage) -> tuple[int, ...]:
+    def _modes_of(self, message: _CommandMessage) -> tuple[int, ...]:
         """The custom modes that a command leads to; empty: it leads to none."""
         firmware = self._firmware
-        if command != _SET_MODE:
-            return firmware.modes_of_command.get(command, ())
+        if message.command != _SET_MODE:
+            return firmware.modes_of_command.get(message.command, ())
         mode = firmware.mode_commanded(ModeCommand(main=message.param2, sub=message.param3))
         return (mode, *firmware.modes_instead.get(mode, ()))
 

@@ -1,7 +1,7 @@
 """Commands and modes: the MAVLink command protocol with its confirmations."""
 
 from collections.abc import Awaitable, Callable
-from typing import Any, Final
+from typing import Any, Final, TypeVar, cast
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
 from missions.errors import CommandRejected, MissionError, ModeNotEntered, VehicleTimeout
@@ -9,6 +9,8 @@ from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode, ModeCommand
 from missions.vehicle.heights import HeightRule
 from missions.vehicle.link import VehicleLink, describe_ack
+
+MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
 ACK_S: Final = 1.0
 REASON_S: Final = 0.5
@@ -82,13 +84,14 @@ class VehicleCommands:
         """Request one message (REQUEST_MESSAGE) without waiting for it."""
         self.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, float(definition(name).message_id))
 
-    async def request(self, name: str, timeout_s: float = 2.0) -> MAVLinkMessage:
-        """Request one message (REQUEST_MESSAGE) and wait for it."""
+    async def request(self, kind: type[MessageT], timeout_s: float = 2.0) -> MessageT:
+        """Request one message (REQUEST_MESSAGE) of this class and wait for it."""
+        name = kind.msgname
         with self.link.messages(name) as stream:
             self.request_once(name)
             try:
                 async with self.link.deadline(timeout_s, name):
-                    return await anext(stream)
+                    return cast(MessageT, await anext(stream))
             except TimeoutError:
                 raise VehicleTimeout(
                     f"no {name} within {timeout_s:g} s of the request; {self.link.last_received()}"

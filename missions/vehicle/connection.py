@@ -10,7 +10,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Protocol, Self
+from typing import TYPE_CHECKING, Any, Final, Protocol, Self, TypeVar, overload
 
 from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.mavlink import (
@@ -30,6 +30,8 @@ from missions.vehicle.peers import NewestFrames
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Link
+
+MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
 AUTOPILOT_COMPONENT: Final = 1
 GROUND_STATION: Final = (255, 190)
@@ -295,11 +297,22 @@ class Connection:
 
     # looking and waiting
 
+    @overload
     def latest(
-        self, name: str, system_id: int, component_id: int = AUTOPILOT_COMPONENT
+        self, kind: type[MessageT], system_id: int, component_id: int = AUTOPILOT_COMPONENT
+    ) -> MessageT | None: ...
+
+    @overload
+    def latest(
+        self, kind: str, system_id: int, component_id: int = AUTOPILOT_COMPONENT
+    ) -> MAVLinkMessage | None: ...
+
+    def latest(
+        self, kind: type[MessageT] | str, system_id: int, component_id: int = AUTOPILOT_COMPONENT
     ) -> MAVLinkMessage | None:
-        """Newest message of a name from one component, or None."""
-        return self._newest.latest((system_id, component_id), definition(name).message_id)
+        """Newest message of a class, or of a name, from one component, or None."""
+        message_id = definition(kind).message_id if isinstance(kind, str) else kind.id
+        return self._newest.latest((system_id, component_id), message_id)
 
     @property
     def autopilots_received(self) -> list[int]:

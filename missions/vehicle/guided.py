@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Final
 
+from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.vehicle.commands import VehicleCommands
@@ -210,7 +211,7 @@ class LocalOrigin:
         """
         if self._origin is None:
             try:
-                m = await self._commands.request("GPS_GLOBAL_ORIGIN", 1.5)
+                m = await self._commands.request(dialect.MAVLink_gps_global_origin_message, 1.5)
                 self._origin = GeodeticPosition(
                     lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3
                 )

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, overload
 
 from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.mavlink import (
@@ -16,6 +16,7 @@ from autopilot_bridge.mavlink import (
     MAVLinkMessage,
     command_name,
     decode,
+    decode_as,
     definition,
     dialect,
     enum_name,
@@ -37,6 +38,7 @@ from missions.vehicle.system_id_check import SystemIdCheck
 from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 
 T = TypeVar("T")
+MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
 _TEXTS_KEPT: Final = 50
 _TEXTS_SHOWN_LEAST: Final = 3
@@ -190,7 +192,12 @@ class VehicleLink:
 
         for name in ("MISSION_CURRENT", "MISSION_ITEM_REACHED"):
             listen(name, lambda frame: tasks.on_mission_message(decode(frame), self.clock.stamp_us))
-        listen("EXTENDED_SYS_STATE", lambda frame: tasks.on_landed_state(decode(frame).landed_state))
+        listen(
+            "EXTENDED_SYS_STATE",
+            lambda frame: tasks.on_landed_state(
+                decode_as(frame, dialect.MAVLink_extended_sys_state_message).landed_state
+            ),
+        )
         listen("GLOBAL_POSITION_INT", self._on_position)
 
     def _on_position(self, frame: Frame) -> None:
@@ -318,7 +325,7 @@ class VehicleLink:
     def _on_event(self, frame: Any) -> None:
         """Add the reason that PX4 names by an event without a text."""
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
-            event = decode(frame)
+            event = decode_as(frame, dialect.MAVLink_event_message)
             found = px4_events.reason(event.id, event.log_levels)
             if found is not None:
                 severity, words = found
@@ -349,9 +356,15 @@ class VehicleLink:
 
     # newest values
 
-    def message(self, name: str) -> MAVLinkMessage | None:
-        """Newest message of a name from the autopilot, or None."""
-        return self.connection.latest(name, self.system_id)
+    @overload
+    def message(self, kind: type[MessageT]) -> MessageT | None: ...
+
+    @overload
+    def message(self, kind: str) -> MAVLinkMessage | None: ...
+
+    def message(self, kind: type[MessageT] | str) -> MAVLinkMessage | None:
+        """Newest message of a class, or of a name, from the autopilot, or None."""
+        return self.connection.latest(kind, self.system_id)
 
     def latest(self, kind: type[T]) -> T | None:
         """Newest telemetry of a kind, for example `latest(Position)`; None before the first.
@@ -375,7 +388,7 @@ class VehicleLink:
 
     def home_or_none(self) -> GeodeticPosition | None:
         """Home as reported by the vehicle, or None."""
-        message = self.message("HOME_POSITION")
+        message = self.message(dialect.MAVLink_home_position_message)
         return None if message is None else home(message)
 
     @property
@@ -428,7 +441,7 @@ class VehicleLink:
         reports that it is in the air.
         """
         if self._reported is None:
-            heartbeat = self.message("HEARTBEAT")
+            heartbeat = self.message(dialect.MAVLink_heartbeat_message)
             return heartbeat is not None and bool(heartbeat.base_mode & _ARMED)
         if self._reported[0] & _ARMED:
             return True
@@ -462,7 +475,7 @@ class VehicleLink:
         """HEARTBEAT.custom_mode, in the firmware's numbering."""
         if self._reported is not None:
             return self._reported[1]
-        heartbeat = self.message("HEARTBEAT")
+        heartbeat = self.message(dialect.MAVLink_heartbeat_message)
         return 0 if heartbeat is None else int(heartbeat.custom_mode)
 
     @property
@@ -473,7 +486,7 @@ class VehicleLink:
     @property
     def landed_state(self) -> int:
         """MAV_LANDED_STATE: 0 not known, 1 on the ground, 2 in the air, 3 taking off, 4 landing."""
-        message = self.message("EXTENDED_SYS_STATE")
+        message = self.message(dialect.MAVLink_extended_sys_state_message)
         return 0 if message is None else int(message.landed_state)
 
     def time_stamp_faults(self) -> str:
@@ -492,9 +505,10 @@ class VehicleLink:
 
     def addressed_here(self, message: MAVLinkMessage) -> bool:
         """Whether a reply is for this mission: addressed to all, or to its own ids."""
-        return message.target_system in (0, self.connection.system_id) and message.target_component in (
-            0,
-            self.connection.component_id,
+        own = (0, self.connection.system_id), (0, self.connection.component_id)
+        return (
+            getattr(message, "target_system", 0) in own[0]
+            and getattr(message, "target_component", 0) in own[1]
         )
 
     def last_received(self, *, silence: bool = True) -> str:
@@ -504,7 +518,7 @@ class VehicleLink:
         if self._firmware is None or self.heartbeat_us is None:
             return "nothing was received from an autopilot"
         parts = [f"last received: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
-        position = self.message("GLOBAL_POSITION_INT")
+        position = self.message(dialect.MAVLink_global_position_int_message)
         if position is not None:
             older_s = self.older_s(position.time_boot_ms * 1000)
             parts.append(height_text(position.relative_alt * 1e-3, older_s, " above home"))

@@ -88,8 +88,8 @@ class ModeTasks:
 
     def on_sent(self, message: MAVLinkMessage) -> None:
         """Note the altitude of a take-off that is commanded."""
-        if message.get_type() == "COMMAND_LONG" and message.command in _TAKEOFFS:
-            self._takeoff_alt_m = float(message.param7)  # PX4: above mean sea level; NaN: its own default
+        if isinstance(message, dialect.MAVLink_command_long_message) and message.command in _TAKEOFFS:
+            self._takeoff_alt_m = message.param7  # PX4: above mean sea level; NaN: its own default
 
     def on_mode(self, custom_mode: int) -> None:
         """Process the newest mode that is commanded or has followed: a mission begins anew when its mode is

@@ -80,7 +80,9 @@ class Payload:
         gimbal manager; None before it was received (`request_gimbal_information`).
         """
         link = self._link
-        m = link.connection.latest("GIMBAL_MANAGER_INFORMATION", link.system_id, GIMBAL_COMPONENT)
+        m = link.connection.latest(
+            dialect.MAVLink_gimbal_manager_information_message, link.system_id, GIMBAL_COMPONENT
+        )
         return None if m is None else (m.pitch_min, m.pitch_max, m.yaw_min, m.yaw_max)
 
     async def request_gimbal_information(self, timeout_s: float = 3.0) -> tuple[float, float, float, float]:
@@ -120,7 +122,9 @@ class Payload:
         commands.
         """
         link = self._link
-        m = link.connection.latest("GIMBAL_MANAGER_STATUS", link.system_id, GIMBAL_COMPONENT)
+        m = link.connection.latest(
+            dialect.MAVLink_gimbal_manager_status_message, link.system_id, GIMBAL_COMPONENT
+        )
         if m is None or not m.primary_control_sysid:
             return None
         other = (int(m.primary_control_sysid), int(m.primary_control_compid))

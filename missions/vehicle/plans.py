@@ -184,7 +184,7 @@ class VehiclePlans:
                 tracker.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self._link.clock.stamp_us)
                 return there()
             message = decode(frame)
-            if message.get_type() != "HEARTBEAT":
+            if not isinstance(message, dialect.MAVLink_heartbeat_message):
                 tracker.on_message(message, self._link.clock.stamp_us)
                 return there()
             if flying:

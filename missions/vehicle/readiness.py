@@ -36,7 +36,7 @@ class Readiness:
     async def wait(self, timeout_s: float, *, leave_mode: bool) -> None:
         """Start the streams and wait until the vehicle could be armed; see `Vehicle.wait_ready`."""
         await self._adapter.start_streams()
-        if self._link.message("HOME_POSITION") is None:
+        if self._link.message(dialect.MAVLink_home_position_message) is None:
             self._commands.request_once("HOME_POSITION")
         await self._repeat_requests(timeout_s)
         await self._wait(timeout_s, leave_mode)
@@ -55,7 +55,7 @@ class Readiness:
         for _ in range(min(_STREAM_REQUESTS, int(0.5 * timeout_s / _STREAMS_S))):
             with suppress(VehicleTimeout):
                 await link.wait_until(
-                    lambda: link.message("SYS_STATUS"),
+                    lambda: link.message(dialect.MAVLink_sys_status_message),
                     what="SYS_STATUS",
                     on=("SYS_STATUS",),
                     timeout_s=_STREAMS_S,
@@ -119,7 +119,7 @@ class Readiness:
 
     @property
     def _sensors_unhealthy(self) -> int:
-        status = self._link.message("SYS_STATUS")
+        status = self._link.message(dialect.MAVLink_sys_status_message)
         if status is None:
             return 0
         return int(status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health)

@@ -233,13 +233,13 @@ class FixedWing:
         """The autopilot's estimate of the velocity of the air (WIND_COV or WIND), north and east; None: not
         reported.
         """
-        m = self._link.message("WIND_COV")
+        m = self._link.message(dialect.MAVLink_wind_cov_message)
         if m is not None and math.isfinite(m.wind_x) and math.isfinite(m.wind_y):
             return float(m.wind_x), float(m.wind_y)
-        m = self._link.message("WIND")
-        if m is not None and math.isfinite(m.speed) and math.isfinite(m.direction):
-            source = math.radians(m.direction)
-            return -m.speed * math.cos(source), -m.speed * math.sin(source)
+        wind = self._link.message(dialect.MAVLink_wind_message)
+        if wind is not None and math.isfinite(wind.speed) and math.isfinite(wind.direction):
+            source = math.radians(wind.direction)
+            return -wind.speed * math.cos(source), -wind.speed * math.sin(source)
         return None
 
     async def land_along(

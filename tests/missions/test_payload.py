@@ -73,8 +73,8 @@ class Rig:
         self.primary = None
         self.connection = SimpleNamespace(system_id=255, component_id=190, latest=self.latest)
 
-    def latest(self, name, system_id, component_id):
-        if name != "GIMBAL_MANAGER_STATUS" or self.primary is None:
+    def latest(self, kind, system_id, component_id):
+        if kind is not d.MAVLink_gimbal_manager_status_message or self.primary is None:
             return None
         return d.MAVLink_gimbal_manager_status_message(0, 0, 0, *self.primary, 0, 0)
 

@@ -14,12 +14,11 @@ found or changed.
 import math
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, receives
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, flags, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -57,7 +56,9 @@ class ArdupilotCalibration(Microservice):
         self._begun_us = 0
 
     @receives(mavlink.MAVLINK_MSG_ID_COMMAND_ACK)
-    def _on_acknowledgement(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_acknowledgement(
+        self, message: mavlink.MAVLink_command_ack_message, source: Source, time_us: int
+    ) -> None:
         waiting = self._position is not None and self._measured_us is None
         if waiting and message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS):
             self._measure()
@@ -281,7 +282,9 @@ class CompassCalibration(Microservice):
                 status,
                 saved,
                 math.sqrt(variance) * _MILLIGAUSS,
-                *offsets,
+                offsets[0],
+                offsets[1],
+                offsets[2],
                 *(1.0, 1.0, 1.0),
                 *(0.0, 0.0, 0.0),
                 scale_factor=1.0,

@@ -4,12 +4,11 @@ import math
 from abc import abstractmethod
 from typing import ClassVar
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.events import ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import FORCE_NUMBER, Command, flags, on_earth, whole

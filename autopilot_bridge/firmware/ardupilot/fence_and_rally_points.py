@@ -10,9 +10,8 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
@@ -77,14 +76,14 @@ class OldPoints(Microservice):
         if number not in self._warned:
             self._warned.add(number)
             self._announce(_INFO, f"Received message ({_NAMES[number]}) is deprecated")
-        match number:
-            case mavlink.MAVLINK_MSG_ID_FENCE_POINT:
+        match message:
+            case mavlink.MAVLink_fence_point_message():
                 self._take_fence_point(message)
-            case mavlink.MAVLINK_MSG_ID_FENCE_FETCH_POINT:
+            case mavlink.MAVLink_fence_fetch_point_message():
                 self._send_fence_point(message.idx, source)
-            case mavlink.MAVLINK_MSG_ID_RALLY_POINT:
+            case mavlink.MAVLink_rally_point_message():
                 self._take_rally_point(message)
-            case mavlink.MAVLINK_MSG_ID_RALLY_FETCH_POINT:
+            case mavlink.MAVLink_rally_fetch_point_message():
                 self._send_rally_point(message.idx, source)
 
     def tick(self, time_us: int) -> None:
@@ -115,7 +114,7 @@ class OldPoints(Microservice):
 
     # fence
 
-    def _take_fence_point(self, message: MavlinkMessage) -> None:
+    def _take_fence_point(self, message: mavlink.MAVLink_fence_point_message) -> None:
         total = self._total(FENCE_TOTAL)
         if 0 < total < _LEAST_FENCE:
             self._announce(_WARNING, "Invalid FENCE_TOTAL")
@@ -160,7 +159,7 @@ class OldPoints(Microservice):
 
     # rally points
 
-    def _take_rally_point(self, message: MavlinkMessage) -> None:
+    def _take_rally_point(self, message: mavlink.MAVLink_rally_point_message) -> None:
         total = self._total(RALLY_TOTAL)
         lat, lon = message.lat * 1e-7, message.lng * 1e-7
         if message.idx >= total:

@@ -14,7 +14,7 @@ from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 from flightsim import interface as i
@@ -53,17 +53,22 @@ class GpsInputService(Microservice):
         self.taken = self.refused = 0
 
     @receives(mavlink.MAVLINK_MSG_ID_GPS_INPUT)
-    def _on_gps_input(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_gps_input(self, message: mavlink.MAVLink_gps_input_message, source: Source, time_us: int) -> None:
         """Only the first receiver (`gps_id`) exists."""
         if self._listens and message.gps_id == 0:
             self._take(message, _gps_input(message), time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_HIL_GPS)
-    def _on_hil_gps(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_hil_gps(self, message: mavlink.MAVLink_hil_gps_message, source: Source, time_us: int) -> None:
         if self._listens:
             self._take(message, _hil_gps(message), time_us)
 
-    def _take(self, message: MavlinkMessage, values: list[float] | None, time_us: int) -> None:
+    def _take(
+        self,
+        message: mavlink.MAVLink_gps_input_message | mavlink.MAVLink_hil_gps_message,
+        values: list[float] | None,
+        time_us: int,
+    ) -> None:
         if values is None:
             self.refused += 1
             return
@@ -75,12 +80,18 @@ class GpsInputService(Microservice):
             self._reading.time_us = measured_us
             self.taken += 1
 
-    def _sent_us(self, message: MavlinkMessage, values: list[float], time_us: int) -> int:
+    def _sent_us(
+        self,
+        message: mavlink.MAVLink_gps_input_message | mavlink.MAVLink_hil_gps_message,
+        values: list[float],
+        time_us: int,
+    ) -> int:
         """The send time of a fix from its GPS time, which removes the variation of the transport delay."""
-        week = int(getattr(message, "time_week", 0))
-        if week == 0 or values[i.GPS_FIX_TYPE] < _FIX_3D:
+        if isinstance(message, mavlink.MAVLink_hil_gps_message):
             return time_us
-        stamp_us = 1000 * (week * _WEEK_MS + int(message.time_week_ms))
+        if message.time_week == 0 or values[i.GPS_FIX_TYPE] < _FIX_3D:
+            return time_us
+        stamp_us = 1000 * (message.time_week * _WEEK_MS + message.time_week_ms)
         offset_us = time_us - stamp_us
         if self._offset_us is None or not -_LATEST_US < offset_us - self._offset_us < _LATEST_US:
             self._offset_us = offset_us  # the first message, or another clock
@@ -89,7 +100,7 @@ class GpsInputService(Microservice):
         return stamp_us + self._offset_us
 
 
-def _gps_input(message: MavlinkMessage) -> list[float] | None:
+def _gps_input(message: mavlink.MAVLink_gps_input_message) -> list[float] | None:
     """The values of a GPS_INPUT; None: not a fix."""
     ignored = int(message.ignore_flags)
 
@@ -113,7 +124,7 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
     )
 
 
-def _hil_gps(message: MavlinkMessage) -> list[float] | None:
+def _hil_gps(message: mavlink.MAVLink_hil_gps_message) -> list[float] | None:
     """The values of a HIL_GPS, which has integers."""
     return _fix(
         message,

@@ -3,9 +3,8 @@
 from dataclasses import replace
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.firmware.data import commands, load_data
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.plans.policy import CRITICAL, WARNING, MissionPolicy, MissionTexts

@@ -6,8 +6,6 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.ardupilot import messages, packed_parameters
@@ -30,6 +28,7 @@ from autopilot_bridge.firmware.ardupilot.plane.setpoints import ArduPlaneSetpoin
 from autopilot_bridge.firmware.data import commands, load_data, message_ids
 from autopilot_bridge.firmware.mapping import integer
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation.external import ExternalFrame
 from autopilot_bridge.parameter_files import MAVPROXY_SUFFIXES
 from autopilot_bridge.parameters import ParameterStore

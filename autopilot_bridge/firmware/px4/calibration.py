@@ -2,12 +2,11 @@
 
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.px4 import calibration_script as scripts
 from autopilot_bridge.firmware.px4.calibration_script import CalibrationScript
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice

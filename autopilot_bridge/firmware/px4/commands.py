@@ -2,13 +2,12 @@
 
 import math
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.events import CommandDenied, ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import FORCE_NUMBER, Command, flags, on_earth, whole
 from autopilot_bridge.services.commands.handlers import CommandHandlers

@@ -27,7 +27,7 @@ from autopilot_bridge.mavlink.event_messages import (
     EventMessage,
     ResponseEventError,
 )
-from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.streams import Values
@@ -56,7 +56,7 @@ class EventService(Microservice):
         self._broadcast = broadcast
         self._notices = notices
         self._sequence = _FIRST_SEQUENCE
-        self._kept: deque[MavlinkMessage] = deque(maxlen=KEPT)
+        self._kept: deque[mavlink.MAVLink_event_message] = deque(maxlen=KEPT)
         self._time_us = 0
         self._next_report_us = 0
         self._reported: tuple[Occurrence, ...] = ()
@@ -67,7 +67,9 @@ class EventService(Microservice):
         return (self._sequence, 0)
 
     @receives(REQUEST_EVENT)
-    def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_request(
+        self, message: mavlink.MAVLink_request_event_message, source: Source, time_us: int
+    ) -> None:
         """REQUEST_EVENT: ranges may wrap. An event that is no longer kept gets one error reply."""
         count = (message.last_sequence - message.first_sequence) % _MODULO + 1
         kept = {event.sequence: event for event in self._kept}

@@ -5,9 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.firmware.data import commands, load_data
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_feasibility.px4 import PARAMETERS, Px4MissionRules, mission_problems
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES

@@ -6,8 +6,6 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
@@ -25,6 +23,7 @@ from autopilot_bridge.firmware.px4.setpoints import Px4Setpoints
 from autopilot_bridge.firmware.px4.texts import copter_notices, plane_notices
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices
 from autopilot_bridge.firmware.texts import Notice
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation.external import ExternalFrame
 from autopilot_bridge.parameter_files import QGC_SUFFIX
 from autopilot_bridge.parameters import ParameterStore

@@ -6,11 +6,9 @@ Source: `mavlink_receiver.cpp` of PX4 1.16.1.
 import math
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import SetpointDenied, SetpointFault
-from autopilot_bridge.services.channel import MavlinkMessage
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.inputs import setpoints as wire
 
 _GLOBAL_FRAMES: Final = {mavlink.MAV_FRAME_GLOBAL_INT: False, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
@@ -23,7 +21,7 @@ class Px4Setpoints:
     def __init__(self, commander: Commander) -> None:
         self.commander = commander
 
-    def on_local(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_local(self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         mask = message.type_mask
         position = wire.position_of((message.x, message.y, message.z), mask)
@@ -43,7 +41,9 @@ class Px4Setpoints:
             return
         self._take(message, position, velocity, acceleration, time_us)
 
-    def on_global(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_global(
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+    ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         mask = message.type_mask
         position = wire.UNSET
@@ -64,7 +64,8 @@ class Px4Setpoints:
 
     def _take(
         self,
-        message: MavlinkMessage,
+        message: mavlink.MAVLink_set_position_target_local_ned_message
+        | mavlink.MAVLink_set_position_target_global_int_message,
         position: wire.Triple,
         velocity: wire.Triple,
         acceleration: wire.Triple,
@@ -83,7 +84,12 @@ class Px4Setpoints:
         stream.offboard.set_trajectory(*target)
         stream.note(time_us, needs_position=target.has_position or target.has_velocity)
 
-    def _deny(self, message: MavlinkMessage, fault: SetpointFault) -> None:
+    def _deny(
+        self,
+        message: mavlink.MAVLink_set_position_target_local_ned_message
+        | mavlink.MAVLink_set_position_target_global_int_message,
+        fault: SetpointFault,
+    ) -> None:
         commander = self.commander
         commander.emit(
             SetpointDenied(
@@ -94,7 +100,7 @@ class Px4Setpoints:
             )
         )
 
-    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         thrust = message.thrust

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import on_request
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.microservice import Microservice
 

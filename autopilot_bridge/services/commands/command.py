@@ -7,11 +7,10 @@ import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import UNSET_INT
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import Source
 
 FORCE_NUMBER: Final = 21196
 _LOCAL_FRAMES: Final = frozenset(
@@ -55,25 +54,20 @@ class Command(NamedTuple):
         return self.frame is not None
 
 
-def command_from_message(message: MavlinkMessage) -> Command:
+def command_from_message(
+    message: mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message,
+) -> Command:
     """A `Command` from a COMMAND_LONG or COMMAND_INT."""
-    if message.get_msgId() == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
-        x, y, z, frame = message.param5, message.param6, message.param7, None
+    frame: int | None = None
+    if isinstance(message, mavlink.MAVLink_command_long_message):
+        x, y, z = message.param5, message.param6, message.param7
     else:
         scale = 1e-4 if message.frame in _LOCAL_FRAMES else 1e-7
         x = math.nan if message.x == UNSET_INT else message.x * scale
         y = math.nan if message.y == UNSET_INT else message.y * scale
-        z, frame = message.z, int(message.frame)
+        z, frame = message.z, message.frame
     return Command(
-        int(message.command),
-        float(message.param1),
-        float(message.param2),
-        float(message.param3),
-        float(message.param4),
-        float(x),
-        float(y),
-        float(z),
-        frame,
+        message.command, message.param1, message.param2, message.param3, message.param4, x, y, z, frame
     )
 
 

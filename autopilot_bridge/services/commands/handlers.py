@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Channel, Source
 from autopilot_bridge.services.commands.command import Command, whole

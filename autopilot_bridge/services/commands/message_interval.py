@@ -9,12 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import receives
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Channel, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
@@ -78,7 +77,9 @@ class MessageIntervalService(Microservice):
         self._time_us = 0
 
     @receives(mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM)
-    def _on_data_stream(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_data_stream(
+        self, message: mavlink.MAVLink_request_data_stream_message, source: Source, time_us: int
+    ) -> None:
         self._time_us = time_us
         table = self._tables.get(source.channel.name)
         groups = self._policy.groups

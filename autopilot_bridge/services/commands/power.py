@@ -8,12 +8,11 @@ does.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import RebootRequested
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice

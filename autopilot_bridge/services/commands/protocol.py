@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.services.channel import NO_CLIENT, AddressRule, MavlinkMessage, Source
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import NO_CLIENT, AddressRule, Source
 from autopilot_bridge.services.commands.command import Command, Handler, command_from_message
 from autopilot_bridge.services.commands.handlers import CommandHandlers
 from autopilot_bridge.services.microservice import Microservice
@@ -29,7 +28,7 @@ class CommandService(Microservice):
         self._table = {**handlers.commands, **(more or {})}
 
     @receives(mavlink.MAVLINK_MSG_ID_SET_MODE)
-    def _on_set_mode(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_set_mode(self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int) -> None:
         if self._address.accepts(message):
             result = self._handlers.set_mode_message(message.base_mode, message.custom_mode, source)
             if result is not None:
@@ -46,7 +45,12 @@ class CommandService(Microservice):
         return Result.UNSUPPORTED if handler is None else handler(command, sender)
 
     @receives(mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT)
-    def _on_command(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_command(
+        self,
+        message: mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
         if not self._address.accepts(message):
             return
         command = command_from_message(message)

@@ -6,11 +6,10 @@ does with its default configuration, and the commands drive nothing.
 
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, flags, whole
 from autopilot_bridge.services.microservice import Microservice

@@ -12,13 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, Handler
@@ -93,7 +92,9 @@ class PayloadCommands(Microservice):
             self._received_us[source.component_id] = time_us
 
     @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
-    def _on_manager_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_manager_status(
+        self, message: mavlink.MAVLink_gimbal_manager_status_message, source: Source, time_us: int
+    ) -> None:
         if self._is_own(source):
             primary = (message.primary_control_sysid, message.primary_control_compid)
             secondary = (message.secondary_control_sysid, message.secondary_control_compid)

@@ -14,10 +14,9 @@ import errno
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import Source, is_congested
 from autopilot_bridge.services.files.ftp_protocol import (
     HEADER,
     MAX_DATA,
@@ -109,7 +108,9 @@ class FileTransferService(Microservice):
         }
 
     @receives(mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL)
-    def on_transfer(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def on_transfer(
+        self, message: mavlink.MAVLink_file_transfer_protocol_message, source: Source, time_us: int
+    ) -> None:
         """Answer a request; replies (ACK, NAK) of other systems are ignored."""
         payload = bytes(message.payload)
         request = parse_request(payload)

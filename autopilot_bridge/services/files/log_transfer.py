@@ -12,9 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
 from autopilot_bridge.services.files.log_book import LogBook, LogFile
 from autopilot_bridge.services.microservice import Microservice
@@ -96,14 +95,14 @@ class LogTransferService(Microservice):
         if self._waits:
             self._refuse(source)
             return
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST:
+        match message:
+            case mavlink.MAVLink_log_request_list_message():
                 self._list(message, self._download(source, time_us))
-            case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_DATA:
+            case mavlink.MAVLink_log_request_data_message():
                 self._request(message, self._download(source, time_us))
-            case mavlink.MAVLINK_MSG_ID_LOG_ERASE:
+            case mavlink.MAVLink_log_erase_message():
                 self._erase()
-            case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_END:
+            case mavlink.MAVLink_log_request_end_message():
                 self._download(source, time_us).close()
 
     def tick(self, time_us: int) -> None:
@@ -144,7 +143,7 @@ class LogTransferService(Microservice):
         download.used_us = time_us
         return download
 
-    def _list(self, message: MavlinkMessage, download: _Download) -> None:
+    def _list(self, message: mavlink.MAVLink_log_request_list_message, download: _Download) -> None:
         self._logs = self._book.logs()
         logs = self._logs
         last = logs[-1].number if logs else 0
@@ -158,7 +157,7 @@ class LogTransferService(Microservice):
         if not logs:
             download.entries.append(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
 
-    def _request(self, message: MavlinkMessage, download: _Download) -> None:
+    def _request(self, message: mavlink.MAVLink_log_request_data_message, download: _Download) -> None:
         if download.number != message.id:
             download.close()
             if not self._logs:

@@ -8,10 +8,9 @@ import contextlib
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.events import Armed, Disarmed, Event
 from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage

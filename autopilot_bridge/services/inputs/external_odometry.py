@@ -9,7 +9,7 @@ of any other clock, the time of arrival and the delay parameter are used.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -112,14 +112,16 @@ class ExternalOdometryService(Microservice):
             return
         if source.component_id == _AUTOPILOT and source.system_id != self._system_id:
             return
-        sample = _READERS[message.get_msgId()](self, message, time_us)
+        sample = self._sample(message, time_us)
         if sample is None:
             self.wrong_frames += 1
         elif self._simulation is None or self._simulation.apply_failure(_VIO, sample.values):
             self._navigation.take_external(sample)
 
     @receives(mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN)
-    def _set_origin(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _set_origin(
+        self, message: mavlink.MAVLink_set_gps_global_origin_message, source: Source, time_us: int
+    ) -> None:
         """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
         if self._navigation.frame is not None or message.target_system != self._system_id:
             return
@@ -136,7 +138,25 @@ class ExternalOdometryService(Microservice):
 
     # messages
 
-    def _odometry(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample | None:
+    def _sample(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample | None:
+        match message:
+            case mavlink.MAVLink_odometry_message():
+                return self._odometry(message, time_us)
+            case mavlink.MAVLink_att_pos_mocap_message():
+                return self._mocap(message, time_us)
+            case mavlink.MAVLink_vision_speed_estimate_message():
+                return self._speed(message, time_us)
+            case (
+                mavlink.MAVLink_vision_position_estimate_message()
+                | mavlink.MAVLink_global_vision_position_estimate_message()
+                | mavlink.MAVLink_vicon_position_estimate_message()
+            ):
+                return self._pose(message, time_us)
+        return None
+
+    def _odometry(
+        self, message: mavlink.MAVLink_odometry_message, time_us: int
+    ) -> external.ExternalSample | None:
         """ODOMETRY (331)."""
         policy = self._policy
         pose, twist = int(message.frame_id), int(message.child_frame_id)
@@ -160,7 +180,13 @@ class ExternalOdometryService(Microservice):
             quality=int(message.quality),
         )
 
-    def _pose(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample:
+    def _pose(
+        self,
+        message: mavlink.MAVLink_vision_position_estimate_message
+        | mavlink.MAVLink_global_vision_position_estimate_message
+        | mavlink.MAVLink_vicon_position_estimate_message,
+        time_us: int,
+    ) -> external.ExternalSample:
         """VISION_POSITION_ESTIMATE (102), GLOBAL_VISION_POSITION_ESTIMATE (101), VICON_... (104)."""
         values = np.full(external.SAMPLE_SIZE, math.nan)
         values[external.POSITION_M] = (message.x, message.y, message.z)
@@ -175,7 +201,7 @@ class ExternalOdometryService(Microservice):
             int(getattr(message, "reset_counter", 0)),
         )
 
-    def _mocap(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample:
+    def _mocap(self, message: mavlink.MAVLink_att_pos_mocap_message, time_us: int) -> external.ExternalSample:
         """ATT_POS_MOCAP (138)."""
         values = np.full(external.SAMPLE_SIZE, math.nan)
         values[external.POSITION_M] = (message.x, message.y, message.z)
@@ -188,7 +214,9 @@ class ExternalOdometryService(Microservice):
             0,
         )
 
-    def _speed(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample:
+    def _speed(
+        self, message: mavlink.MAVLink_vision_speed_estimate_message, time_us: int
+    ) -> external.ExternalSample:
         """VISION_SPEED_ESTIMATE (103)."""
         frame = self._policy.local_frame(self._parameters)
         values = np.full(external.SAMPLE_SIZE, math.nan)
@@ -225,23 +253,12 @@ class ExternalOdometryService(Microservice):
         )
 
 
-_Reader = Callable[[ExternalOdometryService, MavlinkMessage, int], external.ExternalSample | None]
-_READERS: Final[Mapping[int, _Reader]] = {
-    mavlink.MAVLINK_MSG_ID_ODOMETRY: ExternalOdometryService._odometry,
-    mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: ExternalOdometryService._pose,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE: ExternalOdometryService._pose,
-    mavlink.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE: ExternalOdometryService._pose,
-    mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP: ExternalOdometryService._mocap,
-    mavlink.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE: ExternalOdometryService._speed,
-}
-
-
-def _entry(covariance: list[float], index: int) -> float:
+def _entry(covariance: Sequence[float], index: int) -> float:
     """One element of the covariance; NaN in the first element means that no covariance is given."""
     return float(covariance[index]) if math.isfinite(covariance[0]) else math.nan
 
 
-def _diagonal(covariance: list[float], indices: tuple[int, int, int]) -> tuple[float, float, float]:
+def _diagonal(covariance: Sequence[float], indices: tuple[int, int, int]) -> tuple[float, float, float]:
     x, y, z = (_entry(covariance, index) for index in indices)
     return x, y, z
 
@@ -254,7 +271,7 @@ def _rotated(q: Quaternion, vector: tuple[float, float, float]) -> tuple[float, 
     return (x, -y, -z) if q is _FRD_FROM_FLU else (x, y, z)
 
 
-def _changed(local: Quaternion, q: list[float], body: Quaternion) -> Quaternion:
+def _changed(local: Quaternion, q: Sequence[float], body: Quaternion) -> Quaternion:
     """An attitude between other axes: local q body^-1."""
     w, x, y, z = q
     return product(product(local, (w, x, y, z)), conjugate(body))

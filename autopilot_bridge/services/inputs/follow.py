@@ -12,7 +12,7 @@ import numpy as np
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import Receiver, Source, receiver
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
@@ -44,22 +44,28 @@ class FollowService(Microservice):
     @property
     def receivers(self) -> Mapping[int, Receiver]:
         """FOLLOW_TARGET, and GLOBAL_POSITION_INT where the firmware follows it."""
-        positions = (
-            {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._on_position} if self._by_position else {}
-        )
-        return {**super().receivers, **positions}
+        if not self._by_position:
+            return super().receivers
+        return {
+            **super().receivers,
+            **receiver(mavlink.MAVLink_global_position_int_message, self._on_position),
+        }
 
     @receives(mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET)
-    def _on_follow_target(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_follow_target(
+        self, message: mavlink.MAVLink_follow_target_message, source: Source, time_us: int
+    ) -> None:
         self._take(message, source, time_us, *_of_follow(message))
 
-    def _on_position(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_position(
+        self, message: mavlink.MAVLink_global_position_int_message, source: Source, time_us: int
+    ) -> None:
         if source.component_id == _AUTOPILOT:
             self._take(message, source, time_us, *self._of_position(message))
 
     def _take(
         self,
-        message: MavlinkMessage,
+        message: mavlink.MAVLink_global_position_int_message | mavlink.MAVLink_follow_target_message,
         source: Source,
         time_us: int,
         alt_m: float,
@@ -88,7 +94,9 @@ class FollowService(Microservice):
         if float(np.abs(place).max()) < 1e6:
             leader.take(time_us, place, None if velocity is None else np.array(velocity), sigma_m=sigma_m)
 
-    def _of_position(self, message: MavlinkMessage) -> tuple[float, tuple[float, float, float] | None, float]:
+    def _of_position(
+        self, message: mavlink.MAVLink_global_position_int_message
+    ) -> tuple[float, tuple[float, float, float] | None, float]:
         """(altitude over mean sea level, velocity, 1-sigma) of a GLOBAL_POSITION_INT."""
         context = self._context
         alt_m = message.alt * 1e-3
@@ -101,11 +109,15 @@ class FollowService(Microservice):
         return alt_m, (message.vx * 1e-2, message.vy * 1e-2, message.vz * 1e-2), _SIGMA_M
 
 
-def _of_degrees(message: MavlinkMessage) -> tuple[float, float]:
+def _of_degrees(
+    message: mavlink.MAVLink_global_position_int_message | mavlink.MAVLink_follow_target_message,
+) -> tuple[float, float]:
     return message.lat * 1e-7, message.lon * 1e-7
 
 
-def _of_follow(message: MavlinkMessage) -> tuple[float, tuple[float, float, float] | None, float]:
+def _of_follow(
+    message: mavlink.MAVLink_follow_target_message,
+) -> tuple[float, tuple[float, float, float] | None, float]:
     """(altitude over mean sea level, velocity, 1-sigma) of a FOLLOW_TARGET."""
     capabilities = int(message.est_capabilities)
     north, east, down = (float(part) for part in message.vel)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
+from autopilot_bridge.services.channel import Receiver, Source
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -61,7 +61,9 @@ class LandingTargetService(Microservice):
         return super().receivers
 
     @receives(mavlink.MAVLINK_MSG_ID_LANDING_TARGET)
-    def _on_target(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_target(
+        self, message: mavlink.MAVLink_landing_target_message, source: Source, time_us: int
+    ) -> None:
         """A landing target from the vehicle's own payload or from any other system."""
         place = self._place(message, source, time_us)
         track = self._context.surroundings.landing_target
@@ -69,7 +71,9 @@ class LandingTargetService(Microservice):
             self.refused += 1
 
     @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
-    def _on_gimbal(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_gimbal(
+        self, message: mavlink.MAVLink_gimbal_device_attitude_status_message, source: Source, time_us: int
+    ) -> None:
         if source.system_id != self._system_id or source.component_id != _GIMBAL_COMPONENT:
             return
         q = np.array(message.q, dtype=np.float64)
@@ -78,7 +82,7 @@ class LandingTargetService(Microservice):
             self._gimbal.append((in_vehicle_time(message.time_boot_ms * 1000, time_us), q, in_earth))
 
     def _place(
-        self, message: MavlinkMessage, source: Source, time_us: int
+        self, message: mavlink.MAVLink_landing_target_message, source: Source, time_us: int
     ) -> tuple[int, Array, float] | None:
         """(time, local NED, 1-sigma) from the message; None if the message is not usable."""
         measured_us = in_vehicle_time(int(message.time_usec), time_us)

@@ -4,11 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives, streams
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs.transmitter import (
     CHANNELS,
     ArmingGesture,
@@ -95,7 +94,7 @@ class ManualService(Microservice):
         self._gesture.tick(time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-    def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
         gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
         if gcs:
             self._commander.pilot.on_gcs(time_us)
@@ -105,7 +104,9 @@ class ManualService(Microservice):
         return not only or source.system_id == round(self._parameters.get(only))
 
     @receives(mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL)
-    def _on_manual(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_manual(
+        self, message: mavlink.MAVLink_manual_control_message, source: Source, time_us: int
+    ) -> None:
         """MANUAL_CONTROL: x forward, y right, r clockwise in -1000..1000; z throttle in 0..1000."""
         if message.target not in (0, self._system_id) or not self._may_steer(source):
             return
@@ -132,7 +133,9 @@ class ManualService(Microservice):
             )
 
     @receives(mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
-    def _on_override(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_override(
+        self, message: mavlink.MAVLink_rc_channels_override_message, source: Source, time_us: int
+    ) -> None:
         """RC_CHANNELS_OVERRIDE: pulses of channels 1 to 18."""
         if message.target_system not in (0, self._system_id) or not self._may_steer(source):
             return

@@ -15,7 +15,7 @@ from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
@@ -46,14 +46,22 @@ class ObstacleService(Microservice):
         self.refused = 0
 
     @receives(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
-    def _on_obstacles(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_obstacles(
+        self,
+        message: mavlink.MAVLink_obstacle_distance_message | mavlink.MAVLink_distance_sensor_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
         """A DISTANCE_SENSOR of another vehicle is ignored."""
         if not self._enabled(self._parameters) or source.component_id == _AUTOPILOT:
             return
-        circle = message.get_msgId() == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
-        self.refused += not (self._circle(message, time_us) if circle else self._beam(message, time_us))
+        if isinstance(message, mavlink.MAVLink_obstacle_distance_message):
+            taken = self._circle(message, time_us)
+        else:
+            taken = self._beam(message, time_us)
+        self.refused += not taken
 
-    def _circle(self, message: MavlinkMessage, time_us: int) -> bool:
+    def _circle(self, message: mavlink.MAVLink_obstacle_distance_message, time_us: int) -> bool:
         """OBSTACLE_DISTANCE (330)."""
         frame = message.frame
         if frame not in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_FRD):
@@ -83,7 +91,7 @@ class ObstacleService(Microservice):
             obstacles.take(first_rad + k * step_rad, abs(step_rad), distance_m, time_us)
         return True
 
-    def _beam(self, message: MavlinkMessage, time_us: int) -> bool:
+    def _beam(self, message: mavlink.MAVLink_distance_sensor_message, time_us: int) -> bool:
         """DISTANCE_SENSOR (132) in one of the eight horizontal directions."""
         if message.orientation not in _HORIZONTAL:
             return False

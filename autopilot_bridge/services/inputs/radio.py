@@ -2,10 +2,9 @@
 
 from collections.abc import Callable
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import Channel, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.throttle import StreamThrottle
 
@@ -21,7 +20,12 @@ class RadioService(Microservice):
         self._throttle = throttle
 
     @receives(mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO)
-    def _on_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_status(
+        self,
+        message: mavlink.MAVLink_radio_status_message | mavlink.MAVLink_radio_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
         throttle = self._throttle(source.channel)
         if throttle is not None:
             throttle.radio.on_radio_status(message.txbuf, time_us)

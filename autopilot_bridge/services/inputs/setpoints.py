@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver
+from autopilot_bridge.services.channel import Receiver, receiver
 from autopilot_bridge.services.microservice import Microservice
 from flightsim.foundation.rotations import rotate
 
@@ -172,7 +172,7 @@ def whole(values: Triple, bits: tuple[int, int, int], type_mask: int) -> Triple:
     return UNSET if any(type_mask & bit for bit in bits) else values
 
 
-def rates_of(message: MavlinkMessage) -> Triple:
+def rates_of(message: mavlink.MAVLink_set_attitude_target_message) -> Triple:
     """Body rates that are not ignored, rad/s; NaN for the others."""
     values = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
     roll, pitch, yaw = (
@@ -185,11 +185,15 @@ def rates_of(message: MavlinkMessage) -> Triple:
 class SetpointRules(Protocol):
     """How one firmware uses each kind of setpoint; invalid setpoints are ignored."""
 
-    def on_local(self, message: MavlinkMessage, time_us: int) -> None: ...
+    def on_local(
+        self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int
+    ) -> None: ...
 
-    def on_global(self, message: MavlinkMessage, time_us: int) -> None: ...
+    def on_global(
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+    ) -> None: ...
 
-    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None: ...
+    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None: ...
 
 
 class SetpointService(Microservice):
@@ -207,13 +211,16 @@ class SetpointService(Microservice):
         """The three kinds of setpoints; invalid ones are ignored, as in the firmware."""
         rules = self._rules
         return {
-            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: (
-                lambda message, source, time_us: rules.on_local(message, time_us)
+            **receiver(
+                mavlink.MAVLink_set_position_target_local_ned_message,
+                lambda message, source, time_us: rules.on_local(message, time_us),
             ),
-            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: (
-                lambda message, source, time_us: rules.on_global(message, time_us)
+            **receiver(
+                mavlink.MAVLink_set_position_target_global_int_message,
+                lambda message, source, time_us: rules.on_global(message, time_us),
             ),
-            mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: (
-                lambda message, source, time_us: rules.on_attitude(message, time_us)
+            **receiver(
+                mavlink.MAVLink_set_attitude_target_message,
+                lambda message, source, time_us: rules.on_attitude(message, time_us),
             ),
         }

@@ -7,10 +7,9 @@ addressed to its sender).
 
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 
 _NS_PER_US: Final = 1000
@@ -42,13 +41,13 @@ class TimeSyncService(Microservice):
         self._answers_ping = answers_ping
 
     @receives(mavlink.MAVLINK_MSG_ID_TIMESYNC)
-    def _on_timesync(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_timesync(self, message: mavlink.MAVLink_timesync_message, source: Source, time_us: int) -> None:
         if message.tc1 == 0:
             now_ns = min(time_us * _NS_PER_US, _INT64_MAX)
             source.channel.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
 
     @receives(mavlink.MAVLINK_MSG_ID_PING)
-    def _on_ping(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_ping(self, message: mavlink.MAVLink_ping_message, source: Source, time_us: int) -> None:
         if self._answers_ping and message.target_system == 0 and message.target_component == 0:
             source.channel.send(
                 mavlink.MAVLink_ping_message(

@@ -8,12 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.dispatch import receives, streams
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
@@ -74,13 +73,13 @@ class TrafficService(Microservice):
         """ADSB_VEHICLE can be requested, and is not sent."""
 
     @receives(_ADSB_VEHICLE)
-    def _on_report(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_report(self, message: mavlink.MAVLink_adsb_vehicle_message, source: Source, time_us: int) -> None:
         """A report forwarded by another autopilot is not forwarded again."""
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0
         if switched_on and source.component_id != _AUTOPILOT:
             self._take(message, time_us)
 
-    def _take(self, message: MavlinkMessage, time_us: int) -> None:
+    def _take(self, message: mavlink.MAVLink_adsb_vehicle_message, time_us: int) -> None:
         address = message.ICAO_address
         for old in [
             icao for icao, seen in self._aircraft.items() if seen.received_us < time_us - _LIFETIME_US
@@ -98,7 +97,7 @@ class TrafficService(Microservice):
         if self._rules.conflicts:
             self._warn(message, known, time_us)
 
-    def _warn(self, message: MavlinkMessage, known: _Aircraft, time_us: int) -> None:
+    def _warn(self, message: mavlink.MAVLink_adsb_vehicle_message, known: _Aircraft, time_us: int) -> None:
         action = round(self._parts.parameters.get("NAV_TRAFF_AVOID"))
         separation_m = self._conflict(message) if action > 0 else None
         if separation_m is None:
@@ -116,7 +115,7 @@ class TrafficService(Microservice):
         if mode is not None and self._commander.airborne:
             self._commander.set_mode(mode)
 
-    def _conflict(self, message: MavlinkMessage) -> float | None:
+    def _conflict(self, message: mavlink.MAVLink_adsb_vehicle_message) -> float | None:
         """The distance at which the other's straight path passes us, metres; None without a conflict.
 
         As in PX4, a conflict means: its path passes nearer than NAV_TRAFF_A_HOR ahead of it, its height

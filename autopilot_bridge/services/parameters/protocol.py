@@ -12,9 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import (
     INTEGER_LIMITS,
     ParameterDefinition,
@@ -142,7 +141,9 @@ class ParameterService(Microservice):
         self.list_on(source.channel)
 
     @receives(mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ)
-    def _on_read(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_read(
+        self, message: mavlink.MAVLink_param_request_read_message, source: Source, time_us: int
+    ) -> None:
         channel = source.channel
         if message.param_index >= 0:
             if message.param_index < self._store.count:
@@ -179,7 +180,7 @@ class ParameterService(Microservice):
             listing.next_index += 1
 
     @receives(mavlink.MAVLINK_MSG_ID_PARAM_SET)
-    def _on_set(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_set(self, message: mavlink.MAVLink_param_set_message, source: Source, time_us: int) -> None:
         channel = source.channel
         name = _name_of(message)
         if self._policy.hash_parameter and name == HASH_NAME:
@@ -213,7 +214,9 @@ class ParameterService(Microservice):
                 self._broadcast, self._value_message(definition, index=self._index_in_reply(definition))
             )
 
-    def _decode(self, definition: ParameterDefinition, message: MavlinkMessage) -> float | None:
+    def _decode(
+        self, definition: ParameterDefinition, message: mavlink.MAVLink_param_set_message
+    ) -> float | None:
         """The value in a PARAM_SET; None when the firmware would ignore it."""
         value = message.param_value
         if self._policy.strict_type and message.param_type != definition.type:
@@ -265,7 +268,7 @@ def _raw_int(value: float) -> bytes:
     return _AS_UINT32.pack(int(value) & 0xFFFFFFFF)
 
 
-def _name_of(message: MavlinkMessage) -> str:
+def _name_of(message: mavlink.MAVLink_param_set_message | mavlink.MAVLink_param_request_read_message) -> str:
     """The parameter name of a message, up to the first NUL."""
     name = message.param_id
     if isinstance(name, bytes):

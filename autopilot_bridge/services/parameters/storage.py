@@ -7,11 +7,10 @@ sets at the start are not stored. PX4 stores a short time after a change, ArduPi
 from dataclasses import dataclass
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Source
 from autopilot_bridge.services.commands.command import Command, whole

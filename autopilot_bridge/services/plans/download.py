@@ -5,11 +5,10 @@ PX4 opens a list and sends its items in order; ArduPilot answers each request in
 
 from collections.abc import Callable
 
-from pymavlink.dialects.v20 import all as mavlink
-
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_message
-from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Source
 from autopilot_bridge.services.plans.messages import ack_message, count_message, send_extended
 from autopilot_bridge.services.plans.policy import MissionPolicy, Text
 from autopilot_bridge.services.plans.sessions import Download, Sessions, mission_type_of, same_partner
@@ -36,7 +35,12 @@ class MissionDownloads:
         self._read_plan = read_plan
 
     def on_list(
-        self, message: MavlinkMessage, source: Source, time_us: int, *, uploader: Source | None
+        self,
+        message: mavlink.MAVLink_mission_request_list_message,
+        source: Source,
+        time_us: int,
+        *,
+        uploader: Source | None,
     ) -> None:
         mission_type = mission_type_of(message.mission_type)
         if self._policy.ordered_download:
@@ -49,7 +53,12 @@ class MissionDownloads:
             self._count(source, len(self._read_plan(mission_type)), mission_type)
 
     def on_request(
-        self, message: MavlinkMessage, source: Source, time_us: int, *, uploader: Source | None
+        self,
+        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        source: Source,
+        time_us: int,
+        *,
+        uploader: Source | None,
     ) -> None:
         as_int = message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT
         if self._policy.ordered_download:
@@ -58,7 +67,7 @@ class MissionDownloads:
         else:
             self._single(message, source, uploader, as_int=as_int)
 
-    def on_ack(self, message: MavlinkMessage, source: Source) -> None:
+    def on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source) -> None:
         """The client has received everything, or has cancelled."""
         session = self._sessions.of(source.channel)
         download = session.download
@@ -78,7 +87,7 @@ class MissionDownloads:
 
     def _open_list(
         self,
-        message: MavlinkMessage,
+        message: mavlink.MAVLink_mission_request_list_message,
         mission_type: MissionType | None,
         source: Source,
         time_us: int,
@@ -102,7 +111,13 @@ class MissionDownloads:
         self._count(source, len(items), mission_type)
 
     def _next_of_list(
-        self, message: MavlinkMessage, source: Source, time_us: int, uploader: Source | None, *, as_int: bool
+        self,
+        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        source: Source,
+        time_us: int,
+        uploader: Source | None,
+        *,
+        as_int: bool,
     ) -> None:
         session = self._sessions.of(source.channel)
         download = session.download
@@ -126,7 +141,12 @@ class MissionDownloads:
         self._item(source, download.items[message.seq], message.seq, download.mission_type, as_int=as_int)
 
     def _single(
-        self, message: MavlinkMessage, source: Source, uploader: Source | None, *, as_int: bool
+        self,
+        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        source: Source,
+        uploader: Source | None,
+        *,
+        as_int: bool,
     ) -> None:
         session = self._sessions.of(source.channel)
         if not as_int and not session.warned_request:

@@ -8,12 +8,11 @@ navigator/mission_block (issue_command), ArduPilot 4.6 AP_Mission_Commands, gimb
 import math
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.events import Event, ItemCommanded, ModeChanged
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.plan_reading import is_waypoint
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import TERRAIN_FRAMES, UNSET_INT, is_geodetic
 from autopilot_bridge.services.channel import MavlinkMessage, send_to_all

@@ -7,21 +7,19 @@ the message nor the command.
 import math
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event, FenceBreached
 from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, FenceType
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, streams
 from autopilot_bridge.flight.plan_reading import target_of
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.rules import PLACED_COMMANDS
-from autopilot_bridge.telemetry.streams import Values
 
 _STATUS: Final = mavlink.MAVLINK_MSG_ID_FENCE_STATUS
 _OFF, _ON, _FLOOR_OFF = 0, 1, 2  # of DO_FENCE_ENABLE
@@ -49,7 +47,7 @@ class ArdupilotGeofence(Microservice):
                 send_to_all(self._broadcast, mavlink.MAVLink_fence_status_message(*values))
 
     @streams(_STATUS)
-    def _status(self) -> Values | None:
+    def _status(self) -> tuple[int, int, int, int, int] | None:
         """FENCE_STATUS (162), while the fence is on."""
         watch = self._commander.fence
         if not watch.enabled(self._commander.parameters.fence):

@@ -10,8 +10,7 @@ import struct
 import zlib
 from typing import Any, ClassVar, Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_message
 from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
@@ -67,12 +66,18 @@ def send_extended(channel: Channel, message: MavlinkMessage) -> None:
     An encoder based on pymavlink's definitions would leave them out, so the packed payload is passed to a
     channel that supports it (`send_payload(message_id, payload)`).
     """
-    wire_payload = getattr(message, "wire_payload", None)
+    payload = extended_payload(message)
     send_payload = getattr(channel, "send_payload", None)
-    if wire_payload is None or send_payload is None:
+    if payload is None or send_payload is None:
         channel.send(message)
     else:
-        send_payload(type(message).id, wire_payload())
+        send_payload(type(message).id, payload)
+
+
+def extended_payload(message: MavlinkMessage) -> bytes | None:
+    """The payload of a message with its extension fields; None where pymavlink's definition has them."""
+    wire_payload = getattr(message, "wire_payload", None)
+    return None if wire_payload is None else wire_payload()
 
 
 def count_message(to: Source, count: int, mission_type: int, plan_id: int = 0) -> MavlinkMessage:
@@ -117,7 +122,9 @@ def request_message(to: Source, seq: int, mission_type: int, *, as_int: bool) ->
     return message(to.system_id, to.component_id, seq, mission_type)
 
 
-def message_checksum(message: MavlinkMessage, previous: int) -> int:
+def message_checksum(
+    message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message, previous: int
+) -> int:
     """PX4's plan identifier, continued over one more MISSION_ITEM(_INT).
 
     CRC-32 (reflected 0xEDB88320, no inversion) over frame, command, autocontinue and the seven parameters as

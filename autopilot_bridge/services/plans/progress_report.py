@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from typing import Final, Protocol
 
-from pymavlink.dialects.v20 import all as mavlink
-
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, send_to_all
 from autopilot_bridge.services.plans.messages import current_message, send_extended

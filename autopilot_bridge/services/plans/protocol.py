@@ -8,9 +8,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import receives
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
@@ -170,34 +169,50 @@ class MissionService(Microservice):
         self._report.tick(time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_COUNT)
-    def _on_count(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_count(self, message: mavlink.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
         self._report.forget_reached()
         self._uploads.on_count(message, source, time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_ITEM, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT)
-    def _on_item(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_item(
+        self,
+        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
         if not self._take_guided_item(message, source):
             self._uploads.on_item(message, source, time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST)
-    def _on_partial(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_partial(
+        self, message: mavlink.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
+    ) -> None:
         self._uploads.on_partial(message, source, time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_ACK)
-    def _on_ack(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
         self._downloads.on_ack(message, source)
         self._uploads.on_ack(message, source, time_us)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST)
-    def _on_list(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_list(
+        self, message: mavlink.MAVLink_mission_request_list_message, source: Source, time_us: int
+    ) -> None:
         self._downloads.on_list(message, source, time_us, uploader=self._uploads.partner)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT)
-    def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_request(
+        self,
+        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
         self._downloads.on_request(message, source, time_us, uploader=self._uploads.partner)
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL)
-    def _on_clear(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_clear(
+        self, message: mavlink.MAVLink_mission_clear_all_message, source: Source, time_us: int
+    ) -> None:
         uploader = self._uploads.partner
         mission_type = mission_type_of(message.mission_type)
         if self._policy.clears_all_types:
@@ -224,7 +239,9 @@ class MissionService(Microservice):
         source.channel.send(ack_message(source, result, message.mission_type))
 
     @receives(mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT)
-    def _on_set_current(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_set_current(
+        self, message: mavlink.MAVLink_mission_set_current_message, source: Source, time_us: int
+    ) -> None:
         uploader = self._uploads.partner
         texts = self._policy.texts
         session = self._sessions.of(source.channel)
@@ -238,7 +255,11 @@ class MissionService(Microservice):
         if self.set_current(message.seq) and self._policy.acks_set_current:
             send_extended(source.channel, self._report.current_message())
 
-    def _take_guided_item(self, message: MavlinkMessage, source: Source) -> bool:
+    def _take_guided_item(
+        self,
+        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        source: Source,
+    ) -> bool:
         if not self._policy.guided_items or message.current != _GUIDED_ITEM or self._on_guided_item is None:
             return False
         item = item_from_message(message)

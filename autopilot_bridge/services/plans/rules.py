@@ -7,8 +7,7 @@ value is refused with the result that the MAVLink specification defines for it.
 import math
 from typing import Final, Protocol
 
-from pymavlink.dialects.v20 import all as mavlink
-
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES
 

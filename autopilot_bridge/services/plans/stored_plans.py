@@ -14,8 +14,7 @@ import zlib
 from collections.abc import Mapping
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Announce
 from autopilot_bridge.services.microservice import Microservice

@@ -8,11 +8,10 @@ types.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from pymavlink.dialects.v20 import all as mavlink
-
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
-from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Source
 from autopilot_bridge.services.plans.messages import (
     ack_message,
     message_checksum,
@@ -74,7 +73,7 @@ class MissionUploads:
         """The client that is uploading now; None: no upload."""
         return None if self._upload is None else self._upload.partner
 
-    def on_count(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def on_count(self, message: mavlink.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
         texts = self._policy.texts
         upload = self._upload
         if upload is None and self._sessions.of(source.channel).download is not None:
@@ -106,7 +105,9 @@ class MissionUploads:
         else:
             self._request(self._upload, time_us)
 
-    def on_partial(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def on_partial(
+        self, message: mavlink.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
+    ) -> None:
         """MISSION_WRITE_PARTIAL_LIST: items start_index..end_index (inclusive) are uploaded again."""
         if not self._policy.partial_writes:
             return
@@ -127,7 +128,12 @@ class MissionUploads:
         )
         self._request(self._upload, time_us)
 
-    def on_item(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def on_item(
+        self,
+        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
         session = self._sessions.of(source.channel)
         session.as_int = message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT
         if not session.as_int and not session.warned_item:
@@ -153,7 +159,7 @@ class MissionUploads:
             return
         self._take(upload, message, time_us)
 
-    def on_ack(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
         """MISSION_ACK of the client: it does not support that form of item, or it cancels."""
         upload = self._upload
         if upload is None or not same_partner(upload.partner, source):
@@ -177,7 +183,12 @@ class MissionUploads:
         elif time_us - upload.sent_us > self._policy.retry_us:
             self._request(upload, time_us)
 
-    def _take(self, upload: Upload, message: MavlinkMessage, time_us: int) -> None:
+    def _take(
+        self,
+        upload: Upload,
+        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        time_us: int,
+    ) -> None:
         upload.received_us = time_us
         item = item_from_message(message)
         rules = self._policy.rules
@@ -214,7 +225,11 @@ class MissionUploads:
         self._say(self._policy.texts.invalid_item)
         self._ack(upload.partner, result, upload.mission_type)
 
-    def _on_unexpected_item(self, message: MavlinkMessage, source: Source) -> None:
+    def _on_unexpected_item(
+        self,
+        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        source: Source,
+    ) -> None:
         finished = self._sessions.of(source.channel).finished
         if (
             self._policy.plan_ids

@@ -2,14 +2,13 @@
 
 import math
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.flight.heading import Turn
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole

@@ -6,12 +6,10 @@ Source: `ArduCopter/GCS_Mavlink.cpp` of ArduPilot 4.6.3.
 import math
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
-from autopilot_bridge.services.channel import MavlinkMessage
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.inputs import setpoints as wire
 
 _GLOBAL_FRAMES: Final = {
@@ -33,7 +31,7 @@ class ArduCopterSetpoints:
     def __init__(self, commander: Commander) -> None:
         self.commander = commander
 
-    def on_local(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_local(self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         guided = self._guided()
         if guided is None:
@@ -59,7 +57,9 @@ class ArduCopterSetpoints:
             position = (position[0] + north_m, position[1] + east_m, position[2] + down_m)
         self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
-    def on_global(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_global(
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+    ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         guided = self._guided()
         if guided is None:
@@ -83,7 +83,12 @@ class ArduCopterSetpoints:
         yaw, yaw_rate = wire.yaw_of(message.yaw, message.yaw_rate, mask)
         self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
-    def _motion(self, guided: GuidedTask, message: MavlinkMessage) -> tuple[wire.Triple, wire.Triple] | None:
+    def _motion(
+        self,
+        guided: GuidedTask,
+        message: mavlink.MAVLink_set_position_target_local_ned_message
+        | mavlink.MAVLink_set_position_target_global_int_message,
+    ) -> tuple[wire.Triple, wire.Triple] | None:
         """Velocity and acceleration; None: the message is not used further.
 
         A velocity that is no speed of a vehicle stops it, forces and an impossible acceleration are ignored.
@@ -128,7 +133,7 @@ class ArduCopterSetpoints:
         else:
             guided.set_hold(context)
 
-    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         guided = self._guided()

@@ -3,14 +3,13 @@
 import math
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.flight.plan_reading import in_landing_sequence, landing_start
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_feasibility.ardupilot import PLANE_PARAMETERS, plane_problems
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source

@@ -5,12 +5,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.ardupilot import messages as ardupilot
 from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_flags
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.telemetry.common import TelemetrySources
 from autopilot_bridge.telemetry.streams import Values

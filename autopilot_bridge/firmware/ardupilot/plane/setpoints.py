@@ -8,12 +8,11 @@ import math
 from typing import Any, Final
 
 import numpy as np
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import AltitudeChanged
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.services.channel import MavlinkMessage
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.inputs.setpoints import POSITION_BITS, place_of, unit_quaternion
 from flightsim.foundation.rotations import euler_from_quaternion
 
@@ -35,7 +34,7 @@ class ArduPlaneSetpoints:
     def __init__(self, commander: Commander) -> None:
         self.commander = commander
 
-    def on_local(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_local(self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int) -> None:
         """SET_POSITION_TARGET_LOCAL_NED: in MAV_FRAME_LOCAL_OFFSET_NED (7) a step in height, nothing else.
 
         The mask is not checked, as in the firmware.
@@ -53,7 +52,9 @@ class ArduPlaneSetpoints:
         height_m = self._home_down_m() - down_m
         self.commander.emit(AltitudeChanged(time_us=self.commander.time_us, height_m=height_m))
 
-    def on_global(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_global(
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+    ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT: its altitude.
 
         As in the firmware (`ArduPlane/GCS_Mavlink.cpp`) it is used when the mask has any bit but that of the
@@ -76,7 +77,7 @@ class ArduPlaneSetpoints:
         if guided is not None:
             self._fly_at(guided, reference_down_m - message.alt)
 
-    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
+    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None:
         """SET_ATTITUDE_TARGET: what the mask does not ignore of roll, pitch and throttle.
 
         The bits of the body rates leave roll or pitch to the autopilot only together with the attitude's bit:

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.firmware.data import by_member, load_data, modes
 from autopilot_bridge.firmware.flavour import ModeDisplay
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.commands.available_modes import ListedMode
 
 MAIN_MANUAL: Final = 1

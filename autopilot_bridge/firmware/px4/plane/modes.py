@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.firmware.flavour import ModeDisplay
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
+from autopilot_bridge.mavlink import dialect as mavlink
 
 _STABILIZE: Final = 0x10
 MULTICOPTER_ONLY: Final = frozenset({FlightMode.ORBIT, FlightMode.POSITION_SLOW, FlightMode.PRECISION_LAND})
