@@ -33,7 +33,7 @@ class RunRequest:
             Missions and estimators can't reach it. With `connect` only its magnetic target is used, as the
             place that a result is compared with.
         speedup: simulated seconds per wall second at most in the embedded world; None: no limit.
-        expected_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
+        forecast_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
             is not used: a mission plans in the same way for embedded and for other vehicles.
         parameters: autopilot parameters to set before the flight.
         strict_parameters: a parameter that a vehicle at `connect` does not have ends the run; otherwise it is
@@ -65,7 +65,7 @@ class RunRequest:
     system_ids: Sequence[int] = ()
     world: "WorldSpec | None" = None
     speedup: float | None = None
-    expected_wind_m_s: float | None = None
+    forecast_wind_m_s: float | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     strict_parameters: bool = True
     left_out_parameters: Sequence[str] = ()
@@ -109,4 +109,4 @@ class RunRequest:
     @property
     def planning_wind_m_s(self) -> float:
         """Wind that turns are planned for."""
-        return FORECAST_WIND_M_S if self.expected_wind_m_s is None else self.expected_wind_m_s
+        return FORECAST_WIND_M_S if self.forecast_wind_m_s is None else self.forecast_wind_m_s

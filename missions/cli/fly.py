@@ -234,7 +234,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
         system_ids=given["system_id"],
         world=world,
         speedup=given["speedup"],
-        expected_wind_m_s=forecast_m_s,
+        forecast_wind_m_s=forecast_m_s,
         parameters=parameters,
         strict_parameters=given["strict_params"],
         left_out_parameters=left_out_parameters,
