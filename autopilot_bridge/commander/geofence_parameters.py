@@ -5,7 +5,7 @@ from enum import IntEnum, IntFlag
 from typing import Final
 
 from autopilot_bridge.commander.events import FailsafeAction
-from flightsim.foundation.checks import check_fields, require_finite
+from flightsim.foundation.options import Options
 
 
 class FenceType(IntFlag):
@@ -30,7 +30,7 @@ class AutoEnable(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FenceParameters:
+class FenceParameters(Options):
     """The geofence.
 
     Attributes:
@@ -82,8 +82,7 @@ class FenceParameters:
     walls: FenceType = field(init=False)
     has_cylinder: bool = field(init=False)
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_finite)
+    def check_together(self) -> None:
         walls = FenceType(0)
         for there, wall in (
             (self.height_max_m > 0.0, FenceType.HEIGHT_MAX),
@@ -93,7 +92,6 @@ class FenceParameters:
         ):
             if there:
                 walls |= wall
-        # used ten times a second
         object.__setattr__(self, "walls", walls)
         object.__setattr__(self, "has_cylinder", bool(walls & ~FenceType.SHAPES))
 

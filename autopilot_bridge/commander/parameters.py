@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.modes import FlightMode
-from flightsim.foundation.checks import NotNegativeOrInf, check_fields, require_finite
+from flightsim.foundation.checks import NotNegativeOrInf
+from flightsim.foundation.options import Options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CommanderParameters:
+class CommanderParameters(Options):
     """Timeouts, thresholds and actions of arming and failsafes.
 
     Attributes:
@@ -80,6 +81,3 @@ class CommanderParameters:
     crash_check: bool = False
     follow_enabled: bool = True
     faults: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_finite)

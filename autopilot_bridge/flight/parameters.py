@@ -12,15 +12,8 @@ from autopilot_bridge.flight.surroundings_parameters import (
     Precision,
     PrecisionParameters,
 )
-from flightsim.foundation.checks import (
-    Finite,
-    NotNegative,
-    NotNegativeOrInf,
-    PositiveOrInf,
-    Share,
-    check_fields,
-    require_positive,
-)
+from flightsim.foundation.checks import Finite, NotNegative, NotNegativeOrInf, Positive, PositiveOrInf, Share
+from flightsim.foundation.options import Options
 
 
 class ReturnDestination(IntEnum):
@@ -73,47 +66,47 @@ class YawBehaviour(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlightParameters:
+class FlightParameters(Options):
     """Parameters of every flight task. PX4's and ArduPilot's names stand beside each field.
 
     Raises:
         ValueError: a field is not finite, or not positive where it must be.
     """
 
-    cruise_speed_m_s: float = 5.0  # MPC_XY_CRUISE | WPNAV_SPEED
-    max_speed_m_s: float = 12.0  # MPC_XY_VEL_MAX | WPNAV_SPEED
-    climb_speed_m_s: float = 3.0  # MPC_Z_V_AUTO_UP | WPNAV_SPEED_UP
-    descend_speed_m_s: float = 1.5  # MPC_Z_V_AUTO_DN | WPNAV_SPEED_DN
-    acceleration_m_s2: float = 3.0  # MPC_ACC_HOR | WPNAV_ACCEL
-    corner_acceleration_m_s2: float = 2.5  # lateral, in mission corners | WPNAV_ACCEL_C
-    acceleration_up_m_s2: float = 4.0  # MPC_ACC_UP_MAX | WPNAV_ACCEL_Z
-    acceleration_down_m_s2: float = 3.0  # MPC_ACC_DOWN_MAX | WPNAV_ACCEL_Z
-    jerk_m_s3: float = 4.0  # MPC_JERK_AUTO | PSC_JERK_XY
-    trajectory_p_1_s: float = 1.0  # MPC_XY_TRAJ_P: cross-track and end-of-leg gain
-    trajectory_error_max_m: float = 2.0  # MPC_XY_ERR_MAX: the trajectory waits for a vehicle this far behind
-    yaw_rate_max_rad_s: float = math.radians(45.0)  # MPC_YAWRAUTO_MAX | ATC_SLEW_YAW
-    yaw_acceleration_rad_s2: float = math.radians(60.0)  # MPC_YAWRAUTO_ACC
+    cruise_speed_m_s: Positive = 5.0  # MPC_XY_CRUISE | WPNAV_SPEED
+    max_speed_m_s: Positive = 12.0  # MPC_XY_VEL_MAX | WPNAV_SPEED
+    climb_speed_m_s: Positive = 3.0  # MPC_Z_V_AUTO_UP | WPNAV_SPEED_UP
+    descend_speed_m_s: Positive = 1.5  # MPC_Z_V_AUTO_DN | WPNAV_SPEED_DN
+    acceleration_m_s2: Positive = 3.0  # MPC_ACC_HOR | WPNAV_ACCEL
+    corner_acceleration_m_s2: Positive = 2.5  # lateral, in mission corners | WPNAV_ACCEL_C
+    acceleration_up_m_s2: Positive = 4.0  # MPC_ACC_UP_MAX | WPNAV_ACCEL_Z
+    acceleration_down_m_s2: Positive = 3.0  # MPC_ACC_DOWN_MAX | WPNAV_ACCEL_Z
+    jerk_m_s3: Positive = 4.0  # MPC_JERK_AUTO | PSC_JERK_XY
+    trajectory_p_1_s: Positive = 1.0  # MPC_XY_TRAJ_P: cross-track and end-of-leg gain
+    trajectory_error_max_m: Positive = 2.0  # MPC_XY_ERR_MAX: the trajectory waits for a vehicle so far behind
+    yaw_rate_max_rad_s: Positive = math.radians(45.0)  # MPC_YAWRAUTO_MAX | ATC_SLEW_YAW
+    yaw_acceleration_rad_s2: Positive = math.radians(60.0)  # MPC_YAWRAUTO_ACC
     yaw_behaviour: YawBehaviour = YawBehaviour.TOWARDS_TARGET  # MPC_YAW_MODE | WP_YAW_BEHAVIOR
-    acceptance_radius_m: float = 2.0  # NAV_ACC_RAD | WPNAV_RADIUS
-    acceptance_altitude_m: float = 0.8  # NAV_MC_ALT_RAD
+    acceptance_radius_m: Positive = 2.0  # NAV_ACC_RAD | WPNAV_RADIUS
+    acceptance_altitude_m: Positive = 0.8  # NAV_MC_ALT_RAD
     nose_follows_roi: bool = True  # MIS_MNT_YAW_CTL 0 | MNT1_TYPE 0: no gimbal that turns by itself
     use_waypoint_yaw: bool = True  # param4 of mission items turns the nose (PX4); ArduPilot ignores it
 
-    takeoff_altitude_m: float = 2.5  # MIS_TAKEOFF_ALT
-    takeoff_speed_m_s: float = 1.5  # MPC_TKO_SPEED | WPNAV_SPEED_UP
+    takeoff_altitude_m: Positive = 2.5  # MIS_TAKEOFF_ALT
+    takeoff_speed_m_s: Positive = 1.5  # MPC_TKO_SPEED | WPNAV_SPEED_UP
     takeoff_ramp_time_s: NotNegative = 3.0  # MPC_TKO_RAMP_T | TKOFF_SLEW_TIME
     spoolup_time_s: NotNegative = 1.0  # COM_SPOOLUP_TIME | MOT_SPOOL_TIME
 
-    land_speed_m_s: float = 0.7  # MPC_LAND_SPEED | LAND_SPEED
-    land_descend_speed_m_s: float = 1.5  # MPC_Z_V_AUTO_DN | LAND_SPEED_HIGH or WPNAV_SPEED_DN
-    land_slow_altitude_m: float = 5.0  # MPC_LAND_ALT2 | LAND_ALT_LOW: at and below, land_speed
-    land_fast_altitude_m: float = 10.0  # MPC_LAND_ALT1 | LAND_ALT_LOW: at and above, land_descend_speed
+    land_speed_m_s: Positive = 0.7  # MPC_LAND_SPEED | LAND_SPEED
+    land_descend_speed_m_s: Positive = 1.5  # MPC_Z_V_AUTO_DN | LAND_SPEED_HIGH or WPNAV_SPEED_DN
+    land_slow_altitude_m: Positive = 5.0  # MPC_LAND_ALT2 | LAND_ALT_LOW: at and below, land_speed
+    land_fast_altitude_m: Positive = 10.0  # MPC_LAND_ALT1 | LAND_ALT_LOW: at and above, land_descend_speed
 
-    return_altitude_m: float = 30.0  # RTL_RETURN_ALT | RTL_ALT, above home
+    return_altitude_m: Positive = 30.0  # RTL_RETURN_ALT | RTL_ALT, above home
     return_descend_altitude_m: NotNegative = 10.0  # RTL_DESCEND_ALT | RTL_ALT_FINAL, above home
     return_loiter_time_s: Finite = 0.0  # RTL_LAND_DELAY | RTL_LOIT_TIME; negative (PX4 -1): hold, don't land
     return_loiters_high: bool = False  # ArduPilot waits before it descends, PX4 at the descend altitude
-    return_speed_m_s: float = 5.0  # MPC_XY_CRUISE | RTL_SPEED
+    return_speed_m_s: Positive = 5.0  # MPC_XY_CRUISE | RTL_SPEED
     return_cone_half_angle_rad: NotNegative = math.radians(
         45.0
     )  # RTL_CONE_ANG; ArduPilot: atan(1/RTL_CONE_SLOPE); 0: off
@@ -126,30 +119,29 @@ class FlightParameters:
     return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE
     rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
 
-    orbit_radius_m: float = 20.0  # default of DO_ORBIT | CIRCLE_RADIUS
-    orbit_speed_m_s: float = 3.0  # default of DO_ORBIT | CIRCLE_RATE
-    orbit_acceleration_max_m_s2: float = 2.0
+    orbit_radius_m: Positive = 20.0  # default of DO_ORBIT | CIRCLE_RADIUS
+    orbit_speed_m_s: Positive = 3.0  # default of DO_ORBIT | CIRCLE_RATE
+    orbit_acceleration_max_m_s2: Positive = 2.0
 
-    manual_speed_m_s: float = 10.0  # MPC_VEL_MANUAL | LOIT_SPEED
-    manual_climb_speed_m_s: float = 3.0  # MPC_Z_VEL_MAX_UP | PILOT_SPEED_UP
-    manual_descend_speed_m_s: float = 1.5  # MPC_Z_VEL_MAX_DN | PILOT_SPEED_DN
-    manual_tilt_rad: float = math.radians(35.0)  # MPC_MAN_TILT_MAX | ANGLE_MAX
-    manual_yaw_rate_rad_s: float = math.radians(150.0)  # MPC_MAN_Y_MAX | PILOT_Y_RATE
-    acro_rate_rad_s: float = math.radians(100.0)  # MC_ACRO_R_MAX, MC_ACRO_P_MAX | ACRO_RP_RATE
-    acro_yaw_rate_rad_s: float = math.radians(100.0)  # MC_ACRO_Y_MAX | ACRO_Y_RATE
-    manual_throttle_min: float = 0.08  # MPC_MANTHR_MIN
+    manual_speed_m_s: Positive = 10.0  # MPC_VEL_MANUAL | LOIT_SPEED
+    manual_climb_speed_m_s: Positive = 3.0  # MPC_Z_VEL_MAX_UP | PILOT_SPEED_UP
+    manual_descend_speed_m_s: Positive = 1.5  # MPC_Z_VEL_MAX_DN | PILOT_SPEED_DN
+    manual_tilt_rad: Positive = math.radians(35.0)  # MPC_MAN_TILT_MAX | ANGLE_MAX
+    manual_yaw_rate_rad_s: Positive = math.radians(150.0)  # MPC_MAN_Y_MAX | PILOT_Y_RATE
+    acro_rate_rad_s: Positive = math.radians(100.0)  # MC_ACRO_R_MAX, MC_ACRO_P_MAX | ACRO_RP_RATE
+    acro_yaw_rate_rad_s: Positive = math.radians(100.0)  # MC_ACRO_Y_MAX | ACRO_Y_RATE
+    manual_throttle_min: Positive = 0.08  # MPC_MANTHR_MIN
     manual_deadzone: NotNegative = 0.1  # MPC_HOLD_DZ
     manual_expo: Share = 0.6  # MPC_XY_MAN_EXPO
 
-    guided_timeout_s: float = 3.0  # GUID_TIMEOUT
+    guided_timeout_s: Positive = 3.0  # GUID_TIMEOUT
 
     return_precision: Precision = Precision.NONE  # RTL_PLD_MD
     follow: FollowParameters = field(default_factory=FollowParameters)  # FLW_TGT_* | FOLL_*
     precision: PrecisionParameters = field(default_factory=PrecisionParameters)  # PLD_* | PLND_*
     avoidance: AvoidanceParameters = field(default_factory=AvoidanceParameters)  # CP_* | AVOID_*
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    def check_together(self) -> None:
         if self.land_fast_altitude_m < self.land_slow_altitude_m:
             raise ValueError(
                 f"land_fast_altitude_m = {self.land_fast_altitude_m} is below "

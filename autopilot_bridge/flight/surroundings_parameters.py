@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from flightsim.foundation.checks import NotNegativeOrInf, Positive, check_fields, require_not_negative
+from flightsim.foundation.checks import NotNegative, NotNegativeOrInf, NotNegativeOrNan, Positive, Whole
+from flightsim.foundation.options import Options
 
 
 class FollowHeight(IntEnum):
@@ -25,7 +26,7 @@ class FollowYaw(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FollowParameters:
+class FollowParameters(Options):
     """The position relative to the target.
 
     Attributes:
@@ -44,26 +45,25 @@ class FollowParameters:
     """
 
     enabled: bool = True
-    system_id: int = 0
+    system_id: Whole = 0
     offset_m: tuple[float, float, float] = (-8.0, 0.0, -8.0)
     along_course: bool = True
     height: FollowHeight = FollowHeight.HOME
     relative_altitude: bool = False
     max_distance_m: NotNegativeOrInf = math.inf
-    timeout_s: float = 2.5
+    timeout_s: NotNegative = 2.5
     gain_1_s: Positive = 0.5
-    smoothing_s: float = 0.5
-    swing_speed_m_s: float = 5.0
+    smoothing_s: NotNegative = 0.5
+    swing_speed_m_s: NotNegative = 5.0
     yaw: FollowYaw = FollowYaw.FACE_TARGET
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         if len(self.offset_m) != 3 or not all(abs(part) <= 1e4 for part in self.offset_m):
             raise ValueError(f"offset_m {self.offset_m} is not accepted: three numbers within 10 km are")
-        check_fields(self, require_not_negative, unchecked=("offset_m",))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AvoidanceParameters:
+class AvoidanceParameters(Options):
     """Distance from obstacles.
 
     Attributes:
@@ -80,16 +80,13 @@ class AvoidanceParameters:
 
     enabled: bool = False
     guided: bool = False
-    margin_m: float = 2.0
-    delay_s: float = 0.4
-    guard_rad: float = math.radians(30.0)
+    margin_m: NotNegative = 2.0
+    delay_s: NotNegative = 0.4
+    guard_rad: NotNegative = math.radians(30.0)
     go_without_data: bool = True
     slide: bool = False
-    timeout_s: float = 0.5
+    timeout_s: NotNegative = 0.5
     deceleration_m_s2: Positive = 2.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_not_negative)
 
 
 class Precision(IntEnum):
@@ -109,7 +106,7 @@ class TargetLost(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrecisionParameters:
+class PrecisionParameters(Options):
     """Parameters of a precision landing.
 
     Attributes:
@@ -126,15 +123,11 @@ class PrecisionParameters:
     """
 
     enabled: bool = False
-    wait_s: float = 5.0
-    align_m: float = 0.2
-    final_m: float = 0.1
-    greatest_m: float = 1e4
-    search_m: float = 10.0
-    search_s: float = 10.0
-    searches: int = 3
+    wait_s: NotNegative = 5.0
+    align_m: NotNegative = 0.2
+    final_m: NotNegative = 0.1
+    greatest_m: NotNegative = 1e4
+    search_m: NotNegativeOrNan = 10.0
+    search_s: NotNegative = 10.0
+    searches: Whole = 3
     lost: TargetLost = TargetLost.SEARCH
-
-    def __post_init__(self) -> None:
-        unchecked = ("search_m",) if math.isnan(self.search_m) else ()
-        check_fields(self, require_not_negative, unchecked=unchecked)

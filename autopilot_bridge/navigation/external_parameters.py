@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
-from flightsim.foundation.checks import NotNegative, check_fields, require_positive
+from flightsim.foundation.checks import NotNegative, Positive
+from flightsim.foundation.options import Options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExternalParameters:
+class ExternalParameters(Options):
     """Which parts of external odometry are fused, and how much they are trusted.
 
     Attributes:
@@ -34,21 +35,20 @@ class ExternalParameters:
     use_yaw: bool = False
     height_reference: bool = False
     own_noise: bool = False
-    position_noise_m: float = 0.1
-    velocity_noise_m_s: float = 0.1
-    yaw_noise_rad: float = 0.1
-    position_gate: float = 5.0
-    velocity_gate: float = 3.0
-    yaw_gate: float = 2.6
+    position_noise_m: Positive = 0.1
+    velocity_noise_m_s: Positive = 0.1
+    yaw_noise_rad: Positive = 0.1
+    position_gate: Positive = 5.0
+    velocity_gate: Positive = 3.0
+    yaw_gate: Positive = 2.6
     delay_s: NotNegative = 0.0
     offset_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     least_quality: int = 0
-    scale: float = 1.0
-    reset_after_s: float = 7.0
-    timeout_s: float = 1.0
+    scale: Positive = 1.0
+    reset_after_s: Positive = 7.0
+    timeout_s: Positive = 1.0
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive, unchecked=("offset_frd_m", "least_quality"))
+    def check_together(self) -> None:
         if not all(abs(part) <= 10.0 for part in self.offset_frd_m):
             raise ValueError(
                 f"offset_frd_m {self.offset_frd_m} is not accepted: three numbers within 10 m are"

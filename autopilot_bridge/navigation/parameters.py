@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass, field
 
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
-from flightsim.foundation.checks import NotNegative, check_fields, require_positive
+from flightsim.foundation.checks import Count, NotNegative, Positive
+from flightsim.foundation.options import Options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NavigationParameters:
+class NavigationParameters(Options):
     """The filter's assumptions about its sensors, and the limits of their use.
 
     The noise figures are the defaults of PX4 1.16's EKF2, converted to continuous time; a flavour sets them
@@ -112,91 +113,90 @@ class NavigationParameters:
         external: odometry that comes by messages.
     """
 
-    covariance_rate_hz: int = 25
-    gyro_noise_rad_s_sqrt_hz: float = 1.5e-3
-    gyro_bias_rad_s: float = 1.75e-3
-    gyro_bias_walk_rad_s_sqrt_s: float = 1e-4
+    covariance_rate_hz: Count = 25
+    gyro_noise_rad_s_sqrt_hz: Positive = 1.5e-3
+    gyro_bias_rad_s: Positive = 1.75e-3
+    gyro_bias_walk_rad_s_sqrt_s: Positive = 1e-4
     gyro_scale_error: NotNegative = 0.0033
     gyro_cross_axis_error: NotNegative = 0.001
-    gyro_scale_tilt_rad: float = 0.2
-    accel_noise_m_s2_sqrt_hz: float = 0.035
-    accel_bias_m_s2: float = 0.2
-    accel_bias_walk_m_s2_sqrt_s: float = 3e-4
-    gps_position_noise_m: tuple[float, float] = (0.5, 0.75)
-    gps_position_walk_m: tuple[float, float] = (0.1, 0.2)
-    gps_position_tau_s: float = 300.0
-    gps_velocity_noise_m_s: tuple[float, float] = (0.3, 0.45)
+    gyro_scale_tilt_rad: Positive = 0.2
+    accel_noise_m_s2_sqrt_hz: Positive = 0.035
+    accel_bias_m_s2: Positive = 0.2
+    accel_bias_walk_m_s2_sqrt_s: Positive = 3e-4
+    gps_position_noise_m: tuple[Positive, Positive] = (0.5, 0.75)
+    gps_position_walk_m: tuple[Positive, Positive] = (0.1, 0.2)
+    gps_position_tau_s: Positive = 300.0
+    gps_velocity_noise_m_s: tuple[Positive, Positive] = (0.3, 0.45)
     use_gps: bool = True
     gps_may_repeat: bool = False
-    gps_required_satellites: int = 6
-    gps_required_eph_m: float = 3.0
-    gps_required_epv_m: float = 5.0
-    gps_required_speed_accuracy_m_s: float = 0.5
-    gps_required_hdop: float = 2.5
+    gps_required_satellites: Count = 6
+    gps_required_eph_m: Positive = 3.0
+    gps_required_epv_m: Positive = 5.0
+    gps_required_speed_accuracy_m_s: Positive = 0.5
+    gps_required_hdop: Positive = 2.5
     gps_check_time_s: NotNegative = 1.0
-    gps_gate: float = 5.0
-    gps_velocity_gate: float = 5.0
-    gps_timeout_s: float = 7.0
-    no_aid_timeout_s: float = 5.0
-    height_timeout_s: float = 5.0
-    barometer_gate: float = 5.0
-    barometer_noise_m: float = 3.5
+    gps_gate: Positive = 5.0
+    gps_velocity_gate: Positive = 5.0
+    gps_timeout_s: Positive = 7.0
+    no_aid_timeout_s: Positive = 5.0
+    height_timeout_s: Positive = 5.0
+    barometer_gate: Positive = 5.0
+    barometer_noise_m: Positive = 3.5
     barometer_lag_s: NotNegative = 0.02
     barometer_offset_walk_m_per_sqrt_s: NotNegative = 0.013
     barometer_scale_error: NotNegative = 0.04
-    magnetometer_gate: float = 3.0
-    magnetometer_noise_gauss: float = 0.05
-    magnetometer_bias_gauss: float = 0.01
-    magnetometer_bias_tau_s: float = 1000.0
-    magnetometer_bias_turn_rad: float = 9.0
-    magnetometer_timeout_s: float = 5.0
+    magnetometer_gate: Positive = 3.0
+    magnetometer_noise_gauss: Positive = 0.05
+    magnetometer_bias_gauss: Positive = 0.01
+    magnetometer_bias_tau_s: Positive = 1000.0
+    magnetometer_bias_turn_rad: Positive = 9.0
+    magnetometer_timeout_s: Positive = 5.0
     mag_ned_gauss: tuple[float, float, float] | None = None
-    magnetic_year: float = 2026.0
-    rangefinder_gate: float = 5.0
-    rangefinder_noise_m: float = 0.03
+    magnetic_year: Positive = 2026.0
+    rangefinder_gate: Positive = 5.0
+    rangefinder_noise_m: Positive = 0.03
     rangefinder_noise_fraction: NotNegative = 0.005
-    rangefinder_max_tilt_rad: float = 0.7
+    rangefinder_max_tilt_rad: Positive = 0.7
     terrain_walk_m_per_sqrt_s: NotNegative = 0.1
     terrain_gradient: NotNegative = 0.5
-    terrain_timeout_s: float = 5.0
-    ground_clearance_m: float = 0.1
-    no_aid_noise_m: float = 10.0
-    at_rest_noise_m: float = 0.5
-    zero_velocity_noise_m_s: float = 0.02
-    zero_rate_noise_rad_s: float = 1.0e-3
-    alignment_time_s: float = 0.5
-    alignment_tilt_rad: float = 0.1
-    alignment_yaw_rad: float = 0.5
-    imu_timeout_s: float = 0.2
-    gyro_range_rad_s: float = 60.0
-    accel_range_m_s2: float = 400.0
-    history_s: float = 0.5
+    terrain_timeout_s: Positive = 5.0
+    ground_clearance_m: Positive = 0.1
+    no_aid_noise_m: Positive = 10.0
+    at_rest_noise_m: Positive = 0.5
+    zero_velocity_noise_m_s: Positive = 0.02
+    zero_rate_noise_rad_s: Positive = 1.0e-3
+    alignment_time_s: Positive = 0.5
+    alignment_tilt_rad: Positive = 0.1
+    alignment_yaw_rad: Positive = 0.5
+    imu_timeout_s: Positive = 0.2
+    gyro_range_rad_s: Positive = 60.0
+    accel_range_m_s2: Positive = 400.0
+    history_s: Positive = 0.5
     fixed_wing: bool = False
     use_airspeed: bool = True
-    airspeed_threshold_m_s: float = 8.0
-    airspeed_noise_m_s: float = 0.4
-    airspeed_gate: float = 5.0
-    airspeed_scale: float = 1.0
+    airspeed_threshold_m_s: Positive = 8.0
+    airspeed_noise_m_s: Positive = 0.4
+    airspeed_gate: Positive = 5.0
+    airspeed_scale: Positive = 1.0
     airspeed_sensor_heating_k: NotNegative = 5.0
     airspeed_lag_s: NotNegative = 0.05
-    airspeed_smoothing_s: float = 0.2
+    airspeed_smoothing_s: Positive = 0.2
     use_sideslip: bool = True
-    sideslip_noise_rad: float = 0.03
-    sideslip_gate: float = 5.0
-    wind_walk_m_s_sqrt_s: float = 0.02
+    sideslip_noise_rad: Positive = 0.03
+    sideslip_gate: Positive = 5.0
+    wind_walk_m_s_sqrt_s: Positive = 0.02
     wind_height_scale: NotNegative = 0.5
-    wind_prior_m_s: float = 5.0
-    turbulence_length_m: float = 250.0
+    wind_prior_m_s: Positive = 5.0
+    turbulence_length_m: Positive = 250.0
     airspeed_checks: bool = True
-    airspeed_check_innovation_m_s: float = 5.0
-    airspeed_check_integral_m: float = 10.0
-    airspeed_stop_delay_s: float = 1.0
-    airspeed_start_delay_s: float = 5.0
-    assumed_airspeed_noise_m_s: float = 3.0
+    airspeed_check_innovation_m_s: Positive = 5.0
+    airspeed_check_integral_m: Positive = 10.0
+    airspeed_stop_delay_s: Positive = 1.0
+    airspeed_start_delay_s: Positive = 5.0
+    assumed_airspeed_noise_m_s: Positive = 3.0
     external: ExternalParameters = field(default_factory=ExternalParameters)
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive, unchecked=("mag_ned_gauss",))
+    def check_together(self) -> None:
         given = self.mag_ned_gauss
         if given is not None and not 0.05 <= math.hypot(*given) < math.inf:
             raise ValueError(f"mag_ned_gauss {given} is not a field of the Earth (0.2 to 0.7 gauss), NED")

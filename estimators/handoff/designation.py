@@ -10,13 +10,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from flightsim.foundation.checks import check_fields, require_positive, require_probability
+from flightsim.foundation.checks import Positive, Share
+from flightsim.foundation.options import Options
 
 Place = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignationParameters:
+class DesignationParameters(Options):
     """When an identity becomes doubtful.
 
     Attributes:
@@ -29,14 +30,11 @@ class DesignationParameters:
         lost_s: time without a track after which the target is lost.
     """
 
-    exchange_m: float = 2.0
-    regained_m: float = 10.0
-    regained: float = 0.9
-    doubled: float = 0.995
-    lost_s: float = 5.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive, but=dict.fromkeys(("regained", "doubled"), require_probability))
+    exchange_m: Positive = 2.0
+    regained_m: Positive = 10.0
+    regained: Share = 0.9
+    doubled: Share = 0.995
+    lost_s: Positive = 5.0
 
 
 class Designation:

@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.relative_pose.belief import PoseMode
-from flightsim.foundation.checks import check_fields, require_positive, require_probability
+from flightsim.foundation.checks import Positive, Share
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ _HANDOFF_TRACKS: Final = 7  # the nearest to the target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EvidenceParameters:
+class EvidenceParameters(Options):
     """Noise and priors of the comparison.
 
     Attributes:
@@ -65,34 +66,30 @@ class EvidenceParameters:
         hold_s: time for which it must stay above, and must not be doubtful.
     """
 
-    every_s: float = 0.5
-    sample_s: float = 1.0
-    sigma_m: float = 1.0
-    slow_sigma_m: float = 1.0
-    slow_s: float = 5.0
-    tilt_sigma_rad: float = 0.012
-    tilt_s: float = 5.0
-    height_sigma_m: float = 2.0
-    pose_sigma_m: float = 3.0
-    pose_sigma_rad: float = 0.02
-    drift_m_s: float = 0.3
-    wrong: float = 0.05
-    wrong_sigma_m: float = 40.0
-    wrong_sigma_rad: float = 0.1
-    rough: float = 0.1
-    rough_scale: float = 3.0
-    apart_m: float = 60.0
-    speed_m_s: float = 1.5
-    turn_s: float = 20.0
-    seen: float = 0.8
-    free: float = 1.0
-    unforeseen: float = 0.004
-    decision: float = 0.99
-    hold_s: float = 3.0
-
-    def __post_init__(self) -> None:
-        shares = ("decision", "rough", "seen", "unforeseen", "wrong")
-        check_fields(self, require_positive, but=dict.fromkeys(shares, require_probability))
+    every_s: Positive = 0.5
+    sample_s: Positive = 1.0
+    sigma_m: Positive = 1.0
+    slow_sigma_m: Positive = 1.0
+    slow_s: Positive = 5.0
+    tilt_sigma_rad: Positive = 0.012
+    tilt_s: Positive = 5.0
+    height_sigma_m: Positive = 2.0
+    pose_sigma_m: Positive = 3.0
+    pose_sigma_rad: Positive = 0.02
+    drift_m_s: Positive = 0.3
+    wrong: Share = 0.05
+    wrong_sigma_m: Positive = 40.0
+    wrong_sigma_rad: Positive = 0.1
+    rough: Share = 0.1
+    rough_scale: Positive = 3.0
+    apart_m: Positive = 60.0
+    speed_m_s: Positive = 1.5
+    turn_s: Positive = 20.0
+    seen: Share = 0.8
+    free: Positive = 1.0
+    unforeseen: Share = 0.004
+    decision: Share = 0.99
+    hold_s: Positive = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

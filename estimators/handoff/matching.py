@@ -9,7 +9,8 @@ import numpy as np
 from estimators.handoff.alignment import Alignment
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.relative_pose.belief import PoseMode
-from flightsim.foundation.checks import check_fields, require_positive, require_probability
+from flightsim.foundation.checks import Positive, Share
+from flightsim.foundation.options import Options
 from flightsim.foundation.vectors import wrap_pi
 
 
@@ -21,7 +22,7 @@ class Residual(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MatchingParameters:
+class MatchingParameters(Options):
     """Thresholds of a match. The paper gives T_r and T_gamma.
 
     Attributes:
@@ -35,16 +36,11 @@ class MatchingParameters:
     """
 
     residual: Residual = Residual.FROBENIUS
-    residual_m: float = 15.0
-    rotation_rad: float = 0.35
-    translation_m: float = 20.0
-    forgetting: float = 0.05
-    decision: float = 0.95
-
-    def __post_init__(self) -> None:
-        check_fields(
-            self, require_positive, but={"forgetting": require_probability, "decision": require_probability}
-        )
+    residual_m: Positive = 15.0
+    rotation_rad: Positive = 0.35
+    translation_m: Positive = 20.0
+    forgetting: Share = 0.05
+    decision: Share = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

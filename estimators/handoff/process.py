@@ -12,7 +12,8 @@ from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.handoff.dead_reckoning import EYE, DeadReckoning, TrackHistory
 from estimators.handoff.matching import blended
 from estimators.relative_pose.belief import LevelMotion, PoseMeasurement, PoseMode, RelativePoseBelief
-from flightsim.foundation.checks import require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class TrackerReport:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WindowParameters:
+class WindowParameters(Options):
     """The windows that are compared.
 
     Attributes:
@@ -51,10 +52,9 @@ class WindowParameters:
     """
 
     samples: int = 100
-    every_s: float = 0.1
+    every_s: Positive = 0.1
 
-    def __post_init__(self) -> None:
-        require_positive(every_s=self.every_s)
+    def check_together(self) -> None:
         if self.samples < 3:
             raise ValueError(f"samples = {self.samples} is not accepted: 3 or more are")
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from estimators.tracking.intensity import BirthIntensity, Cluster
 from estimators.tracking.motion import Motion, MotionKind
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
-from flightsim.foundation.checks import named, require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 
 __all__ = ["GaussianPhd", "GaussianPhdParameters"]
 
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GaussianPhdParameters:
+class GaussianPhdParameters(Options):
     """Parameters of the mixture.
 
     Attributes:
@@ -33,13 +34,12 @@ class GaussianPhdParameters:
         gate_squared: squared Mahalanobis distance of a measurement beyond which its likelihood counts as 0.
     """
 
-    least_weight: float = 1e-4
-    merge_distance_squared: float = 4.0
+    least_weight: Positive = 1e-4
+    merge_distance_squared: Positive = 4.0
     max_components: int = 500
-    gate_squared: float = 30.0
+    gate_squared: Positive = 30.0
 
-    def __post_init__(self) -> None:
-        require_positive(**named(self, "least_weight", "merge_distance_squared", "gate_squared"))
+    def check_together(self) -> None:
         if not 1 <= self.max_components <= 100_000:
             raise ValueError(f"max_components {self.max_components} is not in 1..100000")
 

@@ -11,9 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import named, require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, Positive
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.layouts import Slots
+from flightsim.foundation.options import Options
 
 __all__ = ["RangeBearingSensor", "Viewpoint", "detection_probabilities"]
 
@@ -46,7 +47,7 @@ class Viewpoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RangeBearingSensor:
+class RangeBearingSensor(Options):
     """What is known about the sensor.
 
     A target at the offset (f, r), forward and right of the vehicle, is detected with the probability
@@ -62,20 +63,16 @@ class RangeBearingSensor:
     """
 
     gain: float = 0.98
-    forward_scale_m: float = 15.0
-    right_scale_m: float = 15.0
-    reach_m: float = 100.0
-    range_sigma_m: float = 0.6
-    bearing_sigma_rad: float = 0.035
-    clutter_per_scan: float = 0.0
+    forward_scale_m: Positive = 15.0
+    right_scale_m: Positive = 15.0
+    reach_m: Positive = 100.0
+    range_sigma_m: Positive = 0.6
+    bearing_sigma_rad: Positive = 0.035
+    clutter_per_scan: NotNegative = 0.0
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         if not 0.0 < self.gain <= 1.0:
             raise ValueError(f"gain {self.gain:g} is not in 0..1, or is 0")
-        require_positive(
-            **named(self, "forward_scale_m", "right_scale_m", "reach_m", "range_sigma_m", "bearing_sigma_rad")
-        )
-        require_not_negative(clutter_per_scan=self.clutter_per_scan)
 
     @property
     def values(self) -> Array:

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.tracking import ransac_kernels as kernels
-from flightsim.foundation.checks import check_fields, require_positive, require_probability
+from flightsim.foundation.checks import Count, Positive, Share
+from flightsim.foundation.options import Options
 from flightsim.foundation.random_streams import RandomStreams
 
 __all__ = ["RansacParameters", "RansacTrack", "RecursiveRansac", "TargetModel"]
@@ -43,7 +44,7 @@ _ORDERS: Final = {model: order for order, model in enumerate(TargetModel)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RansacParameters:
+class RansacParameters(Options):
     """Parameters of the tracker. The papers' symbols are in parentheses.
 
     Attributes:
@@ -71,30 +72,26 @@ class RansacParameters:
     """
 
     model: TargetModel = TargetModel.CONSTANT_VELOCITY
-    noise_density: float = 0.1
-    sigma_m: float = 1.0
-    gate_squared: float = 9.2
-    detected: float = 0.9
-    clutter_per_m2: float = 1e-5
-    window: int = 10
-    hypotheses: int = 30
-    iterations: int = 50
-    inlier_m: float = 3.0
-    speed_max_m_s: float = 30.0
-    enough: float = 0.9
-    seed_support: int = 3
-    good_ratio: float = 0.6
-    prune_ratio: float = 0.2
-    good_age: int = 10
-    lost_after: int = 10
-    merge_squared: float = 4.0
+    noise_density: Positive = 0.1
+    sigma_m: Positive = 1.0
+    gate_squared: Positive = 9.2
+    detected: Share = 0.9
+    clutter_per_m2: Positive = 1e-5
+    window: Count = 10
+    hypotheses: Count = 30
+    iterations: Count = 50
+    inlier_m: Positive = 3.0
+    speed_max_m_s: Positive = 30.0
+    enough: Share = 0.9
+    seed_support: Count = 3
+    good_ratio: Share = 0.6
+    prune_ratio: Share = 0.2
+    good_age: Count = 10
+    lost_after: Count = 10
+    merge_squared: Positive = 4.0
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        shares = ("detected", "enough", "good_ratio", "prune_ratio")
-        check_fields(
-            self, require_positive, but=dict.fromkeys(shares, require_probability), unchecked=("seed",)
-        )
+    def check_together(self) -> None:
         if self.window < self.seed_support + 1:
             raise ValueError(
                 f"window = {self.window} is not accepted: more than seed_support = {self.seed_support} is"

@@ -28,8 +28,9 @@ from estimators.tracking.range_bearing import (
     Viewpoint,
 )
 from estimators.tracking.resampling import systematic
-from flightsim.foundation.checks import require_positive
+from flightsim.foundation.checks import Positive
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 
 __all__ = ["SmcPhd", "SmcPhdParameters", "update_weights"]
 
@@ -48,7 +49,7 @@ _BIRTH_SHARE: Final = 1.0 - math.exp(-0.5 * _BIRTH_SIGMAS**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SmcPhdParameters:
+class SmcPhdParameters(Options):
     """Parameters of the particle filter.
 
     Attributes:
@@ -63,10 +64,10 @@ class SmcPhdParameters:
     births_per_measurement: int = 250
     min_particles: int = 200
     max_particles: int = 20_000
-    birth_floor_m: float = 0.2
-    cluster_radius_m: float = 2.0
+    birth_floor_m: Positive = 0.2
+    cluster_radius_m: Positive = 2.0
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         for name in ("particles_per_target", "births_per_measurement", "min_particles", "max_particles"):
             if not 1 <= getattr(self, name) <= 1_000_000:
                 raise ValueError(f"{name} {getattr(self, name)} is not in 1..1000000")
@@ -74,7 +75,6 @@ class SmcPhdParameters:
             raise ValueError(
                 f"min_particles {self.min_particles} is more than max_particles {self.max_particles}"
             )
-        require_positive(birth_floor_m=self.birth_floor_m, cluster_radius_m=self.cluster_radius_m)
 
 
 class SmcPhd:

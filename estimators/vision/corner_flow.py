@@ -14,13 +14,14 @@ from estimators.vision.moving_objects import (
     objects_of,
 )
 from estimators.vision.video_frame import VideoFrame
-from flightsim.foundation.checks import check_fields, require_positive
+from flightsim.foundation.checks import Count, Positive
+from flightsim.foundation.options import Options
 
 __all__ = ["CornerFlowDetector", "CornerFlowParameters"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CornerFlowParameters:
+class CornerFlowParameters(Options):
     """Parameters of the detector.
 
     Attributes:
@@ -34,12 +35,9 @@ class CornerFlowParameters:
 
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
     objects: ObjectParameters = field(default_factory=ObjectParameters)
-    gate_squared: float = 64.0
-    least_px: float = 1.5
-    least_corners: int = 1
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive, unchecked=("registration", "objects"))
+    gate_squared: Positive = 64.0
+    least_px: Positive = 1.5
+    least_corners: Count = 1
 
 
 class CornerFlowDetector(MovingObjectDetector):

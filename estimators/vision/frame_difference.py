@@ -34,7 +34,8 @@ from estimators.vision.moving_objects import (
     objects_of,
 )
 from estimators.vision.video_frame import VideoFrame
-from flightsim.foundation.checks import check_fields, require_positive
+from flightsim.foundation.checks import Count, Positive
+from flightsim.foundation.options import Options
 
 __all__ = ["FrameDifferenceDetector", "FrameDifferenceParameters"]
 
@@ -49,7 +50,7 @@ _QUIET: Final = 0.98  # share of the picture in which nothing moves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrameDifferenceParameters:
+class FrameDifferenceParameters(Options):
     """Parameters of the detector.
 
     Attributes:
@@ -66,14 +67,11 @@ class FrameDifferenceParameters:
         default_factory=lambda: RegistrationParameters(corners=300, apart_px=9.0, baseline_s=0.8)
     )
     objects: ObjectParameters = field(default_factory=ObjectParameters)
-    least_levels: float = 4.0
-    noise_factor: float = 2.0
-    slack_px: float = 0.3
-    least_px: int = 4
-    largest_m: float = 12.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive, unchecked=("registration", "objects"))
+    least_levels: Positive = 4.0
+    noise_factor: Positive = 2.0
+    slack_px: Positive = 0.3
+    least_px: Count = 4
+    largest_m: Positive = 12.0
 
 
 class FrameDifferenceDetector(MovingObjectDetector):

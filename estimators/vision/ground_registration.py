@@ -22,7 +22,8 @@ from estimators.errors import EstimatorError
 from estimators.vision.camera import CameraGeometry
 from estimators.vision.parallax import parallax_px_m
 from estimators.vision.video_frame import CameraPose, VideoFrame
-from flightsim.foundation.checks import check_fields, require_positive, require_probability
+from flightsim.foundation.checks import Count, Positive, Share
+from flightsim.foundation.options import Options
 
 __all__ = ["GroundRegistration", "Registration", "RegistrationParameters", "StoredFrame", "VideoCounts"]
 
@@ -41,7 +42,7 @@ _ON_GROUND: Final = 9.0  # squared Mahalanobis distance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RegistrationParameters:
+class RegistrationParameters(Options):
     """Parameters of corners, flow and homography.
 
     Attributes:
@@ -61,24 +62,21 @@ class RegistrationParameters:
         relief_m: standard deviation of heights that are taken for the ground's, in any case.
     """
 
-    corners: int = 500
-    quality: float = 0.004
-    apart_px: float = 6.0
-    window_px: int = 9
-    levels: int = 3
-    back_px: float = 0.2
-    baseline_s: float = 0.7
-    longest_gap_s: float = 0.8
-    life_s: float = 2.0
-    ground_px: float = 1.5
-    ground_share: float = 0.5
-    least_sigma_px: float = 0.15
-    relief_m: float = 0.5
+    corners: Count = 500
+    quality: Share = 0.004
+    apart_px: Positive = 6.0
+    window_px: Count = 9
+    levels: Count = 3
+    back_px: Positive = 0.2
+    baseline_s: Positive = 0.7
+    longest_gap_s: Positive = 0.8
+    life_s: Positive = 2.0
+    ground_px: Positive = 1.5
+    ground_share: Share = 0.5
+    least_sigma_px: Positive = 0.15
+    relief_m: Positive = 0.5
 
-    def __post_init__(self) -> None:
-        check_fields(
-            self, require_positive, but=dict.fromkeys(("quality", "ground_share"), require_probability)
-        )
+    def check_together(self) -> None:
         if self.longest_gap_s < self.baseline_s:
             raise EstimatorError(
                 f"longest_gap_s {self.longest_gap_s:g} is below baseline_s {self.baseline_s:g}; "

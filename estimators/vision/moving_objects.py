@@ -16,7 +16,8 @@ from estimators.vision.camera import CameraGeometry
 from estimators.vision.ground_points import on_ground
 from estimators.vision.ground_registration import VideoCounts
 from estimators.vision.video_frame import CameraPose, VideoFrame
-from flightsim.foundation.checks import check_fields, require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 
 __all__ = ["MovingObjectDetector", "MovingObjects", "ObjectParameters", "ObjectPoints", "objects_of"]
 
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ObjectParameters:
+class ObjectParameters(Options):
     """What can be an object, and how well it is measured.
 
     Attributes:
@@ -36,15 +37,12 @@ class ObjectParameters:
         centre_m: standard deviation of the middle of what is seen of it from its own, per axis.
     """
 
-    link_m: float = 4.5
-    link_m_s: float = 5.0
-    fastest_m_s: float = 30.0
-    farthest: float = 4.0
-    centre_px: float = 1.0
-    centre_m: float = 0.4
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    link_m: Positive = 4.5
+    link_m_s: Positive = 5.0
+    fastest_m_s: Positive = 30.0
+    farthest: Positive = 4.0
+    centre_px: Positive = 1.0
+    centre_m: Positive = 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

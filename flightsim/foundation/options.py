@@ -20,6 +20,8 @@ from functools import cache
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from flightsim.foundation.checks import Bounds
+
 T = TypeVar("T")
 
 _OPTION: Final = "option"
@@ -60,7 +62,7 @@ class Option:
         least, most, above, below: bounds, in the unit of the field, of each number in it. A number must be
             finite,
             unless `infinite` is set.
-        infinite: an infinite number is accepted.
+        infinite, nan: an infinite number is accepted, or one that is none.
         name: name for users, where it is not that of the field without its unit. Fields of one class with the
             same
             name are one option: the sides of an area.
@@ -81,6 +83,7 @@ class Option:
     above: float | None = None
     below: float | None = None
     infinite: bool = False
+    nan: bool = False
     name: str = ""
     metavar: str = ""
     varies: str = ""
@@ -234,20 +237,21 @@ class Declared:
     def check(self, value: Any) -> None:
         """Raise OptionError for a number that is not accepted, or the first such number of a tuple."""
         for part in value if isinstance(value, tuple) else (value,):
-            if (
-                isinstance(part, int | float)
-                and not isinstance(part, bool | Enum)
-                and not self._accepts(part)
-            ):
+            if not isinstance(part, int | float) or isinstance(part, bool | Enum):
+                continue
+            if self.kind is int and not isinstance(part, int):
+                raise OptionError(self.name, *(f"{part!r} is not a whole number",) * 2)
+            if not self._accepts(part):
                 unit = f" {self.unit}" if self.unit else ""
                 reasons = self._reason(part, lambda x: x, ""), self._reason(part, self.for_users, unit)
                 raise OptionError(self.name, *reasons)
 
     def _accepts(self, number: float) -> bool:
         bounds = self.option
+        if math.isnan(number):
+            return bounds.nan
         return (
-            not math.isnan(number)
-            and (bounds.infinite or math.isfinite(number))
+            (bounds.infinite or math.isfinite(number))
             and (bounds.least is None or number >= bounds.least)
             and (bounds.most is None or number <= bounds.most)
             and (bounds.above is None or number > bounds.above)
@@ -346,14 +350,23 @@ def _option_of(kind: type, each: Any) -> Option:
 
 def _declared(kind: type, each: Any, hint: Any) -> Declared:
     stated, optional = without_none(hint)
+    option = _option_of(kind, each)
+    if (bounds := _bounds_in(stated)) is not None:
+        option = replace(option, **{each.name: getattr(bounds, each.name) for each in fields(bounds)})
     if get_origin(stated) is Annotated:
         stated = get_args(stated)[0]
     default = each.default if each.default_factory is MISSING else each.default_factory()
     shown = each.metadata.get(_HELD)
     return Declared(
-        name=each.name, kind=stated, optional=optional, default=default,
-        option=_option_of(kind, each), shown=shown,
-    )  # fmt: skip
+        name=each.name, kind=stated, optional=optional, default=default, option=option, shown=shown
+    )
+
+
+def _bounds_in(stated: Any) -> Bounds | None:
+    """What a type says about its number, or the numbers in its tuple."""
+    if get_origin(stated) is tuple:
+        return next((_bounds_in(part) for part in get_args(stated) if part is not Ellipsis), None)
+    return next((part for part in getattr(stated, "__metadata__", ()) if isinstance(part, Bounds)), None)
 
 
 def without_none(hint: Any) -> tuple[Any, bool]:

@@ -4,13 +4,14 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from flightsim.foundation.checks import require_finite, require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 
 _MAX_POINTS: Final = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AreaGrid:
+class AreaGrid(Options):
     """Points at equal distances. Edges are local NED of home.
 
     Attributes:
@@ -22,11 +23,9 @@ class AreaGrid:
     west_m: float
     north_m: float
     east_m: float
-    spacing_m: float
+    spacing_m: Positive
 
-    def __post_init__(self) -> None:
-        require_finite(south_m=self.south_m, west_m=self.west_m, north_m=self.north_m, east_m=self.east_m)
-        require_positive(spacing_m=self.spacing_m)
+    def check_together(self) -> None:
         for low, high, names in (
             (self.south_m, self.north_m, "south_m and north_m"),
             (self.west_m, self.east_m, "west_m and east_m"),

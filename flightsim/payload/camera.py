@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_finite, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
+from flightsim.foundation.options import Options
 from flightsim.foundation.rotations import multiply, quaternion_from_euler, rotate
 from flightsim.foundation.vectors import Quaternion, conjugate, product
 from flightsim.foundation.vectors import rotate as rotate_vector
@@ -39,7 +40,7 @@ _BLOCK: Final = 64  # frames served by one call of each generator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraParameters:
+class CameraParameters(Options):
     """A small machine-vision camera with a detector on board.
 
     Attributes:
@@ -73,17 +74,17 @@ class CameraParameters:
     """
 
     model: PinholeModel = field(default_factory=PinholeModel)
-    rate_hz: int = 10
-    latency_s: float = 0.1
-    exposure_s: float = 0.004
-    pixel_noise_px: float = 1.0
-    quantum_px: float = 0.25
-    size_noise: float = 0.1
+    rate_hz: Rate = 10
+    latency_s: NotNegative = 0.1
+    exposure_s: NotNegative = 0.004
+    pixel_noise_px: NotNegative = 1.0
+    quantum_px: NotNegative = 0.25
+    size_noise: NotNegative = 0.1
     tag_range: bool = False
     detection: DetectionModel = field(default_factory=PictureDetection)
-    max_range_m: float = 2000.0
-    min_depression_rad: float = math.radians(3.0)
-    false_detections_per_frame: float = 0.0
+    max_range_m: Positive = 2000.0
+    min_depression_rad: NotNegative = math.radians(3.0)
+    false_detections_per_frame: NotNegative = 0.0
     false_size_px: tuple[float, float] = (3.0, 12.0)
     mount_roll_rad: float = 0.0
     mount_pitch_rad: float = -0.5 * math.pi
@@ -91,31 +92,14 @@ class CameraParameters:
     misalignment_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     max_zoom: float = 6.0
-    blur_px_m: float = 2.0
-    min_focus_m: float = 0.5
+    blur_px_m: NotNegative = 2.0
+    min_focus_m: Positive = 0.5
     imager: ImagerParameters = field(default_factory=ImagerParameters)
     reader: FrameReaderParameters | None = None
 
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        require_positive(max_range_m=self.max_range_m, min_focus_m=self.min_focus_m)
+    def check_together(self) -> None:
         if not 1.0 <= self.max_zoom < math.inf:
             raise ValueError(f"max_zoom = {self.max_zoom!r} is not accepted: a number from 1 is")
-        require_not_negative(
-            latency_s=self.latency_s,
-            exposure_s=self.exposure_s,
-            pixel_noise_px=self.pixel_noise_px,
-            quantum_px=self.quantum_px,
-            size_noise=self.size_noise,
-            min_depression_rad=self.min_depression_rad,
-            false_detections_per_frame=self.false_detections_per_frame,
-            blur_px_m=self.blur_px_m,
-        )
-        require_finite(
-            mount_roll_rad=self.mount_roll_rad,
-            mount_pitch_rad=self.mount_pitch_rad,
-            mount_yaw_rad=self.mount_yaw_rad,
-        )
         if len(self.misalignment_rad) != 3 or not all(map(math.isfinite, self.misalignment_rad)):
             raise ValueError(
                 f"misalignment_rad = {self.misalignment_rad!r} is not accepted: three finite angles are"

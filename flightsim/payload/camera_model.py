@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ def gimbal_from_camera(points_camera: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PinholeModel:
+class PinholeModel(Options):
     """Square pixels, no distortion.
 
     Attributes:
@@ -38,13 +39,12 @@ class PinholeModel:
 
     width_px: int = 1280
     height_px: int = 720
-    horizontal_fov_rad: float = math.radians(60.0)
+    horizontal_fov_rad: Positive = math.radians(60.0)
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         for name, value in (("width_px", self.width_px), ("height_px", self.height_px)):
             if not isinstance(value, int) or value <= 0:
                 raise ValueError(f"{name} = {value!r} is not accepted: a positive whole number is")
-        require_positive(horizontal_fov_rad=self.horizontal_fov_rad)
         if self.horizontal_fov_rad >= math.pi:
             raise ValueError(
                 f"horizontal_fov_rad = {self.horizontal_fov_rad} is not accepted: less than pi is"

@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_not_negative
+from flightsim.foundation.checks import NotNegative
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ _PERIODS_S: Final = (60.0, 900.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DailyVariationParameters:
+class DailyVariationParameters(Options):
     """Sizes of the variation.
 
     Attributes:
@@ -35,11 +36,9 @@ class DailyVariationParameters:
 
     dip_nt: float = 30.0
     boot_h: float = 9.0
-    pulsation_nt: float = 0.5
+    pulsation_nt: NotNegative = 0.5
 
-    def __post_init__(self) -> None:
-        require_finite(dip_nt=self.dip_nt)
-        require_not_negative(pulsation_nt=self.pulsation_nt)
+    def check_together(self) -> None:
         if not 0.0 <= self.boot_h < 24.0:
             raise ValueError(f"boot_h = {self.boot_h} is not accepted: 0 to less than 24 hours are")
 

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_not_negative, require_positive, require_probability
+from flightsim.foundation.checks import NotNegative, Positive, Share
+from flightsim.foundation.options import Options
 from flightsim.payload.camera_model import PinholeModel
 from flightsim.payload.camera_view import CameraView
 from flightsim.payload.imager import ImagerParameters
@@ -111,7 +112,7 @@ class DetectionModel(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PictureDetection:
+class PictureDetection(Options):
     """Detection as detectors do it in pictures of the size of the model: a logistic curve over the size.
 
     Tags of the family 36h11 by the AprilTag 3 library, balls by their colour. A tag on the ground is
@@ -130,25 +131,14 @@ class PictureDetection:
         ball_half_size_px, ball_slope_px: of a ball; it isn't foreshortened, and blur doesn't hide it.
     """
 
-    max_probability: float = 0.998
-    half_size_px: float = 8.65
-    slope_px: float = 0.505
-    foreshortening: float = 0.844
-    min_depression_rad: float = math.radians(4.5)
-    blur_factor: float = 2.95
-    ball_half_size_px: float = 2.01
-    ball_slope_px: float = 0.042
-
-    def __post_init__(self) -> None:
-        require_probability(max_probability=self.max_probability)
-        require_not_negative(
-            half_size_px=self.half_size_px,
-            foreshortening=self.foreshortening,
-            min_depression_rad=self.min_depression_rad,
-            blur_factor=self.blur_factor,
-            ball_half_size_px=self.ball_half_size_px,
-        )
-        require_positive(slope_px=self.slope_px, ball_slope_px=self.ball_slope_px)
+    max_probability: Share = 0.998
+    half_size_px: NotNegative = 8.65
+    slope_px: Positive = 0.505
+    foreshortening: NotNegative = 0.844
+    min_depression_rad: NotNegative = math.radians(4.5)
+    blur_factor: NotNegative = 2.95
+    ball_half_size_px: NotNegative = 2.01
+    ball_slope_px: Positive = 0.042
 
     def probability(self, seen: SeenTargets) -> Array:
         """The curve at each target."""
@@ -164,7 +154,7 @@ class PictureDetection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ResolutionDetection:
+class ResolutionDetection(Options):
     """Detection by resolution: a logistic curve over the size in the image.
 
     The smooth form of Tisdale et al. (2008), equations 5 to 7, whose 0.96 is the default of the upper end.
@@ -175,13 +165,9 @@ class ResolutionDetection:
         slope_px: width of the fall; 0: a step.
     """
 
-    max_probability: float = 0.96
-    half_size_px: float = 4.0
-    slope_px: float = 0.7
-
-    def __post_init__(self) -> None:
-        require_probability(max_probability=self.max_probability)
-        require_not_negative(half_size_px=self.half_size_px, slope_px=self.slope_px)
+    max_probability: Share = 0.96
+    half_size_px: NotNegative = 4.0
+    slope_px: NotNegative = 0.7
 
     @classmethod
     def constant(cls, probability: float) -> "ResolutionDetection":

@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate, require_finite
+from flightsim.foundation.options import Options
 from flightsim.payload import gimbal_kernel as k
 from flightsim.sensors.sensor import gauss_markov
 from flightsim.sensors.suite import steps_per_sample
@@ -48,7 +49,7 @@ _KNOWN: Final = sum(GimbalFlags)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GimbalParameters:
+class GimbalParameters(Options):
     """A small brushless three-axis gimbal; `GimbalParameters.two_axis()` is a pan-tilt turret.
 
     Attributes:
@@ -69,40 +70,24 @@ class GimbalParameters:
     """
 
     axes: int = 3
-    rate_hz: int = 50
-    time_constant_s: float = 0.08
-    max_rate_rad_s: float = 120.0 * _DEG
-    roll_limit_rad: float = 45.0 * _DEG
+    rate_hz: Rate = 50
+    time_constant_s: Positive = 0.08
+    max_rate_rad_s: Positive = 120.0 * _DEG
+    roll_limit_rad: NotNegative = 45.0 * _DEG
     pitch_min_rad: float = -110.0 * _DEG
     pitch_max_rad: float = 30.0 * _DEG
-    yaw_limit_rad: float = math.pi
-    jitter_rad: float = 0.02 * _DEG
-    encoder_noise_rad: float = 0.05 * _DEG
-    attitude_noise_rad: float = 0.03 * _DEG
-    tilt_error_rad: float = 0.15 * _DEG
-    heading_error_rad: float = 1.0 * _DEG
-    error_time_constant_s: float = 60.0
-    gyro_noise_rad_s: float = 0.1 * _DEG
+    yaw_limit_rad: Positive = math.pi
+    jitter_rad: NotNegative = 0.02 * _DEG
+    encoder_noise_rad: NotNegative = 0.05 * _DEG
+    attitude_noise_rad: NotNegative = 0.03 * _DEG
+    tilt_error_rad: NotNegative = 0.15 * _DEG
+    heading_error_rad: NotNegative = 1.0 * _DEG
+    error_time_constant_s: Positive = 60.0
+    gyro_noise_rad_s: NotNegative = 0.1 * _DEG
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         if self.axes not in (2, 3):
             raise ValueError(f"axes = {self.axes!r} is not accepted: 2 or 3 is")
-        require_rate(self.rate_hz)
-        require_positive(
-            time_constant_s=self.time_constant_s,
-            max_rate_rad_s=self.max_rate_rad_s,
-            yaw_limit_rad=self.yaw_limit_rad,
-            error_time_constant_s=self.error_time_constant_s,
-        )
-        require_not_negative(
-            roll_limit_rad=self.roll_limit_rad,
-            jitter_rad=self.jitter_rad,
-            encoder_noise_rad=self.encoder_noise_rad,
-            attitude_noise_rad=self.attitude_noise_rad,
-            tilt_error_rad=self.tilt_error_rad,
-            heading_error_rad=self.heading_error_rad,
-            gyro_noise_rad_s=self.gyro_noise_rad_s,
-        )
         if not self.roll_limit_rad < 0.5 * math.pi:
             raise ValueError(f"roll_limit_rad = {self.roll_limit_rad} is not accepted: less than pi/2 is")
         lowest = -0.5 * math.pi if self.axes == 2 else -math.pi

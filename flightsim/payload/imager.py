@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_not_negative
+from flightsim.foundation.checks import NotNegative, require_finite
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ class BrownDistortion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ImagerParameters:
+class ImagerParameters(Options):
     """Lens and sensor. The defaults are ideal.
 
     Attributes:
@@ -88,14 +89,9 @@ class ImagerParameters:
     """
 
     distortion: BrownDistortion = field(default_factory=BrownDistortion)
-    read_noise: float = 0.0
-    shot_noise: float = 0.0
-    rolling_shutter_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_not_negative(
-            read_noise=self.read_noise, shot_noise=self.shot_noise, rolling_shutter_s=self.rolling_shutter_s
-        )
+    read_noise: NotNegative = 0.0
+    shot_noise: NotNegative = 0.0
+    rolling_shutter_s: NotNegative = 0.0
 
     @property
     def noisy(self) -> bool:

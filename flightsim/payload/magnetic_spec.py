@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from flightsim.foundation.checks import require_finite, require_positive
+from flightsim.foundation.checks import Positive
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
+from flightsim.foundation.options import Options
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload.daily_variation import DailyVariation, DailyVariationParameters
@@ -22,7 +23,7 @@ _MAX_DISTANCE_M: Final = 50_000.0  # from home to a published map
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InducedDipole:
+class InducedDipole(Options):
     """A dipole that is magnetised along the Earth's field.
 
     Attributes:
@@ -34,21 +35,19 @@ class InducedDipole:
 
     north_m: float
     east_m: float
-    moment_a_m2: float
+    moment_a_m2: Positive
     depth_m: float = 10.0
     velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         require_velocity(self.velocity_ne_m_s)
-        require_finite(north_m=self.north_m, east_m=self.east_m, depth_m=self.depth_m)
-        require_positive(moment_a_m2=self.moment_a_m2)
 
 
 SignatureSpec: TypeAlias = GaussianSignature | DipoleSignature | InducedDipole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MagneticSpec:
+class MagneticSpec(Options):
     """The true magnetic field, and the published map that a survey made of it.
 
     Attributes:
@@ -65,18 +64,14 @@ class MagneticSpec:
     """
 
     map_file: Path | None = None
-    width_m: float = 2000.0
-    height_m: float = 2000.0
-    spacing_m: float = _MAP_SPACING_M
+    width_m: Positive = 2000.0
+    height_m: Positive = 2000.0
+    spacing_m: Positive = _MAP_SPACING_M
     survey_height_m: float = 100.0
     raised_m: float = 0.0
     exact_map: bool = False
     daily: DailyVariationParameters | None = None
     signatures: tuple[SignatureSpec, ...] = ()
-
-    def __post_init__(self) -> None:
-        require_positive(width_m=self.width_m, height_m=self.height_m, spacing_m=self.spacing_m)
-        require_finite(survey_height_m=self.survey_height_m)
 
 
 def magnetic_field_of(

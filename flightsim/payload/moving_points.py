@@ -15,12 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import (
-    require_not_negative,
-    require_positive,
-    require_probability,
-    require_rate,
-)
+from flightsim.foundation.checks import NotNegative, Positive, Rate, Share
+from flightsim.foundation.options import Options
 from flightsim.foundation.vectors import conjugate, from_euler, product, rotate
 from flightsim.home import Home
 from flightsim.payload.camera import Camera, CameraParameters
@@ -53,7 +49,7 @@ class PointReaderParameters(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MovingPointParameters:
+class MovingPointParameters(Options):
     """A camera with a front end for moving objects; on the gimbal, if the vehicle has one.
 
     Attributes:
@@ -71,24 +67,18 @@ class MovingPointParameters:
             model.
     """
 
-    rate_hz: int = 10
-    latency_s: float = 0.1
+    rate_hz: Rate = 10
+    latency_s: NotNegative = 0.1
     half_view: tuple[float, float] = (0.577, 0.433)
-    pixel_rad: float = 0.002
-    detected: float = 0.9
-    false_points: float = 1.0
-    least_speed_m_s: float = 0.3
-    reach_m: float = 1500.0
+    pixel_rad: Positive = 0.002
+    detected: Share = 0.9
+    false_points: NotNegative = 1.0
+    least_speed_m_s: NotNegative = 0.3
+    reach_m: Positive = 1500.0
     mount_pitch_rad: float = -0.5 * math.pi
     reader: PointReaderParameters | None = None
 
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        require_positive(reach_m=self.reach_m, pixel_rad=self.pixel_rad)
-        require_probability(detected=self.detected)
-        require_not_negative(
-            latency_s=self.latency_s, false_points=self.false_points, least_speed_m_s=self.least_speed_m_s
-        )
+    def check_together(self) -> None:
         if len(self.half_view) != 2 or not all(0.0 < value < 10.0 for value in self.half_view):
             raise ValueError(f"half_view = {self.half_view!r} is not accepted: two tangents in 0..10 are")
         if not math.isfinite(self.mount_pitch_rad):

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, Positive
+from flightsim.foundation.options import Options
 from flightsim.home import Home
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.detection import CameraFrame
@@ -45,7 +46,7 @@ _READINGS: Final[Mapping[Device, str]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DeviceOutage:
+class DeviceOutage(Options):
     """A time in which a device delivers nothing, while its computer goes on.
 
     Attributes:
@@ -55,13 +56,8 @@ class DeviceOutage:
     """
 
     device: Device
-    start_s: float
-    duration_s: float | None = None
-
-    def __post_init__(self) -> None:
-        require_not_negative(start_s=self.start_s)
-        if self.duration_s is not None:
-            require_positive(duration_s=self.duration_s)
+    start_s: NotNegative
+    duration_s: Positive | None = None
 
     def covers(self, time_us: int) -> bool:
         """Whether it lasts at a vehicle time."""

@@ -11,12 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import (
-    require_not_negative,
-    require_positive,
-    require_probability,
-    require_rate,
-)
+from flightsim.foundation.checks import NotNegative, Positive, Rate, Share
+from flightsim.foundation.options import Options
 from flightsim.home import Home
 from flightsim.payload.home_frame import HomeFrame
 
@@ -24,23 +20,19 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RadioOutage:
+class RadioOutage(Options):
     """A time without ranges.
 
     Attributes:
         start_s, duration_s: time of the simulation.
     """
 
-    start_s: float
-    duration_s: float
-
-    def __post_init__(self) -> None:
-        require_not_negative(start_s=self.start_s)
-        require_positive(duration_s=self.duration_s)
+    start_s: NotNegative
+    duration_s: Positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RangeRadioParameters:
+class RangeRadioParameters(Options):
     """A radio that measures the range to every other vehicle with a radio.
 
     Attributes:
@@ -51,16 +43,11 @@ class RangeRadioParameters:
         outages: times without ranges.
     """
 
-    rate_hz: int = 10
-    sigma_m: float = 3.0
-    missing: float = 0.02
-    reach_m: float = 5000.0
+    rate_hz: Rate = 10
+    sigma_m: Positive = 3.0
+    missing: Share = 0.02
+    reach_m: Positive = 5000.0
     outages: tuple[RadioOutage, ...] = ()
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        require_positive(sigma_m=self.sigma_m, reach_m=self.reach_m)
-        require_probability(missing=self.missing)
 
 
 @dataclass(frozen=True, slots=True)

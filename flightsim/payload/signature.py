@@ -7,8 +7,9 @@ from typing import Final, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_positive
+from flightsim.foundation.checks import Positive
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 Places: TypeAlias = NDArray[np.float64] | np.float64
@@ -52,7 +53,7 @@ def require_velocity(velocity_ne_m_s: tuple[float, float]) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GaussianSignature:
+class GaussianSignature(Options):
     """A two-dimensional Gaussian, the same at every height (Lum et al. 2005, figure 3).
 
     Attributes:
@@ -66,20 +67,13 @@ class GaussianSignature:
     north_m: float
     east_m: float
     amplitude_nt: float = 30.0
-    sigma_along_m: float = 250.0
-    sigma_across_m: float = 120.0
+    sigma_along_m: Positive = 250.0
+    sigma_across_m: Positive = 120.0
     heading_rad: float = 0.0
     velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         require_velocity(self.velocity_ne_m_s)
-        require_finite(
-            north_m=self.north_m,
-            east_m=self.east_m,
-            amplitude_nt=self.amplitude_nt,
-            heading_rad=self.heading_rad,
-        )
-        require_positive(sigma_along_m=self.sigma_along_m, sigma_across_m=self.sigma_across_m)
 
     def anomaly_nt(self, north_m: Places, east_m: Places, height_m: float, field_ned_nt: Array) -> Places:
         """The Gaussian; height and field don't matter."""
@@ -103,7 +97,7 @@ class GaussianSignature:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DipoleSignature:
+class DipoleSignature(Options):
     """A magnetic dipole: the field of any compact body at some of its lengths away.
 
     B = mu_0 / 4 pi (3 (m r) r / |r|^5 - m / |r|^3) adds as a vector to the Earth's field; a scalar
@@ -123,9 +117,8 @@ class DipoleSignature:
     moment_ned_a_m2: tuple[float, float, float]
     velocity_ne_m_s: tuple[float, float] = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         require_velocity(self.velocity_ne_m_s)
-        require_finite(north_m=self.north_m, east_m=self.east_m, height_m=self.height_m)
         if len(self.moment_ned_a_m2) != 3 or not all(map(math.isfinite, self.moment_ned_a_m2)):
             raise ValueError(
                 f"moment_ned_a_m2 = {self.moment_ned_a_m2!r} is not accepted: 3 finite numbers are"

@@ -16,7 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, Positive
+from flightsim.foundation.options import Options
 from flightsim.payload.magnetic_map import MagneticMap
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ _TIE_SPACING: Final = 5.0  # of tie lines, in line spacings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SurveyParameters:
+class SurveyParameters(Options):
     """A survey by a light aircraft at low height, processed with care.
 
     Attributes:
@@ -41,30 +42,15 @@ class SurveyParameters:
         gradient_error_nt_m: one sigma of a line's vertical gradient.
     """
 
-    line_spacing_m: float = 200.0
-    noise_nt: float = 0.2
-    levelling_nt: float = 0.6
-    diurnal_nt: float = 0.4
-    diurnal_time_constant_s: float = 600.0
-    track_error_m: float = 4.0
-    height_error_m: float = 4.0
-    wander_m: float = 300.0
-    gradient_error_nt_m: float = 0.003
-
-    def __post_init__(self) -> None:
-        require_positive(
-            line_spacing_m=self.line_spacing_m,
-            diurnal_time_constant_s=self.diurnal_time_constant_s,
-            wander_m=self.wander_m,
-        )
-        require_not_negative(
-            noise_nt=self.noise_nt,
-            levelling_nt=self.levelling_nt,
-            diurnal_nt=self.diurnal_nt,
-            track_error_m=self.track_error_m,
-            height_error_m=self.height_error_m,
-            gradient_error_nt_m=self.gradient_error_nt_m,
-        )
+    line_spacing_m: Positive = 200.0
+    noise_nt: NotNegative = 0.2
+    levelling_nt: NotNegative = 0.6
+    diurnal_nt: NotNegative = 0.4
+    diurnal_time_constant_s: Positive = 600.0
+    track_error_m: NotNegative = 4.0
+    height_error_m: NotNegative = 4.0
+    wander_m: Positive = 300.0
+    gradient_error_nt_m: NotNegative = 0.003
 
 
 def surveyed(

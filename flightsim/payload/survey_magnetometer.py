@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.main_field import NANOTESLA_PER_GAUSS
+from flightsim.foundation.options import Options
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SurveyMagnetometerParameters:
+class SurveyMagnetometerParameters(Options):
     """A caesium or potassium magnetometer on a small aircraft, compensated.
 
     Attributes:
@@ -38,25 +39,14 @@ class SurveyMagnetometerParameters:
             `heading_error_nt` is left.
     """
 
-    rate_hz: int = 10
-    latency_s: float = 0.0
-    noise_nt: float = 0.2
-    heading_error_nt: float = 0.3
-    drift_nt: float = 0.2
-    drift_time_constant_s: float = 600.0
-    quantum_nt: float = 0.001
+    rate_hz: Rate = 10
+    latency_s: NotNegative = 0.0
+    noise_nt: NotNegative = 0.2
+    heading_error_nt: NotNegative = 0.3
+    drift_nt: NotNegative = 0.2
+    drift_time_constant_s: Positive = 600.0
+    quantum_nt: NotNegative = 0.001
     vehicle_field: VehicleFieldParameters | None = None
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        require_positive(drift_time_constant_s=self.drift_time_constant_s)
-        require_not_negative(
-            latency_s=self.latency_s,
-            noise_nt=self.noise_nt,
-            heading_error_nt=self.heading_error_nt,
-            drift_nt=self.drift_nt,
-            quantum_nt=self.quantum_nt,
-        )
 
 
 @dataclass(frozen=True, slots=True)

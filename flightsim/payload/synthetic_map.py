@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, Positive
 from flightsim.foundation.main_field import MainField
 from flightsim.home import Home
 from flightsim.payload.area_grid import AreaGrid
@@ -41,21 +41,14 @@ class SyntheticMapParameters(AreaGrid):
     west_m: float = -2000.0
     north_m: float = 2000.0
     east_m: float = 2000.0
-    spacing_m: float = 100.0
+    spacing_m: Positive = 100.0
     height_m: float = 100.0
-    anomaly_nt: float = 60.0
-    source_depth_m: float = 500.0
-    spectral_exponent: float = 3.0
-    shallow_anomaly_nt: float = 3.0
-    shallow_depth_m: float = 100.0
-    raised_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        AreaGrid.__post_init__(self)
-        require_finite(height_m=self.height_m)
-        require_positive(source_depth_m=self.source_depth_m, shallow_depth_m=self.shallow_depth_m)
-        require_not_negative(shallow_anomaly_nt=self.shallow_anomaly_nt, raised_m=self.raised_m)
-        require_not_negative(anomaly_nt=self.anomaly_nt, spectral_exponent=self.spectral_exponent)
+    anomaly_nt: NotNegative = 60.0
+    source_depth_m: Positive = 500.0
+    spectral_exponent: NotNegative = 3.0
+    shallow_anomaly_nt: NotNegative = 3.0
+    shallow_depth_m: Positive = 100.0
+    raised_m: NotNegative = 0.0
 
 
 def synthetic_map(

@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, NotNegativeOrInf, Positive
+from flightsim.foundation.options import Options
 
 State = tuple[float, float, float, float]
 """north m, east m, north m/s, east m/s"""
@@ -30,7 +31,7 @@ class TargetMotion(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Static:
+class Static(Options):
     """Stays where it is.
 
     Attributes:
@@ -39,9 +40,6 @@ class Static:
 
     north_m: float
     east_m: float
-
-    def __post_init__(self) -> None:
-        require_finite(north_m=self.north_m, east_m=self.east_m)
 
     def start(self, rng: np.random.Generator) -> Trajectory:
         """Nothing is random."""
@@ -53,7 +51,7 @@ class Static:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ConstantVelocity:
+class ConstantVelocity(Options):
     """Straight on.
 
     Attributes:
@@ -64,12 +62,8 @@ class ConstantVelocity:
 
     north_m: float
     east_m: float
-    speed_m_s: float
+    speed_m_s: NotNegative
     course_rad: float
-
-    def __post_init__(self) -> None:
-        require_finite(north_m=self.north_m, east_m=self.east_m, course_rad=self.course_rad)
-        require_not_negative(speed_m_s=self.speed_m_s)
 
     def start(self, rng: np.random.Generator) -> Trajectory:
         """Nothing is random."""
@@ -83,7 +77,7 @@ class ConstantVelocity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
+class Circle(Options):
     """Round and round.
 
     Attributes:
@@ -96,15 +90,10 @@ class Circle:
 
     north_m: float
     east_m: float
-    radius_m: float
-    speed_m_s: float
+    radius_m: Positive
+    speed_m_s: NotNegative
     bearing_rad: float = 0.0
     clockwise: bool = True
-
-    def __post_init__(self) -> None:
-        require_finite(north_m=self.north_m, east_m=self.east_m, bearing_rad=self.bearing_rad)
-        require_positive(radius_m=self.radius_m)
-        require_not_negative(speed_m_s=self.speed_m_s)
 
     def start(self, rng: np.random.Generator) -> Trajectory:
         """Nothing is random."""
@@ -125,7 +114,7 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RandomWalk:
+class RandomWalk(Options):
     """Fixed speed, straight legs, a random turn between them, within a box whose edges reflect.
 
     Attributes:
@@ -141,20 +130,13 @@ class RandomWalk:
     west_m: float
     north_m: float
     east_m: float
-    speed_m_s: float
-    leg_s: float = 10.0
-    turn_rad: float = 0.5
+    speed_m_s: NotNegative
+    leg_s: Positive = 10.0
+    turn_rad: NotNegativeOrInf = 0.5
     start_m: tuple[float, float] | None = None
     course_rad: float | None = None
 
-    def __post_init__(self) -> None:
-        require_finite(south_m=self.south_m, west_m=self.west_m, north_m=self.north_m, east_m=self.east_m)
-        require_not_negative(speed_m_s=self.speed_m_s)
-        require_positive(leg_s=self.leg_s)
-        if not self.turn_rad >= 0.0:
-            raise ValueError(f"turn_rad = {self.turn_rad!r} is not accepted: at least 0, or infinity, is")
-        if self.course_rad is not None:
-            require_finite(course_rad=self.course_rad)
+    def check_together(self) -> None:
         for low, high, names in (
             (self.south_m, self.north_m, "south_m and north_m"),
             (self.west_m, self.east_m, "west_m and east_m"),

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import require_not_negative, require_positive, require_probability
+from flightsim.foundation.checks import NotNegative, Positive, Share
+from flightsim.foundation.options import Options
 from flightsim.foundation.vectors import wrap_pi, yaw_of
 from flightsim.home import Home
 from flightsim.payload.home_frame import HomeFrame
@@ -26,7 +27,7 @@ _BLOCK: Final = 64  # draws of a stream that are made at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ScanDisturbance:
+class ScanDisturbance(Options):
     """A time in which the sensor does not work as usual.
 
     Attributes:
@@ -34,15 +35,9 @@ class ScanDisturbance:
         clutter_per_scan: mean number of false detections in that time; None: the sensor is off.
     """
 
-    start_s: float
-    duration_s: float
-    clutter_per_scan: float | None = None
-
-    def __post_init__(self) -> None:
-        require_not_negative(start_s=self.start_s)
-        require_positive(duration_s=self.duration_s)
-        if self.clutter_per_scan is not None:
-            require_not_negative(clutter_per_scan=self.clutter_per_scan)
+    start_s: NotNegative
+    duration_s: Positive
+    clutter_per_scan: NotNegative | None = None
 
     def covers(self, time_us: int) -> bool:
         """Whether it lasts at a vehicle time."""
@@ -50,7 +45,7 @@ class ScanDisturbance:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TargetSensorParameters:
+class TargetSensorParameters(Options):
     """A sensor that looks in all directions and is stabilized to the horizon.
 
     A target at the offset (f, r), forward and right of the vehicle, is detected with the probability
@@ -67,29 +62,15 @@ class TargetSensorParameters:
         disturbances: times in which the sensor is off or has more false detections.
     """
 
-    period_s: float = 1.0
-    gain: float = 0.98
-    forward_scale_m: float = 15.0
-    right_scale_m: float = 15.0
-    reach_m: float = 100.0
-    range_sigma_m: float = 0.5
-    bearing_sigma_rad: float = 0.03
-    clutter_per_scan: float = 0.0
+    period_s: Positive = 1.0
+    gain: Share = 0.98
+    forward_scale_m: Positive = 15.0
+    right_scale_m: Positive = 15.0
+    reach_m: Positive = 100.0
+    range_sigma_m: NotNegative = 0.5
+    bearing_sigma_rad: NotNegative = 0.03
+    clutter_per_scan: NotNegative = 0.0
     disturbances: tuple[ScanDisturbance, ...] = ()
-
-    def __post_init__(self) -> None:
-        require_positive(
-            period_s=self.period_s,
-            forward_scale_m=self.forward_scale_m,
-            right_scale_m=self.right_scale_m,
-            reach_m=self.reach_m,
-        )
-        require_probability(gain=self.gain)
-        require_not_negative(
-            range_sigma_m=self.range_sigma_m,
-            bearing_sigma_rad=self.bearing_sigma_rad,
-            clutter_per_scan=self.clutter_per_scan,
-        )
 
     def probability(self, forward_m: float, right_m: float) -> float:
         """Probability to detect a target at an offset."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 from flightsim.payload.target_motion import TargetMotion
 from flightsim.payload.target_shape import TargetShape
 
@@ -17,7 +18,7 @@ NO_TAG = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GroundTargetParameters:
+class GroundTargetParameters(Options):
     """One target.
 
     Attributes:
@@ -28,12 +29,11 @@ class GroundTargetParameters:
     """
 
     motion: TargetMotion
-    size_m: float = 2.0
+    size_m: Positive = 2.0
     tag_id: int = NO_TAG
     shape: TargetShape = TargetShape.BALL
 
-    def __post_init__(self) -> None:
-        require_positive(size_m=self.size_m)
+    def check_together(self) -> None:
         if not isinstance(self.tag_id, int) or self.tag_id < NO_TAG:
             raise ValueError(f"tag_id = {self.tag_id!r} is not accepted: a whole number from {NO_TAG} is")
 

@@ -14,7 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload.area_grid import AreaGrid
 
@@ -33,14 +34,12 @@ class TerrainSpec(AreaGrid):
         stream: number of the terrain; terrains of one seed with different numbers are independent.
     """
 
-    spacing_m: float = 5.0
-    relief_m: float = 10.0
+    spacing_m: Positive = 5.0
+    relief_m: Positive = 10.0
     hurst: float = 0.8
     stream: int = 0
 
-    def __post_init__(self) -> None:
-        AreaGrid.__post_init__(self)
-        require_positive(relief_m=self.relief_m)
+    def check_together(self) -> None:
         if not 0.0 < self.hurst < 1.0:
             raise ValueError(f"hurst = {self.hurst} is not accepted: a number between 0 and 1 is")
 
@@ -63,7 +62,7 @@ class TerrainSpec(AreaGrid):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Terrain:
+class Terrain(Options):
     """Heights of the ground on a grid.
 
     Attributes:
@@ -74,11 +73,10 @@ class Terrain:
 
     south_m: float
     west_m: float
-    spacing_m: float
+    spacing_m: Positive
     height_m: Array
 
-    def __post_init__(self) -> None:
-        require_positive(spacing_m=self.spacing_m)
+    def check_together(self) -> None:
         if self.height_m.ndim != 2 or min(self.height_m.shape) < 2 or not np.all(np.isfinite(self.height_m)):
             raise ValueError(
                 f"height_m of shape {self.height_m.shape} is not accepted: finite heights on a grid of 2 x 2 "

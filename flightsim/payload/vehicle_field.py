@@ -15,13 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_not_negative
+from flightsim.foundation.checks import NotNegative
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleFieldParameters:
+class VehicleFieldParameters(Options):
     """Size of an aircraft's field at its magnetometer, one sigma of each coefficient. The defaults are those
     of a small aircraft with the sensor on a wing tip, before compensation.
 
@@ -31,12 +32,9 @@ class VehicleFieldParameters:
         eddy_s: of each product of an axis and the rate of another.
     """
 
-    permanent_nt: float = 12.0
-    induced: float = 1.5e-4
-    eddy_s: float = 3e-5
-
-    def __post_init__(self) -> None:
-        require_not_negative(permanent_nt=self.permanent_nt, induced=self.induced, eddy_s=self.eddy_s)
+    permanent_nt: NotNegative = 12.0
+    induced: NotNegative = 1.5e-4
+    eddy_s: NotNegative = 3e-5
 
 
 class VehicleField:

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, Positive, require_not_negative
+from flightsim.foundation.options import Options
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
 from flightsim.payload.camera_view import CameraView, TargetView
 from flightsim.payload.imager import ImagerParameters
@@ -29,7 +30,7 @@ _COVERED: Final = 12  # grey of a camera that is put away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scenery:
+class Scenery(Options):
     """The scenery besides the targets: fields of 100 m with tracks between them, a mark at home.
 
     Attributes:
@@ -39,21 +40,12 @@ class Scenery:
         sun_azimuth_rad, sun_elevation_rad: where light comes from.
     """
 
-    runway_length_m: float = 0.0
-    runway_width_m: float = 20.0
+    runway_length_m: NotNegative = 0.0
+    runway_width_m: Positive = 20.0
     runway_heading_rad: float = 0.0
-    visibility_m: float = 6000.0
+    visibility_m: Positive = 6000.0
     sun_azimuth_rad: float = math.radians(150.0)
     sun_elevation_rad: float = math.radians(45.0)
-
-    def __post_init__(self) -> None:
-        require_not_negative(runway_length_m=self.runway_length_m)
-        require_positive(runway_width_m=self.runway_width_m, visibility_m=self.visibility_m)
-        require_finite(
-            runway_heading_rad=self.runway_heading_rad,
-            sun_azimuth_rad=self.sun_azimuth_rad,
-            sun_elevation_rad=self.sun_elevation_rad,
-        )
 
 
 class Renderer:

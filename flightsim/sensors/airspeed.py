@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import ICE_POINT_K
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.interface import AIRSPEED_DIFFERENTIAL_PRESSURE_PA, AIRSPEED_SIZE, AIRSPEED_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
@@ -47,7 +48,7 @@ _NORMALS: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AirspeedParameters:
+class AirspeedParameters(Options):
     """A plain pitot-static tube with a TE Connectivity MS4525DO, 1 psi differential, zeroed before flight.
 
     Attributes:
@@ -66,23 +67,21 @@ class AirspeedParameters:
         self_heating_k, temperature_quantum_k: the transducer's own temperature reading, 11 bits over 200 K.
     """
 
-    rate_hz: int = 25
-    latency_s: float = 0.0
-    noise_pa: float = 1.5
-    zero_offset_pa: float = 1.5
-    scale_error: float = 0.01
-    drift_pa: float = 0.7
-    drift_time_constant_s: float = 300.0
-    lag_s: float = 0.05
-    insensitive_angle_rad: float = math.radians(15.0)
-    range_pa: float = 6894.757
-    quantum_pa: float = 2.0 * 6894.757 / (0.8 * 16383)
-    self_heating_k: float = 5.0
-    temperature_quantum_k: float = 200.0 / 2047
+    rate_hz: Rate = 25
+    latency_s: NotNegative = 0.0
+    noise_pa: NotNegative = 1.5
+    zero_offset_pa: NotNegative = 1.5
+    scale_error: NotNegative = 0.01
+    drift_pa: NotNegative = 0.7
+    drift_time_constant_s: Positive = 300.0
+    lag_s: NotNegative = 0.05
+    insensitive_angle_rad: NotNegative = math.radians(15.0)
+    range_pa: Positive = 6894.757
+    quantum_pa: NotNegative = 2.0 * 6894.757 / (0.8 * 16383)
+    self_heating_k: NotNegative = 5.0
+    temperature_quantum_k: NotNegative = 200.0 / 2047
 
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self, "drift_time_constant_s", "range_pa")
+    def check_together(self) -> None:
         if self.insensitive_angle_rad >= 0.5 * math.pi:
             raise ValueError(
                 f"insensitive_angle_rad = {self.insensitive_angle_rad} is not accepted: less than pi/2 is"

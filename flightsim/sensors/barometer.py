@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import ICE_POINT_K
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
@@ -34,7 +35,7 @@ _NORMALS: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BarometerParameters:
+class BarometerParameters(Options):
     """A TE Connectivity MS5611-01BA03 at oversampling 4096 (datasheet figures) in a Pixhawk's case.
 
     Attributes:
@@ -50,20 +51,16 @@ class BarometerParameters:
         self_heating_k, temperature_quantum_k: the sensor's own temperature reading.
     """
 
-    rate_hz: int = 25
-    latency_s: float = 0.0
-    noise_pa: float = 1.2
-    turn_on_bias_pa: float = 20.0
-    drift_pa: float = 1.5
-    drift_time_constant_s: float = 300.0
-    lag_s: float = 0.03
-    quantum_pa: float = 1.0
-    self_heating_k: float = 10.0
-    temperature_quantum_k: float = 0.01
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self, "drift_time_constant_s")
+    rate_hz: Rate = 25
+    latency_s: NotNegative = 0.0
+    noise_pa: NotNegative = 1.2
+    turn_on_bias_pa: NotNegative = 20.0
+    drift_pa: NotNegative = 1.5
+    drift_time_constant_s: Positive = 300.0
+    lag_s: NotNegative = 0.03
+    quantum_pa: NotNegative = 1.0
+    self_heating_k: NotNegative = 10.0
+    temperature_quantum_k: NotNegative = 0.01
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its offset and where its drift starts."""

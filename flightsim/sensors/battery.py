@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, quantise
 
@@ -31,7 +32,7 @@ _NORMALS: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BatteryMonitorParameters:
+class BatteryMonitorParameters(Options):
     """The classic analogue power module on a 12-bit, 3.3 V converter, with PX4's 18.1 V/V and 36.4 A/V.
 
     Attributes:
@@ -45,18 +46,14 @@ class BatteryMonitorParameters:
         current_quantum_a: 3.3 V / 4096 * 36.4.
     """
 
-    rate_hz: int = 10
-    latency_s: float = 0.0
-    voltage_noise_v: float = 0.01
-    voltage_scale_error: float = 0.002
-    voltage_quantum_v: float = 3.3 / 4096 * 18.1
-    current_noise_a: float = 0.1
-    current_scale_error: float = 0.02
-    current_quantum_a: float = 3.3 / 4096 * 36.4
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self)
+    rate_hz: Rate = 10
+    latency_s: NotNegative = 0.0
+    voltage_noise_v: NotNegative = 0.01
+    voltage_scale_error: NotNegative = 0.002
+    voltage_quantum_v: NotNegative = 3.3 / 4096 * 18.1
+    current_noise_a: NotNegative = 0.1
+    current_scale_error: NotNegative = 0.02
+    current_quantum_a: NotNegative = 3.3 / 4096 * 36.4
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its scale errors. The charge used before the first sample is taken as known."""

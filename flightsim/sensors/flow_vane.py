@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.interface import VANE_ANGLE_OF_ATTACK_RAD, VANE_SIDESLIP_RAD, VANE_SIZE
 from flightsim.sensors.sensor import SensorModel, quantise, saturate
 
@@ -27,7 +28,7 @@ _CONSTANTS: Final = 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlowVaneParameters:
+class FlowVaneParameters(Options):
     """Two balsa-size vanes on magnetic 12-bit encoders, on a boom ahead of the flow that the aircraft bends.
 
     MAVLink has no failure unit for them, so they can't fail.
@@ -43,18 +44,14 @@ class FlowVaneParameters:
         min_dynamic_pressure_pa: below it friction holds the vane where it is (10 Pa: 4 m/s at sea level).
     """
 
-    rate_hz: int = 25
-    latency_s: float = 0.0
-    noise_rad: float = 0.25 * _DEG
-    misalignment_rad: float = 0.2 * _DEG
-    lag_s: float = 0.03
-    limit_rad: float = 40.0 * _DEG
-    quantum_rad: float = 2.0 * math.pi / 4096.0
-    min_dynamic_pressure_pa: float = 10.0
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self, "limit_rad")
+    rate_hz: Rate = 25
+    latency_s: NotNegative = 0.0
+    noise_rad: NotNegative = 0.25 * _DEG
+    misalignment_rad: NotNegative = 0.2 * _DEG
+    lag_s: NotNegative = 0.03
+    limit_rad: Positive = 40.0 * _DEG
+    quantum_rad: NotNegative = 2.0 * math.pi / 4096.0
+    min_dynamic_pressure_pa: NotNegative = 10.0
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its misalignments. Both vanes stand at zero before the first flow."""

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.geodesy import curvature_radii_m, longitude_near
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.foundation.rotations import wrap_180
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
@@ -44,7 +45,7 @@ _NORMALS: Final = 9  # white 3, velocity 3, correlated 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GpsFixStage:
+class GpsFixStage(Options):
     """What the receiver reports from a moment on.
 
     Attributes:
@@ -55,15 +56,14 @@ class GpsFixStage:
         error_scale: factor on all errors and on the accuracies reported.
     """
 
-    start_s: float
+    start_s: NotNegative
     fix_type: int
     satellites: int
-    hdop: float
-    vdop: float
-    error_scale: float = 1.0
+    hdop: NotNegative
+    vdop: NotNegative
+    error_scale: NotNegative = 1.0
 
-    def __post_init__(self) -> None:
-        check_amounts(self)
+    def check_together(self) -> None:
         if not 0 <= self.fix_type <= 6:
             raise ValueError(f"fix_type = {self.fix_type!r} is not accepted: GPS_FIX_TYPE 0 to 6 is")
         if not 0 <= self.satellites <= 254:
@@ -90,7 +90,7 @@ RECEIVERS: Final = ("differential", "standalone")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GpsParameters:
+class GpsParameters(Options):
     """A receiver with differential corrections; `GpsParameters.standalone()` is one without.
 
     The white part is PX4's SIH receiver (0.2 m horizontal, 0.5 m vertical; velocity 0.06, 0.077, 0.158 m/s).
@@ -108,22 +108,20 @@ class GpsParameters:
         fix_timeline: stages by start time; before the first the receiver is silent.
     """
 
-    rate_hz: int = 5
-    latency_s: float = 0.11
-    horizontal_noise_m: float = 0.2
-    vertical_noise_m: float = 0.5
-    horizontal_wander_m: float = 0.06
-    vertical_wander_m: float = 0.12
-    wander_time_constant_s: float = 100.0
-    velocity_noise_north_m_s: float = 0.06
-    velocity_noise_east_m_s: float = 0.077
-    velocity_noise_down_m_s: float = 0.158
-    reported_accuracy_scale: float = 1.0
+    rate_hz: Rate = 5
+    latency_s: NotNegative = 0.11
+    horizontal_noise_m: NotNegative = 0.2
+    vertical_noise_m: NotNegative = 0.5
+    horizontal_wander_m: NotNegative = 0.06
+    vertical_wander_m: NotNegative = 0.12
+    wander_time_constant_s: Positive = 100.0
+    velocity_noise_north_m_s: NotNegative = 0.06
+    velocity_noise_east_m_s: NotNegative = 0.077
+    velocity_noise_down_m_s: NotNegative = 0.158
+    reported_accuracy_scale: Positive = 1.0
     fix_timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
 
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self, "wander_time_constant_s", "reported_accuracy_scale")
+    def check_together(self) -> None:
         starts = [stage.start_s for stage in self.fix_timeline]
         if starts != sorted(starts):
             raise ValueError(f"fix_timeline starts at {starts} s: accepted are stages in order of time")

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, ICE_POINT_K
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
@@ -50,7 +51,7 @@ _NORMALS: Final = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ImuParameters:
+class ImuParameters(Options):
     """A calibrated Bosch BMI088, the IMU of Pixhawk 5X and 6X boards, unless noted otherwise.
 
     Numbers are one-sigma where they describe a spread. Datasheet: BST-BMI088-DS001, section 1.2.
@@ -77,39 +78,28 @@ class ImuParameters:
         vibration: of the airframe by its rotors; None: none.
     """
 
-    rate_hz: int = 250
-    latency_s: float = 0.0
-    gyro_noise_density_rad_s_sqrt_hz: float = 0.014 * _DEG
-    gyro_bias_instability_rad_s: float = 0.015 * _DEG
-    gyro_bias_time_constant_s: float = 1000.0
-    gyro_turn_on_bias_rad_s: float = 1.0e-3
-    gyro_scale_error: float = 0.0033
-    gyro_cross_axis_error: float = 0.001
-    gyro_range_rad_s: float = 2000.0 * _DEG
-    gyro_quantum_rad_s: float = 2000.0 * _DEG / 32768.0
-    accel_noise_density_m_s2_sqrt_hz: float = 175e-6 * GRAVITY_M_S2
-    accel_bias_instability_m_s2: float = 0.2e-3 * GRAVITY_M_S2
-    accel_bias_time_constant_s: float = 300.0
-    accel_turn_on_bias_m_s2: float = 0.02
-    accel_scale_error: float = 0.001
-    accel_cross_axis_error: float = 0.001
-    accel_range_m_s2: float = 24.0 * GRAVITY_M_S2
-    accel_quantum_m_s2: float = 24.0 * GRAVITY_M_S2 / 32768.0
-    self_heating_k: float = 15.0
-    warm_up_s: float = 300.0
-    temperature_quantum_k: float = 0.125
+    rate_hz: Rate = 250
+    latency_s: NotNegative = 0.0
+    gyro_noise_density_rad_s_sqrt_hz: NotNegative = 0.014 * _DEG
+    gyro_bias_instability_rad_s: NotNegative = 0.015 * _DEG
+    gyro_bias_time_constant_s: Positive = 1000.0
+    gyro_turn_on_bias_rad_s: NotNegative = 1.0e-3
+    gyro_scale_error: NotNegative = 0.0033
+    gyro_cross_axis_error: NotNegative = 0.001
+    gyro_range_rad_s: Positive = 2000.0 * _DEG
+    gyro_quantum_rad_s: NotNegative = 2000.0 * _DEG / 32768.0
+    accel_noise_density_m_s2_sqrt_hz: NotNegative = 175e-6 * GRAVITY_M_S2
+    accel_bias_instability_m_s2: NotNegative = 0.2e-3 * GRAVITY_M_S2
+    accel_bias_time_constant_s: Positive = 300.0
+    accel_turn_on_bias_m_s2: NotNegative = 0.02
+    accel_scale_error: NotNegative = 0.001
+    accel_cross_axis_error: NotNegative = 0.001
+    accel_range_m_s2: Positive = 24.0 * GRAVITY_M_S2
+    accel_quantum_m_s2: NotNegative = 24.0 * GRAVITY_M_S2 / 32768.0
+    self_heating_k: NotNegative = 15.0
+    warm_up_s: Positive = 300.0
+    temperature_quantum_k: NotNegative = 0.125
     vibration: RotorVibrationParameters | None = field(default_factory=RotorVibrationParameters)
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(
-            self,
-            "gyro_bias_time_constant_s",
-            "gyro_range_rad_s",
-            "accel_bias_time_constant_s",
-            "accel_range_m_s2",
-            "warm_up_s",
-        )
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its scale, cross-axis and turn-on errors and where its bias starts."""

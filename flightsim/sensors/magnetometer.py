@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.interface import MAG_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -25,7 +26,7 @@ _CONSTANTS: Final = 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MagnetometerParameters:
+class MagnetometerParameters(Options):
     """A calibrated iSentek IST8310, the compass of Holybro's GPS modules.
 
     Attributes:
@@ -37,17 +38,13 @@ class MagnetometerParameters:
         range_gauss, quantum_gauss: 1600 uT and 0.3 uT per bit (datasheet).
     """
 
-    rate_hz: int = 25
-    latency_s: float = 0.0
-    noise_gauss: float = 0.0028
-    hard_iron_gauss: float = 0.002
-    scale_error: float = 0.005
-    range_gauss: float = 16.0
-    quantum_gauss: float = 0.003
-
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self, "range_gauss")
+    rate_hz: Rate = 25
+    latency_s: NotNegative = 0.0
+    noise_gauss: NotNegative = 0.0028
+    hard_iron_gauss: NotNegative = 0.002
+    scale_error: NotNegative = 0.005
+    range_gauss: Positive = 16.0
+    quantum_gauss: NotNegative = 0.003
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its hard iron and scale errors."""

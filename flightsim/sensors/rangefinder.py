@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_amounts, require_rate
+from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.sensor import SensorModel, quantise
@@ -29,7 +30,7 @@ _QY: Final = t.Q_NED_FROM_FRD.start + 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RangefinderParameters:
+class RangefinderParameters(Options):
     """A Benewake TFmini-S (datasheet), a time-of-flight lidar that both firmwares know.
 
     The beam starts at the centre of gravity.
@@ -44,18 +45,16 @@ class RangefinderParameters:
         max_tilt_rad: beyond it no echo comes back from the ground and the distance reads NaN.
     """
 
-    rate_hz: int = 25
-    latency_s: float = 0.0
-    min_range_m: float = 0.1
-    max_range_m: float = 12.0
-    noise_m: float = 0.02
-    noise_per_range: float = 0.003
-    quantum_m: float = 0.01
-    max_tilt_rad: float = math.radians(60.0)
+    rate_hz: Rate = 25
+    latency_s: NotNegative = 0.0
+    min_range_m: NotNegative = 0.1
+    max_range_m: Positive = 12.0
+    noise_m: NotNegative = 0.02
+    noise_per_range: NotNegative = 0.003
+    quantum_m: NotNegative = 0.01
+    max_tilt_rad: Positive = math.radians(60.0)
 
-    def __post_init__(self) -> None:
-        require_rate(self.rate_hz)
-        check_amounts(self, "max_range_m", "max_tilt_rad")
+    def check_together(self) -> None:
         if self.max_range_m <= self.min_range_m:
             raise ValueError(
                 f"max_range_m = {self.max_range_m} is not accepted: "

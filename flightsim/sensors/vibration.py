@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.foundation.checks import check_amounts
+from flightsim.foundation.checks import NotNegative
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ _LEAST_RAD_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RotorVibrationParameters:
+class RotorVibrationParameters(Options):
     """Small propellers, balanced when they were made and not since.
 
     Attributes:
@@ -54,13 +55,12 @@ class RotorVibrationParameters:
         axis: body axis the rotors turn about: 2 (down) of a multicopter, 0 (forward) of a propeller aircraft.
     """
 
-    imbalance_m: float = 6e-7
-    blade_passage_m: float = 1e-7
-    lever_1_m: float = 2.0
+    imbalance_m: NotNegative = 6e-7
+    blade_passage_m: NotNegative = 1e-7
+    lever_1_m: NotNegative = 2.0
     axis: int = 2
 
-    def __post_init__(self) -> None:
-        check_amounts(self)
+    def check_together(self) -> None:
         if self.axis not in (0, 1, 2):
             raise ValueError(f"axis = {self.axis!r} is not accepted: 0 (forward), 1 (right) or 2 (down) is")
 

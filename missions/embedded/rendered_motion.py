@@ -21,7 +21,8 @@ from estimators.vision import (
     VideoFrame,
 )
 from estimators.vision.ground_points import CameraAxes
-from flightsim.foundation.checks import require_not_negative, require_positive
+from flightsim.foundation.checks import NotNegative, Positive
+from flightsim.foundation.options import Options
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.foundation.vectors import from_euler, product
 from flightsim.payload import NO_TAG, CameraView, Detection, ImagerParameters, PinholeModel, Terrain
@@ -42,7 +43,7 @@ class MotionSource(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RenderedMotion:
+class RenderedMotion(Options):
     """Renders what a camera sees, and detects what moves on the ground.
 
     The detector gets an attitude and a height with slow errors, as a camera has them from its vehicle.
@@ -60,13 +61,9 @@ class RenderedMotion:
     differences: FrameDifferenceParameters = field(default_factory=FrameDifferenceParameters)
     scenery: Scenery = field(default_factory=Scenery)
     terrain: Terrain | None = None
-    tilt_sigma_rad: float = 0.012
-    height_sigma_m: float = 2.0
-    error_time_s: float = 5.0
-
-    def __post_init__(self) -> None:
-        require_not_negative(tilt_sigma_rad=self.tilt_sigma_rad, height_sigma_m=self.height_sigma_m)
-        require_positive(error_time_s=self.error_time_s)
+    tilt_sigma_rad: NotNegative = 0.012
+    height_sigma_m: NotNegative = 2.0
+    error_time_s: Positive = 5.0
 
     def start(
         self, *, model: PinholeModel, imager: ImagerParameters, blur_px_m: float, seed: int

@@ -17,7 +17,8 @@ from scipy.special import ndtr
 from estimators.relative_pose import LevelMotion, PoseMeasurement
 from estimators.vision.ground_points import CameraAxes, on_ground
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.checks import Count, NotNegative, Positive
+from flightsim.foundation.options import Options
 from flightsim.foundation.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ _RIGHT_M: Final = 10.0  # a track this far from its nearest target is of none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HandoffSetting:
+class HandoffSetting(Options):
     """Targets, aircraft and sensors.
 
     Attributes:
@@ -62,47 +63,34 @@ class HandoffSetting:
         false_points: mean number of false points in a frame.
     """
 
-    targets: int = 5
-    area_m: tuple[float, float] = (140.0, 270.0)
-    walk_m_s: tuple[float, float] = (0.8, 2.0)
-    turn_rad_sqrt_s: float = 0.3
-    airspeed_m_s: float = 18.0
-    heights_m: tuple[float, float] = (150.0, 120.0)
-    radius_m: float = 120.0
-    start_m: tuple[float, float] = (300.0, 900.0)
-    wind_m_s: float = 4.0
-    rate_hz: float = 10.0
-    range_sigma_m: float = 3.0
-    heading_sigma_rad: float = 0.01
-    range_missing: float = 0.05
-    height_sigma_m: float = 1.0
-    airspeed_sigma_m_s: float = 0.3
-    airspeed_bias_m_s: float = 0.2
-    yaw_rate_sigma_rad_s: float = 0.003
-    yaw_rate_bias_rad_s: float = 0.001
-    tilt_sigma_rad: float = 0.012
-    tilt_time_s: float = 5.0
-    half_view: tuple[float, float] = (0.577, 0.433)
-    pixel_rad: float = 0.0021
-    seen_m: float = 0.9
-    detected: float = 0.945
-    half_detected_m: float = 317.0
-    distance_spread: float = 0.263
-    hidden_s: float = 0.6
-    false_points: float = 0.32
-
-    def __post_init__(self) -> None:
-        check_fields(
-            self,
-            require_not_negative,
-            but=dict.fromkeys(
-                (
-                    *("airspeed_m_s", "radius_m", "rate_hz", "targets", "tilt_time_s"),
-                    *("half_detected_m", "distance_spread", "hidden_s"),
-                ),
-                require_positive,
-            ),
-        )
+    targets: Count = 5
+    area_m: tuple[NotNegative, NotNegative] = (140.0, 270.0)
+    walk_m_s: tuple[NotNegative, NotNegative] = (0.8, 2.0)
+    turn_rad_sqrt_s: NotNegative = 0.3
+    airspeed_m_s: Positive = 18.0
+    heights_m: tuple[NotNegative, NotNegative] = (150.0, 120.0)
+    radius_m: Positive = 120.0
+    start_m: tuple[NotNegative, NotNegative] = (300.0, 900.0)
+    wind_m_s: NotNegative = 4.0
+    rate_hz: Positive = 10.0
+    range_sigma_m: NotNegative = 3.0
+    heading_sigma_rad: NotNegative = 0.01
+    range_missing: NotNegative = 0.05
+    height_sigma_m: NotNegative = 1.0
+    airspeed_sigma_m_s: NotNegative = 0.3
+    airspeed_bias_m_s: NotNegative = 0.2
+    yaw_rate_sigma_rad_s: NotNegative = 0.003
+    yaw_rate_bias_rad_s: NotNegative = 0.001
+    tilt_sigma_rad: NotNegative = 0.012
+    tilt_time_s: Positive = 5.0
+    half_view: tuple[NotNegative, NotNegative] = (0.577, 0.433)
+    pixel_rad: NotNegative = 0.0021
+    seen_m: NotNegative = 0.9
+    detected: NotNegative = 0.945
+    half_detected_m: Positive = 317.0
+    distance_spread: Positive = 0.263
+    hidden_s: Positive = 0.6
+    false_points: NotNegative = 0.32
 
 
 @dataclass

@@ -194,15 +194,15 @@ def test_the_long_range_lidar_sees_the_ground_from_the_approach() -> None:
 @pytest.mark.parametrize(
     ("parameters", "named"),
     [
-        ({"rate_hz": 2.5}, "rate_hz = 2.5"),
-        ({"lag_s": -0.1}, "lag_s = -0.1"),
-        ({"range_pa": 0.0}, "range_pa = 0.0"),
-        ({"noise_pa": math.nan}, "noise_pa = nan"),
+        ({"rate_hz": 2.5}, "rate_hz 2.5"),
+        ({"lag_s": -0.1}, "lag_s -0.1"),
+        ({"range_pa": 0.0}, "range_pa 0"),
+        ({"noise_pa": math.nan}, "noise_pa nan"),
         ({"insensitive_angle_rad": 1.6}, "insensitive_angle_rad = 1.6"),
     ],
 )
 def test_bad_parameters_are_named(parameters: dict[str, float], named: str) -> None:
     with pytest.raises(ValueError, match=named):
         AirspeedParameters(**parameters)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"limit_rad = 0\.0"):
+    with pytest.raises(ValueError, match=r"limit_rad 0"):
         FlowVaneParameters(limit_rad=0.0)

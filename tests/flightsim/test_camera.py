@@ -425,15 +425,15 @@ def test_streams_of_targets_and_clutter_are_their_own() -> None:
 @pytest.mark.parametrize(
     ("make", "named"),
     [
-        (lambda: CameraParameters(rate_hz=0), "rate_hz = 0"),
-        (lambda: CameraParameters(pixel_noise_px=-1.0), r"pixel_noise_px = -1\.0"),
+        (lambda: CameraParameters(rate_hz=0), "rate_hz 0"),
+        (lambda: CameraParameters(pixel_noise_px=-1.0), r"pixel_noise_px -1"),
         (lambda: CameraParameters(false_size_px=(5.0, 2.0)), r"false_size_px = \(5\.0, 2\.0\)"),
-        (lambda: CameraParameters(mount_pitch_rad=math.nan), "mount_pitch_rad = nan"),
+        (lambda: CameraParameters(mount_pitch_rad=math.nan), "mount_pitch_rad nan"),
         (lambda: PinholeModel(width_px=0), "width_px = 0"),
         (lambda: PinholeModel(horizontal_fov_rad=3.2), r"horizontal_fov_rad = 3\.2"),
-        (lambda: ResolutionDetection(max_probability=1.1), r"max_probability = 1\.1"),
+        (lambda: ResolutionDetection(max_probability=1.1), r"max_probability 1.1"),
         (lambda: Bench(rate_hz=30), "30 Hz does not divide"),
-        (lambda: SurveyMagnetometerParameters(noise_nt=-1.0), r"noise_nt = -1\.0"),
+        (lambda: SurveyMagnetometerParameters(noise_nt=-1.0), r"noise_nt -1"),
     ],
 )
 def test_bad_parameters_are_named(make: object, named: str) -> None:

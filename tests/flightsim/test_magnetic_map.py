@@ -298,10 +298,10 @@ def test_geology_is_its_seed_s() -> None:
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"spacing_m": 0.0}, r"spacing_m = 0\.0"),
+        ({"spacing_m": 0.0}, "spacing_m 0"),
         ({"spacing_m": 0.5}, r"spacing_m = 0\.5 is not accepted: it makes 8001 x 8001"),
         ({"north_m": -3000.0}, r"south_m and north_m = -2000\.0, -3000\.0"),
-        ({"source_depth_m": -1.0}, r"source_depth_m = -1\.0"),
+        ({"source_depth_m": -1.0}, "source_depth_m -1"),
     ],
 )
 def test_bad_geology_is_named(changes: dict[str, float], named: str) -> None:
@@ -488,8 +488,8 @@ def test_targets_outside_the_map_are_refused() -> None:
 @pytest.mark.parametrize(
     ("make", "named"),
     [
-        (lambda: GaussianSignature(north_m=math.nan, east_m=0.0), "north_m = nan"),
-        (lambda: GaussianSignature(north_m=0.0, east_m=0.0, sigma_across_m=0.0), r"sigma_across_m = 0\.0"),
+        (lambda: GaussianSignature(north_m=math.nan, east_m=0.0), "north_m nan"),
+        (lambda: GaussianSignature(north_m=0.0, east_m=0.0, sigma_across_m=0.0), r"sigma_across_m 0"),
         (
             lambda: DipoleSignature(north_m=0.0, east_m=0.0, height_m=0.0, moment_ned_a_m2=(1.0, 2.0)),  # type: ignore[arg-type]
             r"moment_ned_a_m2 = \(1\.0, 2\.0\)",

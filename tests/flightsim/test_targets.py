@@ -148,13 +148,13 @@ def test_a_target_is_a_view_and_time_does_not_go_back() -> None:
 @pytest.mark.parametrize(
     ("make_bad", "named"),
     [
-        (lambda: Static(north_m=math.nan, east_m=0.0), "north_m = nan"),
-        (lambda: Circle(north_m=0.0, east_m=0.0, radius_m=0.0, speed_m_s=1.0), r"radius_m = 0\.0"),
+        (lambda: Static(north_m=math.nan, east_m=0.0), "north_m nan"),
+        (lambda: Circle(north_m=0.0, east_m=0.0, radius_m=0.0, speed_m_s=1.0), r"radius_m 0"),
         (lambda: RandomWalk(**(BOX | {"north_m": -80.0}), speed_m_s=1.0), r"south_m and north_m = -70\.0"),
         (lambda: RandomWalk(**BOX, speed_m_s=1.0, start_m=(100.0, 0.0)), r"start_m = \(100\.0, 0\.0\)"),
-        (lambda: RandomWalk(**BOX, speed_m_s=1.0, turn_rad=math.nan), "turn_rad = nan"),
+        (lambda: RandomWalk(**BOX, speed_m_s=1.0, turn_rad=math.nan), "turn_rad nan"),
         (lambda: GroundTargetParameters(motion=MOTIONS[0], tag_id=-2), "tag_id = -2"),
-        (lambda: GroundTargetParameters(motion=MOTIONS[0], size_m=0.0), r"size_m = 0\.0"),
+        (lambda: GroundTargetParameters(motion=MOTIONS[0], size_m=0.0), r"size_m 0"),
     ],
 )
 def test_bad_parameters_are_named(make_bad: object, named: str) -> None:

@@ -3,11 +3,12 @@
 import math
 from dataclasses import dataclass
 
-from flightsim.foundation.checks import NotNegative, Share, check_fields, require_positive
+from flightsim.foundation.checks import NotNegative, Positive, Share
+from flightsim.foundation.options import Options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MulticopterParameters:
+class MulticopterParameters(Options):
     """Parameters of `MulticopterController`.
 
     Torques and thrust are normalised as in PX4: 1 is what the motors can give at most. Defaults are PX4's
@@ -19,55 +20,55 @@ class MulticopterParameters:
     """
 
     # position and velocity
-    pos_xy_p_1_s: float = 1.2  # MPC_XY_P
-    pos_z_p_1_s: float = 1.0  # MPC_Z_P
-    vel_xy_p_1_s: float = 2.6  # MPC_XY_VEL_P_ACC
+    pos_xy_p_1_s: Positive = 1.2  # MPC_XY_P
+    pos_z_p_1_s: Positive = 1.0  # MPC_Z_P
+    vel_xy_p_1_s: Positive = 2.6  # MPC_XY_VEL_P_ACC
     vel_xy_i_1_s2: NotNegative = 0.8  # MPC_XY_VEL_I_ACC
     vel_xy_d: NotNegative = 0.2  # MPC_XY_VEL_D_ACC
-    vel_z_p_1_s: float = 4.0  # MPC_Z_VEL_P_ACC
+    vel_z_p_1_s: Positive = 4.0  # MPC_Z_VEL_P_ACC
     vel_z_i_1_s2: NotNegative = 2.0  # MPC_Z_VEL_I_ACC
     vel_z_d: NotNegative = 0.0  # MPC_Z_VEL_D_ACC
-    vel_derivative_cutoff_hz: float = 5.0  # MPC_VELD_LP
-    speed_xy_max_m_s: float = 12.0  # MPC_XY_VEL_MAX
-    speed_up_max_m_s: float = 3.0  # MPC_Z_VEL_MAX_UP
-    speed_down_max_m_s: float = 1.5  # MPC_Z_VEL_MAX_DN
-    tilt_max_rad: float = math.radians(45.0)  # MPC_TILTMAX_AIR
+    vel_derivative_cutoff_hz: Positive = 5.0  # MPC_VELD_LP
+    speed_xy_max_m_s: Positive = 12.0  # MPC_XY_VEL_MAX
+    speed_up_max_m_s: Positive = 3.0  # MPC_Z_VEL_MAX_UP
+    speed_down_max_m_s: Positive = 1.5  # MPC_Z_VEL_MAX_DN
+    tilt_max_rad: Positive = math.radians(45.0)  # MPC_TILTMAX_AIR
     thrust_min: Share = 0.08  # MPC_THR_MIN
     thrust_max: Share = 1.0  # MPC_THR_MAX
     thrust_xy_margin: Share = 0.3  # MPC_THR_XY_MARG
-    hover_thrust: float = 0.45  # MPC_THR_HOVER: start of the estimate
+    hover_thrust: Positive = 0.45  # MPC_THR_HOVER: start of the estimate
     use_hover_thrust_estimate: bool = True  # MPC_USE_HTE
     drag_compensation_cutoff_hz: NotNegative = 0.8  # (none): measured drag is fed forward below it; 0: off
 
     # attitude
-    roll_p_1_s: float = 6.5  # MC_ROLL_P
-    pitch_p_1_s: float = 6.5  # MC_PITCH_P
-    yaw_p_1_s: float = 2.8  # MC_YAW_P
+    roll_p_1_s: Positive = 6.5  # MC_ROLL_P
+    pitch_p_1_s: Positive = 6.5  # MC_PITCH_P
+    yaw_p_1_s: Positive = 2.8  # MC_YAW_P
     yaw_weight: Share = 0.4  # MC_YAW_WEIGHT
-    roll_rate_max_rad_s: float = math.radians(220.0)  # MC_ROLLRATE_MAX
-    pitch_rate_max_rad_s: float = math.radians(220.0)  # MC_PITCHRATE_MAX
-    yaw_rate_max_rad_s: float = math.radians(200.0)  # MC_YAWRATE_MAX
+    roll_rate_max_rad_s: Positive = math.radians(220.0)  # MC_ROLLRATE_MAX
+    pitch_rate_max_rad_s: Positive = math.radians(220.0)  # MC_PITCHRATE_MAX
+    yaw_rate_max_rad_s: Positive = math.radians(200.0)  # MC_YAWRATE_MAX
 
     # body rates
-    rate_roll_p: float = 0.15  # MC_ROLLRATE_P
+    rate_roll_p: Positive = 0.15  # MC_ROLLRATE_P
     rate_roll_i: NotNegative = 0.2  # MC_ROLLRATE_I
     rate_roll_d: NotNegative = 0.003  # MC_ROLLRATE_D
     rate_roll_ff: NotNegative = 0.0  # MC_ROLLRATE_FF
-    rate_roll_k: float = 1.0  # MC_ROLLRATE_K
+    rate_roll_k: Positive = 1.0  # MC_ROLLRATE_K
     rate_roll_integral_max: NotNegative = 0.3  # MC_RR_INT_LIM
-    rate_pitch_p: float = 0.15  # MC_PITCHRATE_P
+    rate_pitch_p: Positive = 0.15  # MC_PITCHRATE_P
     rate_pitch_i: NotNegative = 0.2  # MC_PITCHRATE_I
     rate_pitch_d: NotNegative = 0.003  # MC_PITCHRATE_D
     rate_pitch_ff: NotNegative = 0.0  # MC_PITCHRATE_FF
-    rate_pitch_k: float = 1.0  # MC_PITCHRATE_K
+    rate_pitch_k: Positive = 1.0  # MC_PITCHRATE_K
     rate_pitch_integral_max: NotNegative = 0.3  # MC_PR_INT_LIM
-    rate_yaw_p: float = 0.45  # MC_YAWRATE_P
+    rate_yaw_p: Positive = 0.45  # MC_YAWRATE_P
     rate_yaw_i: NotNegative = 0.15  # MC_YAWRATE_I
     rate_yaw_d: NotNegative = 0.0  # MC_YAWRATE_D
     rate_yaw_ff: NotNegative = 0.0  # MC_YAWRATE_FF
-    rate_yaw_k: float = 1.0  # MC_YAWRATE_K
+    rate_yaw_k: Positive = 1.0  # MC_YAWRATE_K
     rate_yaw_integral_max: NotNegative = 0.3  # MC_YR_INT_LIM
-    rate_derivative_cutoff_hz: float = 30.0  # IMU_DGYRO_CUTOFF
+    rate_derivative_cutoff_hz: Positive = 30.0  # IMU_DGYRO_CUTOFF
     yaw_torque_cutoff_hz: NotNegative = 2.0  # MC_YAW_TQ_CUTOFF; 0: off
 
     # motors
@@ -75,8 +76,7 @@ class MulticopterParameters:
     motor_idle: Share = 0.1  # lowest command of a running motor | MOT_SPIN_ARM
     rotor_time_constant_s: NotNegative = 0.035  # of the thrust, for the hover-thrust estimate
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    def check_together(self) -> None:
         if self.hover_thrust > 1.0:
             raise ValueError(f"hover_thrust = {self.hover_thrust} is not in 0..1")
         if self.thrust_min >= self.thrust_max:

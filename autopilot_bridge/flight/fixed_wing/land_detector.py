@@ -14,28 +14,26 @@ import numpy as np
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, LandedState
 from autopilot_bridge.navigation import layout as nav_layout
-from flightsim.foundation.checks import check_fields, require_positive
+from flightsim.foundation.checks import Positive
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.options import Options
 
 _IDLE_THROTTLE: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LandDetectorParameters:
+class LandDetectorParameters(Options):
     """Thresholds; PX4's names beside the fields."""
 
-    horizontal_speed_max_m_s: float = 5.0  # LNDFW_VEL_XY_MAX
-    vertical_speed_max_m_s: float = 1.0  # LNDFW_VEL_Z_MAX
-    airspeed_max_m_s: float = 6.0  # LNDFW_AIRSPD_MAX
-    acceleration_max_m_s2: float = 8.0  # LNDFW_XYACC_MAX
-    rotation_max_rad_s: float = 0.5  # LNDFW_ROT_MAX
-    trigger_time_s: float = 2.0  # LNDFW_TRIG_TIME
-    contact_speed_m_s: float = 0.25  # vertical, throttle closed, so long:
-    contact_time_s: float = 0.8
-    filter_time_s: float = 0.5  # of speeds and accelerations
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    horizontal_speed_max_m_s: Positive = 5.0  # LNDFW_VEL_XY_MAX
+    vertical_speed_max_m_s: Positive = 1.0  # LNDFW_VEL_Z_MAX
+    airspeed_max_m_s: Positive = 6.0  # LNDFW_AIRSPD_MAX
+    acceleration_max_m_s2: Positive = 8.0  # LNDFW_XYACC_MAX
+    rotation_max_rad_s: Positive = 0.5  # LNDFW_ROT_MAX
+    trigger_time_s: Positive = 2.0  # LNDFW_TRIG_TIME
+    contact_speed_m_s: Positive = 0.25  # vertical, throttle closed, so long:
+    contact_time_s: Positive = 0.8
+    filter_time_s: Positive = 0.5  # of speeds and accelerations
 
 
 @kernel

@@ -7,11 +7,12 @@ chosen with `benchmarks/aircraft_landings.py`: many landings of several aircraft
 import math
 from dataclasses import dataclass
 
-from flightsim.foundation.checks import Finite, check_fields, require_positive
+from flightsim.foundation.checks import Count, Finite, Positive
+from flightsim.foundation.options import Options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ClimbOutParameters:
+class ClimbOutParameters(Options):
     """The climb-out of a take-off.
 
     Attributes:
@@ -24,19 +25,16 @@ class ClimbOutParameters:
         left_ground_m: height over the start from which the aircraft counts as in the air.
     """
 
-    reached_m: float = 1.5
-    capture_s: float = 3.0
-    climb_share: float = 0.9
-    fast_share: float = 1.15
-    low_m: float = 2.0
-    left_ground_m: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    reached_m: Positive = 1.5
+    capture_s: Positive = 3.0
+    climb_share: Positive = 0.9
+    fast_share: Positive = 1.15
+    low_m: Positive = 2.0
+    left_ground_m: Positive = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LandingParameters:
+class LandingParameters(Options):
     """Circle, approach, go-around and roll-out of a landing.
 
     Attributes:
@@ -73,37 +71,36 @@ class LandingParameters:
         bounce_s: a bounce happens within this time of the touch.
     """
 
-    calm_m_s: float = 1.0
-    runway_near_home_m: float = 300.0
-    shallow_share: float = 0.5
-    shortest_leg_m: float = 30.0
-    entry_height_m: float = 4.0
-    entry_course_rad: float = math.radians(20.0)
-    entry_share: float = 0.4
-    before_entry_radii: float = 1.5
-    along_leg_share: float = 0.3
-    too_high_m: float = 25.0
-    blind_m: float = 30.0
-    free_bank_m: float = 15.0
-    low_m: float = 2.0
-    short_final_m: float = 12.0
-    missed_m: float = 40.0
-    aside_m: float = 20.0
-    beyond_s: float = 0.75
-    decided_m: float = 0.12
-    go_arounds: int = 3
-    slope_gain: float = 0.4
-    dive_free_m: float = 25.0
+    calm_m_s: Positive = 1.0
+    runway_near_home_m: Positive = 300.0
+    shallow_share: Positive = 0.5
+    shortest_leg_m: Positive = 30.0
+    entry_height_m: Positive = 4.0
+    entry_course_rad: Positive = math.radians(20.0)
+    entry_share: Positive = 0.4
+    before_entry_radii: Positive = 1.5
+    along_leg_share: Positive = 0.3
+    too_high_m: Positive = 25.0
+    blind_m: Positive = 30.0
+    free_bank_m: Positive = 15.0
+    low_m: Positive = 2.0
+    short_final_m: Positive = 12.0
+    missed_m: Positive = 40.0
+    aside_m: Positive = 20.0
+    beyond_s: Positive = 0.75
+    decided_m: Positive = 0.12
+    go_arounds: Count = 3
+    slope_gain: Positive = 0.4
+    dive_free_m: Positive = 25.0
     dive_low_rad: Finite = math.radians(-1.0)
-    latest_flare_share: float = 0.6
-    standing_m_s: float = 1.5
-    brake_after_s: float = 1.5
-    nose_down_s: float = 1.0
-    bounced_m: float = 0.3
-    bounce_s: float = 3.0
+    latest_flare_share: Positive = 0.6
+    standing_m_s: Positive = 1.5
+    brake_after_s: Positive = 1.5
+    nose_down_s: Positive = 1.0
+    bounced_m: Positive = 0.3
+    bounce_s: Positive = 3.0
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    def check_together(self) -> None:
         if not (self.low_m < self.free_bank_m and self.low_m < self.dive_free_m):
             raise ValueError(
                 f"low_m = {self.low_m} is not below free_bank_m = {self.free_bank_m} and dive_free_m = "
@@ -112,7 +109,7 @@ class LandingParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlareParameters:
+class FlareParameters(Options):
     """The flare.
 
     Attributes:
@@ -142,35 +139,32 @@ class FlareParameters:
         power_gain: throttle for each share of the airspeed that is missing.
     """
 
-    align_m: float = 1.0
-    touch_m: float = 0.12
-    touch_s: float = 0.1
-    still_m_s: float = 0.25
-    still_s: float = 0.6
-    still_m: float = 0.5
-    shortest_s: float = 1.0
-    long_s: float = 6.0
-    pitch_blend_s: float = 1.0
-    pitch_free_m: float = 0.4
-    pitch_free_rad_m: float = math.radians(3.0)
-    height_gain: float = 0.5
-    lead: float = 1.2
-    firmest_m_s: float = 0.6
-    firmer_1_s: float = 0.5
-    late_1_s: float = 0.06
-    late_m_s: float = 0.8
-    softest_share: float = 0.5
-    airspeed_share: float = 0.94
-    head_wind_share: float = 0.25
-    power_share: float = 0.6
-    power_gain: float = 3.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    align_m: Positive = 1.0
+    touch_m: Positive = 0.12
+    touch_s: Positive = 0.1
+    still_m_s: Positive = 0.25
+    still_s: Positive = 0.6
+    still_m: Positive = 0.5
+    shortest_s: Positive = 1.0
+    long_s: Positive = 6.0
+    pitch_blend_s: Positive = 1.0
+    pitch_free_m: Positive = 0.4
+    pitch_free_rad_m: Positive = math.radians(3.0)
+    height_gain: Positive = 0.5
+    lead: Positive = 1.2
+    firmest_m_s: Positive = 0.6
+    firmer_1_s: Positive = 0.5
+    late_1_s: Positive = 0.06
+    late_m_s: Positive = 0.8
+    softest_share: Positive = 0.5
+    airspeed_share: Positive = 0.94
+    head_wind_share: Positive = 0.25
+    power_share: Positive = 0.6
+    power_gain: Positive = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SurfaceWindParameters:
+class SurfaceWindParameters(Options):
     """The wind assumed close to the ground.
 
     Attributes:
@@ -184,12 +178,9 @@ class SurfaceWindParameters:
             ground, shorter than the last part of the slope.
     """
 
-    roughness_m: float = 0.05
-    known_at_m: float = 30.0
-    lowest_known_m: float = 5.0
-    ahead_s: float = 1.5
-    lowest_m: float = 0.5
-    corrected_s: float = 6.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    roughness_m: Positive = 0.05
+    known_at_m: Positive = 30.0
+    lowest_known_m: Positive = 5.0
+    ahead_s: Positive = 1.5
+    lowest_m: Positive = 0.5
+    corrected_s: Positive = 6.0

@@ -16,15 +16,8 @@ from autopilot_bridge.flight.fixed_wing.landing_parameters import (
 )
 from autopilot_bridge.flight.parameters import RallyRule, ReturnDestination
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.foundation.checks import (
-    Finite,
-    NotNegative,
-    NotNegativeOrInf,
-    PositiveOrInf,
-    Share,
-    check_fields,
-    require_positive,
-)
+from flightsim.foundation.checks import Finite, NotNegative, NotNegativeOrInf, Positive, PositiveOrInf, Share
+from flightsim.foundation.options import Options
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
@@ -51,7 +44,7 @@ class TurnInRule(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FixedWingFlightParameters:
+class FixedWingFlightParameters(Options):
     """Parameters of every fixed-wing flight task. PX4's and ArduPilot's names stand beside each field.
 
     Airspeeds are equivalent airspeeds. Heights are above home, or above the ground where they say so.
@@ -60,65 +53,65 @@ class FixedWingFlightParameters:
         ValueError: a field is not finite, not positive where it must be, or contradicts another.
     """
 
-    airspeed_min_m_s: float = 18.0  # FW_AIRSPD_MIN | AIRSPEED_MIN
-    airspeed_trim_m_s: float = 25.0  # FW_AIRSPD_TRIM | AIRSPEED_CRUISE
-    airspeed_max_m_s: float = 35.0  # FW_AIRSPD_MAX | AIRSPEED_MAX
-    climb_rate_m_s: float = 3.0  # wanted climbs: FW_T_CLMB_R_SP | FBWB_CLIMB_RATE
-    sink_rate_m_s: float = 2.0  # wanted descents: FW_T_SINK_R_SP | FBWB_CLIMB_RATE
+    airspeed_min_m_s: Positive = 18.0  # FW_AIRSPD_MIN | AIRSPEED_MIN
+    airspeed_trim_m_s: Positive = 25.0  # FW_AIRSPD_TRIM | AIRSPEED_CRUISE
+    airspeed_max_m_s: Positive = 35.0  # FW_AIRSPD_MAX | AIRSPEED_MAX
+    climb_rate_m_s: Positive = 3.0  # wanted climbs: FW_T_CLMB_R_SP | FBWB_CLIMB_RATE
+    sink_rate_m_s: Positive = 2.0  # wanted descents: FW_T_SINK_R_SP | FBWB_CLIMB_RATE
     climb_max_m_s: NotNegative = 5.0  # FW_T_CLMB_MAX | TECS_CLMB_MAX
-    sink_max_m_s: float = 5.0  # FW_T_SINK_MAX | TECS_SINK_MAX
-    bank_max_rad: float = math.radians(45.0)  # FW_R_LIM | ROLL_LIMIT_DEG
-    pitch_max_rad: float = math.radians(25.0)  # FW_P_LIM_MAX | PTCH_LIM_MAX_DEG
+    sink_max_m_s: Positive = 5.0  # FW_T_SINK_MAX | TECS_SINK_MAX
+    bank_max_rad: Positive = math.radians(45.0)  # FW_R_LIM | ROLL_LIMIT_DEG
+    pitch_max_rad: Positive = math.radians(25.0)  # FW_P_LIM_MAX | PTCH_LIM_MAX_DEG
     pitch_min_rad: Finite = math.radians(-20.0)  # FW_P_LIM_MIN | PTCH_LIM_MIN_DEG
     trim_pitch_rad: Finite = math.radians(3.0)  # FW_PSP_OFF | PTCH_TRIM_DEG: flown when the height is lost
     trim_throttle: Share = 0.5  # FW_THR_TRIM | TRIM_THROTTLE
     throttle_idle: Share = 0.0  # FW_THR_IDLE | THR_MIN
 
-    guidance_period_s: float = 10.0  # NPFG_PERIOD | NAVL1_PERIOD
-    guidance_damping: float = 0.7  # NPFG_DAMPING | NAVL1_DAMPING
-    guidance_period_safety: float = 1.5  # NPFG_PERIOD_SF
+    guidance_period_s: Positive = 10.0  # NPFG_PERIOD | NAVL1_PERIOD
+    guidance_damping: Positive = 0.7  # NPFG_DAMPING | NAVL1_DAMPING
+    guidance_period_safety: Positive = 1.5  # NPFG_PERIOD_SF
     guidance_period_lower_bound: bool = True  # NPFG_LB_PERIOD
     guidance_period_upper_bound: bool = True  # NPFG_UB_PERIOD
-    roll_time_constant_s: float = 0.5  # NPFG_ROLL_TC | RLL2SRV_TCONST
-    switch_distance_multiplier: float = 0.32  # NPFG_SW_DST_MLT
+    roll_time_constant_s: Positive = 0.5  # NPFG_ROLL_TC | RLL2SRV_TCONST
+    switch_distance_multiplier: Positive = 0.32  # NPFG_SW_DST_MLT
 
-    acceptance_radius_m: float = 20.0  # NAV_ACC_RAD | WP_RADIUS
+    acceptance_radius_m: Positive = 20.0  # NAV_ACC_RAD | WP_RADIUS
     acceptance_altitude_m: PositiveOrInf = 10.0  # NAV_FW_ALT_RAD; ArduPilot: infinite
     turn_in: TurnInRule = TurnInRule.SWITCH_DISTANCE
     loiter_exits_aligned: bool = False  # every loiter item ends towards the next waypoint (ArduPilot)
     loiter_radius_m: Finite = 80.0  # NAV_LOITER_RAD | WP_LOITER_RAD; negative: counter-clockwise
 
     launch: LaunchKind = LaunchKind.RUNWAY
-    takeoff_altitude_m: float = 30.0  # MIS_TAKEOFF_ALT | TKOFF_ALT
+    takeoff_altitude_m: Positive = 30.0  # MIS_TAKEOFF_ALT | TKOFF_ALT
     takeoff_straight: bool = False  # ArduPilot climbs straight out, whatever the place of the item
-    takeoff_airspeed_m_s: float = 25.0  # FW_TKO_AIRSPD | TECS' climb speed: AIRSPEED_CRUISE
-    takeoff_pitch_min_rad: float = math.radians(8.0)  # FW_TKO_PITCH_MIN | TKOFF_LVL_PITCH
-    takeoff_clearance_m: float = 15.0  # straight and nearly level wings below: RWTO_ | TKOFF_LVL_ALT
-    takeoff_bank_max_rad: float = math.radians(15.0)  # in the climb-out | LEVEL_ROLL_LIMIT
-    takeoff_throttle_max: float = 1.0  # RWTO_MAX_THR | TKOFF_THR_MAX
+    takeoff_airspeed_m_s: Positive = 25.0  # FW_TKO_AIRSPD | TECS' climb speed: AIRSPEED_CRUISE
+    takeoff_pitch_min_rad: Positive = math.radians(8.0)  # FW_TKO_PITCH_MIN | TKOFF_LVL_PITCH
+    takeoff_clearance_m: Positive = 15.0  # straight and nearly level wings below: RWTO_ | TKOFF_LVL_ALT
+    takeoff_bank_max_rad: Positive = math.radians(15.0)  # in the climb-out | LEVEL_ROLL_LIMIT
+    takeoff_throttle_max: Positive = 1.0  # RWTO_MAX_THR | TKOFF_THR_MAX
     takeoff_throttle_ramp_s: NotNegative = 2.0  # RWTO_RAMP_TIME | TKOFF_THR_SLEW
     takeoff_roll_pitch_rad: Finite = 0.0  # RWTO_PSP: on the runway | TKOFF_GND_PITCH
-    rotation_airspeed_m_s: float = 20.0  # RWTO_ROT_AIRSPD | TKOFF_ROTATE_SPD
-    rotation_time_s: float = 1.0  # RWTO_ROT_TIME
+    rotation_airspeed_m_s: Positive = 20.0  # RWTO_ROT_AIRSPD | TKOFF_ROTATE_SPD
+    rotation_time_s: Positive = 1.0  # RWTO_ROT_TIME
     launch_acceleration_m_s2: NotNegative = 15.0  # FW_LAUN_AC_THLD | TKOFF_THR_MINACC
     launch_time_s: NotNegative = 0.05  # FW_LAUN_AC_T: so long
     launch_speed_min_m_s: NotNegative = 0.0  # TKOFF_THR_MINSPD: over ground, too; 0: off
     launch_delay_s: NotNegative = 0.2  # FW_LAUN_MOT_DEL | TKOFF_THR_DELAY: motor off after the launch
 
-    landing_angle_rad: float = math.radians(5.0)  # FW_LND_ANG: glide slope without an approach leg
-    landing_angle_max_rad: float = math.radians(10.0)  # steepest slope flown to meet the place
-    landing_airspeed_m_s: float = 21.0  # FW_LND_AIRSPD | TECS_LAND_ARSPD
-    landing_loiter_altitude_m: float = 40.0  # where a landing without an approach begins its slope
-    flare_height_m: float = 1.5  # above ground, at least: FW_LND_FLALT | LAND_FLARE_ALT
-    flare_time_s: float = 2.0  # before the ground at the present sink: FW_LND_FL_TIME | LAND_FLARE_SEC
-    flare_sink_m_s: float = 0.6  # FW_LND_FL_SINK | TECS_LAND_SINK
+    landing_angle_rad: Positive = math.radians(5.0)  # FW_LND_ANG: glide slope without an approach leg
+    landing_angle_max_rad: Positive = math.radians(10.0)  # steepest slope flown to meet the place
+    landing_airspeed_m_s: Positive = 21.0  # FW_LND_AIRSPD | TECS_LAND_ARSPD
+    landing_loiter_altitude_m: Positive = 40.0  # where a landing without an approach begins its slope
+    flare_height_m: Positive = 1.5  # above ground, at least: FW_LND_FLALT | LAND_FLARE_ALT
+    flare_time_s: Positive = 2.0  # before the ground at the present sink: FW_LND_FL_TIME | LAND_FLARE_SEC
+    flare_sink_m_s: Positive = 0.6  # FW_LND_FL_SINK | TECS_LAND_SINK
     flare_pitch_min_rad: Finite = math.radians(1.0)  # FW_LND_FL_PMIN | LAND_PITCH_DEG
-    flare_pitch_max_rad: float = math.radians(12.0)  # FW_LND_FL_PMAX | LAND_PITCH_DEG
-    ground_bank_max_rad: float = math.radians(
+    flare_pitch_max_rad: Positive = math.radians(12.0)  # FW_LND_FL_PMAX | LAND_PITCH_DEG
+    ground_bank_max_rad: Positive = math.radians(
         5.0
     )  # wing tips free near the ground: FW_WING_* | LEVEL_ROLL_LIMIT
     rangefinder_landing: bool = True  # FW_LND_USETER | RNGFND_LANDING
-    pitch_time_constant_s: float = 0.25  # FW_P_TC | PTCH2SRV_TCONST: of the flare's haste
+    pitch_time_constant_s: Positive = 0.25  # FW_P_TC | PTCH2SRV_TCONST: of the flare's haste
     standing_height_m: NotNegative = 0.3  # of the rangefinder on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
     landing_abort_climb_m: NotNegative = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
     flaps_takeoff: Share = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
@@ -129,7 +122,7 @@ class FixedWingFlightParameters:
     flare: FlareParameters = field(default_factory=FlareParameters)
     surface_wind: SurfaceWindParameters = field(default_factory=SurfaceWindParameters)
 
-    return_altitude_m: float = 60.0  # RTL_RETURN_ALT | RTL_ALTITUDE
+    return_altitude_m: Positive = 60.0  # RTL_RETURN_ALT | RTL_ALTITUDE
     return_descend_altitude_m: PositiveOrInf = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE, or infinite
     return_climbs: bool = True  # PX4 climbs and never descends on the way; ArduPilot flies at the altitude
     glide_slope_min_m: PositiveOrInf = math.inf  # GLIDE_SLOPE_MIN: from so high above the target a slope
@@ -139,19 +132,19 @@ class FixedWingFlightParameters:
     return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE | RTL_AUTOLAND
     rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
 
-    manual_bank_max_rad: float = math.radians(45.0)  # FW_MAN_R_MAX | ROLL_LIMIT_DEG
-    manual_pitch_max_rad: float = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MAX_DEG
-    manual_pitch_down_max_rad: float = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MIN_DEG
-    acro_roll_rate_rad_s: float = math.radians(90.0)  # FW_ACRO_X_MAX | ACRO_ROLL_RATE
-    acro_pitch_rate_rad_s: float = math.radians(90.0)  # FW_ACRO_Y_MAX | ACRO_PITCH_RATE
-    acro_yaw_rate_rad_s: float = math.radians(45.0)  # FW_ACRO_Z_MAX | ACRO_YAW_RATE
+    manual_bank_max_rad: Positive = math.radians(45.0)  # FW_MAN_R_MAX | ROLL_LIMIT_DEG
+    manual_pitch_max_rad: Positive = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MAX_DEG
+    manual_pitch_down_max_rad: Positive = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MIN_DEG
+    acro_roll_rate_rad_s: Positive = math.radians(90.0)  # FW_ACRO_X_MAX | ACRO_ROLL_RATE
+    acro_pitch_rate_rad_s: Positive = math.radians(90.0)  # FW_ACRO_Y_MAX | ACRO_PITCH_RATE
+    acro_yaw_rate_rad_s: Positive = math.radians(45.0)  # FW_ACRO_Z_MAX | ACRO_YAW_RATE
     manual_deadzone: NotNegative = 0.06
     manual_expo: Share = 0.0
 
-    guided_timeout_s: float = 3.0  # ArduPlane: attitudes in GUIDED
-    position_lost_bank_rad: float = math.radians(15.0)  # FW_GPSF_R
+    guided_timeout_s: Positive = 3.0  # ArduPlane: attitudes in GUIDED
+    position_lost_bank_rad: Positive = math.radians(15.0)  # FW_GPSF_R
     position_lost_wait_s: NotNegativeOrInf = 30.0  # FW_GPSF_LT: then it descends; ArduPilot: infinite
-    position_lost_sink_m_s: float = 1.5
+    position_lost_sink_m_s: Positive = 1.5
 
     @classmethod
     def for_envelope(cls, envelope: FlightEnvelope, **changes: Any) -> Self:
@@ -202,8 +195,7 @@ class FixedWingFlightParameters:
         values.update(changes)
         return cls(**values)
 
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    def check_together(self) -> None:
         if not self.airspeed_min_m_s <= self.airspeed_trim_m_s <= self.airspeed_max_m_s:
             raise ValueError(
                 f"airspeed_trim_m_s = {self.airspeed_trim_m_s} is not between airspeed_min_m_s = "

@@ -11,22 +11,20 @@ from dataclasses import dataclass
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState
 from autopilot_bridge.navigation import layout as nav_layout
-from flightsim.foundation.checks import check_fields, require_positive
+from flightsim.foundation.checks import Positive
+from flightsim.foundation.options import Options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LandDetectorParameters:
+class LandDetectorParameters(Options):
     """Thresholds; PX4's names beside the fields."""
 
-    vertical_speed_max_m_s: float = 0.25  # LNDMC_Z_VEL_MAX
-    horizontal_speed_max_m_s: float = 1.5  # LNDMC_XY_VEL_MAX
-    rotation_max_rad_s: float = math.radians(20.0)  # LNDMC_ROT_MAX
-    contact_time_s: float = 0.35
-    trigger_time_s: float = 1.0  # LNDMC_TRIG_TIME: maybe landed and landed take two thirds and a third of it
-    low_thrust: float = 0.6  # share of hover thrust that can't carry the vehicle
-
-    def __post_init__(self) -> None:
-        check_fields(self, require_positive)
+    vertical_speed_max_m_s: Positive = 0.25  # LNDMC_Z_VEL_MAX
+    horizontal_speed_max_m_s: Positive = 1.5  # LNDMC_XY_VEL_MAX
+    rotation_max_rad_s: Positive = math.radians(20.0)  # LNDMC_ROT_MAX
+    contact_time_s: Positive = 0.35
+    trigger_time_s: Positive = 1.0  # LNDMC_TRIG_TIME: maybe landed takes two thirds, landed a third
+    low_thrust: Positive = 0.6  # share of hover thrust that can't carry the vehicle
 
 
 class LandDetector:

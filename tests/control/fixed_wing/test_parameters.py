@@ -14,10 +14,10 @@ from tests.control.fixed_wing.aerosonde import AEROSONDE
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"airspeed_trim_m_s": math.nan}, "airspeed_trim_m_s = nan is not accepted: a finite number above 0"),
-        ({"rate_roll_p": -0.1}, "rate_roll_p = -0.1 is not accepted: a finite number of at least 0"),
-        ({"roll_time_constant_s": 0.0}, "roll_time_constant_s = 0.0 is not accepted: .* above 0"),
-        ({"throttle_max": 1.2}, "throttle_max = 1.2 is not accepted: 0 to 1 is"),
+        ({"airspeed_trim_m_s": math.nan}, "airspeed_trim_m_s nan"),
+        ({"rate_roll_p": -0.1}, "rate_roll_p -0.1"),
+        ({"roll_time_constant_s": 0.0}, "roll_time_constant_s 0"),
+        ({"throttle_max": 1.2}, "throttle_max 1.2"),
         ({"trim_elevator": -1.5}, "trim_elevator = -1.5 is not in -1..1"),
         ({"airspeed_min_m_s": 21.0}, "airspeed_min_m_s = 21.0 is not below airspeed_max_m_s = 20.0"),
         ({"airspeed_trim_m_s": 9.0}, "airspeed_trim_m_s = 9.0 is not in"),

@@ -19,15 +19,15 @@ from tests.flight.fixed_wing.kinematic import PointMass
     ("change", "named"),
     [
         ({"airspeed_trim_m_s": 40.0}, "airspeed_trim_m_s = 40"),
-        ({"airspeed_min_m_s": -1.0}, "airspeed_min_m_s = -1"),
-        ({"guidance_period_s": 0.0}, "guidance_period_s = 0"),
-        ({"bank_max_rad": math.nan}, "bank_max_rad = nan"),
+        ({"airspeed_min_m_s": -1.0}, "airspeed_min_m_s -1"),
+        ({"guidance_period_s": 0.0}, "guidance_period_s 0"),
+        ({"bank_max_rad": math.nan}, "bank_max_rad nan"),
         ({"bank_max_rad": 1.56}, "85 degrees"),
         ({"loiter_radius_m": 0.2}, "loiter_radius_m = 0.2"),
         ({"pitch_min_rad": 0.5}, "pitch_min_rad = 0.5"),
-        ({"trim_throttle": 1.2}, "trim_throttle = 1.2"),
-        ({"flaps_landing": -0.1}, "flaps_landing = -0.1"),
-        ({"flaps_takeoff": 1.1}, "flaps_takeoff = 1.1"),
+        ({"trim_throttle": 1.2}, "trim_throttle 1.2"),
+        ({"flaps_landing": -0.1}, "flaps_landing -0.1"),
+        ({"flaps_takeoff": 1.1}, "flaps_takeoff 1.1"),
         ({"manual_deadzone": 1.0}, "manual_deadzone = 1"),
         ({"landing_angle_max_rad": 0.05}, "landing_angle_max_rad = 0.05"),
     ],
@@ -77,6 +77,6 @@ def test_parameters_may_change_in_flight() -> None:
 def test_the_values_of_a_landing_must_fit_each_other() -> None:
     with pytest.raises(ValueError, match=r"low_m = 20\.0 is not below free_bank_m = 15\.0"):
         LandingParameters(low_m=20.0)
-    with pytest.raises(ValueError, match=r"touch_s = 0\.0 is not accepted"):
+    with pytest.raises(ValueError, match=r"touch_s 0"):
         FlareParameters(touch_s=0.0)
     assert LandingParameters(dive_low_rad=0.0).dive_low_rad == 0.0
