@@ -5,19 +5,19 @@ its flight task, services, events); control laws; streams that are due. Nothing 
 clock.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.autopilot.channels import AutopilotChannel, ChannelStreams
+from autopilot_bridge.autopilot.flown_mission import FlownMission
 from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
 from autopilot_bridge.autopilot.status_text import StatusTextService
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
-from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.external_mapping import connected
@@ -30,23 +30,19 @@ from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import CommandHooks
+from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.commands.message_interval import MessageIntervalService
 from autopilot_bridge.services.commands.protocol import CommandService
-from autopilot_bridge.services.inputs.radio import RadioService
-from autopilot_bridge.services.inputs.setpoints import SetpointService
-from autopilot_bridge.services.inputs.timesync import TimeSyncService
 from autopilot_bridge.services.microservice import Microservice, receivers_by_id
 from autopilot_bridge.services.parameters.parameter_file import boot_parameters
 from autopilot_bridge.services.parameters.protocol import ParameterService, fix_identity
-from autopilot_bridge.services.parts import AutopilotParts, Simulation
+from autopilot_bridge.services.parts import AutopilotParts, FailureHook, Simulation
 from autopilot_bridge.services.plans.geofence import MissionFence
-from autopilot_bridge.services.plans.messages import extended_payload
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
 from autopilot_bridge.storage.memory import MemoryCard
-from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.line import MICROSECONDS
+from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.streams import PayloadCache
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
@@ -59,7 +55,6 @@ _TURNS: Final = 5  # iterations of the slow loop; microservices with `coarse_tim
 _COMPONENT: Final = 1
 _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
 
-FailureHook = Callable[[int, int, int], Result]
 EntryT = TypeVar("EntryT")
 
 
@@ -70,19 +65,6 @@ class _TypedParameters(NamedTuple):
     controller: Any
     flight: Any
     commander: CommanderParameters
-
-
-class _Progress:
-    """The mission being flown, as the mission protocol sees it."""
-
-    def __init__(self, commander: Commander) -> None:
-        self._commander = commander
-        self.complete = False
-
-    @property
-    def active(self) -> bool:
-        """The mission mode is selected."""
-        return self._commander.mode is FlightMode.MISSION
 
 
 class Autopilot:
@@ -127,13 +109,11 @@ class Autopilot:
     ) -> None:
         if physics_rate_hz % SLOW_RATE_HZ:
             raise ValueError(f"physics rate {physics_rate_hz} Hz is not a multiple of {SLOW_RATE_HZ} Hz")
-        firmware = flavour.services
         self.flavour = flavour
         self.system_id = system_id
         self.channels: list[AutopilotChannel] = []
-        self._firmware = firmware
         self._simulation = simulation
-        self._address = firmware.address(system_id)
+        self._address = flavour.services.address(system_id)
         self._divisor = physics_rate_hz // SLOW_RATE_HZ
         self._until_slow = self._divisor
         self._time_us = 0
@@ -143,45 +123,73 @@ class Autopilot:
         if envelope is not None and flavour.airframe_of is not None:
             airframe.update(flavour.airframe_of(envelope))
         self.parameters = ParameterStore(flavour.parameter_definitions(), {**airframe, **(parameters or {})})
-        fix_identity(self.parameters, firmware.parameters, system_id)
+        fix_identity(self.parameters, flavour.services.parameters, system_id)
         card = card or MemoryCard()
         memory = VehicleMemory(
             card=card,
             stored=boot_parameters(
                 self.parameters,
                 card,
-                firmware.card,
+                flavour.services.card,
                 system_id=system_id,
                 given=parameters or {},
                 check=self._typed_parameters,
             ),
-            time_us=lambda: self._time_us,
+            time_us=self._now_us,
             unix_epoch_us=unix_epoch_us,
-            add_channel=lambda channel, role: self.add_channel(channel, role=role),
+            add_channel=self.add_channel,
             remove_channel=self.remove_channel,
             power=power,
         )
-        readings = connected(readings, flavour.gps_source(self.parameters))
+        self._build_core(connected(readings, flavour.gps_source(self.parameters)), physics_rate_hz)
+        self._texts = StatusTextService(flavour, self)
+        plans = FlownMission(self.commander)
+        self.missions = MissionService(
+            flavour.services.missions,
+            self._stores,
+            self,
+            self._texts.announce,
+            home=plans.home,
+            progress=plans,
+            on_plan_changed=plans.plan_changed,
+            parameters=self.parameters,
+            fence=MissionFence(self.commander),
+            landed=plans.landed,
+        )
+        self._parameter_service = ParameterService(
+            self.parameters,
+            flavour.services.parameters,
+            self,
+            on_list=self._texts.banner,
+            on_fixed=self._report_fixed,
+        )
+        self._connect_services(plans, memory, inject_failure, physics_rate_hz)
+        if simulation is not None:
+            simulation.connect(self.parameters, self._lose_radio)
+        self.parameters.subscribe(self._on_parameter)
+
+    def _build_core(self, readings: SensorReadings, physics_rate_hz: int) -> None:
+        """Navigation filter, control laws and commander, which share state in place."""
+        flavour, typed = self.flavour, self._typed_parameters()
         self._readings = readings
-        typed = self._typed_parameters()
+        self._stores = stores = new_stores()
         self.navigation = NavigationFilter(
             typed.navigation, readings=readings, physics_rate_hz=physics_rate_hz
         )
         self.controller = flavour.controller(
             typed.controller, physics_rate_hz=physics_rate_hz, nav=self.navigation.state
         )
-        self.context = FlightContext(
+        self.context = context = FlightContext(
             nav=self.navigation.state, setpoint=self.controller.setpoint, parameters=typed.flight
         )
-        self.context.health = self.navigation.health
-        self.context.attitude_setpoint = self.controller.attitude_setpoint
-        stores = new_stores()
-        self.context.rally = stores[MissionType.RALLY]
+        context.health = self.navigation.health
+        context.attitude_setpoint = self.controller.attitude_setpoint
+        context.rally = stores[MissionType.RALLY]
         self.commander = Commander(
-            self.context,
+            context,
             policy=flavour.policy,
             parameters=typed.commander,
-            vehicle=flavour.vehicle_tasks(self.context, stores[MissionType.MISSION], flavour.policy),
+            vehicle=flavour.vehicle_tasks(context, stores[MissionType.MISSION], flavour.policy),
             health=HealthMonitor(
                 readings,
                 NavigationJudgement(self.navigation),
@@ -189,110 +197,85 @@ class Autopilot:
                 gps_may_repeat=self.navigation.parameters.gps_may_repeat,
             ),
             land_detector=flavour.land_detector(),
-            thrust=lambda: self.controller.thrust,
+            thrust=self._thrust,
             missions=stores[MissionType.MISSION],
             fence=stores[MissionType.FENCE],
-            mission_valid=lambda: self.missions.mission_valid(landed=self.commander.landed),
+            mission_valid=self._mission_valid,
         )
-        self._progress = _Progress(self.commander)
-        self._texts = StatusTextService(flavour, self)
-        self.missions = MissionService(
-            firmware.missions,
-            stores,
-            self,
-            self._texts.announce,
-            home=lambda: self.commander.home.position,
-            progress=self._progress,
-            on_plan_changed=self._on_plan_changed,
-            parameters=self.parameters,
-            fence=MissionFence(self.commander),
-            landed=lambda: self.commander.landed,
-        )
-        self._status = StatusReport(flavour, self.commander)
-        self._view = TelemetryView(self.context, self.navigation.state, readings)
-        self._messages = self._build_messages(unix_epoch_us)
-        parts = AutopilotParts(
-            kind=flavour.kind,
-            system_id=system_id,
-            commander=self.commander,
-            navigation=self.navigation,
-            parameters=self.parameters,
-            readings=readings,
-            stores=stores,
-            missions=firmware.missions,
-            broadcast=self,
-            announce=self._texts.announce,
-            memory=memory,
-            simulation=simulation,
-            execute=lambda command: self.commands.carry_out(command),
-        )
-        if simulation is not None:
-            simulation.connect(
-                self.parameters,
-                lambda failed: self.commander.pilot.lose_signal(failed, self.commander.time_us),
-            )
-        self._more = firmware.microservices(parts)
-        self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
+
+    def _connect_services(
+        self,
+        plans: FlownMission,
+        memory: VehicleMemory,
+        inject_failure: FailureHook | None,
+        physics_rate_hz: int,
+    ) -> None:
+        """Make the services, and the tables of what they receive, execute and send."""
+        flavour, announce = self.flavour, self._texts.announce
+        rules = flavour.services
+        self._view = TelemetryView(self.context, self.navigation.state, self._readings)
+        motion = MotionMessages(self._view, self.context, self.navigation, self._readings)
+        cache = PayloadCache(motion.builders)
         self._streams = ChannelStreams(
             self.channels,
-            firmware=firmware,
+            flavour=flavour,
             parameters=self.parameters,
-            cache=self._cache,
-            motion=self._messages.motion,
+            cache=cache,
+            motion=motion,
             physics_step_us=MICROSECONDS // physics_rate_hz,
         )
-        self.intervals = MessageIntervalService(
-            firmware.intervals,
-            self._streams.tables,
-            self._cache,
-            self._texts.announce,
-            merged(*(more.on_demand for more in self._more)),
-        )
-        hooks = CommandHooks(
-            intervals=self.intervals,
+        self.intervals = MessageIntervalService(rules.intervals, self._streams.tables, cache, announce)
+        parts = AutopilotParts(
+            kind=flavour.kind,
+            system_id=self.system_id,
+            commander=self.commander,
+            navigation=self.navigation,
+            controller=self.controller,
             parameters=self.parameters,
-            announce=self._texts.announce,
+            readings=self._readings,
+            stores=self._stores,
+            missions=rules.missions,
+            broadcast=self,
+            announce=announce,
             banner=self._texts.banner,
+            memory=memory,
+            view=self._view,
+            status=StatusReport(flavour, self.commander),
+            intervals=self.intervals,
             set_current_item=self.missions.set_current,
-            mission_item_count=lambda: len(stores[MissionType.MISSION].items),
             inject_failure=inject_failure,
+            simulation=self._simulation,
+            execute=self._execute,
         )
-        self._parameter_service = ParameterService(
-            self.parameters,
-            firmware.parameters,
-            self,
-            on_list=self._texts.banner,
-            on_fixed=self._report_fixed,
-        )
-        timed = [more for more in self._more if type(more).tick is not Microservice.tick]
-        self._timed: tuple[Microservice, ...] = (
-            self._parameter_service,
-            self.missions,
-            *(more for more in timed if not more.coarse_timers),
-            self.intervals,
-        )
-        coarse_timers = [more for more in timed if more.coarse_timers]
-        self._coarse_timers = tuple(coarse_timers[turn::_TURNS] for turn in range(_TURNS))
-        self._turn = 0
+        of_firmware = rules.make(parts)
         self.commands = CommandService(
-            firmware.commands(self.commander, hooks),
-            flavour.command_address(system_id),
-            merged(*(more.commands for more in self._more)),
+            flavour.command_address(self.system_id), merged(*(service.commands for service in of_firmware))
         )
-        services: tuple[Microservice, ...] = (
-            SetpointService(firmware.setpoints(self.commander)),
+        # the order in which they get messages and timers
+        self._services: tuple[Microservice, ...] = (
             self.commands,
             self._parameter_service,
             self.missions,
-            TimeSyncService(answers_ping=firmware.answers_ping),
-            RadioService(lambda channel: self._streams.throttle(channel, self._time_us)),
-            *self._more,
+            *of_firmware,
             self.intervals,
+            plans,
+            self._streams,
             self._texts,
         )
-        self._receivers = receivers_by_id(services)
-        self._followers = tuple(more for more in self._more if type(more).follow is not Microservice.follow)
-        self.parameters.subscribe(self._on_parameter)
+        for service in self._services:
+            cache.add(service.builders)
+            self.intervals.requested.update(service.on_demand)
+        self._receivers = receivers_by_id(self._services)
+        timed = [service for service in self._services if type(service).tick is not Microservice.tick]
+        self._timed = tuple(service for service in timed if not service.coarse_timers)
+        coarse_timers = [service for service in timed if service.coarse_timers]
+        self._coarse_timers = tuple(coarse_timers[turn::_TURNS] for turn in range(_TURNS))
+        self._turn = 0
+        # the text of an event comes before what else it causes
+        self._followers = (
+            self._texts,
+            *(service for service in self._services[:-1] if type(service).follow is not Microservice.follow),
+        )
 
     # interface to the simulator
 
@@ -317,7 +300,7 @@ class Autopilot:
 
     # interface to the links
 
-    def add_channel(self, channel: AutopilotChannel, *, role: str) -> None:
+    def add_channel(self, channel: AutopilotChannel, role: str) -> None:
         """Start the default streams of a role ("onboard", "gcs" or "payload") on one more channel.
 
         Raises:
@@ -330,8 +313,8 @@ class Autopilot:
 
     def close(self) -> None:
         """Shut down: close open files and store pending data."""
-        for more in self._more:
-            more.close()
+        for service in self._services:
+            service.close()
 
     def remove_channel(self, channel: AutopilotChannel) -> None:
         """Stop all streams and answers on a channel."""
@@ -375,27 +358,8 @@ class Autopilot:
 
     def _follow(self, event: events.Event) -> None:
         """Pass an event of the vehicle to the other parts of the autopilot."""
-        self._texts.report(event)
         for follower in self._followers:
             follower.follow(event)
-        match event:
-            case events.MissionItemReached(index=index):
-                self.missions.item_reached(index)
-            case events.MissionFinished():
-                self._progress.complete = True
-            case events.ModeChanged(mode=mode):
-                if mode is not FlightMode.MISSION:
-                    self._progress.complete = False
-                if self.flavour.heartbeat_on_mode_change:
-                    self._streams.push(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._time_us)
-            case events.HomeSet():
-                self._push_position()
-            case events.Armed() if self._firmware.position_pushed_at_arm:
-                self._push_position()
-
-    def _push_position(self) -> None:
-        self._streams.push(mavlink.MAVLINK_MSG_ID_HOME_POSITION, self._time_us)
-        self._streams.push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, self._time_us)
 
     def _typed_parameters(self) -> _TypedParameters:
         """The parameters as the parts use them.
@@ -423,33 +387,20 @@ class Autopilot:
         value = self.parameters.get(name)
         self._texts.announce(mavlink.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
 
-    def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
-        sources = TelemetrySources(
-            view=self._view,
-            context=self.context,
-            navigation=self.navigation,
-            controller=self.controller,
-            readings=self._readings,
-            heartbeat=self._status.heartbeat,
-            sys_status=self._status.sys_status,
-            mission_current=self._mission_current,
-            autopilot_version=self._status.autopilot_version,
-            battery_level=lambda: int(self.commander.battery_level),
-            position_ready=lambda: self.commander.situation.position,
-            unix_epoch_us=unix_epoch_us,
-            current_mode=self._status.current_mode,
-            orbit=lambda: self.commander.tasks.orbit,
-            task=lambda: self.commander.tasks.task,
-            missions=self.commander.missions,
-        )
-        return self._firmware.messages(sources)
+    def _lose_radio(self, failed: bool) -> None:
+        self.commander.pilot.lose_signal(failed, self.commander.time_us)
 
-    def _on_plan_changed(self, mission_type: MissionType) -> None:
-        if mission_type is MissionType.MISSION:
-            self._progress.complete = False
+    def _now_us(self) -> int:
+        return self._time_us
 
-    def _mission_current(self) -> bytes | None:
-        return extended_payload(self.missions.current_message())
+    def _thrust(self) -> float:
+        return float(self.controller.thrust)
+
+    def _mission_valid(self) -> bool:
+        return self.missions.mission_valid(landed=self.commander.landed)
+
+    def _execute(self, command: Command) -> Result | None:
+        return self.commands.carry_out(command)
 
 
 def merged(*tables: Mapping[int, EntryT]) -> dict[int, EntryT]:

@@ -3,10 +3,14 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from autopilot_bridge.firmware.services import PAYLOAD_ROLE, FirmwareServices
+from autopilot_bridge.commander.events import Armed, Event, HomeSet, ModeChanged
+from autopilot_bridge.dispatch import receives
+from autopilot_bridge.firmware.flavour import Flavour
+from autopilot_bridge.firmware.services import PAYLOAD_ROLE
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Channel
+from autopilot_bridge.services.channel import Channel, Source
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE
 from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
@@ -34,12 +38,12 @@ class AutopilotChannel(Channel, Protocol):
         """Send the due motion messages and frames of the payloads (message id, bytes) together."""
 
 
-class ChannelStreams:
-    """The streams of all channels.
+class ChannelStreams(Microservice):
+    """The streams of all channels, slowed down while the transmit buffer of a channel's radio fills up.
 
     Args:
         channels: the open channels; updated.
-        firmware: default rates by role, and how streams follow a radio's buffer.
+        flavour: default rates by role, and how streams follow a radio's buffer.
         parameters: ArduPilot's SRn_*, if there are any.
         cache: makes and packs messages.
         motion: makes the fastest messages.
@@ -54,18 +58,19 @@ class ChannelStreams:
         self,
         channels: list[AutopilotChannel],
         *,
-        firmware: FirmwareServices,
+        flavour: Flavour,
         parameters: ParameterStore,
         cache: PayloadCache,
         motion: MotionMessages,
         physics_step_us: int,
     ) -> None:
         self._channels = channels
-        self._firmware = firmware
+        self._flavour = flavour
         self._parameters = parameters
         self._cache = cache
         self._motion = motion
         self._step_us = physics_step_us
+        self._time_us = 0
         self.tables: dict[str, StreamTable] = {}
         self.running: tuple[StreamTable, ...] = ()
         self._ports: list[StreamTable] = []  # the tables of client channels: SR0_* is the first
@@ -80,9 +85,9 @@ class ChannelStreams:
         Raises:
             ValueError: unknown role, or a channel of that name is there already.
         """
-        rates_hz = self._firmware.rates_hz.get(role)
+        rates_hz = self._flavour.services.rates_hz.get(role)
         if rates_hz is None:
-            accepted = ", ".join(self._firmware.rates_hz)
+            accepted = ", ".join(self._flavour.services.rates_hz)
             raise ValueError(f"channel role {role!r} is unknown; accepted: {accepted}")
         if channel.name in self.tables:
             raise ValueError(f"a channel named {channel.name!r} is open already")
@@ -121,13 +126,27 @@ class ChannelStreams:
         throttle = self._throttles.get(channel.name)
         if throttle is None:
             line: LineBudget | None = getattr(channel, "line", None)
-            throttle = StreamThrottle(table, line, self._firmware.flow_control)
+            throttle = StreamThrottle(table, line, self._flavour.services.flow_control)
             throttle.advance(time_us)
             self._throttles[channel.name] = throttle
         return throttle
 
+    @receives(mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO)
+    def _on_radio_status(
+        self,
+        message: mavlink.MAVLink_radio_status_message | mavlink.MAVLink_radio_message,
+        source: Source,
+        time_us: int,
+    ) -> None:
+        """RADIO_STATUS (109), and RADIO (166) of older radios."""
+        throttle = self.throttle(source.channel, time_us)
+        if throttle is not None:
+            throttle.radio.on_radio_status(message.txbuf, time_us)
+            throttle.fit()
+
     def advance(self, time_us: int) -> None:
         """Update the budgets of slow lines. Called at 50 Hz."""
+        self._time_us = time_us
         for throttle in self._throttles.values():
             throttle.advance(time_us)
 
@@ -139,6 +158,21 @@ class ChannelStreams:
             for channel in self._channels:
                 channel.send_payload(message_id, payload)
 
+    def follow(self, event: Event) -> None:
+        """Send at once what has changed."""
+        flavour, time_us = self._flavour, self._time_us
+        match event:
+            case ModeChanged() if flavour.heartbeat_on_mode_change:
+                self.push(mavlink.MAVLINK_MSG_ID_HEARTBEAT, time_us)
+            case HomeSet():
+                self._push_position(time_us)
+            case Armed() if flavour.services.position_pushed_at_arm:
+                self._push_position(time_us)
+
+    def _push_position(self, time_us: int) -> None:
+        self.push(mavlink.MAVLINK_MSG_ID_HOME_POSITION, time_us)
+        self.push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, time_us)
+
     def change(self, name: str, time_us: int) -> None:
         """A parameter has changed; if it sets the rates of a channel's streams, apply it."""
         if name.startswith("SR") and name[2:3].isdigit():
@@ -148,11 +182,11 @@ class ChannelStreams:
         """ArduPilot's SRn_* parameters: rates of the stream groups of channel n (one that changed)."""
         if index >= len(self._ports):
             return
-        for group, ending in self._firmware.stream_rate_parameters.items():
+        for group, ending in self._flavour.services.stream_rate_parameters.items():
             name = f"SR{index}_{ending}"
             if name not in self._parameters or changed not in (None, name):
                 continue
             rate_hz = self._parameters.get(name)
             interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
-            for message_id in self._firmware.intervals.groups[group]:
+            for message_id in self._flavour.services.intervals.groups[group]:
                 self._ports[index].set_default(message_id, interval_us, time_us)

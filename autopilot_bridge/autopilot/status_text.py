@@ -36,7 +36,7 @@ class StatusTextService(Microservice):
         """Forget a channel that was closed."""
         self._greeted.discard(channel.name)
 
-    def report(self, event: Event) -> None:
+    def follow(self, event: Event) -> None:
         """Announce an event with the flavour's text."""
         end = "\t" if self._flavour.sends_events else ""  # marks a text that an EVENT repeats
         for notice in self._flavour.notices(event):

@@ -5,18 +5,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import AddressRule
-from autopilot_bridge.services.commands.handlers import CommandHandlers, CommandHooks
 from autopilot_bridge.services.commands.message_interval import IntervalPolicy
 from autopilot_bridge.services.files.card_layout import CardLayout
-from autopilot_bridge.services.inputs.setpoints import SetpointRules
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parameters.protocol import ParameterPolicy
 from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.policy import MissionPolicy
-from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.line import FlowControl
 
 PAYLOAD_ROLE: Final = "payload"
@@ -39,14 +35,11 @@ class FirmwareServices:
         address: the target ids of this autopilot, for everything but commands.
         parameters, missions, intervals: policies of the services.
         card: the files on the memory card.
-        commands: makes the handlers of the firmware's commands.
-        setpoints: makes the rules for streamed setpoints.
-        messages: makes the streamed messages.
-        microservices: makes the other services, in the order in which they get messages and timers.
+        make: makes what the firmware executes, receives and sends, in the order in which the services get
+            messages and timers.
         rates_hz: streams that run from the start, by role of the channel.
         stream_rate_parameters: endings of the parameters SRn_* that set the rates of a stream group, by group
             (ArduPilot).
-        answers_ping: PING requests are answered.
         flow_control: how streams follow a radio's transmit buffer.
         position_pushed_at_arm: HOME_POSITION and GPS_GLOBAL_ORIGIN are sent once more at every arming.
     """
@@ -56,12 +49,8 @@ class FirmwareServices:
     missions: MissionPolicy
     intervals: IntervalPolicy
     card: CardLayout
-    commands: Callable[[Commander, CommandHooks], CommandHandlers]
-    setpoints: Callable[[Commander], SetpointRules]
-    messages: Callable[[TelemetrySources], CommonMessages]
-    microservices: Callable[[AutopilotParts], tuple[Microservice, ...]]
+    make: Callable[[AutopilotParts], tuple[Microservice, ...]]
     rates_hz: Mapping[str, Mapping[int, float]]
     stream_rate_parameters: Mapping[int, str]
-    answers_ping: bool
     flow_control: FlowControl
     position_pushed_at_arm: bool

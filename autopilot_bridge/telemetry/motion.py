@@ -279,6 +279,7 @@ class MotionMessages:
         size: int = self._make_frames(due, sender, sequence)
         return size
 
+    @property
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its payload."""
         return {

@@ -15,7 +15,7 @@ from typing import Final, Protocol
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget, thinned_us
-from autopilot_bridge.telemetry.packing import values_packer
+from autopilot_bridge.telemetry.packing import Pack, values_packer
 
 Values = tuple[object, ...]
 Builder = Callable[[], Values | bytes | None]
@@ -40,11 +40,18 @@ class PayloadSink(Protocol):
 class PayloadCache:
     """Builds and packs messages, once per physics step for all channels."""
 
-    def __init__(self, builders: Mapping[int, Builder]) -> None:
-        self._builders = builders
-        self._packers = {message_id: values_packer(definition(message_id)) for message_id in builders}
+    def __init__(self, builders: Mapping[int, Builder] | None = None) -> None:
+        self._builders: dict[int, Builder] = {}
+        self._packers: dict[int, Pack] = {}
         self._payloads: dict[int, bytes | None] = {}
         self.time_us = -1
+        self.add(builders or {})
+
+    def add(self, builders: Mapping[int, Builder]) -> None:
+        """More messages; a builder replaces an earlier one of the same message."""
+        self._builders.update(builders)
+        for message_id in builders:
+            self._packers[message_id] = values_packer(definition(message_id))
 
     def __contains__(self, message_id: int) -> bool:
         return message_id in self._builders

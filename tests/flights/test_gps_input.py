@@ -80,7 +80,7 @@ def show_fixes(flight: Flight) -> None:
 
 
 def service(flight: Flight) -> GpsInputService:
-    return next(more for more in flight.vehicle.autopilot._more if isinstance(more, GpsInputService))
+    return next(more for more in flight.vehicle.autopilot._services if isinstance(more, GpsInputService))
 
 
 def hovers(flight: Flight) -> None:

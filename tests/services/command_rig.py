@@ -8,14 +8,19 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.autopilot.status_text import StatusTextService
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.ardupilot import services as ardupilot_services
+from autopilot_bridge.firmware.ardupilot.copter.commands import ArduCopterCommands
+from autopilot_bridge.firmware.ardupilot.copter.setpoints import ArduCopterSetpoints
+from autopilot_bridge.firmware.ardupilot.plane.commands import ArduPlaneCommands
+from autopilot_bridge.firmware.ardupilot.plane.setpoints import ArduPlaneSetpoints
 from autopilot_bridge.firmware.px4 import services as px4_services
+from autopilot_bridge.firmware.px4.commands import Px4Commands, Px4PlaneCommands
 from autopilot_bridge.firmware.px4.event_service import EventService
+from autopilot_bridge.firmware.px4.setpoints import Px4Setpoints
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.handlers import CommandHooks
 from autopilot_bridge.services.commands.protocol import CommandService
 from autopilot_bridge.services.equipment.payload_commands import PayloadCommands
 from autopilot_bridge.services.inputs.manual import ManualService
-from autopilot_bridge.services.inputs.setpoints import SetpointService
+from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.geofence import ArdupilotGeofence
 from flightsim.airframe import AirframeKind
 from tests.commander.rig import Rig
@@ -27,6 +32,14 @@ MANUAL = {
     ("px4", AirframeKind.FIXED_WING): px4_services.MANUAL,
     ("ardupilot", AirframeKind.MULTICOPTER): ardupilot_services.COPTER_MANUAL,
     ("ardupilot", AirframeKind.FIXED_WING): ardupilot_services.PLANE_MANUAL,
+}
+
+
+COMMANDS: dict[tuple[str, AirframeKind], tuple[Any, Any]] = {
+    ("px4", AirframeKind.MULTICOPTER): (Px4Commands, Px4Setpoints),
+    ("px4", AirframeKind.FIXED_WING): (Px4PlaneCommands, Px4Setpoints),
+    ("ardupilot", AirframeKind.MULTICOPTER): (ArduCopterCommands, ArduCopterSetpoints),
+    ("ardupilot", AirframeKind.FIXED_WING): (ArduPlaneCommands, ArduPlaneSetpoints),
 }
 
 
@@ -83,34 +96,36 @@ class ServiceRig(Rig):
         self.intervals = Intervals()
         self.failures: list[tuple[int, int, int]] = []
         self.status = StatusTextService(self.flavour, self)
-        hooks = CommandHooks(
-            intervals=self.intervals,
+        parts: Any = SimpleNamespace(
+            commander=self.commander,
+            system_id=1,
             parameters=self.store,
+            broadcast=self,
+            intervals=self.intervals,
             announce=self.status.announce,
             banner=self.status.banner,
             set_current_item=self._set_current,
-            mission_item_count=lambda: len(self.missions.items),
             inject_failure=self._inject,
         )
-        parts: Any = SimpleNamespace(
-            commander=self.commander, system_id=1, parameters=self.store, broadcast=self
-        )
+        more: tuple[Microservice, ...]
         if flavour == "ardupilot":
-            more = ArdupilotGeofence(self.commander, self.store, self).commands
+            more = (ArdupilotGeofence(self.commander, self.store, self),)
         else:
-            more = {
-                **PayloadCommands(parts, px4_services.PAYLOAD).commands,
-                **EventService(self.commander, self, lambda event: ()).commands,
-            }
-        services = self.flavour.services
-        self.commands = CommandService(
-            services.commands(self.commander, hooks), self.flavour.command_address(1), more
-        )
-        self.setpoints = SetpointService(services.setpoints(self.commander))
+            more = (
+                PayloadCommands(parts, px4_services.PAYLOAD),
+                EventService(self.commander, self, lambda event: ()),
+            )
+        make_commands, make_setpoints = COMMANDS[flavour, self.flavour.kind]
+        self.handlers = make_commands(parts)
+        table = {
+            number: take for service in (self.handlers, *more) for number, take in service.commands.items()
+        }
+        self.commands = CommandService(self.flavour.command_address(1), table)
+        self.setpoints = make_setpoints(parts)
         self.manual = ManualService(parts, MANUAL[flavour, self.flavour.kind])
 
     def handle(self, message: Any) -> bool:
-        services = (self.setpoints, self.manual, self.commands, self.status)
+        services = (self.setpoints, self.manual, self.commands, self.handlers, self.status)
         return deliver(message, self.source, self.time_us, *services)
 
     def long(self, command: int, *parameters: float, system: int = 1, component: int = 1) -> list[int]:
@@ -144,7 +159,7 @@ class ServiceRig(Rig):
         assert self.handle(message)
         for event in self.commander.drain_events():
             self.events.append(event)
-            self.status.report(event)
+            self.status.follow(event)
         return [sent.result for sent in self.channel.sent if sent.get_msgId() == 77]
 
     def _set_current(self, item: int) -> bool:

@@ -10,6 +10,7 @@ from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.protocol import new_stores
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.storage.memory import MemoryCard
+from autopilot_bridge.telemetry.view import TelemetryView
 from tests.services.command_rig import ServiceRig
 
 DATA = {"px4": px4_services, "ardupilot": ardupilot_services}
@@ -41,11 +42,17 @@ def parts_of(rig: ServiceRig, **more: Any) -> AutopilotParts:
         "broadcast": rig,
         "announce": rig.status.announce,
         "memory": memory,
+        "controller": None,
+        "banner": rig.status.banner,
+        "view": TelemetryView(rig.context, rig.context.nav, rig.readings),
+        "status": None,
+        "intervals": rig.intervals,
+        "set_current_item": rig._set_current,
     }
     return AutopilotParts(**{**chosen, **more})
 
 
 def service_of(rig: ServiceRig, wanted: type[ServiceT], **more: Any) -> ServiceT:
     """The microservice of this type, from the firmware's own list."""
-    services = rig.flavour.services.microservices(parts_of(rig, **more))
+    services = rig.flavour.services.make(parts_of(rig, **more))
     return next(service for service in services if isinstance(service, wanted))

@@ -27,11 +27,11 @@ class Vehicle:
     def __init__(self, flavour: str, *, plane: bool = False, **parameters: float) -> None:
         self.rig = PlaneRig(flavour, **parameters) if plane else ServiceRig(flavour, **parameters)
         rig = self.rig
-        services = rig.flavour.services.microservices(parts_of(rig))
+        services = rig.flavour.services.make(parts_of(rig))
         names = [type(service).__name__ for service in services]
         self.services = services[names.index("ManualService") : names.index("FileTransferService")]
         more = {number: take for service in self.services for number, take in service.commands.items()}
-        rig.commands = CommandService(rig.commands._handlers, rig.commands._address, more)
+        rig.commands = CommandService(rig.commands._address, {**rig.commands._table, **more})
         rig.manual = self.services[0]
         if flavour == "ardupilot":  # says nothing before it is greeted
             rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))

@@ -47,9 +47,7 @@ def test_a_message_belongs_to_one_service(flavour: str, kind: AirframeKind) -> N
 @pytest.mark.parametrize("flavour", FLAVOUR_NAMES)
 def test_a_command_belongs_to_one_service(flavour: str, kind: AirframeKind) -> None:
     autopilot = autopilot_of(flavour, kind)
-    owners = Counter(
-        number for service in (autopilot.commands._handlers, *autopilot._more) for number in service.commands
-    )
+    owners = Counter(number for service in autopilot._services for number in service.commands)
     assert [number for number, count in owners.items() if count > 1] == [] and len(owners) > 40
 
 

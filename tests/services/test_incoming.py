@@ -88,7 +88,7 @@ def odometry_service(flavour: str, parameters: dict[str, float]) -> tuple[Extern
         physics_rate_hz=250,
         parameters=parameters,
     )
-    service = next(more for more in autopilot._more if isinstance(more, ExternalOdometryService))
+    service = next(more for more in autopilot._services if isinstance(more, ExternalOdometryService))
     noted = _Filter()
     service._navigation = noted  # type: ignore[assignment]
     return service, noted
@@ -245,7 +245,7 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
         readings=SensorReadings(),
         physics_rate_hz=250,
     )
-    service = next(more for more in autopilot._more if isinstance(more, LandingTargetService))
+    service = next(more for more in autopilot._services if isinstance(more, LandingTargetService))
     service._navigation = _Pose(q)  # type: ignore[assignment]
     autopilot.context.health = type("Sound", (), {"position_horizontal_relative": True})()  # type: ignore[assignment]
     autopilot.context.nav[nav_layout.HEIGHT_ABOVE_GROUND_M] = 10.0

@@ -82,7 +82,9 @@ class Rig:
             {self.line.name: self.table},  # type: ignore[dict-item]
             Cache(),  # type: ignore[arg-type]
             lambda severity, text: self.texts.append(text),
-            {HOME: lambda channel, parameter: self.sent_on_demand.append((channel, parameter))},
+        )
+        self.service.requested[HOME] = lambda channel, parameter: self.sent_on_demand.append(
+            (channel, parameter)
         )
         self.service.tick(NOW_US)
 

@@ -22,8 +22,8 @@ def flying() -> Sitl:
 
 def test_frames_equal_the_encoders(flying: Sitl) -> None:
     autopilot = flying.vehicles[0].autopilot
-    motion = autopilot._messages.motion
-    builders = motion.builders()
+    motion = autopilot._streams._motion
+    builders = motion.builders
     compiled, plain = FrameEncoder(7, 1), FrameEncoder(7, 1)
     compiled.sequence = plain.sequence = 253  # wraps on the way
     due = sum(motion.bits.values())
@@ -41,7 +41,7 @@ def test_frames_equal_the_encoders(flying: Sitl) -> None:
 
 def test_contents_are_the_navigation_state(flying: Sitl) -> None:
     autopilot = flying.vehicles[0].autopilot
-    motion = autopilot._messages.motion
+    motion = autopilot._streams._motion
     autopilot._view.advance(flying.time_us)
     parsed = FrameParser().feed(motion.packet(sum(motion.bits.values()), FrameEncoder(7, 1))[0])
     messages = {message.get_type(): message for message in map(decode, parsed)}
@@ -59,7 +59,7 @@ def test_contents_are_the_navigation_state(flying: Sitl) -> None:
 def test_global_position_has_centimetres_per_second_and_centidegrees(flying: Sitl) -> None:
     """Units of common.xml: vx, vy, vz in cm/s (north, east, down), hdg in cdeg, relative_alt in mm up."""
     autopilot = flying.vehicles[0].autopilot
-    motion, state = autopilot._messages.motion, autopilot.navigation.state
+    motion, state = autopilot._streams._motion, autopilot.navigation.state
     before = state.copy()
     autopilot._view.advance(flying.time_us + 1)
     try:
@@ -78,7 +78,7 @@ def test_global_position_has_centimetres_per_second_and_centidegrees(flying: Sit
 
 
 def test_a_single_bit_makes_a_single_frame(flying: Sitl) -> None:
-    motion = flying.vehicles[0].autopilot._messages.motion
+    motion = flying.vehicles[0].autopilot._streams._motion
     for message_id, bit in motion.bits.items():
         (frame,) = FrameParser().feed(motion.packet(bit, FrameEncoder(1, 1))[0])
         assert frame.message_id == message_id
@@ -86,7 +86,7 @@ def test_a_single_bit_makes_a_single_frame(flying: Sitl) -> None:
 
 def test_nothing_is_said_before_there_is_an_attitude() -> None:
     sitl = Sitl(WorldSpec())
-    motion = sitl.vehicles[0].autopilot._messages.motion
+    motion = sitl.vehicles[0].autopilot._streams._motion
     local = motion.bits[definition("LOCAL_POSITION_NED").message_id]
     frames = FrameParser().feed(motion.packet(sum(motion.bits.values()), FrameEncoder(1, 1))[0])
     assert [frame.message_id for frame in frames] == [definition("LOCAL_POSITION_NED").message_id]

@@ -28,8 +28,8 @@ from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.message_interval import MessageIntervalService
-from autopilot_bridge.telemetry.common import TelemetrySources
-from autopilot_bridge.telemetry.flight_path import FlightPath, flight_path
+from autopilot_bridge.services.messages.flight_path import FlightPath, flight_path
+from autopilot_bridge.telemetry import motion
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
 from autopilot_bridge.tlog import TlogReader
@@ -80,24 +80,33 @@ class Aircraft:
         self.missions = MissionStore()
         view = TelemetryView(self.context, state, readings)
         view.advance(2_000_000)
-        self.sources = TelemetrySources(
+        aircraft = self
+
+        class Tasks:
+            orbit = None
+            task = property(lambda tasks: aircraft.task)
+
+        class Status:
+            def heartbeat(self) -> tuple[int, ...]:
+                return (1, 3, 0, CUSTOM_MODES[aircraft.mode], 4, 3)
+
+        self.parts: Any = SimpleNamespace(
             view=view,
-            context=self.context,
-            navigation=navigation,  # type: ignore[arg-type]
+            commander=SimpleNamespace(
+                context=self.context,
+                tasks=Tasks(),
+                missions=self.missions,
+                battery_level=1,
+                situation=SimpleNamespace(position=True),
+            ),
+            navigation=navigation,
             controller=self.controller,
             readings=readings,
-            heartbeat=lambda: (1, 3, 0, CUSTOM_MODES[self.mode], 4, 3),
-            sys_status=lambda: (0, 0, 0),
-            mission_current=lambda: b"",
-            autopilot_version=lambda: (),
-            battery_level=lambda: 1,
-            position_ready=lambda: True,
-            unix_epoch_us=0,
-            task=lambda: self.task,
-            missions=self.missions,
+            status=Status(),
+            memory=SimpleNamespace(unix_epoch_us=0),
         )
-        self.px4 = Px4PlaneMessages(self.sources)
-        self.ardupilot = ArduPlaneMessages(self.sources)
+        self.px4 = Px4PlaneMessages(self.parts)
+        self.ardupilot = ArduPlaneMessages(self.parts)
 
     def actuate(self, **values: float) -> None:
         for name, value in values.items():
@@ -248,25 +257,25 @@ def test_every_message_has_the_fields_of_its_definition() -> None:
             *("NAV_CONTROLLER_OUTPUT", "SERVO_OUTPUT_RAW", "POSITION_TARGET_LOCAL_NED", "VFR_HUD"),
             *("POSITION_TARGET_GLOBAL_INT", "EXTENDED_SYS_STATE"),
         ):
-            values = messages.builders()[definition(name).message_id]()
+            values = messages.builders[definition(name).message_id]()
             assert values is not None and len(values) == len(definition(name).field_names), name
-    of_services = {definition(name).message_id for name in ("CURRENT_EVENT_SEQUENCE", "FENCE_STATUS")}
-    arduplane = set(Aircraft().ardupilot.builders()) | of_services
+    names = ("CURRENT_EVENT_SEQUENCE", "FENCE_STATUS", "MISSION_CURRENT", *motion.MESSAGES)
+    of_services = {definition(name).message_id for name in names}
+    arduplane = set(Aircraft().ardupilot.builders) | of_services
     for group in ardupilot_plane.STREAM_GROUPS.values():
         assert set(group) <= arduplane
-    assert set(px4_plane.ONBOARD_RATES_HZ) <= set(Aircraft().px4.builders()) | of_services
+    assert set(px4_plane.ONBOARD_RATES_HZ) <= set(Aircraft().px4.builders) | of_services
 
 
 @pytest.mark.parametrize(("rate_hz", "result"), [(40.0, Result.ACCEPTED), (45.0, 2), (50.0, 2), (4.0, 0)])
 def test_arduplane_refuses_rates_beyond_its_loop(rate_hz: float, result: int) -> None:
     """A loop of 50 Hz sends 40 Hz, and says what to increase for more (docs/firmware/ardupilot.md, 2)."""
-    aircraft = Aircraft()
-    cache = PayloadCache(aircraft.ardupilot.builders())
+    cache = PayloadCache({definition("ATTITUDE").message_id: bytes})
     channel = SimpleNamespace(name="one", send=lambda message: None)
     table = StreamTable(cache, channel, {}, physics_step_us=4000)  # type: ignore[arg-type]
     texts: list[str] = []
     service = MessageIntervalService(
-        PLANE_SERVICES.intervals, {"one": table}, cache, lambda severity, text: texts.append(text), {}
+        PLANE_SERVICES.intervals, {"one": table}, cache, lambda severity, text: texts.append(text)
     )
     source = Source(channel, 255, 190)
     assert service.set_interval(source, definition("ATTITUDE").message_id, 1e6 / rate_hz) == result

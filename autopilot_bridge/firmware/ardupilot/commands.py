@@ -7,7 +7,7 @@ from typing import ClassVar
 from autopilot_bridge.commander.events import ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
-from autopilot_bridge.dispatch import command
+from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
@@ -34,9 +34,12 @@ class ArduPilotCommands(CommandHandlers):
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
 
-    def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_MODE)
+    def set_mode_message(
+        self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int
+    ) -> None:
         """SET_MODE: works, never acknowledged."""
-        self._set_mode(base_mode, custom_mode)
+        self._set_mode(message.base_mode, message.custom_mode)
 
     @command(mavlink.MAV_CMD_DO_SET_MODE)
     def set_mode(self, command: Command, source: Source) -> Result:
@@ -86,7 +89,7 @@ class ArduPilotCommands(CommandHandlers):
         if not command.is_int:
             return Result.UNSUPPORTED
         if command.frame not in GLOBAL_FRAMES | RELATIVE_FRAMES:
-            self.hooks.announce(_WARNING, f"Unknown mavlink coordinate frame {command.frame}")
+            self.parts.announce(_WARNING, f"Unknown mavlink coordinate frame {command.frame}")
             return Result.DENIED
         unset = not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z))
         if unset or not on_earth(command):
@@ -124,9 +127,9 @@ class ArduPilotCommands(CommandHandlers):
     def set_mission_current(self, command: Command, source: Source) -> Result:
         """DO_SET_MISSION_CURRENT: p1 item."""
         item = whole(command.p1)
-        if item is None or not 0 <= item < self.hooks.mission_item_count():
+        if item is None or not 0 <= item < len(self.commander.missions.items):
             return Result.DENIED
-        return Result.ACCEPTED if self.hooks.set_current_item(item) else Result.FAILED
+        return Result.ACCEPTED if self.parts.set_current_item(item) else Result.FAILED
 
     @command(mavlink.MAV_CMD_DO_SET_HOME)
     def set_home(self, command: Command, source: Source) -> Result:
@@ -164,7 +167,7 @@ class ArduPilotCommands(CommandHandlers):
     @command(mavlink.MAV_CMD_DO_SEND_BANNER)
     def send_banner(self, command: Command, source: Source) -> Result:
         """DO_SEND_BANNER: send the texts of the firmware's version on the requesting channel."""
-        self.hooks.banner(source.channel)
+        self.parts.banner(source.channel)
         return Result.ACCEPTED
 
     @command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)

@@ -10,7 +10,7 @@ from autopilot_bridge.firmware.data import load_data, message_ids
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.telemetry.common import NAN, CommonMessages
+from autopilot_bridge.services.messages.common import NAN, CommonMessages
 from autopilot_bridge.telemetry.streams import Values
 from flightsim.foundation.vectors import euler_of
 
@@ -84,7 +84,7 @@ class ArdupilotMessages(CommonMessages):
     @streams(_M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT)
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62)."""
-        roll, pitch, _ = euler_of(self.sources.controller.attitude_setpoint.tolist())
+        roll, pitch, _ = euler_of(self.parts.controller.attitude_setpoint.tolist())
         v = self.view.refreshed()
         bearing_deg, distance_m, alt_error_m = 0, 0.0, 0.0
         target = self.trajectory_setpoint()
@@ -113,7 +113,7 @@ class ArdupilotMessages(CommonMessages):
     @streams(_M.MAVLINK_MSG_ID_AHRS)
     def ahrs(self) -> Values:
         """AHRS (163): gyro bias estimate."""
-        bias = self.sources.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
+        bias = self.parts.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
         return (*bias, 0.0, 0.0, 0.0, 0.0)
 
     @streams(_M.MAVLINK_MSG_ID_AHRS2)
@@ -127,7 +127,7 @@ class ArdupilotMessages(CommonMessages):
     @streams(_M.MAVLINK_MSG_ID_EKF_STATUS_REPORT)
     def ekf_status_report(self) -> Values:
         """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
-        health = self.sources.navigation.health
+        health = self.parts.navigation.health
         return (
             self.ekf_status_flags(),
             finite(health.velocity_test_ratio),
@@ -140,7 +140,7 @@ class ArdupilotMessages(CommonMessages):
 
     def ekf_status_flags(self) -> int:
         """EKF_STATUS_FLAGS."""
-        return ekf_flags(self.sources.navigation.health, position_ready=self.sources.position_ready())
+        return ekf_flags(self.parts.navigation.health, position_ready=self.parts.commander.situation.position)
 
     @streams(_M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4)
     def esc_telemetry(self) -> Values | None:
@@ -180,7 +180,7 @@ class ArdupilotMessages(CommonMessages):
 
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245): a copter reports VTOL in multicopter state."""
-        return (mavlink.MAV_VTOL_STATE_MC, int(self.sources.context.landed_state))
+        return (mavlink.MAV_VTOL_STATE_MC, int(self.context.landed_state))
 
     def battery_status(self) -> Values | None:
         """BATTERY_STATUS (147): kind of battery unknown, energy in hectojoules from charge and voltage."""

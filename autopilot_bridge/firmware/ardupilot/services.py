@@ -1,8 +1,7 @@
 """The services of ArduPilot 4.6.3: what they accept, answer and send, for ArduCopter and for ArduPlane."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -44,6 +43,7 @@ from autopilot_bridge.services.inputs.follow import FollowService
 from autopilot_bridge.services.inputs.landing_target import LandingTargetService
 from autopilot_bridge.services.inputs.manual import ManualRules, ManualService
 from autopilot_bridge.services.inputs.obstacles import ObstacleService
+from autopilot_bridge.services.inputs.timesync import TimeSyncService
 from autopilot_bridge.services.inputs.traffic import TrafficRules, TrafficService
 from autopilot_bridge.services.inputs.transmitter import GestureRules, ModeSwitchRules
 from autopilot_bridge.services.microservice import Microservice
@@ -176,10 +176,29 @@ def address_rule(system_id: int) -> AddressRule:
     return AddressRule(system_id=system_id, component_ids=None, any_system=True)
 
 
-def _microservices(
-    parts: AutopilotParts, *, manual: ManualRules, actuators: Callable[[AutopilotParts], Microservice]
+def _copter_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
+    return (
+        ArduCopterSetpoints(parts),
+        ArduCopterCommands(parts),
+        messages.ArdupilotMessages(parts),
+        *_common_services(parts, COPTER_MANUAL, ArducopterActuators(parts)),
+    )
+
+
+def _plane_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
+    return (
+        ArduPlaneSetpoints(parts),
+        ArduPlaneCommands(parts),
+        plane_messages.ArduPlaneMessages(parts),
+        *_common_services(parts, PLANE_MANUAL, ArduplaneActuators(parts)),
+    )
+
+
+def _common_services(
+    parts: AutopilotParts, manual: ManualRules, actuators: Microservice
 ) -> tuple[Microservice, ...]:
     return (
+        TimeSyncService(answers_ping=False),
         MissionEquipment(parts),
         ArdupilotGeofence(parts.commander, parts.parameters, parts.broadcast),
         OldPoints(parts.parameters, parts.stores, parts.announce),
@@ -191,7 +210,7 @@ def _microservices(
         ManualService(parts, manual),
         ArdupilotCalibration(parts),
         CompassCalibration(parts),
-        actuators(parts),
+        actuators,
         TrafficService(parts, TrafficRules(switch="ADSB_TYPE")),
         *vehicle_files(
             parts,
@@ -247,13 +266,9 @@ SERVICES: Final = FirmwareServices(
         too_fast_text="Requested rate for message ID {} too fast. Increase SCHED_LOOP_RATE",
     ),
     card=CARD,
-    commands=ArduCopterCommands,
-    setpoints=ArduCopterSetpoints,
-    messages=messages.ArdupilotMessages,
-    microservices=partial(_microservices, manual=COPTER_MANUAL, actuators=ArducopterActuators),
+    make=_copter_services,
     rates_hz=_rates_hz(messages.STREAM_GROUPS),
     stream_rate_parameters=messages.STREAM_RATE_PARAMETERS,
-    answers_ping=False,
     flow_control=FLOW_CONTROL,
     position_pushed_at_arm=True,
 )
@@ -265,9 +280,6 @@ PLANE_SERVICES: Final = replace(
     intervals=replace(
         SERVICES.intervals, max_rate_hz=_PLANE_MAX_RATE_HZ, groups=plane_messages.STREAM_GROUPS
     ),
-    commands=ArduPlaneCommands,
-    setpoints=ArduPlaneSetpoints,
-    messages=plane_messages.ArduPlaneMessages,
-    microservices=partial(_microservices, manual=PLANE_MANUAL, actuators=ArduplaneActuators),
+    make=_plane_services,
     rates_hz=_rates_hz(plane_messages.STREAM_GROUPS),
 )

@@ -5,11 +5,18 @@ import math
 from autopilot_bridge.commander.events import CommandDenied, ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
-from autopilot_bridge.dispatch import command
+from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.commands.command import FORCE_NUMBER, Command, flags, on_earth, whole
+from autopilot_bridge.services.commands.command import (
+    FORCE_NUMBER,
+    Command,
+    acknowledge,
+    flags,
+    on_earth,
+    whole,
+)
 from autopilot_bridge.services.commands.handlers import CommandHandlers
 
 _CUSTOM_MODE_FLAG = 1
@@ -19,15 +26,21 @@ _PROTOCOL_VERSION = 300
 class Px4Commands(CommandHandlers):
     """PX4's commands. Everything not in the table is UNSUPPORTED, as in the firmware."""
 
-    double_ack = frozenset({mavlink.MAV_CMD_DO_SET_MODE})
-
-    def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> Result:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_MODE)
+    def set_mode_message(
+        self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int
+    ) -> None:
         """SET_MODE: acknowledged once, with the actual result."""
-        return self._set_mode(base_mode, custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF, source)
+        main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
+        result = self._set_mode(message.base_mode, main, sub, source)
+        acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
 
     @command(mavlink.MAV_CMD_DO_SET_MODE)
     def set_mode(self, command: Command, source: Source) -> Result:
-        """DO_SET_MODE: p1 base mode, p2 main mode, p3 sub mode."""
+        """DO_SET_MODE: p1 base mode, p2 main mode, p3 sub mode; acknowledged as accepted before it is
+        executed, and once more after.
+        """
+        acknowledge(command.id, Result.ACCEPTED, source)
         return self._set_mode(flags(command.p1), flags(command.p2), flags(command.p3), source)
 
     def _set_mode(self, base_mode: int, main: int, sub: int, source: Source) -> Result:
@@ -122,9 +135,9 @@ class Px4Commands(CommandHandlers):
         if self.commander.mission_problem is not None:
             return self.deny(command, Reason.MISSION_MISSING, Result.DENIED)
         first = whole(command.p1)
-        if first is None or not -1 <= first < self.hooks.mission_item_count():
+        if first is None or not -1 <= first < len(self.commander.missions.items):
             return Result.DENIED
-        if first > 0 and not self.hooks.set_current_item(first):
+        if first > 0 and not self.parts.set_current_item(first):
             return Result.DENIED
         if not self.commander.set_mode(FlightMode.MISSION).accepted:
             return Result.TEMPORARILY_REJECTED
@@ -144,7 +157,7 @@ class Px4Commands(CommandHandlers):
         start = next(
             (i for i, item in enumerate(items) if item.command == mavlink.MAV_CMD_DO_LAND_START), None
         )
-        if start is None or not self.hooks.set_current_item(start):
+        if start is None or not self.parts.set_current_item(start):
             return Result.CANCELLED
         return self.commander.set_mode(FlightMode.MISSION).result
 
@@ -152,17 +165,17 @@ class Px4Commands(CommandHandlers):
     def inject_failure(self, command: Command, source: Source) -> Result:
         """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all)."""
         unit, kind, instance = (whole(command.p1), whole(command.p2), whole(command.p3, 0))
-        if self.hooks.inject_failure is None:
+        if self.parts.inject_failure is None:
             return Result.UNSUPPORTED
-        enabled = bool(self.hooks.parameters.get("SYS_FAILURE_EN"))
+        enabled = bool(self.parts.parameters.get("SYS_FAILURE_EN"))
         if not enabled or unit is None or kind is None or instance is None:
             return Result.DENIED
-        return self.hooks.inject_failure(unit, kind, instance)
+        return self.parts.inject_failure(unit, kind, instance)
 
     @command(mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION)
     def request_protocol_version(self, command: Command, source: Source) -> Result:
         """REQUEST_PROTOCOL_VERSION, the former request."""
-        return self.hooks.intervals.request(source, _PROTOCOL_VERSION)
+        return self.parts.intervals.request(source, _PROTOCOL_VERSION)
 
     @command(mavlink.MAV_CMD_DO_VTOL_TRANSITION, mavlink.MAV_CMD_SET_CAMERA_MODE)
     def silence(self, command: Command, source: Source) -> None:

@@ -11,7 +11,8 @@ from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.telemetry.common import NAN, CommonMessages, TelemetrySources
+from autopilot_bridge.services.messages.common import NAN, CommonMessages
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 
@@ -45,8 +46,8 @@ class Px4Messages(CommonMessages):
     gps_timeout_us = 1_000_000
     gps_sent_before_first = False
 
-    def __init__(self, sources: TelemetrySources) -> None:
-        super().__init__(sources)
+    def __init__(self, parts: AutopilotParts) -> None:
+        super().__init__(parts)
         self._ping_sequence = -1
 
     @streams(_M.MAVLINK_MSG_ID_PING)
@@ -72,7 +73,7 @@ class Px4Messages(CommonMessages):
         v = self.view.refreshed()
         if not v.has_global:
             return None
-        clearance_m = float(self.sources.navigation.state[nav.HEIGHT_ABOVE_GROUND_M])
+        clearance_m = float(self.parts.navigation.state[nav.HEIGHT_ABOVE_GROUND_M])
         local_m = -v.pos[2]
         pressure_pa, _ = v.pressure()
         return (
@@ -88,7 +89,7 @@ class Px4Messages(CommonMessages):
     def attitude_target(self) -> Values | None:
         """ATTITUDE_TARGET (83), at rest too: level, with the present heading, motors off."""
         target = super().attitude_target()
-        if target is not None or not self.sources.navigation.health.attitude:
+        if target is not None or not self.parts.navigation.health.attitude:
             return target
         half_yaw = 0.5 * self.view.refreshed().yaw
         level = (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
@@ -100,11 +101,11 @@ class Px4Messages(CommonMessages):
         """
         target = self.trajectory_setpoint()
         if target is None:
-            if self.sources.context.armed or not self.sources.navigation.health.attitude:
+            if self.context.armed or not self.parts.navigation.health.attitude:
                 return None
             target = [NAN] * 6 + [0.0, 0.0, _FREE_FALL_M_S2, self.view.refreshed().yaw, 0.0]
         else:  # PX4 shows the output of its position controller
-            computed = self.sources.controller.velocity_setpoint_ned_m_s.tolist()
+            computed = self.parts.controller.velocity_setpoint_ned_m_s.tolist()
             target[3:6] = [
                 made if math.isnan(commanded) else commanded
                 for commanded, made in zip(target[3:6], computed, strict=True)
@@ -115,7 +116,7 @@ class Px4Messages(CommonMessages):
     @streams(_M.MAVLINK_MSG_ID_ESTIMATOR_STATUS)
     def estimator_status(self) -> Values:
         """ESTIMATOR_STATUS (230). PX4's ratios are squared: (innovation / gate)^2."""
-        health = self.sources.navigation.health
+        health = self.parts.navigation.health
         return (
             self.view.time_us,
             estimator_flags(health),
@@ -132,8 +133,8 @@ class Px4Messages(CommonMessages):
     @streams(_M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS)
     def orbit_execution_status(self) -> Values | None:
         """ORBIT_EXECUTION_STATUS (360), while circling."""
-        orbit = self.sources.orbit()
-        frame = self.sources.context.frame
+        orbit = self.parts.commander.tasks.orbit
+        frame = self.context.frame
         if orbit is None or frame is None:
             return None
         radius_m, north_m, east_m, down_m = orbit
@@ -150,7 +151,7 @@ class Px4Messages(CommonMessages):
     @streams(_M.MAVLINK_MSG_ID_CURRENT_MODE)
     def current_mode(self) -> Values:
         """CURRENT_MODE (436)."""
-        return self.sources.current_mode()
+        return self.parts.status.current_mode()
 
     @streams(_M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION)
     def open_drone_id_location(self) -> Values | None:
@@ -158,7 +159,7 @@ class Px4Messages(CommonMessages):
         v = self.view.refreshed()
         if not v.has_global:
             return None
-        airborne = int(self.sources.context.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND
+        airborne = int(self.context.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND
         course_cdeg = round(math.degrees(math.atan2(v.vel[1], v.vel[0])) % 360.0 * 100.0) % 36000
         pressure_pa, _ = v.pressure()
         return (
@@ -189,7 +190,7 @@ class Px4Messages(CommonMessages):
         home = self.home_place()
         if home is None:
             return None
-        unix_s = (self.sources.unix_epoch_us + self.view.time_us) // 1_000_000
+        unix_s = (self.parts.memory.unix_epoch_us + self.view.time_us) // 1_000_000
         return (
             0,
             0,

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -45,6 +44,7 @@ from autopilot_bridge.services.inputs.follow import FollowService
 from autopilot_bridge.services.inputs.landing_target import LandingTargetService
 from autopilot_bridge.services.inputs.manual import ManualRules, ManualService
 from autopilot_bridge.services.inputs.obstacles import ObstacleService
+from autopilot_bridge.services.inputs.timesync import TimeSyncService
 from autopilot_bridge.services.inputs.traffic import TrafficRules, TrafficService
 from autopilot_bridge.services.inputs.transmitter import GestureRules, ModeSwitchRules
 from autopilot_bridge.services.microservice import Microservice
@@ -162,7 +162,25 @@ def address_rule(system_id: int) -> AddressRule:
     return AddressRule(system_id=system_id, component_ids=frozenset((1, 190)), any_system=False)
 
 
-def _microservices(
+def _copter_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
+    return (
+        Px4Setpoints(parts),
+        Px4Commands(parts),
+        messages.Px4Messages(parts),
+        *_common_services(parts, listed_modes=copter_modes.LISTED_MODES, notices=copter_notices),
+    )
+
+
+def _plane_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
+    return (
+        Px4Setpoints(parts),  # the same: the offboard task has the same setters
+        Px4PlaneCommands(parts),
+        plane_messages.Px4PlaneMessages(parts),
+        *_common_services(parts, listed_modes=plane_modes.LISTED_MODES, notices=plane_notices),
+    )
+
+
+def _common_services(
     parts: AutopilotParts,
     *,
     listed_modes: tuple[ListedMode, ...],
@@ -170,6 +188,7 @@ def _microservices(
 ) -> tuple[Microservice, ...]:
     metadata = ComponentMetadataService(parts.parameters.definitions, parts.memory.time_us)
     return (
+        TimeSyncService(answers_ping=True),
         MissionEquipment(parts),
         ExternalOdometryService(parts, ODOMETRY),
         FollowService(parts, by_position=False),
@@ -210,13 +229,9 @@ SERVICES: Final = FirmwareServices(
         refuse_running=True,
     ),
     card=CARD,
-    commands=Px4Commands,
-    setpoints=Px4Setpoints,
-    messages=messages.Px4Messages,
-    microservices=partial(_microservices, listed_modes=copter_modes.LISTED_MODES, notices=copter_notices),
+    make=_copter_services,
     rates_hz=_rates_hz(messages.ONBOARD_RATES_HZ, messages.GCS_RATES_HZ),
     stream_rate_parameters=MappingProxyType({}),
-    answers_ping=True,
     flow_control=FLOW_CONTROL,
     position_pushed_at_arm=False,
 )
@@ -225,8 +240,6 @@ SERVICES: Final = FirmwareServices(
 PLANE_SERVICES: Final = replace(
     SERVICES,
     missions=PX4_PLANE_MISSION_POLICY,
-    commands=Px4PlaneCommands,  # the setpoints are the same: the offboard task has the same setters
-    messages=plane_messages.Px4PlaneMessages,
-    microservices=partial(_microservices, listed_modes=plane_modes.LISTED_MODES, notices=plane_notices),
+    make=_plane_services,
     rates_hz=_rates_hz(plane_messages.ONBOARD_RATES_HZ, plane_messages.GCS_RATES_HZ),
 )

@@ -6,22 +6,28 @@ Source: `mavlink_receiver.cpp` of PX4 1.16.1.
 import math
 from typing import Final
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import SetpointDenied, SetpointFault
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs import setpoints as wire
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _GLOBAL_FRAMES: Final = {mavlink.MAV_FRAME_GLOBAL_INT: False, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
 """Whether the altitude is over home."""
 
 
-class Px4Setpoints:
+class Px4Setpoints(Microservice):
     """PX4: each component can be ignored; a setpoint that controls nothing does not count."""
 
-    def __init__(self, commander: Commander) -> None:
-        self.commander = commander
+    def __init__(self, parts: AutopilotParts) -> None:
+        self.commander = parts.commander
 
-    def on_local(self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
+    def on_local(
+        self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
+    ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         mask = message.type_mask
         position = wire.position_of((message.x, message.y, message.z), mask)
@@ -41,8 +47,9 @@ class Px4Setpoints:
             return
         self._take(message, position, velocity, acceleration, time_us)
 
+    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT)
     def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         mask = message.type_mask
@@ -100,7 +107,10 @@ class Px4Setpoints:
             )
         )
 
-    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET)
+    def on_attitude(
+        self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
+    ) -> None:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         thrust = message.thrust

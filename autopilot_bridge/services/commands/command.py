@@ -92,3 +92,10 @@ def on_earth(command: Command) -> bool:
 
 Handler = Callable[[Command, Source], Result | None]
 """Executes a command; the result for the COMMAND_ACK, or None where the firmware sends none."""
+
+
+def acknowledge(command: int, result: Result, source: Source) -> None:
+    """Send a COMMAND_ACK to the client that has sent the command."""
+    source.channel.send(
+        mavlink.MAVLink_command_ack_message(command, int(result), 0, 0, source.system_id, source.component_id)
+    )

@@ -5,80 +5,32 @@ for the COMMAND_ACK, or None where the firmware sends no acknowledgement.
 """
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final, Protocol
+from abc import ABC
+from typing import Final
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, Channel, Source
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _HOME_POSITION: Final = mavlink.MAVLINK_MSG_ID_HOME_POSITION
 _AUTOPILOT_VERSION: Final = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
-
-
-class MessageIntervals(Protocol):
-    """The service that answers the commands about messages and their rates (511, 510, 512)."""
-
-    def set_interval(self, source: Source, message_id: int, interval_us: float) -> Result: ...
-
-    def get_interval(self, source: Source, message_id: int) -> Result: ...
-
-    def request(self, source: Source, message_id: int, parameter: float = 0.0) -> Result: ...
-
-
-FailureHook = Callable[[int, int, int], Result]
-"""Handles MAV_CMD_INJECT_FAILURE: (FAILURE_UNIT, FAILURE_TYPE, instance; 0: all)."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CommandHooks:
-    """The parts of the autopilot that commands need besides the commander.
-
-    Attributes:
-        intervals: message rates and requests.
-        parameters: the parameter store (fence switch, reset to defaults).
-        announce: sends a STATUSTEXT.
-        banner: sends the texts that identify the firmware, on one channel.
-        set_current_item: continues the mission from another item; False: refused.
-        mission_item_count: stored items.
-        inject_failure: switches sensor failures; None: not supported by this vehicle.
-    """
-
-    intervals: MessageIntervals
-    parameters: ParameterStore
-    announce: Announce
-    banner: Callable[[Channel], None]
-    set_current_item: Callable[[int], bool]
-    mission_item_count: Callable[[], int]
-    inject_failure: FailureHook | None = None
 
 
 class CommandHandlers(Microservice, ABC):
     """Commands that both flavours share; a flavour adds its own. All others are UNSUPPORTED.
 
     Args:
-        commander: executes the commands.
-        hooks: the rest of the autopilot.
+        parts: of the autopilot.
     """
 
-    double_ack: frozenset[int] = frozenset()
-    """Commands that are acknowledged as accepted before execution, and once more after it."""
-
-    def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
-        self.commander = commander
-        self.hooks = hooks
-
-    @abstractmethod
-    def set_mode_message(self, base_mode: int, custom_mode: int, source: Source) -> Result | None:
-        """The SET_MODE message."""
+    def __init__(self, parts: AutopilotParts) -> None:
+        self.parts = parts
+        self.commander = parts.commander
 
     def deny(self, command: Command, reason: Reason, result: Result) -> Result:
         """Refuse with a text, if the flavour has one."""
@@ -98,13 +50,13 @@ class CommandHandlers(Microservice, ABC):
         message_id = whole(command.p1)
         if message_id is None:
             return Result.DENIED
-        return self.hooks.intervals.set_interval(source, message_id, command.p2)
+        return self.parts.intervals.set_interval(source, message_id, command.p2)
 
     @command(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL)
     def get_message_interval(self, command: Command, source: Source) -> Result:
         """GET_MESSAGE_INTERVAL: p1 message."""
         message_id = whole(command.p1)
-        return Result.DENIED if message_id is None else self.hooks.intervals.get_interval(source, message_id)
+        return Result.DENIED if message_id is None else self.parts.intervals.get_interval(source, message_id)
 
     @command(mavlink.MAV_CMD_REQUEST_MESSAGE)
     def request_message(self, command: Command, source: Source) -> Result:
@@ -112,12 +64,12 @@ class CommandHandlers(Microservice, ABC):
         message_id = whole(command.p1)
         if message_id is None:
             return Result.DENIED
-        return self.hooks.intervals.request(source, message_id, command.p2)
+        return self.parts.intervals.request(source, message_id, command.p2)
 
     @command(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES)
     def request_capabilities(self, command: Command, source: Source) -> Result:
         """REQUEST_AUTOPILOT_CAPABILITIES, the former request for AUTOPILOT_VERSION."""
-        self.hooks.intervals.request(source, _AUTOPILOT_VERSION)
+        self.parts.intervals.request(source, _AUTOPILOT_VERSION)
         return Result.ACCEPTED
 
     @command(mavlink.MAV_CMD_GET_HOME_POSITION)
@@ -125,7 +77,7 @@ class CommandHandlers(Microservice, ABC):
         """GET_HOME_POSITION, the former request for HOME_POSITION."""
         if self.commander.home.position is None:
             return Result.FAILED
-        self.hooks.intervals.request(source, _HOME_POSITION)
+        self.parts.intervals.request(source, _HOME_POSITION)
         return Result.ACCEPTED
 
     # places

@@ -57,7 +57,9 @@ class MessageIntervalService(Microservice):
         tables: the stream table of each channel, by channel name; the mapping may grow.
         cache: builds the messages.
         announce: sends a STATUSTEXT (MAV_SEVERITY, text).
-        on_demand: messages that are only sent on request: id -> function (channel, param2).
+
+    Attributes:
+        requested: messages that are only sent on request: id -> function (channel, param2).
     """
 
     def __init__(
@@ -66,13 +68,12 @@ class MessageIntervalService(Microservice):
         tables: Mapping[str, StreamTable],
         cache: PayloadCache,
         announce: Callable[[int, str], None],
-        on_demand: Mapping[int, Callable[[Channel, float], None]],
     ) -> None:
         self._policy = policy
         self._tables = tables
         self._cache = cache
         self._announce = announce
-        self._on_demand = on_demand
+        self.requested: dict[int, Callable[[Channel, float], None]] = {}
         self._pending: dict[tuple[Channel, int, float], None] = {}  # two equal requests get one answer
         self._time_us = 0
 
@@ -98,8 +99,8 @@ class MessageIntervalService(Microservice):
             return
         pending, self._pending = self._pending, {}
         for channel, message_id, parameter in pending:
-            if message_id in self._on_demand:
-                self._on_demand[message_id](channel, parameter)
+            if message_id in self.requested:
+                self.requested[message_id](channel, parameter)
                 continue
             payload = self._cache.payload(message_id, time_us)
             if payload is not None:
@@ -143,7 +144,7 @@ class MessageIntervalService(Microservice):
 
     def request(self, source: Source, message_id: int, parameter: float = 0.0) -> Result:
         """MAV_CMD_REQUEST_MESSAGE: the message follows the acknowledgement."""
-        if message_id in self._on_demand:
+        if message_id in self.requested:
             self._pending[source.channel, message_id, parameter] = None
             return Result.ACCEPTED
         policy = self._policy

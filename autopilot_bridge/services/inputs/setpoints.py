@@ -8,16 +8,13 @@ acknowledges them.
 """
 
 import math
-from collections.abc import Mapping
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import Receiver, receiver
-from autopilot_bridge.services.microservice import Microservice
 from flightsim.foundation.rotations import rotate
 
 Triple = tuple[float, float, float]
@@ -180,47 +177,3 @@ def rates_of(message: mavlink.MAVLink_set_attitude_target_message) -> Triple:
         for value, bit in zip(values, _RATE_BITS, strict=True)
     )
     return roll, pitch, yaw
-
-
-class SetpointRules(Protocol):
-    """How one firmware uses each kind of setpoint; invalid setpoints are ignored."""
-
-    def on_local(
-        self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int
-    ) -> None: ...
-
-    def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
-    ) -> None: ...
-
-    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None: ...
-
-
-class SetpointService(Microservice):
-    """Passes setpoints to the firmware's rules.
-
-    Args:
-        rules: how the firmware uses setpoints.
-    """
-
-    def __init__(self, rules: SetpointRules) -> None:
-        self._rules = rules
-
-    @property
-    def receivers(self) -> Mapping[int, Receiver]:
-        """The three kinds of setpoints; invalid ones are ignored, as in the firmware."""
-        rules = self._rules
-        return {
-            **receiver(
-                mavlink.MAVLink_set_position_target_local_ned_message,
-                lambda message, source, time_us: rules.on_local(message, time_us),
-            ),
-            **receiver(
-                mavlink.MAVLink_set_position_target_global_int_message,
-                lambda message, source, time_us: rules.on_global(message, time_us),
-            ),
-            **receiver(
-                mavlink.MAVLink_set_attitude_target_message,
-                lambda message, source, time_us: rules.on_attitude(message, time_us),
-            ),
-        }

@@ -8,7 +8,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
-from autopilot_bridge.dispatch import receives
+from autopilot_bridge.commander.events import Event, MissionItemReached
+from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
@@ -16,7 +17,12 @@ from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.download import MissionDownloads
-from autopilot_bridge.services.plans.messages import ack_message, plan_checksum, send_extended
+from autopilot_bridge.services.plans.messages import (
+    ack_message,
+    extended_payload,
+    plan_checksum,
+    send_extended,
+)
 from autopilot_bridge.services.plans.policy import CRITICAL, INFO, MissionPolicy, Text
 from autopilot_bridge.services.plans.progress_report import MissionProgress, MissionReport, NoProgress
 from autopilot_bridge.services.plans.rules import fence_excludes
@@ -114,9 +120,18 @@ class MissionService(Microservice):
     def stores(self) -> Mapping[MissionType, MissionStore]:
         return self._stores
 
+    @streams(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
+    def _current(self) -> bytes | None:
+        return extended_payload(self.current_message())
+
     def current_message(self) -> MavlinkMessage:
         """MISSION_CURRENT with the present state, for the streams."""
         return self._report.current_message()
+
+    def follow(self, event: Event) -> None:
+        """Report an item that the flying task has finished."""
+        if isinstance(event, MissionItemReached):
+            self.item_reached(event.index)
 
     def item_reached(self, seq: int) -> None:
         """The flying task has finished an item: the next `tick` sends MISSION_ITEM_REACHED."""

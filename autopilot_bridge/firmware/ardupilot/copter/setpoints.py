@@ -6,11 +6,14 @@ Source: `ArduCopter/GCS_Mavlink.cpp` of ArduPilot 4.6.3.
 import math
 from typing import Final
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs import setpoints as wire
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 
 _GLOBAL_FRAMES: Final = {
     mavlink.MAV_FRAME_GLOBAL_INT: False,
@@ -25,13 +28,16 @@ _OFFSET_FRAMES: Final = frozenset(
 _BODY_FRAMES: Final = frozenset({mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED})
 
 
-class ArduCopterSetpoints:
+class ArduCopterSetpoints(Microservice):
     """ArduCopter: position, velocity and acceleration are each used or ignored whole; used in GUIDED only."""
 
-    def __init__(self, commander: Commander) -> None:
-        self.commander = commander
+    def __init__(self, parts: AutopilotParts) -> None:
+        self.commander = parts.commander
 
-    def on_local(self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
+    def on_local(
+        self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
+    ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         guided = self._guided()
         if guided is None:
@@ -57,8 +63,9 @@ class ArduCopterSetpoints:
             position = (position[0] + north_m, position[1] + east_m, position[2] + down_m)
         self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
+    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT)
     def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         guided = self._guided()
@@ -133,7 +140,10 @@ class ArduCopterSetpoints:
         else:
             guided.set_hold(context)
 
-    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET)
+    def on_attitude(
+        self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
+    ) -> None:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         guided = self._guided()

@@ -54,12 +54,12 @@ class ArduPlaneCommands(ArduPilotCommands):
         if command.p1 == 1.0 and checked and not self.commander.armed:
             problem = self._mission_problem()
             if problem is not None:
-                self.hooks.announce(_CRITICAL, problem)
+                self.parts.announce(_CRITICAL, problem)
                 return Result.FAILED
         return super().arm_disarm(command, source)
 
     def _mission_problem(self) -> str | None:
-        store = self.hooks.parameters
+        store = self.parts.parameters
         values = {
             name: store.get(name) if name in store else usual for name, usual in PLANE_PARAMETERS.items()
         }
@@ -75,8 +75,8 @@ class ArduPlaneCommands(ArduPilotCommands):
         )
         result = super().set_flight_mode(mode)
         if landed_by_mission and result is Result.ACCEPTED and mode not in _NAVIGATING:
-            self.hooks.set_current_item(0)
-            self.hooks.announce(_INFO, "In landing sequence: mission reset")
+            self.parts.set_current_item(0)
+            self.parts.announce(_INFO, "In landing sequence: mission reset")
         if mode is FlightMode.MISSION:
             self._leave_empty_mission(result)
         return result
@@ -89,15 +89,15 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     def _leave_empty_mission(self, entered: Result) -> None:
         """Without a mission AUTO is left at once."""
-        if entered is Result.ACCEPTED and self.hooks.mission_item_count() <= 1:
-            self.hooks.announce(_INFO, "Mission complete, changing mode to RTL")
+        if entered is Result.ACCEPTED and len(self.commander.missions.items) <= 1:
+            self.parts.announce(_INFO, "Mission complete, changing mode to RTL")
             self.commander.set_mode(FlightMode.RETURN)
 
     @command(mavlink.MAV_CMD_DO_LAND_START)
     def land_start(self, command: Command, source: Source) -> Result:
         """DO_LAND_START: jump to the mission's landing sequence, in AUTO."""
         start = landing_start(self.commander.missions.items)
-        if start is None or not self.commander.situation.position or not self.hooks.set_current_item(start):
+        if start is None or not self.commander.situation.position or not self.parts.set_current_item(start):
             return Result.FAILED
         return self.commander.set_mode(FlightMode.MISSION).result
 
@@ -126,7 +126,7 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     def radius_of(self, command: Command) -> float:
         """DO_REPOSITION: p3 radius (not positive: WP_LOITER_RAD); p4 not 0: counter-clockwise."""
-        radius_m = command.p3 if command.p3 > 0.0 else abs(self.hooks.parameters.get("WP_LOITER_RAD"))
+        radius_m = command.p3 if command.p3 > 0.0 else abs(self.parts.parameters.get("WP_LOITER_RAD"))
         counter_clockwise = math.isfinite(command.p4) and command.p4 != 0.0
         return -radius_m if counter_clockwise else radius_m
 
@@ -134,23 +134,23 @@ class ArduPlaneCommands(ArduPilotCommands):
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 m/s (-2: the parameter's), p3 throttle %; AUTO and GUIDED."""
         if self.commander.mode not in (FlightMode.MISSION, FlightMode.GUIDED):
             return Result.FAILED
-        parameters, kind, speed = self.hooks.parameters, whole(command.p1, 0), command.p2
+        parameters, kind, speed = self.parts.parameters, whole(command.p1, 0), command.p2
         guidance = self.commander.guidance
         if kind == _AIRSPEED and speed == _DEFAULT_SPEED:
             guidance.change_speed(-1.0, kind=_AIRSPEED)
             return Result.ACCEPTED
         if kind == _AIRSPEED and parameters.get("AIRSPEED_MIN") <= speed <= parameters.get("AIRSPEED_MAX"):
             guidance.change_speed(speed, kind=_AIRSPEED)
-            self.hooks.announce(_INFO, f"Set airspeed {speed:.0f} m/s")
+            self.parts.announce(_INFO, f"Set airspeed {speed:.0f} m/s")
             return Result.ACCEPTED
         if kind == _GROUND_SPEED and 0.0 <= speed <= 100.0:
             parameters.set("MIN_GROUNDSPEED", speed, check_range=False)
-            self.hooks.announce(_INFO, f"Set groundspeed {speed:.0f} m/s")
+            self.parts.announce(_INFO, f"Set groundspeed {speed:.0f} m/s")
             return Result.ACCEPTED
         throttle = whole(command.p3, 0) or 0
         if 0 < throttle <= 100:
             parameters.set("TRIM_THROTTLE", throttle)
-            self.hooks.announce(_INFO, f"Set throttle {throttle}")
+            self.parts.announce(_INFO, f"Set throttle {throttle}")
             return Result.ACCEPTED
         return Result.FAILED
 
@@ -159,7 +159,7 @@ class ArduPlaneCommands(ArduPilotCommands):
         """GUIDED_CHANGE_SPEED: p1 airspeed only, p2 m/s, p3 m/s^2 (0: at once)."""
         if self.commander.mode is not FlightMode.GUIDED:
             return Result.FAILED
-        parameters = self.hooks.parameters
+        parameters = self.parts.parameters
         low, high = parameters.get("AIRSPEED_MIN"), parameters.get("AIRSPEED_MAX")
         if whole(command.p1) != _AIRSPEED or not low <= command.p2 <= high:
             return Result.DENIED
@@ -202,8 +202,8 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: only with the advanced failsafe switched on."""
-        if not self.hooks.parameters.get("AFS_ENABLE"):
-            self.hooks.announce(_INFO, "AFS not enabled, can't terminate the vehicle")
+        if not self.parts.parameters.get("AFS_ENABLE"):
+            self.parts.announce(_INFO, "AFS not enabled, can't terminate the vehicle")
             return Result.FAILED
         return super().terminate(command, source)
 

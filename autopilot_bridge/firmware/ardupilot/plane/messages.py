@@ -10,8 +10,8 @@ from autopilot_bridge.firmware.ardupilot import messages as ardupilot
 from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_flags
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
-from autopilot_bridge.telemetry.common import TelemetrySources
+from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.streams import Values
 from flightsim import interface
 
@@ -46,14 +46,14 @@ _ABSOLUTE: Final = mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_PRED_POS_HORIZ_ABS
 class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
     """Builders of what ArduPlane sends."""
 
-    def __init__(self, sources: TelemetrySources) -> None:
-        super().__init__(sources)
-        self._aircraft = AircraftState(sources)
+    def __init__(self, parts: AutopilotParts) -> None:
+        super().__init__(parts)
+        self._aircraft = AircraftState(parts)
 
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, throttle, rudder; disarmed neutral and throttle off."""
         pulses = [_NEUTRAL_US, _NEUTRAL_US, _THROTTLE_OFF_US, _NEUTRAL_US]
-        if self.sources.context.armed:
+        if self.context.armed:
             surfaces = self._aircraft.surfaces
             pulses = [
                 _NEUTRAL_US + round(_TRAVEL_US * surfaces.aileron),
@@ -69,9 +69,9 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
         pressure_pa = self._aircraft.pitot_pressure_pa
         if pressure_pa is None:
             return None
-        temperature_c = float(self.sources.readings.airspeed.values[interface.AIRSPEED_TEMPERATURE_C])
-        health = self.sources.navigation.health
-        rejected = self.sources.context.armed and not health.airspeed_valid
+        temperature_c = float(self.parts.readings.airspeed.values[interface.AIRSPEED_TEMPERATURE_C])
+        health = self.parts.navigation.health
+        rejected = self.context.armed and not health.airspeed_valid
         return (
             0,
             self._aircraft.airspeed_m_s,
@@ -84,7 +84,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
     def flow_angles(self) -> Values:
         """AOA_SSA (11020): angle of attack and sideslip by velocity and wind, degrees; 0 on the ground."""
         forward, right, down = self._aircraft.air_velocity_frd_m_s
-        if self.sources.context.on_ground or forward <= 0.0:
+        if self.context.on_ground or forward <= 0.0:
             return (self.view.time_us, 0.0, 0.0)
         return (
             self.view.time_us,
@@ -102,7 +102,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
 
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62), in modes with navigation by the autopilot; airspeed error in cm/s."""
-        if self.sources.heartbeat()[_CUSTOM_MODE_FIELD] not in _NAVIGATING:
+        if self.parts.status.heartbeat()[_CUSTOM_MODE_FIELD] not in _NAVIGATING:
             return None
         controller, v = self._aircraft.controller, self.view.refreshed()
         north_m, east_m, down_m = v.pos
@@ -126,7 +126,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
 
     def ekf_status_flags(self) -> int:
         """EKF_STATUS_FLAGS: dead reckoning by wind and airspeed is a relative position, not an absolute."""
-        health = self.sources.navigation.health
+        health = self.parts.navigation.health
         if not health.wind_dead_reckoning:
             return super().ekf_status_flags()
         flags = ekf_flags(health, position_ready=True)
@@ -142,7 +142,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
 
     def position_target_global_int(self) -> Values | None:
         """POSITION_TARGET_GLOBAL_INT (87): frame 0, altitude above mean sea level."""
-        path, frame = self._aircraft.path, self.sources.context.frame
+        path, frame = self._aircraft.path, self.context.frame
         if path is None or frame is None:
             return None
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(path.north_m, path.east_m, path.down_m)
@@ -158,7 +158,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
 
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245): no VTOL; a take-off is reported as flight."""
-        landed = int(self.sources.context.landed_state)
+        landed = int(self.context.landed_state)
         if landed == mavlink.MAV_LANDED_STATE_TAKEOFF:
             landed = int(mavlink.MAV_LANDED_STATE_IN_AIR)
         return (mavlink.MAV_VTOL_STATE_UNDEFINED, landed)

@@ -9,11 +9,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import AltitudeChanged
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs.setpoints import POSITION_BITS, place_of, unit_quaternion
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
 from flightsim.foundation.rotations import euler_from_quaternion
 
 _ROLL_RATE_BIT, _PITCH_RATE_BIT = 1, 2  # SET_ATTITUDE_TARGET.type_mask
@@ -28,13 +31,16 @@ _RELATIVE: Final = frozenset(
 )
 
 
-class ArduPlaneSetpoints:
+class ArduPlaneSetpoints(Microservice):
     """ArduPlane's setpoints."""
 
-    def __init__(self, commander: Commander) -> None:
-        self.commander = commander
+    def __init__(self, parts: AutopilotParts) -> None:
+        self.commander = parts.commander
 
-    def on_local(self, message: mavlink.MAVLink_set_position_target_local_ned_message, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
+    def on_local(
+        self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
+    ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED: in MAV_FRAME_LOCAL_OFFSET_NED (7) a step in height, nothing else.
 
         The mask is not checked, as in the firmware.
@@ -52,8 +58,9 @@ class ArduPlaneSetpoints:
         height_m = self._home_down_m() - down_m
         self.commander.emit(AltitudeChanged(time_us=self.commander.time_us, height_m=height_m))
 
+    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT)
     def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, time_us: int
+        self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT: its altitude.
 
@@ -77,7 +84,10 @@ class ArduPlaneSetpoints:
         if guided is not None:
             self._fly_at(guided, reference_down_m - message.alt)
 
-    def on_attitude(self, message: mavlink.MAVLink_set_attitude_target_message, time_us: int) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET)
+    def on_attitude(
+        self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
+    ) -> None:
         """SET_ATTITUDE_TARGET: what the mask does not ignore of roll, pitch and throttle.
 
         The bits of the body rates leave roll or pitch to the autopilot only together with the attitude's bit:

@@ -10,8 +10,9 @@ from autopilot_bridge.firmware.px4 import messages as px4
 from autopilot_bridge.firmware.px4.messages import Px4Messages
 from autopilot_bridge.flight.context import LandedState
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.telemetry.aircraft import AircraftAir, AircraftState
-from autopilot_bridge.telemetry.common import NAN, TelemetrySources
+from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
+from autopilot_bridge.services.messages.common import NAN
+from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.streams import Values
 
 _M = mavlink
@@ -42,15 +43,15 @@ _NOTHING: Final = (NAN,) * 8
 class Px4PlaneMessages(AircraftAir, Px4Messages):
     """Builders of what PX4 sends on a fixed wing."""
 
-    def __init__(self, sources: TelemetrySources) -> None:
-        super().__init__(sources)
-        self._aircraft = AircraftState(sources)
+    def __init__(self, parts: AutopilotParts) -> None:
+        super().__init__(parts)
+        self._aircraft = AircraftState(parts)
         self._has_flown = False
 
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, rudder, motor; 900 us for outputs without an actuator."""
         aileron = elevator = rudder = motor = _STOPPED_US
-        if self.sources.context.armed:
+        if self.context.armed:
             surfaces = self._aircraft.surfaces
             aileron = _NEUTRAL_US + round(_TRAVEL_US * surfaces.aileron)
             elevator = _NEUTRAL_US + round(_TRAVEL_US * surfaces.elevator)
@@ -97,18 +98,18 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
     @streams(_M.MAVLINK_MSG_ID_WIND_COV)
     def wind_cov(self) -> Values | None:
         """WIND_COV (231), from the first flight on; horizontal."""
-        if self.sources.context.landed_state is LandedState.IN_AIR:
+        if self.context.landed_state is LandedState.IN_AIR:
             self._has_flown = True
         wind = self._aircraft.wind_ned_m_s
         v = self.view.refreshed()
         if wind is None or not self._has_flown or not v.has_global:
             return None
-        north, east = self.sources.navigation.health.wind_variance_m2_s2
+        north, east = self.parts.navigation.health.wind_variance_m2_s2
         return (v.time_us, wind[0], wind[1], 0.0, north + east, 0.0, v.alt_amsl_m, 0.0, 0.0)
 
     def position_target_global_int(self) -> Values | None:
         """POSITION_TARGET_GLOBAL_INT (87): the target position, or the centre of the circle."""
-        path, frame = self._aircraft.path, self.sources.context.frame
+        path, frame = self._aircraft.path, self.context.frame
         if path is None or frame is None:
             return None
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(path.north_m, path.east_m, path.down_m)
@@ -127,13 +128,13 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         level.
         """
         v = self.view.refreshed()
-        frame, path = self.sources.context.frame, self._aircraft.path
+        frame, path = self.context.frame, self._aircraft.path
         if frame is None:
             return None
         north_m, east_m, _ = v.pos
         if path is not None:
             place = (*path.nearest_point(north_m, east_m), path.down_m)
-        elif self.sources.context.armed:
+        elif self.context.armed:
             return None
         else:
             place = (north_m, east_m, frame.origin.alt_m)
@@ -142,7 +143,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
     def estimator_status(self) -> Values:
         """ESTIMATOR_STATUS (230): with the airspeed's ratio while it is fused."""
         values = super().estimator_status()
-        health = self.sources.navigation.health
+        health = self.parts.navigation.health
         if not health.airspeed_in_use:
             return values
         return (*values[:7], health.airspeed_test_ratio**2, *values[8:])

@@ -1,66 +1,23 @@
 """Messages that are the same in both firmwares (MAVLink common message set)."""
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.control.multicopter import setpoint as sp
-from autopilot_bridge.dispatch import BUILDERS, streams, table_of
-from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.dispatch import streams
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.mission_plan import MissionStore
-from autopilot_bridge.navigation import NavigationFilter
-from autopilot_bridge.telemetry.motion import MotionMessages
-from autopilot_bridge.telemetry.streams import Builder, Values
-from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, TelemetryView
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.parts import AutopilotParts
+from autopilot_bridge.telemetry.streams import Values
+from autopilot_bridge.telemetry.view import UINT16_UNKNOWN
 from flightsim import interface
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.interface import SensorReadings
 
 NAN: Final = math.nan
 _NO_GPS: Final = 0  # GPS_FIX_TYPE
 
 
-@dataclass(slots=True, kw_only=True)
-class TelemetrySources:
-    """The sources of the messages' values.
-
-    Attributes:
-        controller: `MulticopterController` or `FixedWingController`.
-        heartbeat: field values of HEARTBEAT in definition order.
-        sys_status: (present, enabled, health) sensor bits of SYS_STATUS.
-        mission_current: packed payload of MISSION_CURRENT.
-        autopilot_version: field values of AUTOPILOT_VERSION.
-        battery_level: MAV_BATTERY_CHARGE_STATE.
-        position_ready: the position can be used for flight (the boot timeline is over and the filter has
-            one).
-        unix_epoch_us: Unix time of boot, microseconds.
-        current_mode: (standard_mode, custom_mode, intended_custom_mode).
-        orbit: (signed radius m, centre north, east, down m) while circling, else None.
-        task: the flight task being flown, None while there is none (aircraft).
-        missions: the plan a mission task flies (aircraft).
-    """
-
-    view: TelemetryView
-    context: FlightContext
-    navigation: NavigationFilter
-    controller: Any
-    readings: SensorReadings
-    heartbeat: Callable[[], Values]
-    sys_status: Callable[[], tuple[int, int, int]]
-    mission_current: Callable[[], bytes | None]
-    autopilot_version: Callable[[], Values]
-    battery_level: Callable[[], int]
-    position_ready: Callable[[], bool]
-    unix_epoch_us: int
-    current_mode: Callable[[], Values] = lambda: (0, 0, 0)
-    orbit: Callable[[], tuple[float, float, float, float] | None] = lambda: None
-    task: Callable[[], object] = lambda: None
-    missions: MissionStore | None = None
-
-
-class CommonMessages:
+class CommonMessages(Microservice):
     """Builders of the messages that are the same for both flavours; flavours extend and override them."""
 
     servo_unused_us = 0
@@ -68,34 +25,25 @@ class CommonMessages:
     gps_timeout_us = 4_000_000  # ArduPilot's GPS_TIMEOUT_MS
     gps_sent_before_first = True
 
-    def __init__(self, sources: TelemetrySources) -> None:
-        self.sources = sources
-        self.view = sources.view
-        self.motion = MotionMessages(sources.view, sources.context, sources.navigation, sources.readings)
-
-    def builders(self) -> Mapping[int, Builder]:
-        """Message id -> builder of its field values."""
-        return {**self.motion.builders(), **table_of(self, BUILDERS)}
+    def __init__(self, parts: AutopilotParts) -> None:
+        self.parts = parts
+        self.view = parts.view
+        self.context = parts.commander.context
 
     @streams(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     def heartbeat(self) -> Values:
         """HEARTBEAT (0)."""
-        return self.sources.heartbeat()
-
-    @streams(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
-    def mission_current(self) -> bytes | None:
-        """MISSION_CURRENT (42)."""
-        return self.sources.mission_current()
+        return self.parts.status.heartbeat()
 
     @streams(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
     def autopilot_version(self) -> Values:
         """AUTOPILOT_VERSION (148)."""
-        return self.sources.autopilot_version()
+        return self.parts.status.autopilot_version()
 
     @streams(mavlink.MAVLINK_MSG_ID_SYS_STATUS)
     def sys_status(self) -> Values:
         """SYS_STATUS (1)."""
-        present, enabled, health = self.sources.sys_status()
+        present, enabled, health = self.parts.status.sys_status()
         voltage_mv, current_ca, remaining = UINT16_UNKNOWN, -1, -1
         battery = self.view.battery
         if battery is not None:
@@ -107,7 +55,7 @@ class CommonMessages:
     @streams(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
     def system_time(self) -> Values:
         """SYSTEM_TIME (2)."""
-        return (self.sources.unix_epoch_us + self.view.time_us, self.view.time_ms)
+        return (self.parts.memory.unix_epoch_us + self.view.time_us, self.view.time_ms)
 
     @streams(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT)
     def gps_raw_int(self) -> Values | None:
@@ -115,7 +63,7 @@ class CommonMessages:
 
         A receiver that has stopped sending is shown as not present.
         """
-        gps = self.sources.readings.gps
+        gps = self.parts.readings.gps
         if gps.time_us < 0:
             if not self.gps_sent_before_first:
                 return None
@@ -175,8 +123,8 @@ class CommonMessages:
     @streams(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW)
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""
-        motors = self.sources.controller.actuators.tolist()[:4]
-        if self.sources.context.armed:
+        motors = self.parts.controller.actuators.tolist()[:4]
+        if self.context.armed:
             pulses = [1000 + round(1000.0 * motor) for motor in motors]
         else:
             pulses = [self.servo_disarmed_us] * 4
@@ -185,7 +133,7 @@ class CommonMessages:
     @streams(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     def gps_global_origin(self) -> Values | None:
         """GPS_GLOBAL_ORIGIN (49): the filter's local origin."""
-        frame = self.sources.context.frame
+        frame = self.context.frame
         if frame is None:
             return None
         origin = frame.origin
@@ -215,15 +163,15 @@ class CommonMessages:
 
     def throttle(self) -> float:
         """Collective being commanded, 0..1."""
-        return self.sources.controller.thrust if self.sources.context.armed else 0.0
+        return self.parts.controller.thrust if self.context.armed else 0.0
 
     @streams(mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET)
     def attitude_target(self) -> Values | None:
         """ATTITUDE_TARGET (83): the setpoint of the attitude loop."""
-        context = self.sources.context
+        context = self.context
         if not context.armed or context.setpoint[sp.LEVEL] < sp.RATES:
             return None
-        controller = self.sources.controller
+        controller = self.parts.controller
         return (
             self.view.time_ms,
             0,
@@ -235,7 +183,7 @@ class CommonMessages:
 
     def trajectory_setpoint(self) -> list[float] | None:
         """Commanded position 3, velocity 3, acceleration 3, yaw, yaw rate; None in other kinds of flight."""
-        context = self.sources.context
+        context = self.context
         if not context.armed or context.setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return None
         values = context.setpoint.tolist()
@@ -253,7 +201,7 @@ class CommonMessages:
     def position_target_global_int(self) -> Values | None:
         """POSITION_TARGET_GLOBAL_INT (87)."""
         target = self.trajectory_setpoint()
-        frame = self.sources.context.frame
+        frame = self.context.frame
         if target is None or frame is None or not all(map(math.isfinite, target[:3])):
             return None
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(*target[:3])
@@ -305,7 +253,7 @@ class CommonMessages:
             -1,
             round(remaining * 100.0),
             0,
-            self.sources.battery_level(),
+            int(self.parts.commander.battery_level),
             (0, 0, 0, 0),
             0,
             0,
@@ -324,7 +272,7 @@ class CommonMessages:
             return None
         return (
             *place,
-            *self.sources.context.home_ned_m.tolist(),
+            *self.context.home_ned_m.tolist(),
             self.home_quaternion(),
             0.0,
             0.0,
@@ -334,7 +282,7 @@ class CommonMessages:
 
     def home_place(self) -> tuple[int, int, int] | None:
         """Latitude and longitude (degE7) and altitude (mm) of home; None before there is one."""
-        context = self.sources.context
+        context = self.context
         north, east, down = context.home_ned_m.tolist()
         if context.frame is None or not math.isfinite(north):
             return None
@@ -343,25 +291,25 @@ class CommonMessages:
 
     def home_quaternion(self) -> tuple[float, float, float, float]:
         """Heading at home as HOME_POSITION carries it."""
-        half_yaw = 0.5 * self.sources.context.home_yaw_rad
+        half_yaw = 0.5 * self.context.home_yaw_rad
         return (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
 
     @streams(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245)."""
-        return (mavlink.MAV_VTOL_STATE_UNDEFINED, int(self.sources.context.landed_state))
+        return (mavlink.MAV_VTOL_STATE_UNDEFINED, int(self.context.landed_state))
 
     @streams(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
     def distance_sensor(self) -> Values | None:
         """DISTANCE_SENSOR (132), facing down."""
-        reading = self.sources.readings.rangefinder
+        reading = self.parts.readings.rangefinder
         if reading.time_us < 0:
             return None
         values = reading.values.tolist()
         distance_m = values[interface.RANGE_DISTANCE_M]
         min_m, max_m = values[interface.RANGE_MIN_M], values[interface.RANGE_MAX_M]
         in_range = math.isfinite(distance_m)
-        beyond_cm = 0 if self.sources.context.on_ground else round(max_m * 100.0) + 1  # too near, or too far
+        beyond_cm = 0 if self.context.on_ground else round(max_m * 100.0) + 1  # too near, or too far
         return (
             reading.time_us // 1000,
             round(min_m * 100.0),
