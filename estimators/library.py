@@ -6,32 +6,17 @@ import inspect
 import re
 import sys
 import types
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import is_dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 from estimators.errors import EstimatorError, described
 from estimators.interface import Estimator
+from estimators.names import ESTIMATORS, GROUP
 from flightsim.foundation.conversion import Conversion, Refused
 from flightsim.foundation.options import declared
-
-ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "attitude": "estimators.attitude",
-        "handoff": "estimators.handoff",
-        "lissajous": "estimators.lissajous",
-        "magnetic-identification": "estimators.magnetic_identification",
-        "multi-target": "estimators.multi_target",
-        "orbit-target": "estimators.orbit_target",
-        "relative-pose": "estimators.relative_pose",
-        "survey": "estimators.survey",
-        "target-fusion": "estimators.target_fusion",
-        "vision-search": "estimators.vision_search",
-    }
-)
-"""Module of each estimator that has a name; it is imported only when it is used."""
+from flightsim.foundation.plug_ins import plug_ins
 
 _NAME: Final = re.compile(r"[\w-]+")
 
@@ -40,7 +25,7 @@ def make_estimator(name: str, settings: Iterable[str] = ()) -> Estimator[Any]:
     """Create an estimator with parameters.
 
     Args:
-        name: one of `ESTIMATORS`, or the path of a Python file.
+        name: one of `estimators.names`, or of a user's package, or the path of a Python file.
         settings: parameters as NAME=VALUE.
 
     Raises:
@@ -58,18 +43,33 @@ def estimator_class(name: str) -> type[Estimator[Any]]:
     """
     if name.endswith(".py"):
         path = Path(name)
-        return _checked(_the_one(_load(path), f"estimator file {path}"), path)
+        return _checked(_the_one(_load(path), f"estimator file {path}"), f"estimator file {path}")
     if name not in ESTIMATORS:
-        raise EstimatorError(
-            f"estimator {name!r} is not known; there are {', '.join(ESTIMATORS)}, "
-            "or the path of a Python file (.py) with an Estimator of your own"
-        )
+        return _of_package(name)
     module = importlib.import_module(ESTIMATORS[name])
     exported = [getattr(module, item) for item in getattr(module, "__all__", ())]
     for candidate in exported:
         if inspect.isclass(candidate) and issubclass(candidate, Estimator) and name == candidate.NAME:
             return candidate
     raise EstimatorError(f"{ESTIMATORS[name]} exports no estimator named {name!r}")
+
+
+def _of_package(name: str) -> type[Estimator[Any]]:
+    """The class of an estimator that a user's package names."""
+    others = plug_ins(GROUP)
+    if name not in others:
+        raise EstimatorError(
+            f"estimator {name!r} is not known; there are {', '.join((*ESTIMATORS, *others))}, "
+            "or the path of a Python file (.py) with an Estimator of your own"
+        )
+    where = f"estimator {name!r} of {others[name].value}"
+    try:
+        found = others[name].load()
+    except Exception as error:
+        raise EstimatorError(f"{where} can't be loaded: {described(error)}") from error
+    if not (inspect.isclass(found) and issubclass(found, Estimator)):
+        raise EstimatorError(f"{where} is no class on estimators.interface.Estimator")
+    return _checked(found, where)
 
 
 def _load(path: Path) -> types.ModuleType:
@@ -110,26 +110,22 @@ def _the_one(module: types.ModuleType, where: str) -> type[Estimator[Any]]:
     )  # fmt: skip
 
 
-def _checked(found: type[Estimator[Any]], path: Path) -> type[Estimator[Any]]:
+def _checked(found: type[Estimator[Any]], where: str) -> type[Estimator[Any]]:
     """Check that a user's class has everything that the command line needs."""
     name = getattr(found, "NAME", None)
     if not (isinstance(name, str) and _NAME.fullmatch(name)):
         raise EstimatorError(
-            f"estimator file {path}: {found.__name__}.NAME is {name!r}; give letters, digits, '-' and '_', "
+            f"{where}: {found.__name__}.NAME is {name!r}; give letters, digits, '-' and '_', "
             "for run folders are named after it"
         )
     if not is_dataclass(getattr(found, "PARAMETERS", None)):
-        raise EstimatorError(f"estimator file {path}: {found.__name__}.PARAMETERS is no dataclass; name one")
+        raise EstimatorError(f"{where}: {found.__name__}.PARAMETERS is no dataclass; name one")
     try:
         complete = hasattr(found(), "parameters")
     except Exception as error:
-        raise EstimatorError(
-            f"estimator file {path}: {found.__name__}() failed: {described(error)}"
-        ) from error
+        raise EstimatorError(f"{where}: {found.__name__}() failed: {described(error)}") from error
     if not complete:
-        raise EstimatorError(
-            f"estimator file {path}: {found.__name__}.__init__ does not call super().__init__(parameters)"
-        )
+        raise EstimatorError(f"{where}: {found.__name__}.__init__ does not call super().__init__(parameters)")
     return found
 
 

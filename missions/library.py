@@ -1,28 +1,22 @@
 """The missions of this package, and users' own missions."""
 
+import importlib
 import importlib.util
 import inspect
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from importlib.metadata import EntryPoint
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 from autopilot_bridge.errors import BridgeError
+from flightsim.foundation.plug_ins import plug_ins
 from missions.base.mission import Mission
 from missions.base.options import FlightOptions
 from missions.base.report import Report
+from missions.catalogue import GROUP, NAMES, OTHERS, PATTERNS
 from missions.errors import MissionError, PlanError
-from missions.pattern_search.curves import (
-    expanding_square_curve,
-    lissajous_curve,
-    lissajous_size,
-    parallel_sweep_curve,
-    sector_curve,
-    sector_size,
-    square_size,
-    sweep_size,
-)
+from missions.pattern_search import curves
 from missions.pattern_search.for_vehicle import flight_for_vehicle
 from missions.pattern_search.mission import PatternMission
 from missions.plan_files.mission import FileMission
@@ -31,75 +25,22 @@ from missions.vehicle.limits import Limits
 from missions.vehicle.vehicle import Vehicle
 
 
-def _orbit() -> Mission[Any]:
-    from missions.orbit.mission import OrbitMission
-
-    return OrbitMission()
-
-
-def _occupancy() -> Mission[Any]:
-    from missions.occupancy.mission import OccupancyMission
-
-    return OccupancyMission()
-
-
-def _multi_target() -> Mission[Any]:
-    from missions.multi_target.mission import MultiTargetMission
-
-    return MultiTargetMission()
-
-
-def _vision_search() -> Mission[Any]:
-    from missions.vision_search.mission import VisionSearchMission
-
-    return VisionSearchMission()
-
-
-def _handoff() -> Mission[Any]:
-    from missions.handoff.mission import HandoffMission
-
-    return HandoffMission()
-
-
-def _survey() -> Mission[Any]:
-    from missions.survey.mission import SurveyMission
-
-    return SurveyMission()
-
-
 class _NamedMissions(Mapping[str, Mission[Any]]):
     """The missions by name; only those that are used are imported."""
 
-    _MAKERS: Final[Mapping[str, Callable[[], Mission[Any]]]] = MappingProxyType(
-        {
-            "lissajous": lambda: PatternMission("lissajous", lissajous_curve, lissajous_size),
-            "sector": lambda: PatternMission("sector", sector_curve, sector_size),
-            "parallel-sweep": lambda: PatternMission("parallel-sweep", parallel_sweep_curve, sweep_size),
-            "expanding-square": lambda: PatternMission(
-                "expanding-square", expanding_square_curve, square_size
-            ),
-            "orbit": _orbit,
-            "occupancy": _occupancy,
-            "multi-target": _multi_target,
-            "handoff": _handoff,
-            "survey": _survey,
-            "vision-search": _vision_search,
-        }
-    )
-
-    def __init__(self) -> None:
-        self._made: dict[str, Mission[Any]] = {}
-
     def __getitem__(self, name: str) -> Mission[Any]:
-        if name not in self._made:
-            self._made[name] = self._MAKERS[name]()
-        return self._made[name]
+        if name in PATTERNS:
+            entry = PATTERNS[name]
+            return PatternMission(name, getattr(curves, entry.curve), getattr(curves, entry.size))
+        module, kind = OTHERS[name]
+        made: Mission[Any] = getattr(importlib.import_module(module), kind)()
+        return made
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._MAKERS)
+        return iter(NAMES)
 
     def __len__(self) -> int:
-        return len(self._MAKERS)
+        return len(NAMES)
 
 
 MISSIONS: Final[Mapping[str, Mission[Any]]] = _NamedMissions()
@@ -169,7 +110,8 @@ def _load(path: Path) -> Any:
 
 
 def find_mission(name: str) -> Mission[Any]:
-    """A mission by name, a user's own by path (anything ending in .py), or a mission file.
+    """A mission by name, of this package or of a user's, a user's own by path (anything ending in .py), or a
+    mission file.
 
     Raises:
         PlanError: the mission does not exist; the message lists the known ones.
@@ -178,10 +120,30 @@ def find_mission(name: str) -> Mission[Any]:
         return ScriptMission(Path(name))
     if Path(name).suffix.lower() in MISSION_FILES:
         return FileMission(Path(name))
-    known = MISSIONS.get(name)
-    if known is None:
+    if name in NAMES:
+        return MISSIONS[name]
+    others = plug_ins(GROUP)
+    if name not in others:
         raise PlanError(
-            f"mission {name!r} is not known; there are {', '.join(MISSIONS)}, "
+            f"mission {name!r} is not known; there are {', '.join((*NAMES, *others))}, "
             f"or the path of a file: Python (.py), or a mission file ({', '.join(MISSION_FILES)})"
         )
-    return known
+    return _of_package(others[name])
+
+
+def _of_package(point: EntryPoint) -> Mission[Any]:
+    """A mission that a user's package names.
+
+    Raises:
+        PlanError: it can't be made, or is none.
+    """
+    try:
+        made = point.load()()
+    except PlanError:
+        raise
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}"
+        raise PlanError(f"mission {point.name!r} of {point.value} can't be loaded: {text}") from error
+    if not isinstance(made, Mission):
+        raise PlanError(f"mission {point.name!r} of {point.value} makes no `missions.Mission`")
+    return made

@@ -39,7 +39,7 @@ FLOORS = (
     ("cli",),
     ("studies",),
     ("runs",),
-    ("library",),
+    ("library", "catalogue"),
     THE_MISSIONS,
     ("embedded", "worlds", "estimation", "vehicle_client"),
     ("base", "search"),

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from estimators.library import ESTIMATORS, estimator_class
+from estimators.library import estimator_class
+from estimators.names import ESTIMATORS
 from flightsim.foundation.options import Declared, Options, declared, user_options
 from missions.cli import options_page
 from missions.cli.fly import fly

@@ -9,7 +9,7 @@ from typing import Any, Generic
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.base.flight import AnyOptions, FunctionFlight, MissionFlight
-from missions.base.options import MissionOptions
+from missions.base.options import FlightOptions, MissionOptions
 from missions.base.report import Report
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -54,6 +54,7 @@ class Mission(Generic[AnyOptions]):
         lands_without_sensors: the mission itself ends when one of its sensors stops
             (`vehicle.sensors.stopped`), so that a team lands in its layers; otherwise the run ends it, and
             the vehicle returns.
+        options_class: class of its options, which the command line makes of a mission of a user's package.
         unflown: figures of a run that ended before the mission's flight began.
     """
 
@@ -62,6 +63,7 @@ class Mission(Generic[AnyOptions]):
     kinds: tuple[VehicleKind, ...] = (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
     commands = True
     lands_without_sensors = False
+    options_class: type[MissionOptions] = FlightOptions
     unflown: Mapping[str, Any] = MappingProxyType({})
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:

@@ -2,10 +2,11 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from estimators.names import ESTIMATORS
 from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.status_line import StatusLine
@@ -41,7 +42,17 @@ class _LiveProgressLine:
         self._line.end()
 
 
-@click.command()
+_HELP: Final = f"""Run an estimator on a live link: {", ".join(ESTIMATORS)}, or a Python file.
+
+It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
+replay of flight.tlog in the run folder gives the same estimates.
+
+Exit codes: 0 done, 1 the link was silent or lacks messages that the estimator needs (the data received
+are kept), 2 usage, 130 interrupted before --duration was over.
+"""
+
+
+@click.command(help=_HELP)
 @click.argument("name", metavar="NAME|FILE.py")
 @click.option("--connect", required=True, metavar="URL", help="The vehicle: udpin:0.0.0.0:14550, serial:...")
 @click.option("--duration", type=_SECONDS, metavar="S", help="Vehicle time. [default: until Ctrl-C]")
@@ -66,15 +77,6 @@ class _LiveProgressLine:
 @click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
 @key_option()
 def estimate(**given: Any) -> int:
-    """Run an estimator on a live link: attitude, handoff, lissajous, magnetic-identification,
-    multi-target, orbit-target, relative-pose, survey, target-fusion, vision-search, or a Python file.
-
-    It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
-    replay of flight.tlog in the run folder gives the same estimates.
-
-    Exit codes: 0 done, 1 the link was silent or lacks messages that the estimator needs (the data received
-    are kept), 2 usage, 130 interrupted before --duration was over.
-    """
     from autopilot_bridge.errors import AddressError, BridgeError
     from estimators.errors import EstimatorError
     from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warnings_of

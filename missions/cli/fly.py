@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from estimators.names import ESTIMATORS
+from missions.catalogue import NAMES
 from missions.cli.confirm import confirmation
 from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
 from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
@@ -31,11 +33,17 @@ _flight = partial(flight_option, group="The flight")
 _estimator = partial(flight_option, group="An estimator beside it")
 _results = partial(flight_option, group="Results")
 
+_HELP: Final = f"""Fly MISSION: {", ".join(NAMES)}, a mission file (.plan, .waypoints), or a Python file of
+your own.
+
+`flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
+options)`. The run folder gets flight.tlog, summary.json and track.png.
+"""
 _NAMES_SHOWN: Final = 20  # names of parameters that were left out; the summary has all
 _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
 
 
-@click.command(cls=FlyCommand, context_settings={"show_default": True})
+@click.command(cls=FlyCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("mission")
 @_link("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
 @_link("--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:...")
@@ -131,10 +139,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 )
 @_link("--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS.")
 @_estimator(
-    "--estimator",
-    metavar="NAME|FILE.py",
-    help="Estimator beside the flight: attitude, handoff, lissajous, magnetic-identification, "
-    "multi-target, orbit-target, relative-pose, survey, target-fusion, vision-search.",
+    "--estimator", metavar="NAME|FILE.py", help=f"Estimator beside the flight: {', '.join(ESTIMATORS)}."
 )
 @_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
@@ -148,13 +153,6 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_results("--no-picture", is_flag=True, help="Don't draw track.png.")
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
-    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy,
-    multi-target, survey, vision-search, handoff, a mission file (.plan, .waypoints), or a Python file of
-    your own.
-
-    `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
-    options)`. The run folder gets flight.tlog, summary.json and track.png.
-    """
     from missions.errors import PlanError
     from missions.process.ending import signal_of
 

@@ -2,11 +2,14 @@
 combinations.
 """
 
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import click
 
+from flightsim.foundation.plug_ins import plug_ins
+from missions.catalogue import GROUP
 from missions.cli.mission_command import MISSION_GROUP, FlightOption, MissionCommand, Scope
 from missions.cli.mission_commands import COMMANDS, FILE, OWN
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
@@ -16,11 +19,21 @@ _FILE: Final = "a mission file"
 _COMMANDS: Final[Mapping[str, MissionCommand]] = {**COMMANDS, _OWN: OWN, _FILE: FILE}
 
 
-def _declaring(mission: str) -> str:
-    """Name of the mission whose options apply, from the mission argument of the command line."""
+def _command_of(mission: str) -> MissionCommand:
+    """The command whose options apply, from the mission argument of the command line."""
     if mission in COMMANDS:
-        return mission
-    return _OWN if mission.endswith(".py") else _FILE
+        return COMMANDS[mission]
+    if _is_file(mission):
+        return OWN if mission.endswith(".py") else FILE
+    from missions.errors import PlanError
+    from missions.library import find_mission
+
+    try:
+        found = find_mission(mission)
+    except PlanError as error:
+        raise click.UsageError(str(error)) from error
+    made = found.options_class
+    return MissionCommand(help=inspect.getdoc(found) or mission, made=(made.__module__, made.__qualname__))
 
 
 def _is_file(name: str) -> bool:
@@ -42,7 +55,7 @@ class FlyCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         named = self._mission_named(args)
         if named is not None:
-            ctx.meta["mission command"] = _COMMANDS[_declaring(named)]
+            ctx.meta["mission command"] = _command_of(named)
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -62,7 +75,8 @@ class FlyCommand(click.Command):
             for name in parameter.opts
         }
         words = [a for a, before in zip(args, ["", *args], strict=False) if before not in valued]
-        return next((a for a in words if a in COMMANDS or _is_file(a)), None)
+        found = next((a for a in words if a in COMMANDS or _is_file(a)), None)
+        return found or next((a for a in words if not a.startswith("-") and a in plug_ins(GROUP)), None)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         declared = ctx.meta.get("mission command")

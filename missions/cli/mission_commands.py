@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import click
 
+from missions.catalogue import PATTERNS
 from missions.cli.mission_command import Given, MissionCommand, option
 from missions.cli.option_classes import MISSION_FILE, OPTIONS, PARTS, PATTERN
 
@@ -90,12 +91,7 @@ def arguments_of(pairs: tuple[str, ...]) -> dict[str, str]:
 
 COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
     {
-        "lissajous": _pattern(
-            "Fly a Lissajous pattern, east by one frequency and north by another.", "heading", "spacing"
-        ),
-        "sector": _pattern("Fly a sector search (IAMSAR) around a point.", "spacing", *_OF_LISSAJOUS),
-        "parallel-sweep": _pattern("Fly a parallel sweep search (IAMSAR).", *_OF_LISSAJOUS),
-        "expanding-square": _pattern("Fly an expanding square search (IAMSAR).", *_OF_LISSAJOUS),
+        **{name: _pattern(entry.help, *entry.without) for name, entry in PATTERNS.items()},
         "orbit": MissionCommand(
             help=(
                 "Circle a target on the ground without GPS, by roll commands from what a gimballed camera "

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from estimators.library import ESTIMATORS, estimator_class
+from estimators.library import estimator_class
+from estimators.names import ESTIMATORS
 from flightsim.foundation.options import Declared, choices_of, declared, unit_of, written
 from missions.cli.mission_command import DeclaredOption, Scope
 from missions.cli.mission_commands import COMMANDS

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from estimators.names import ESTIMATORS
 from missions.cli.options import FiniteRange, in_options, report
 
 if TYPE_CHECKING:
@@ -21,8 +22,7 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     "--estimator",
     required=True,
     metavar="NAME|FILE.py",
-    help="attitude, handoff, lissajous, magnetic-identification, multi-target, orbit-target, "
-    "relative-pose, survey, target-fusion, vision-search, or a Python file with an Estimator of your own.",
+    help=f"{', '.join(ESTIMATORS)}, or a Python file with an Estimator of your own.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
 @click.option(

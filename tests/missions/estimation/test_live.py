@@ -18,6 +18,7 @@ from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs import open_log
+from estimators.names import ESTIMATORS
 from flightsim.foundation.vectors import from_euler
 from missions.cli.main import run_command_line
 from tests.clients.forked_process import flightstack
@@ -332,10 +333,7 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
 @pytest.mark.parametrize(
     ("arguments", "reported"),
     [
-        (
-            ["level", "--connect", "udpin:127.0.0.1:1"],
-            "there are attitude, handoff, lissajous, magnetic-identification, multi-target",
-        ),
+        (["level", "--connect", "udpin:127.0.0.1:1"], f"there are {', '.join(ESTIMATORS)}"),
         ([LEVEL, "--connect", "carrier pigeon"], "carrier pigeon"),
         ([LEVEL, "--connect", "flight.tlog"], "that is a log; use flightstack replay"),
         ([LEVEL, "--connect", "udpin:127.0.0.1:1", "--component-id", "1"], "is not in the range"),

@@ -10,6 +10,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogWriter
+from estimators.names import ESTIMATORS
 from missions.cli.main import run_command_line
 from tests.recorded_logs import recorded_log
 
@@ -199,10 +200,7 @@ def test_wrong_use_names_value_and_what_is_accepted(tmp_path, capfd, arguments, 
 def test_an_unknown_estimator(tmp_path, capfd):
     log = write_log(tmp_path / "flight.tlog")
     assert replay(log, "--estimator", "atitude") == 2
-    assert (
-        "there are attitude, handoff, lissajous, magnetic-identification, multi-target"
-        in capfd.readouterr().err
-    )
+    assert f"there are {', '.join(ESTIMATORS)}" in capfd.readouterr().err
 
 
 def test_a_vehicle_that_is_not_in_it(tmp_path, capfd):
