@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+
 if TYPE_CHECKING:
     from estimators.logs import Log
 
@@ -27,7 +29,6 @@ _HOLD_US: Final = 2_500_000
 """Longest time for which a reported state holds without another report; one lost message of a 1 Hz stream
 does not end it.
 """
-_AUTOPILOT: Final = 1
 
 Samples = tuple[NDArray[np.int64], NDArray[Any]]
 """Times and values."""
@@ -56,7 +57,7 @@ def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple
         # Requested by name only if the log has it: the log's dialect may not define this message.
         if not any(key.name == name and key.system_id == system_id for key in log.keys):
             return None
-        tables = log.tables(name, system_id=system_id, component_id=_AUTOPILOT, boot=boot)
+        tables = log.tables(name, system_id=system_id, component_id=AUTOPILOT_COMPONENT, boot=boot)
         return (tables[0].time_us, tables[0][field]) if tables else None
 
     def spans_of(samples: Samples | None, judge: _Judge) -> Spans:

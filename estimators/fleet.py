@@ -5,13 +5,13 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.interface import Estimator, Outcome
 from estimators.messages import Message, read_message
 from estimators.observations import Observation
 from estimators.runner import Runner
 from estimators.vehicle_time import VehicleTime, stamp_field
 
-AUTOPILOT_COMPONENT: Final = 1
 GROUND_SYSTEM: Final = 200
 """By convention, system ids from here on belong to ground stations and simulated targets."""
 MAX_VEHICLES: Final = 64

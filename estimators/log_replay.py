@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.errors import EstimatorError, EstimatorFailure
-from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
+from estimators.fleet import GROUND_SYSTEM, Fleet
 from estimators.interface import Estimator, Need
 from estimators.library import make_estimator
 from estimators.messages import Message

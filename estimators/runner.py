@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import DEFINITIONS, Frame, FrameEncoder, MAVLinkMessage
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SIMULATOR_COMPONENT
 from estimators.errors import EstimatorError, EstimatorFailure, described
 from estimators.input_guard import NEW_BOOT_US
 from estimators.interface import Estimate, EstimateSet, Estimator, Need, Outcome
@@ -22,8 +23,6 @@ from estimators.needs import message_names
 from estimators.observations import Observation
 from estimators.vehicle_time import TeamTime, VehicleTime
 
-TRUTH_COMPONENT: Final = 25
-"""Component id of the simulator in an embedded SITL (MAV_COMP_ID_USER1)."""
 TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})
 ESTIMATOR_COMPONENTS: Final = frozenset(range(191, 195))
 """Onboard computers. Estimators run there, as do programs that use their own cameras and other sensors."""
@@ -52,7 +51,7 @@ _SYSTEM_TIME: Final = "SYSTEM_TIME"
 
 def why_excluded(name: str, component_id: int) -> str | None:
     """The reason why estimators don't receive a component's message; None when they do."""
-    if component_id == TRUTH_COMPONENT:
+    if component_id == SIMULATOR_COMPONENT:
         return "truth"
     if component_id in ESTIMATOR_COMPONENTS and name in ESTIMATE_MESSAGES:
         return "from an estimator"
@@ -261,12 +260,12 @@ class Runner:
         """
         name = message.name
         team_time = self._team_time
-        if team_time is not None and name == _SYSTEM_TIME and message.src_component == 1:
+        if team_time is not None and name == _SYSTEM_TIME and message.src_component == AUTOPILOT_COMPONENT:
             team_time.learn(time_us, message)
         if name not in self.names:
             return None
         component = message.src_component
-        if component != 1 and (reason := why_excluded(name, component)):
+        if component != AUTOPILOT_COMPONENT and (reason := why_excluded(name, component)):
             self.left_out[reason] += 1
             return None
         if team_time is not None:
@@ -311,7 +310,7 @@ class Runner:
         """Whether a message is of the selected vehicle or, if none was specified, of the first autopilot
         received.
         """
-        if self.system_id is None and message.src_component == 1:
+        if self.system_id is None and message.src_component == AUTOPILOT_COMPONENT:
             self.system_id = message.src_system
         return bool(message.src_system == self.system_id)
 
@@ -323,7 +322,7 @@ class Runner:
         """
         assert self._team_time is not None, "for teams"
         for time_us, message in system_times:
-            if message.src_component == 1:
+            if message.src_component == AUTOPILOT_COMPONENT:
                 self._team_time.learn(time_us, message)
 
     def common_us(self, time_us: int, system_id: int) -> int:

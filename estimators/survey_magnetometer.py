@@ -2,10 +2,8 @@
 
 from typing import Final
 
-__all__ = ["COMPONENT", "STRONGEST_NT", "STUCK_READINGS", "TOTAL_FIELD_NAME"]
+__all__ = ["STRONGEST_NT", "STUCK_READINGS", "TOTAL_FIELD_NAME"]
 
-COMPONENT: Final = 158
-"""Its component id, MAV_COMP_ID_PERIPHERAL."""
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 """Name of the total field, nT, in NAMED_VALUE_FLOAT."""
 STRONGEST_NT: Final = 200_000.0

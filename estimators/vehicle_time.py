@@ -28,11 +28,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.messages import Message
 from flightsim.foundation.kernels import kernel
-
-AUTOPILOT: Final = 1
-"""Component id of autopilots (MAV_COMP_ID_AUTOPILOT1)."""
 
 LATE_US: Final = 1_000_000
 """A stamp that is farther behind is late, or begins a new boot."""
@@ -136,7 +134,7 @@ class VehicleTime:
         own = getattr(message, found[0]) * found[1]
         if not 0 < own < UNIX_TIME_US:
             return system.newest_us
-        autopilot = message.src_component == AUTOPILOT
+        autopilot = message.src_component == AUTOPILOT_COMPONENT
         if autopilot and not system.led:
             system.led = True
             system.newest_us = 0
@@ -223,7 +221,7 @@ def _vehicle_times(
         if own <= 0 or own >= UNIX_TIME_US:
             times[index] = newest[system]
             continue
-        autopilot = components[stream] == AUTOPILOT
+        autopilot = components[stream] == AUTOPILOT_COMPONENT
         if autopilot and not led[system]:
             led[system] = True
             newest[system] = 0

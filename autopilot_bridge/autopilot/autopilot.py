@@ -25,6 +25,7 @@ from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -52,7 +53,6 @@ if TYPE_CHECKING:  # its module imports scipy
 
 SLOW_RATE_HZ: Final = 50
 _TURNS: Final = 5  # iterations of the slow loop; microservices with `coarse_timers` are called in one of them
-_COMPONENT: Final = 1
 _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
 
 EntryT = TypeVar("EntryT")
@@ -322,7 +322,7 @@ class Autopilot:
 
     def receive(self, frame: Frame, channel: AutopilotChannel) -> None:
         """Take one frame from a channel. Contents are untrusted and never raise."""
-        if frame.system_id == self.system_id and frame.component_id == _COMPONENT:
+        if frame.system_id == self.system_id and frame.component_id == AUTOPILOT_COMPONENT:
             return
         receivers = self._receivers.get(frame.message_id)
         if receivers is None:

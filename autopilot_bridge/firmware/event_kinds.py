@@ -10,9 +10,9 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 from autopilot_bridge.firmware.texts import Severity
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.event_messages import event_sub_id
 
-COMPONENT: Final = 1
 ARGUMENT_BYTES: Final = 40
 _CODES: Final[Mapping[str, str]] = {
     "uint8_t": "B",
@@ -94,7 +94,7 @@ class EventKind:
     @property
     def event_id(self) -> int:
         """EVENT.id."""
-        return COMPONENT << 24 | self.sub_id
+        return AUTOPILOT_COMPONENT << 24 | self.sub_id
 
     def pack(self, values: tuple[float, ...]) -> bytes:
         """EVENT.arguments: the values, without padding between them."""
@@ -143,7 +143,7 @@ def definitions(
     return {
         "version": 1,
         "components": {
-            str(COMPONENT): {
+            str(AUTOPILOT_COMPONENT): {
                 "namespace": namespace,
                 "enums": enums,
                 "event_groups": groups,

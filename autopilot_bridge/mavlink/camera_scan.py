@@ -19,7 +19,6 @@ from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.vectors import Vector
 
 __all__ = [
-    "CAMERA_COMPONENTS",
     "CAMERA_SCAN_PAYLOAD",
     "CameraScan",
     "camera_scan_message",
@@ -30,8 +29,6 @@ __all__ = [
 CAMERA_SCAN_PAYLOAD: Final = 0xF517
 """Payload type; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""
 
-CAMERA_COMPONENTS: Final = range(100, 106)
-"""Component ids of cameras (MAV_COMP_ID_CAMERA to CAMERA6)."""
 
 _MOST_TAG: Final = 255
 _VERSION: Final = 1

@@ -5,16 +5,22 @@ Each represents one device of `flightsim.payload`. They do no I/O: they take dec
 outputs, and produce frames.
 """
 
+from autopilot_bridge.mavlink.components import (
+    CAMERA_COMPONENT,
+    GIMBAL_COMPONENT,
+    MAGNETOMETER_COMPONENT,
+    MOVING_POINT_COMPONENT,
+    RANGE_RADIO_COMPONENT,
+    TARGET_SENSOR_COMPONENT,
+)
 from autopilot_bridge.payload.camera import CameraComponent
-from autopilot_bridge.payload.camera_state import CAMERA_COMPONENT
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
-from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
-from autopilot_bridge.payload.magnetometer import MAGNETOMETER_COMPONENT, MagnetometerComponent
-from autopilot_bridge.payload.moving_points import MOVING_POINT_COMPONENT, MovingPointComponent
-from autopilot_bridge.payload.range_radio import RANGE_RADIO_COMPONENT, RangeRadioComponent
+from autopilot_bridge.payload.magnetometer import MagnetometerComponent
+from autopilot_bridge.payload.moving_points import MovingPointComponent
+from autopilot_bridge.payload.range_radio import RangeRadioComponent
 from autopilot_bridge.payload.station import PayloadStation
-from autopilot_bridge.payload.target_sensor import TARGET_SENSOR_COMPONENT, TargetSensorComponent
+from autopilot_bridge.payload.target_sensor import TargetSensorComponent
 
 __all__ = [
     "CAMERA_COMPONENT",

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import CAMERA_COMPONENT
 from autopilot_bridge.payload.camera_lens import CameraLens
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, VIDEO_MIB_S, CameraStorage
 from autopilot_bridge.payload.camera_tracking import CameraTracker
@@ -14,7 +15,6 @@ from autopilot_bridge.payload.reported_vehicle import ReportedVehicle
 from flightsim.foundation.vectors import Quaternion, from_euler, product
 from flightsim.payload import Camera, Gimbal
 
-CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)
 SENSOR_WIDTH_MM: Final = 6.0  # a 1/2.3-inch sensor; with the field of view it gives the focal length
 
 

@@ -11,11 +11,11 @@ from typing import Any, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.payload.component import Component, parameters, whole
 from autopilot_bridge.payload.gimbal_aim import GimbalAim
 from autopilot_bridge.payload.gimbal_control import GimbalControl, Sender
 from autopilot_bridge.payload.gimbal_messages import (
-    GIMBAL_COMPONENT,
     attitude_status,
     device_information,
     manager_information,

@@ -4,8 +4,8 @@ DO_GIMBAL_MANAGER_CONFIGURE).
 
 from typing import Final
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.payload.component import whole
-from autopilot_bridge.payload.reported_vehicle import AUTOPILOT
 
 Sender = tuple[int, int]
 
@@ -27,7 +27,7 @@ class GimbalControl:
     def __init__(self, system_id: int) -> None:
         self.primary: Sender = NO_CONTROLLER
         self.secondary: Sender = NO_CONTROLLER
-        self._autopilot = (system_id, AUTOPILOT)
+        self._autopilot = (system_id, AUTOPILOT_COMPONENT)
 
     def may_point(self, sender: Sender) -> bool:
         """True when a sender's commands are executed."""

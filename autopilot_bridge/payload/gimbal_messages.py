@@ -4,11 +4,10 @@ import math
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.payload.component import fixed_text
 from flightsim.foundation.vectors import euler_of, yaw_of
 from flightsim.payload import Gimbal, GimbalFlags
-
-GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 
 _CAPABILITIES: Final = int(
     mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_RETRACT

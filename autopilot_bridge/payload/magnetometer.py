@@ -9,10 +9,10 @@ from struct import Struct
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import MAGNETOMETER_COMPONENT
 from autopilot_bridge.payload.component import Component, fixed_text
 from flightsim.payload import MagneticReading
 
-MAGNETOMETER_COMPONENT: Final = int(mavlink.MAV_COMP_ID_PERIPHERAL)
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 _NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
 _MESSAGE_ID: Final = int(mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT)

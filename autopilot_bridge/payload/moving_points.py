@@ -3,14 +3,13 @@
 """
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import MOVING_POINT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import moving_points_messages
 from autopilot_bridge.payload.component import Component
 from flightsim.payload import MovingPointScan
-
-MOVING_POINT_COMPONENT: Final = int(mavlink.MAV_COMP_ID_USER4)
 
 
 class MovingPointComponent(Component):

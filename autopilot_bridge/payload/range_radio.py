@@ -3,14 +3,12 @@
 """
 
 from collections.abc import Callable, Sequence
-from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import RANGE_RADIO_COMPONENT
 from autopilot_bridge.mavlink.vehicle_range import VehicleRange, range_message
 from autopilot_bridge.payload.component import Component
 from flightsim.payload import MeasuredRange
-
-RANGE_RADIO_COMPONENT: Final = int(mavlink.MAV_COMP_ID_USER3)
 
 
 class RangeRadioComponent(Component):

@@ -4,10 +4,10 @@ import math
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, from_euler
 
-AUTOPILOT: Final = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
 STALE_US: Final = 3_000_000
 _LAT_MAX: Final = 900_000_000
 _LON_MAX: Final = 1_800_000_000
@@ -38,7 +38,7 @@ class ReportedVehicle:
 
     def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> bool:
         """Handle a message; True when it brought new data. Contents never raise."""
-        if sender != (self._system_id, AUTOPILOT):
+        if sender != (self._system_id, AUTOPILOT_COMPONENT):
             return False
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT:

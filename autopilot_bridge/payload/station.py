@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 from autopilot_bridge.mavlink import FrameParser
+from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.payload.camera import CameraComponent
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
-from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MagnetometerComponent
 from autopilot_bridge.payload.moving_points import MovingPointComponent
 from autopilot_bridge.payload.range_radio import RangeRadioComponent

@@ -3,14 +3,12 @@
 """
 
 from collections.abc import Callable
-from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import TARGET_SENSOR_COMPONENT
 from autopilot_bridge.mavlink.target_scan import scan_messages
 from autopilot_bridge.payload.component import Component
 from flightsim.payload import TargetScan
-
-TARGET_SENSOR_COMPONENT: Final = int(mavlink.MAV_COMP_ID_USER2)
 
 
 class TargetSensorComponent(Component):

@@ -5,6 +5,7 @@ from typing import Final
 
 from autopilot_bridge.links import Link, MemoryLink, PeerId
 from autopilot_bridge.mavlink import Frame, FrameEncoder, Intake, LinkSigning, Packet, ParserCounters
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE
 from autopilot_bridge.mavlink.signing import is_unsigned_v2
 from autopilot_bridge.routing import LoopGuard, Router
@@ -36,7 +37,7 @@ class LinkChannel:
         link: Link,
         *,
         system_id: int,
-        component_id: int = 1,
+        component_id: int = AUTOPILOT_COMPONENT,
         line: LineBudget | None = None,
         signing: LinkSigning | None = None,
     ) -> None:

@@ -2,9 +2,10 @@
 
 from autopilot_bridge.links import Link, LinkCounters, PeerId, Reach
 from autopilot_bridge.mavlink import Frame, Intake
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.routing import LoopGuard
 from autopilot_bridge.sitl.channel import LinkChannel, PeerExchange
-from autopilot_bridge.sitl.switchboard import AUTOPILOT_COMPONENT, Switchboard
+from autopilot_bridge.sitl.switchboard import Switchboard
 
 
 class SharedLink:

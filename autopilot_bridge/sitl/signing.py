@@ -24,6 +24,7 @@ from autopilot_bridge.mavlink import (
     decode_as,
 )
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.signing import DAY, INTERNAL, MINUTE, RADIO, REQUIRED, TRUSTED, UNSIGNED_TOO
 
 _KEY_REMOVED: Final = "Signing key removed"
@@ -207,7 +208,10 @@ class VehicleSigning:
             A text for the sender; None when the message was addressed to another system or component.
         """
         message = decode_as(frame, mavlink.MAVLink_setup_signing_message)
-        if message.target_system != self._system_id or message.target_component not in (0, 1):
+        if message.target_system != self._system_id or message.target_component not in (
+            0,
+            AUTOPILOT_COMPONENT,
+        ):
             return None
         if self._armed():
             return _WHILE_ARMED

@@ -6,18 +6,16 @@ it goes to the autopilot, which may answer for it (ArduPilot).
 """
 
 from collections.abc import Callable, Sequence
-from typing import Final
 
 from autopilot_bridge.links import Link, MemoryLink, PeerId, Reach
 from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.backend import BackendLinks
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.signing import VehicleSigning, answer_to_key
 from autopilot_bridge.telemetry.line import LineBudget
-
-AUTOPILOT_COMPONENT: Final = 1
 
 
 class Switchboard:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
 from flightsim import truth as t
@@ -21,7 +22,6 @@ from flightsim.foundation.kernels import bound, kernel
 from flightsim.home import Home
 from flightsim.payload import GroundTargets, Static
 
-SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
 TARGET_SYSTEM: Final = 251
 MAX_TARGETS: Final = 250
 _STATIC_EVERY: Final = 5

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.attitude import layout as at
 from estimators.attitude.air import AirData
 from estimators.attitude.estimate import AttitudeEstimate
@@ -30,7 +31,6 @@ WANTED_RATE_HZ: Final = 50.0
 _SLOWEST_US: Final = int(1e6 / (0.9 * LEAST_RATE_HZ))
 _GONE_US: Final = 4 * _SLOWEST_US
 _write_sample: Final = Struct(at.SAMPLE_FORMAT).pack_into
-_AUTOPILOT: Final = dialect.MAV_COMP_ID_AUTOPILOT1
 _IMU_NAMES: Final = tuple(SAMPLES)
 _AIRSPEED_NAMES: Final = ("VFR_HUD", "AIRSPEED", "SCALED_PRESSURE")
 
@@ -101,7 +101,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         # Other components may have their own inertial sensors.
-        handler = self._handlers.get(message.name) if message.src_component == _AUTOPILOT else None
+        handler = self._handlers.get(message.name) if message.src_component == AUTOPILOT_COMPONENT else None
         return Outcome.IGNORED if handler is None else handler(time_us, message)
 
     def reset(self) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.handoff_messages import (
     HANDOFF_DECISION_PAYLOAD,
     TRACK_DESIGNATION_PAYLOAD,
@@ -148,7 +149,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             return self._from_elsewhere(message)
         if message.src_system != self.own:
             return Outcome.IGNORED
-        if message.name in _INERTIAL and message.src_component == 1:
+        if message.name in _INERTIAL and message.src_component == AUTOPILOT_COMPONENT:
             self._now_us = time_us
             if message.time_usec < UNIX_TIME_US:
                 self._offset_us = time_us - message.time_usec

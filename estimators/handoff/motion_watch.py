@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MAVLinkMessage
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, Point, moving_points_messages
 from estimators.attitude.air import pressure_pa
 from estimators.handoff.sight import GroundHeight, armed_of
@@ -121,7 +122,7 @@ class MotionWatch:
             attitude = gimbal_attitude(message)
             if attitude is not None:
                 self._gimbal.add(attitude.time_us, attitude)
-        elif message.src_component != 1:
+        elif message.src_component != AUTOPILOT_COMPONENT:
             return
         elif message.name == "SCALED_PRESSURE":
             pascal = pressure_pa(message.press_abs) if np.isfinite(message.press_abs) else None

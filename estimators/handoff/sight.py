@@ -5,6 +5,7 @@ from collections import Counter
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, read_moving_points
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.dead_reckoning import ReckonedPath
@@ -15,7 +16,6 @@ from estimators.relative_pose.aircraft import AircraftState
 from estimators.tracking.line_of_sight import gimbal_attitude
 from estimators.tracking.recursive_ransac import RecursiveRansac
 
-_AUTOPILOT: Final = 1
 _PATH_S: Final = 5.0  # time in which scans and reports may be late
 _GROUND_SHARE: Final = 0.05  # of a new height on the ground
 
@@ -106,7 +106,7 @@ class AircraftSight:
                 if found is None:
                     return Outcome.IMPLAUSIBLE
                 return Outcome.USED if self._gimbal.add(found) else Outcome.LATE
-            case "HEARTBEAT" if message.src_component == _AUTOPILOT:
+            case "HEARTBEAT" if message.src_component == AUTOPILOT_COMPONENT:
                 self.height.armed(armed_of(message), self.state.height_m)
                 return Outcome.USED
         return Outcome.IGNORED

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.estimate import LissajousEstimate
@@ -18,7 +19,6 @@ from estimators.lissajous.pattern_frame import PatternFrame, PositionReader, Tra
 from estimators.messages import Message
 from flightsim.foundation.geodesy import GeodeticPosition
 
-_AUTOPILOT: Final = 1
 _NEEDED_HZ: Final = 2.0
 _WANTED_HZ: Final = 10.0
 _COVARIANCE_OF: Final = {(0, 0): 0, (0, 1): 1, (0, 3): 3, (0, 4): 4, (1, 1): 9, (1, 3): 11, (1, 4): 12}
@@ -64,7 +64,10 @@ class LissajousEstimator(Estimator[LissajousParameters]):
     def handle(self, time_us: int, message: Message) -> Outcome:
         """Process one message; only messages of the autopilot itself are used."""
         name = type(message).name
-        if message.src_component != _AUTOPILOT or name not in (self._reader.message, "HOME_POSITION"):
+        if message.src_component != AUTOPILOT_COMPONENT or name not in (
+            self._reader.message,
+            "HOME_POSITION",
+        ):
             return Outcome.IGNORED
         if name == "HOME_POSITION":
             if not self._reader.take_home(message):

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.logs.source import LogSource
-from estimators.vehicle_time import AUTOPILOT
 
 _FIRST_GROUND_SYSTEM = 200
 
@@ -45,7 +45,7 @@ def make_clock(source: LogSource) -> LogClock:
         (
             stream.system_id
             for stream in source.streams
-            if stream.component_id == AUTOPILOT
+            if stream.component_id == AUTOPILOT_COMPONENT
             and stream.system_id < _FIRST_GROUND_SYSTEM
             and times[stream.order[-1]] > times[stream.order[0]]
         ),

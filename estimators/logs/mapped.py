@@ -13,11 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.logs.columns import Columns, field_dtype
 from estimators.logs.dialect import Description, Dialect, describe, load_dialect
 from estimators.logs.source import LogSource, Positions, Stream
 from estimators.logs.xml_definitions import FieldText
-from estimators.vehicle_time import AUTOPILOT
 
 Array = NDArray[Any]
 
@@ -217,7 +217,7 @@ class MappedSource(LogSource):
         found = []
         for part, end in zip(parts, ends, strict=True):
             order = places[end - len(part.time_us) : end]
-            found.append((Stream(part.description, SYSTEM_ID, AUTOPILOT, order), part.columns))
+            found.append((Stream(part.description, SYSTEM_ID, AUTOPILOT_COMPONENT, order), part.columns))
         found.sort(key=lambda item: int(item[0].order[0]))
         self.streams = tuple(stream for stream, _ in found)
         self._columns = {id(stream): columns for stream, columns in found}

@@ -5,12 +5,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.plain_text import plain_text
 from estimators.logs.log import Log
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
 from estimators.received import GAP_US, received_positions, together
-from estimators.vehicle_time import AUTOPILOT
 
 _MAX_INSTANCES: Final = 32
 _POSITIONS: Final = {"GLOBAL_POSITION_INT": ("time_boot_ms", 1000), "HIL_STATE_QUATERNION": ("time_usec", 1)}
@@ -207,7 +207,9 @@ def _gaps(log: Log) -> tuple[Gap, ...]:
     found = []
     clock = log.clock
     # A system without an autopilot has no clock that advances by itself.
-    clocked = {stream.system_id for stream in log.source.streams if stream.component_id == AUTOPILOT}
+    clocked = {
+        stream.system_id for stream in log.source.streams if stream.component_id == AUTOPILOT_COMPONENT
+    }
     for boot in log.boots:
         if boot.system_id not in clocked:
             continue

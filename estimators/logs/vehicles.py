@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect, enum_name
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.plain_text import plain_text
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names
 from estimators.logs.log import Log
 from estimators.logs.table import Table
-from estimators.vehicle_time import AUTOPILOT
 
 _HEARTBEAT: Final = "HEARTBEAT"
 _STATUSTEXT: Final = "STATUSTEXT"
@@ -83,7 +83,9 @@ def vehicles(log: Log) -> tuple[VehicleReport, ...]:
     found = []
     if not any(stream.name == _HEARTBEAT for stream in log.source.streams):
         return ()
-    for table in sorted(log.tables(_HEARTBEAT, component_id=AUTOPILOT), key=lambda item: item.system_id):
+    for table in sorted(
+        log.tables(_HEARTBEAT, component_id=AUTOPILOT_COMPONENT), key=lambda item: item.system_id
+    ):
         kinds = np.flatnonzero(
             (table["autopilot"] != dialect.MAV_AUTOPILOT_INVALID) & (table["type"] != dialect.MAV_TYPE_GCS)
         )
@@ -148,7 +150,7 @@ def _firmware(log: Log, system_id: int, autopilot: int) -> tuple[str, tuple[int,
 def _of_autopilot(log: Log, name: str, system_id: int) -> list[Table]:
     if not any(key.name == name and key.system_id == system_id for key in log.keys):
         return []
-    return log.tables(name, system_id=system_id, component_id=AUTOPILOT)
+    return log.tables(name, system_id=system_id, component_id=AUTOPILOT_COMPONENT)
 
 
 def _modes(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.magnetic_identification.anomaly import Anomaly
@@ -23,7 +24,7 @@ from estimators.magnetic_identification.parameters import IdentificationParamete
 from estimators.messages import Message
 from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
-from estimators.survey_magnetometer import COMPONENT, TOTAL_FIELD_NAME
+from estimators.survey_magnetometer import TOTAL_FIELD_NAME
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.foundation.options import option
@@ -32,7 +33,6 @@ __all__ = ["MagneticIdentificationEstimator", "MagneticIdentificationParameters"
 
 Array = NDArray[np.float64]
 
-_AUTOPILOT: Final = 1
 _POSITION_HZ: Final = 2.0
 _PUBLISHED: Final = b"MAGTGT_P"
 
@@ -116,10 +116,10 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
     def handle(self, time_us: int, message: Message) -> Outcome:
         name = message.name
         if name == "NAMED_VALUE_FLOAT":
-            if message.src_component != COMPONENT or message.name_ != TOTAL_FIELD_NAME:
+            if message.src_component != MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message)
-        if name == "GLOBAL_POSITION_INT" and message.src_component == _AUTOPILOT:
+        if name == "GLOBAL_POSITION_INT" and message.src_component == AUTOPILOT_COMPONENT:
             return self._on_position(time_us, message)
         return Outcome.IGNORED
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.target_scan import read_scan_payload
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message
@@ -23,7 +24,6 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 __all__ = ["MultiTargetEstimator"]
 
-_AUTOPILOT: Final = 1
 _POSITION_AGE_US: Final = 1_000_000  # a scan farther from every position is not placed
 _NO_HEADING: Final = 0xFFFF
 _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
@@ -86,7 +86,7 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         """Process one message of any vehicle."""
         name = type(message).name
         handler = self._handlers.get(name)
-        if handler is None or (name != "TUNNEL" and message.src_component != _AUTOPILOT):
+        if handler is None or (name != "TUNNEL" and message.src_component != AUTOPILOT_COMPONENT):
             return Outcome.IGNORED
         searcher = self._searchers.get(message.src_system)
         if searcher is None:

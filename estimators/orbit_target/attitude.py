@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import Final
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
 from estimators.interface import Outcome
 from estimators.messages import Message
@@ -12,7 +13,6 @@ from estimators.needs import message_names
 from flightsim.foundation.vectors import Quaternion, between, from_euler, yaw_of
 
 ATTITUDE: Final = "ATTITUDE"
-_AUTOPILOT: Final = 1
 _KEPT: Final = 256
 _ESTIMATES_KEPT: Final = 512
 _STALE_US: Final = 500_000
@@ -52,7 +52,7 @@ class AutopilotAttitude(AttitudeSource):
         self._kept: deque[tuple[int, Quaternion]] = deque(maxlen=_KEPT)
 
     def take(self, time_us: int, message: Message) -> Outcome:
-        if message.name != ATTITUDE or message.src_component != _AUTOPILOT:
+        if message.name != ATTITUDE or message.src_component != AUTOPILOT_COMPONENT:
             return Outcome.IGNORED
         return self.add(time_us, message.roll, message.pitch, message.yaw)
 

@@ -13,6 +13,7 @@ from statistics import fmean
 from typing import ClassVar, Final, Literal
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message
@@ -25,7 +26,6 @@ from flightsim.foundation.atmosphere import air_density_ratio
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.options import option
 
-_AUTOPILOT: Final = 1
 _GROUND_SAMPLES: Final = 20
 _PRESSURES_PA: Final = (10_000.0, 120_000.0)
 _AIR_M_S: Final = 8.0
@@ -180,7 +180,7 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
         self._time_us: int | None = None
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        if message.name != ATTITUDE or message.src_component != _AUTOPILOT:
+        if message.name != ATTITUDE or message.src_component != AUTOPILOT_COMPONENT:
             return self.take(time_us, message)
         refused = self._guard.check(time_us, ATTITUDE, (message.roll, message.pitch, message.yaw))
         if refused is Outcome.TIME_JUMP:
@@ -205,7 +205,7 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
         name = message.name
         outcome = self.attitude.take(time_us, message) if name in self.attitude.names else Outcome.IGNORED
         handler = self._handlers.get(name)
-        if handler is None and message.src_component == _AUTOPILOT:
+        if handler is None and message.src_component == AUTOPILOT_COMPONENT:
             handler = self._own_handlers.get(name)
         return outcome if handler is None else handler(time_us, message)
 

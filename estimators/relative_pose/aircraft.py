@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.vehicle_motion import VehicleMotion
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
 from estimators.attitude.air import pressure_pa
@@ -17,7 +18,6 @@ from estimators.messages import Message
 from estimators.relative_pose.belief import LevelMotion
 from flightsim.foundation.atmosphere import pressure_altitude_m
 
-_AUTOPILOT: Final = 1
 _LEFT_OUT: Final = ("VFR_HUD",)  # its rate of climb is the autopilot's, and on some vehicles its airspeed
 _SMOOTHING_S: Final = 0.3  # of height and heading: the messages are faster than the ranges
 _FIELD_GAUSS: Final = (0.1, 1.0)  # of a plausible magnetic field
@@ -90,7 +90,7 @@ class AircraftState:
     def take(self, time_us: int, message: Message) -> Outcome:
         """Process a message of the aircraft's autopilot."""
         name = message.name
-        if message.src_component != _AUTOPILOT or name in _LEFT_OUT:
+        if message.src_component != AUTOPILOT_COMPONENT or name in _LEFT_OUT:
             return Outcome.IGNORED
         outcome = self.filter.handle(time_us, message)
         if name == "SCALED_PRESSURE":

@@ -14,6 +14,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message
@@ -27,7 +28,7 @@ from estimators.survey.lines import LinePlan, detected_lines, load_lines
 from estimators.survey.parameters import ProcessingParameters
 from estimators.survey.processing import SurveyResult, aircraft_field_nt, check_grid, process_survey
 from estimators.survey.readings import SurveyReadings, joined, placed_readings
-from estimators.survey_magnetometer import COMPONENT, TOTAL_FIELD_NAME
+from estimators.survey_magnetometer import TOTAL_FIELD_NAME
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.main_field import MainField
 from flightsim.foundation.options import option
@@ -36,7 +37,6 @@ __all__ = ["SurveyEstimator", "SurveyEstimatorParameters"]
 
 Array = NDArray[np.float64]
 
-_AUTOPILOT: Final = 1
 _BLOCK_US: Final = 1_000_000
 _KEPT: Final = 500  # positions and attitudes that are kept for readings that arrive late
 _TRACK_M: Final = 10.0
@@ -124,10 +124,10 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
     def handle(self, time_us: int, message: Message) -> Outcome:
         name = message.name
         if name == "NAMED_VALUE_FLOAT":
-            if message.src_component != COMPONENT or message.name_ != TOTAL_FIELD_NAME:
+            if message.src_component != MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message.value)
-        if message.src_component != _AUTOPILOT or name not in ("GLOBAL_POSITION_INT", "ATTITUDE"):
+        if message.src_component != AUTOPILOT_COMPONENT or name not in ("GLOBAL_POSITION_INT", "ATTITUDE"):
             return Outcome.IGNORED
         if name == "ATTITUDE":
             if self._compensation is None:

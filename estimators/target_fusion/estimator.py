@@ -9,6 +9,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.model import Array
 from estimators.lissajous.motion_filter import off_pattern_remarks
@@ -20,7 +21,6 @@ from estimators.target_fusion.estimate import TargetEstimate
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
 from flightsim.foundation.geodesy import GeodeticPosition
 
-_AUTOPILOT: Final = 1
 _ATTITUDE_HZ: Final = 10.0
 _GIMBAL_HZ: Final = 5.0
 _POSITION_HZ: Final = 2.0
@@ -98,7 +98,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         if handler is None:
             return Outcome.IGNORED
         from_payload = name in ("LANDING_TARGET", "GIMBAL_DEVICE_ATTITUDE_STATUS")
-        if not from_payload and message.src_component != _AUTOPILOT:
+        if not from_payload and message.src_component != AUTOPILOT_COMPONENT:
             return Outcome.IGNORED
         drone = self.drones.get(message.src_system)
         if drone is None:

@@ -18,6 +18,7 @@ from autopilot_bridge.mavlink.camera_scan import (
     camera_scan_message,
     detection_message,
 )
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.messages import Message
 from estimators.vision.camera_file import CameraDescription
 from estimators.vision.clock_check import ClockCheck
@@ -72,7 +73,7 @@ class PictureWatch:
 
     def handle(self, message: Message) -> None:
         """Take a message of the vehicle."""
-        if message.src_component != 1:
+        if message.src_component != AUTOPILOT_COMPONENT:
             return
         if message.name == "GLOBAL_POSITION_INT":  # the distance of a tag needs the height only
             self._track.place(message.time_boot_ms * 1000, (0.0, 0.0, -1e-3 * message.relative_alt))

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
-from autopilot_bridge.mavlink.camera_scan import CAMERA_COMPONENTS, CameraScan, read_camera_scan
+from autopilot_bridge.mavlink.camera_scan import CameraScan, read_camera_scan
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENTS
 from autopilot_bridge.mavlink.search_likelihood import (
     SearchLikelihood,
     read_search_likelihood,
@@ -31,7 +32,6 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 __all__ = ["VisionSearchEstimator"]
 
-_AUTOPILOT: Final = 1
 _FIDUCIAL: Final = int(dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL)
 _MOST_TAG: Final = 255
 _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
@@ -103,7 +103,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         handler = self._handlers.get(name)
         if handler is None:
             return Outcome.IGNORED
-        if name not in ("TUNNEL", "LANDING_TARGET") and message.src_component != _AUTOPILOT:
+        if name not in ("TUNNEL", "LANDING_TARGET") and message.src_component != AUTOPILOT_COMPONENT:
             return Outcome.IGNORED
         camera = self._cameras.get(message.src_system)
         if camera is None:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, Packet, dialect
+from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
 from estimators.fleet import Fleet
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import Runner
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from autopilot_bridge.clock import Clock
     from autopilot_bridge.links import Link
 
-COMPONENT_ID: Final = 191
-"""MAV_COMP_ID_ONBOARD_COMPUTER."""
 _HEARTBEAT_PERIOD_S: Final = 1.0
 
 
@@ -64,7 +63,7 @@ class FlightEstimators:
         name: str,
         settings: Sequence[str] = (),
         *,
-        component_id: int = COMPONENT_ID,
+        component_id: int = ONBOARD_COMPUTER_COMPONENT,
         known: Mapping[str, float | str] = MappingProxyType({}),
     ) -> None:
         self._class = estimator_class(name)

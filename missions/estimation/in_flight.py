@@ -27,10 +27,11 @@ def estimators_of(request: RunRequest, known: Mapping[str, float | str]) -> "Fli
                 f"{request.estimator_settings[0]!r} is for an estimator; name one with `estimator`"
             )
         return None
-    from missions.estimation.embedded import COMPONENT_ID, FlightEstimators
+    from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
+    from missions.estimation.embedded import FlightEstimators
 
     # A mission on board may itself use the first id of an onboard computer.
-    component_id = COMPONENT_ID + (request.identity[1] == COMPONENT_ID)
+    component_id = ONBOARD_COMPUTER_COMPONENT + (request.identity[1] == ONBOARD_COMPUTER_COMPONENT)
     with refused_in_plan():
         return FlightEstimators(
             request.estimator, request.estimator_settings, component_id=component_id, known=known

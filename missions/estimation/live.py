@@ -17,6 +17,7 @@ from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
 from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
+from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
 from estimators.fleet import Fleet
@@ -24,7 +25,6 @@ from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import ESTIMATOR_COMPONENTS, Runner
 from missions.errors import LinkClosed
-from missions.estimation.embedded import COMPONENT_ID
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
@@ -66,7 +66,7 @@ class LiveRequest:
     settings: Sequence[str] = ()
     duration_s: float | None = None
     system_id: int | None = None
-    component_id: int = COMPONENT_ID
+    component_id: int = ONBOARD_COMPUTER_COMPONENT
     publish: bool = True
     request_rates: bool = True
     silence_s: float = SILENCE_S

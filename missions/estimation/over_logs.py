@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from autopilot_bridge.clock.pacing import wall_time_s
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.errors import EstimatorError
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
@@ -107,7 +108,9 @@ def _replay_one(
     wall_s = wall_time_s() - begun_s
     failure = done.failure
     if request.system_id is not None and not done.supplies:
-        ids = sorted({key.system_id for log in logs for key in log.keys if key.component_id == 1})
+        ids = sorted(
+            {key.system_id for log in logs for key in log.keys if key.component_id == AUTOPILOT_COMPONENT}
+        )
         failure = (
             f"there is no vehicle {request.system_id} in it; there are {', '.join(map(str, ids)) or 'none'}"
         )

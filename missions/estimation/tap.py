@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, Packet
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.errors import EstimatorFailure
-from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
+from estimators.fleet import GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
 from estimators.observations import SUFFIX, Observation, ObservationWriter
 from estimators.runner import Runner, why_excluded

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, Generic
+from typing import Any, Generic
 
 from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
@@ -24,8 +25,6 @@ from missions.flown.run_folder import LOG_NAME, create_run_folder
 
 __all__ = ["over_log"]
 
-_AUTOPILOT: Final = 1
-
 
 def over_log(
     request: VisionRequest, log: Path, pictures: PictureProcess[Any], on_progress: OnProgress | None
@@ -42,7 +41,7 @@ def over_log(
         for stamp_us, frame in reader:
             definition, sender = frame.definition, (frame.system_id, frame.component_id)
             if (
-                sender == (system_id, _AUTOPILOT)
+                sender == (system_id, AUTOPILOT_COMPONENT)
                 and stamp_field(definition.name, definition.field_names) is not None
             ):
                 now_us = times.stamp(read_message(frame))
@@ -117,6 +116,6 @@ class _Recording(Generic[Found]):
 
 def _first_autopilot(reader: TlogReader) -> int:
     for _, frame in reader:
-        if frame.component_id == _AUTOPILOT:
+        if frame.component_id == AUTOPILOT_COMPONENT:
             return frame.system_id
     raise EstimatorError(f"{reader.path} has no message of an autopilot; give the log of a vehicle")

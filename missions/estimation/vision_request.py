@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, Protocol, TypeVar
 
 from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
-from autopilot_bridge.mavlink.camera_scan import CAMERA_COMPONENTS
+from autopilot_bridge.mavlink.components import CAMERA_COMPONENTS, MOVING_POINT_COMPONENT
 from estimators.errors import EstimatorError
 from estimators.handoff.motion_watch import MotionWatchParameters
 from estimators.messages import Message
 from estimators.vision import CameraDescription, TagDetectorParameters
 from estimators.vision.video import Picture, is_stream
-from missions.vehicle.payload import MOVING_POINT_COMPONENT
 
 __all__ = [
     "COMPLETED",

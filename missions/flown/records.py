@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS, Packet, definition
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs.columns import decode_records, record_dtype
 from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, message_table, scan
 from estimators.received import received_positions, together
-from estimators.vehicle_time import AUTOPILOT
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 UnixTime = Callable[[], int]
@@ -92,13 +92,13 @@ class FlightRecords:
         Positions at 0, 0 are left out, which ArduPilot sends until it has one, and places and times that no
         vehicle can have (`left_out`).
         """
-        return self._sound("GLOBAL_POSITION_INT", system_id, AUTOPILOT)[0]
+        return self._sound("GLOBAL_POSITION_INT", system_id, AUTOPILOT_COMPONENT)[0]
 
     def left_out(self, system_id: int) -> dict[str, int]:
         """Number of messages that `truth` and `positions` leave out of a vehicle, by reason."""
         return together(
             self._sound("HIL_STATE_QUATERNION", system_id, None)[1],
-            self._sound("GLOBAL_POSITION_INT", system_id, AUTOPILOT)[1],
+            self._sound("GLOBAL_POSITION_INT", system_id, AUTOPILOT_COMPONENT)[1],
         )
 
     def _sound(

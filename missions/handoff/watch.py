@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, MAVLinkMessage
+from autopilot_bridge.mavlink.components import RANGE_RADIO_COMPONENT
 from autopilot_bridge.mavlink.handoff_messages import TrackDesignation, designation_message
 from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
 from estimators.relative_pose import PoseMode
 from estimators.runner import Runner
-from missions.vehicle.payload import RANGE_RADIO_COMPONENT
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

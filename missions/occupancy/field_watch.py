@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.mavlink import field_reader
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.occupancy.detection import Anomaly, AnomalyDetector
 from estimators.occupancy.placed_readings import PlacedReading, ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

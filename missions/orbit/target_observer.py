@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT, GIMBAL_COMPONENT
 from estimators.messages import read_message
 from estimators.orbit_target import OrbitTargetEstimator, OrbitTargetParameters
 from estimators.orbit_target.attitude import FilterAttitude
@@ -15,8 +16,6 @@ from missions.errors import MissionError
 from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
-from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from missions.vehicle.vehicle import Vehicle
 
 TICK_HZ: Final = 25.0

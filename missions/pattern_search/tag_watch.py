@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, CameraScan, read_camera_scan
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT
 from estimators.messages import read_message
 from estimators.vision import VehicleTrack, ground_place
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["FoundTag", "TagWatch"]
 
 _AT_ALTITUDE: Final = 0.9
-_CAMERA: Final = int(dialect.MAV_COMP_ID_CAMERA)
 _FIDUCIAL: Final = int(dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL)
 
 
@@ -152,7 +152,7 @@ class TagWatch:
         return frame.system_id == self._vehicle.system_id and frame.component_id == component
 
     def _on_attitude(self, frame: "Frame") -> None:
-        if self._own(frame, int(dialect.MAV_COMP_ID_AUTOPILOT1)):
+        if self._own(frame, AUTOPILOT_COMPONENT):
             self._track.handle(read_message(frame))
 
     def _on_position(self, position: Position) -> None:
@@ -166,7 +166,7 @@ class TagWatch:
             self._ended.set()
 
     def _on_detection(self, frame: "Frame") -> None:
-        if not self._own(frame, _CAMERA):
+        if not self._own(frame, CAMERA_COMPONENT):
             return
         message = read_message(frame)
         values = (message.angle_x, message.angle_y, message.distance)
@@ -178,7 +178,7 @@ class TagWatch:
         self._seen = {int(message.time_usec): values}
 
     def _on_scan(self, frame: "Frame") -> None:
-        if not self._own(frame, _CAMERA):
+        if not self._own(frame, CAMERA_COMPONENT):
             return
         message = read_message(frame)
         if message.payload_type != CAMERA_SCAN_PAYLOAD:

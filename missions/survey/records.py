@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
 from estimators import survey_magnetometer
 from estimators.errors import EstimatorError
 from estimators.survey.compensation import (
@@ -28,7 +29,6 @@ __all__ = ["Calibration", "calibrated", "flight_readings"]
 
 Array = NDArray[np.float64]
 
-_AUTOPILOT: Final = 1
 _MARGIN_S: Final = 5.0  # of the flight around the manoeuvres, for the filter's ends
 
 
@@ -43,10 +43,10 @@ def flight_readings(
         frame: the frame.
         attitude: give them the vehicle's attitude, for a compensation; readings without one are left out.
     """
-    sent = records.table("NAMED_VALUE_FLOAT", system_id, survey_magnetometer.COMPONENT)
+    sent = records.table("NAMED_VALUE_FLOAT", system_id, MAGNETOMETER_COMPONENT)
     sent = sent[sent["name"] == survey_magnetometer.TOTAL_FIELD_NAME.encode()]
     positions = records.positions(system_id)
-    attitudes = records.table("ATTITUDE", system_id, _AUTOPILOT)
+    attitudes = records.table("ATTITUDE", system_id, AUTOPILOT_COMPONENT)
     finite = np.all([np.isfinite(attitudes[name]) for name in ("roll", "pitch", "yaw")], axis=0)
     attitudes = attitudes[finite]
     return placed_readings(

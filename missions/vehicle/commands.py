@@ -4,8 +4,8 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar, cast
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from missions.errors import CommandRejected, MissionError, ModeNotEntered, VehicleTimeout
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode, ModeCommand
 from missions.vehicle.heights import HeightRule
 from missions.vehicle.link import VehicleLink, describe_ack

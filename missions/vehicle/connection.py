@@ -24,6 +24,11 @@ from autopilot_bridge.mavlink import (
     definition,
     dialect,
 )
+from autopilot_bridge.mavlink.components import (
+    AUTOPILOT_COMPONENT,
+    GROUND_STATION_COMPONENT,
+    ONBOARD_COMPUTER_COMPONENT,
+)
 from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 from missions.errors import LinkClosed
 from missions.vehicle.peers import NewestFrames
@@ -33,10 +38,9 @@ if TYPE_CHECKING:
 
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
-AUTOPILOT_COMPONENT: Final = 1
-GROUND_STATION: Final = (255, 190)
-"""System and component id of a mission on the ground (MAV_COMP_ID_MISSIONPLANNER, as in ground stations)."""
-ONBOARD_COMPUTER: Final = (1, 191)
+GROUND_STATION: Final = (255, GROUND_STATION_COMPONENT)
+"""System and component id of a mission on the ground."""
+ONBOARD_COMPUTER: Final = (1, ONBOARD_COMPUTER_COMPONENT)
 """System and component id of a mission on board of system 1."""
 
 _HEARTBEAT_PERIOD_S: Final = 1.0

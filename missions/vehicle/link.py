@@ -22,13 +22,14 @@ from autopilot_bridge.mavlink import (
     enum_name,
     field_reader,
 )
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, TakenOver, VehicleTimeout
 from missions.how_left import height_text
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.vehicle import px4_events
 from missions.vehicle.command_authority import CommandAuthority
-from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
+from missions.vehicle.connection import Connection, MessageStream
 from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
 from missions.vehicle.link_watch import LOST_AFTER_S, QUIET_AFTER_S, LinkWatch

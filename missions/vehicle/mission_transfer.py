@@ -5,10 +5,11 @@ from dataclasses import replace
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import command_name, dialect, enum_name
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_from_message, item_message
 from missions.errors import CommandRejected, VehicleTimeout
-from missions.vehicle.connection import AUTOPILOT_COMPONENT, MessageStream
+from missions.vehicle.connection import MessageStream
 from missions.vehicle.items import WITH_PLACE
 from missions.vehicle.link import VehicleLink
 

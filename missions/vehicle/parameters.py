@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.limits import Limits
 from missions.vehicle.link import VehicleLink
 

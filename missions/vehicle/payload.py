@@ -9,15 +9,10 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import decode, dialect
+from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
 from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.vehicle.link import VehicleLink
-
-CAMERA_COMPONENT: Final = 100
-GIMBAL_COMPONENT: Final = 154
-TARGET_SENSOR_COMPONENT: Final = 26
-RANGE_RADIO_COMPONENT: Final = 27
-MOVING_POINT_COMPONENT: Final = 28
 
 # within this time the gimbal manager reports which component has the control
 _CONTROL_REPORTED_US: Final = 3_000_000
@@ -56,9 +51,7 @@ class Payload:
                 return None
             return int(m.time_boot_ms) * 1000, float(m.value)
 
-        return self._listen(
-            "NAMED_VALUE_FLOAT", survey_magnetometer.COMPONENT, sample, lambda s: listener(*s)
-        )
+        return self._listen("NAMED_VALUE_FLOAT", MAGNETOMETER_COMPONENT, sample, lambda s: listener(*s))
 
     def _listen(
         self, name: str, component_id: int, convert: Callable[[Any], Any], listener: Callable[[Any], None]

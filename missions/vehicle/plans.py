@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame, decode, definition, dialect, field_reader
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import MissionError, VehicleTimeout
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.firmware import Mode
 from missions.vehicle.heights import HeightRule, refuse_low_items
 from missions.vehicle.item_tracker import (

@@ -16,20 +16,21 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, read_camera_scan
+from autopilot_bridge.mavlink.components import (
+    AUTOPILOT_COMPONENT,
+    CAMERA_COMPONENT,
+    GIMBAL_COMPONENT,
+    MAGNETOMETER_COMPONENT,
+    MOVING_POINT_COMPONENT,
+    RANGE_RADIO_COMPONENT,
+    TARGET_SENSOR_COMPONENT,
+)
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, read_moving_points
 from autopilot_bridge.mavlink.target_scan import TARGET_SCAN_PAYLOAD, ScanEnd, read_scan_payload
 from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import gimbal_attitude
 from missions.errors import MissionError, VehicleTimeout
-from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.link import VehicleLink
-from missions.vehicle.payload import (
-    CAMERA_COMPONENT,
-    GIMBAL_COMPONENT,
-    MOVING_POINT_COMPONENT,
-    RANGE_RADIO_COMPONENT,
-    TARGET_SENSOR_COMPONENT,
-)
 
 __all__ = [
     "CAMERA",
@@ -161,7 +162,7 @@ GIMBAL: Final = Sensor(
 )
 SURVEY_MAGNETOMETER: Final = Sensor(
     name="survey magnetometer",
-    component=survey_magnetometer.COMPONENT,
+    component=MAGNETOMETER_COMPONENT,
     message="NAMED_VALUE_FLOAT",
     what=f"readings of a field (NAMED_VALUE_FLOAT {survey_magnetometer.TOTAL_FIELD_NAME})",
     least_hz=1.0,

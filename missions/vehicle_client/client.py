@@ -27,6 +27,7 @@ from autopilot_bridge.links import (
     UdpServer,
 )
 from autopilot_bridge.mavlink import definition, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.plain_text import plain_text
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
@@ -34,7 +35,6 @@ from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
 from missions.vehicle.firmware_records import FIRMWARES
 from missions.vehicle_client.listening import listen
 
-_AUTOPILOT: Final = 1
 _FLAVOURS: Final = {dialect.MAV_AUTOPILOT_PX4: "px4", dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot"}
 _LOOK_S: Final = 0.05
 _LISTEN_S: Final = 2.0
@@ -120,7 +120,7 @@ class VehicleClient:
 
     async def _keep_messages(self) -> None:
         async for message in self.direct.subscribe_message(""):
-            if message.component_id != _AUTOPILOT or message.system_id != self.system_id:
+            if message.component_id != AUTOPILOT_COMPONENT or message.system_id != self.system_id:
                 continue
             with suppress(ValueError):  # NaN in a field is not valid JSON
                 fields = json.loads(message.fields_json)
@@ -183,13 +183,17 @@ class VehicleClient:
     async def command(self, command: int, *parameters: float) -> int | None:
         """Send a COMMAND_LONG; returns its MAV_RESULT, or None without an answer."""
         fields = {f"param{k}": value for k, value in enumerate((*parameters, *(0.0,) * 7)[:7], start=1)}
-        fields |= {"target_system": self.system_id, "target_component": _AUTOPILOT, "command": command}
+        fields |= {
+            "target_system": self.system_id,
+            "target_component": AUTOPILOT_COMPONENT,
+            "command": command,
+        }
         message = MavlinkMessage(
             message_name="COMMAND_LONG",
             system_id=0,
             component_id=0,
             target_system_id=self.system_id,
-            target_component_id=_AUTOPILOT,
+            target_component_id=AUTOPILOT_COMPONENT,
             fields_json=json.dumps(fields),
         )
         try:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from autopilot_bridge.links import Address, open_link
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 
 _LOOK_S = 0.02
 _GCS_HEARTBEAT_S = 1.0
@@ -60,7 +61,9 @@ class LinkQuality:
                 "is the baud rate right?"
             )
         if "HEARTBEAT" in self.rates_hz:
-            ids = ", ".join(str(system) for system, component in self.components if component == 1)
+            ids = ", ".join(
+                str(system) for system, component in self.components if component == AUTOPILOT_COMPONENT
+            )
             return f"received now: autopilot with system id {ids}; try again, or choose it with `system_id`"
         names = ", ".join(f"{system}/{component}" for system, component in self.components)
         return f"received were components {names} (system/component), none of them an autopilot's heartbeat"
@@ -99,7 +102,7 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
                         if gap < 128:  # a larger gap means that a frame came late
                             lost[who] += gap
                     last[who] = frame.sequence
-                    signed |= frame.signed and frame.component_id == 1
+                    signed |= frame.signed and frame.component_id == AUTOPILOT_COMPONENT
                     counts.setdefault(who, Counter())[frame.message_id] += 1
             await asyncio.sleep(_LOOK_S)
     finally:

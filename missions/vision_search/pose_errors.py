@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.received import not_in_gaps, received_times
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
@@ -21,7 +22,6 @@ __all__ = ["PoseErrorFigures", "pose_errors"]
 Array = NDArray[np.float64]
 PoseErrorFigures = dict[str, float]
 
-_AUTOPILOT: Final = 1
 _STEP_S: Final = 0.25
 _LEAST: Final = 40  # samples
 
@@ -43,7 +43,7 @@ def pose_errors(
         times after which the autocorrelation of the errors has fallen to 1/e, the mean of the axes.
     """
     truth = records.truth(system_id)
-    attitude = records.table("ATTITUDE", system_id, _AUTOPILOT)
+    attitude = records.table("ATTITUDE", system_id, AUTOPILOT_COMPONENT)
     attitude = attitude[received_times(attitude["time_boot_ms"].astype(np.int64) * 1000).rows]
     position = records.positions(system_id)
     times = np.arange(span_us[0], span_us[1], _STEP_S * 1e6)

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import pytest
 
 from autopilot_bridge.mavlink import FrameParser, decode, dialect
+from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from missions.errors import PlanError
 from missions.vehicle import AttitudeSetpoint
 from missions.vehicle.notes import FlightNotes
-from missions.vehicle.payload import GIMBAL_COMPONENT, Payload, detection, gimbal_attitude
+from missions.vehicle.payload import Payload, detection, gimbal_attitude
 
 d = dialect
 

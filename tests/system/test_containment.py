@@ -7,9 +7,9 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
+from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.sitl import Sitl, VehicleFailure
 from autopilot_bridge.sitl.containment import Aftermath, Probation
-from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT
 from autopilot_bridge.storage import MemoryStore
 from autopilot_bridge.storage.files import exists, replace_whole
 from autopilot_bridge.storage.memory import MemoryCard

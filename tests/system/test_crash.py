@@ -5,8 +5,8 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import FrameParser, decode
+from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.sitl import Sitl
-from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT
 from flightsim import truth as t
 from flightsim.initial_state import InitialState
 from flightsim.world_spec import WorldSpec, team

@@ -13,9 +13,10 @@ import pytest
 
 from autopilot_bridge.clock import LoopClock
 from autopilot_bridge.mavlink import FrameParser, Packet, definition
+from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
-from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT, TruthEncoder
+from autopilot_bridge.sitl.truth import TruthEncoder
 from flightsim import truth as t
 from missions.cli.main import run_command_line
 from tests.slow import slow

@@ -8,6 +8,7 @@ from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import GROUND_STATION_COMPONENT
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import (
     FORCE_NUMBER,
@@ -49,7 +50,7 @@ class Px4Commands(CommandHandlers):
         mode = px4_modes.commanded_mode(main, sub)
         if mode is not None:
             # the text of a refusal is for ground stations; others see the result only
-            announced = source.component_id == mavlink.MAV_COMP_ID_MISSIONPLANNER
+            announced = source.component_id == GROUND_STATION_COMPONENT
             return self.commander.set_mode(mode, announced=announced).result
         if main != px4_modes.MAIN_AUTO:
             return Result.ACCEPTED  # acknowledged, and nothing changes

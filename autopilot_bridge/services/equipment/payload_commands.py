@@ -18,6 +18,7 @@ from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, Handler
@@ -25,8 +26,6 @@ from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.equipment import GIMBAL_COMMANDS
 
-_CAMERA: Final = int(mavlink.MAV_COMP_ID_CAMERA)
-_GIMBAL: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 _CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 _NONE: Final = mavlink.MAV_CMD_DO_SET_ROI_NONE
 _NEXT_WAYPOINT: Final = mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
@@ -84,7 +83,10 @@ class PayloadCommands(Microservice):
         }
 
     def _is_own(self, source: Source) -> bool:
-        return source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL)
+        return source.system_id == self._parts.system_id and source.component_id in (
+            CAMERA_COMPONENT,
+            GIMBAL_COMPONENT,
+        )
 
     @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
@@ -108,20 +110,20 @@ class PayloadCommands(Microservice):
         return not self._in_control or (source.system_id, source.component_id) in self._in_control
 
     def _to_camera(self, command: Command, source: Source) -> Result | None:
-        if not self._is_there(_CAMERA):
+        if not self._is_there(CAMERA_COMPONENT):
             return self._policy.absent
-        self._pass_on(_CAMERA, command)
+        self._pass_on(CAMERA_COMPONENT, command)
         return Result.ACCEPTED
 
     @command(*GIMBAL_COMMANDS)
     def _to_gimbal(self, command: Command, source: Source) -> Result | None:
-        if not self._is_there(_GIMBAL):
+        if not self._is_there(GIMBAL_COMPONENT):
             return self._policy.absent
         if command.id == _CONFIGURE:
             command = self._configured(command, source)
         elif not self._may_point(source):
             return Result.DENIED
-        self._pass_on(_GIMBAL, command)
+        self._pass_on(GIMBAL_COMPONENT, command)
         return Result.ACCEPTED
 
     @command(*_ROI)
@@ -129,10 +131,10 @@ class PayloadCommands(Microservice):
         item = _roi_item(command, kinds=self._policy.kinds_of_roi)
         if item is not None and not (abs(item.x) <= 90.0 and abs(item.y) <= 180.0):
             return self._policy.bad_place
-        if self._is_there(_GIMBAL) and command.id != _NEXT_WAYPOINT:
+        if self._is_there(GIMBAL_COMPONENT) and command.id != _NEXT_WAYPOINT:
             if not self._may_point(source):
                 return Result.DENIED
-            self._pass_on(_GIMBAL, command)
+            self._pass_on(GIMBAL_COMPONENT, command)
         elif item is not None:
             self._turn_nose(item)
         return Result.ACCEPTED

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.navigation import external as external
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
@@ -30,7 +31,6 @@ from flightsim.foundation.vectors import Quaternion, conjugate, from_euler, prod
 Array = NDArray[np.float64]
 
 _VIO: Final = 6  # FAILURE_UNIT_SENSOR_VIO
-_AUTOPILOT: Final = 1
 _HALF: Final = math.sqrt(0.5)
 _UNKNOWN3: Final = (math.nan, math.nan, math.nan)
 _POSE_DIAGONAL: Final = (0, 6, 11)  # of an upper triangle of 6 x 6, by rows
@@ -110,7 +110,7 @@ class ExternalOdometryService(Microservice):
         """Another vehicle's own ODOMETRY that arrives here is ignored."""
         if not self._policy.enabled(self._parameters):
             return
-        if source.component_id == _AUTOPILOT and source.system_id != self._system_id:
+        if source.component_id == AUTOPILOT_COMPONENT and source.system_id != self._system_id:
             return
         sample = self._sample(message, time_us)
         if sample is None:

@@ -12,11 +12,11 @@ import numpy as np
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.services.channel import Receiver, Source, receiver
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_AUTOPILOT: Final = 1
 _HAS_POSITION: Final = 1  # of est_capabilities
 _HAS_VELOCITY: Final = 2
 _MAX_SPEED_M_S: Final = 200.0
@@ -60,7 +60,7 @@ class FollowService(Microservice):
     def _on_position(
         self, message: mavlink.MAVLink_global_position_int_message, source: Source, time_us: int
     ) -> None:
-        if source.component_id == _AUTOPILOT:
+        if source.component_id == AUTOPILOT_COMPONENT:
             self._take(message, source, time_us, *self._of_position(message))
 
     def _take(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Receiver, Source
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
@@ -27,8 +28,6 @@ from flightsim.foundation.vectors import from_euler, rotate, yaw_of
 
 Array = NDArray[np.float64]
 
-_CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)
-_GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 _YAW_IN_EARTH: Final = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
 _GIMBAL_US: Final = 500_000
 _MAX_ANGLE_RAD: Final = 1.3
@@ -74,7 +73,7 @@ class LandingTargetService(Microservice):
     def _on_gimbal(
         self, message: mavlink.MAVLink_gimbal_device_attitude_status_message, source: Source, time_us: int
     ) -> None:
-        if source.system_id != self._system_id or source.component_id != _GIMBAL_COMPONENT:
+        if source.system_id != self._system_id or source.component_id != GIMBAL_COMPONENT:
             return
         q = np.array(message.q, dtype=np.float64)
         if 0.9 < float(q @ q) < 1.1:  # False for NaN
@@ -123,7 +122,7 @@ class LandingTargetService(Microservice):
             right, down: in the image, tangents of the angles off the optical axis.
         """
         gimbal = None
-        if source.system_id == self._system_id and source.component_id == _CAMERA_COMPONENT:
+        if source.system_id == self._system_id and source.component_id == CAMERA_COMPONENT:
             gimbal = min(self._gimbal, key=lambda entry: abs(entry[0] - measured_us), default=None)
         if gimbal is not None and abs(gimbal[0] - measured_us) < _GIMBAL_US:
             line = rotated(gimbal[1], np.array((1.0, right, down)))

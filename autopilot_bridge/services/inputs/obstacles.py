@@ -13,6 +13,7 @@ import numpy as np
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source
@@ -21,7 +22,6 @@ from autopilot_bridge.services.parts import AutopilotParts
 
 _AVOIDANCE: Final = int(mavlink.FAILURE_UNIT_SYSTEM_AVOIDANCE)
 _UNKNOWN_CM: Final = 65535
-_AUTOPILOT: Final = 1
 _SENSOR_WIDTH_RAD: Final = math.radians(30.0)
 _HORIZONTAL: Final = range(mavlink.MAV_SENSOR_ROTATION_NONE, mavlink.MAV_SENSOR_ROTATION_YAW_315 + 1)
 
@@ -53,7 +53,7 @@ class ObstacleService(Microservice):
         time_us: int,
     ) -> None:
         """A DISTANCE_SENSOR of another vehicle is ignored."""
-        if not self._enabled(self._parameters) or source.component_id == _AUTOPILOT:
+        if not self._enabled(self._parameters) or source.component_id == AUTOPILOT_COMPONENT:
             return
         if isinstance(message, mavlink.MAVLink_obstacle_distance_message):
             taken = self._circle(message, time_us)

@@ -11,13 +11,13 @@ from typing import Final
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
 _ADSB_VEHICLE: Final = mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE
-_AUTOPILOT: Final = 1
 _MOST: Final = 50  # maximum number of aircraft stored
 _LIFETIME_US: Final = 30_000_000
 _LEAST_INTERVAL_US: Final = 90_000  # between two reports of one aircraft
@@ -76,7 +76,7 @@ class TrafficService(Microservice):
     def _on_report(self, message: mavlink.MAVLink_adsb_vehicle_message, source: Source, time_us: int) -> None:
         """A report forwarded by another autopilot is not forwarded again."""
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0
-        if switched_on and source.component_id != _AUTOPILOT:
+        if switched_on and source.component_id != AUTOPILOT_COMPONENT:
             self._take(message, time_us)
 
     def _take(self, message: mavlink.MAVLink_adsb_vehicle_message, time_us: int) -> None:

@@ -14,6 +14,7 @@ from typing import Final
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.parameters import (
     INTEGER_LIMITS,
     ParameterDefinition,
@@ -33,7 +34,6 @@ from autopilot_bridge.services.microservice import Microservice
 
 HASH_NAME: Final = "_HASH_CHECK"
 NO_INDEX: Final = 65535
-_COMPONENT_ID: Final = 1
 _AS_FLOAT: Final = struct.Struct("<f")
 _AS_INT32: Final = struct.Struct("<i")
 _AS_UINT32: Final = struct.Struct("<I")
@@ -73,7 +73,7 @@ class ParameterPolicy:
 
 def fix_identity(store: ParameterStore, policy: ParameterPolicy, system_id: int) -> None:
     """Set the identity parameters to the vehicle's ids, whatever a file contains."""
-    for name, value in zip(policy.identity, (system_id, _COMPONENT_ID), strict=False):
+    for name, value in zip(policy.identity, (system_id, AUTOPILOT_COMPONENT), strict=False):
         if name in store:
             store.fix(name, value)
 

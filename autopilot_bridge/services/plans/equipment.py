@@ -13,6 +13,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.plan_reading import is_waypoint
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import TERRAIN_FRAMES, UNSET_INT, is_geodetic
 from autopilot_bridge.services.channel import MavlinkMessage, send_to_all
@@ -42,9 +43,6 @@ MOUNT_COMMANDS: Final = frozenset((mavlink.MAV_CMD_DO_MOUNT_CONTROL, mavlink.MAV
 GIMBAL_COMMANDS: Final = frozenset(
     (*MOUNT_COMMANDS, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
 )
-_AUTOPILOT: Final = 1
-_CAMERA: Final = mavlink.MAV_COMP_ID_CAMERA
-_GIMBAL: Final = mavlink.MAV_COMP_ID_GIMBAL
 _CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 _POINT: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
 _KEEP, _GIVE_UP = -1.0, -3.0  # of DO_GIMBAL_MANAGER_CONFIGURE
@@ -78,7 +76,7 @@ class MissionEquipment(Microservice):
 
     def _carry_out(self, index: int, item: MissionItem) -> None:
         if item.command in CAMERA_COMMANDS:
-            self._command(_CAMERA, item.command, *_parameters(item))
+            self._command(CAMERA_COMPONENT, item.command, *_parameters(item))
         elif item.command in GIMBAL_COMMANDS:
             self._take_control()
             if item.command in MOUNT_COMMANDS:
@@ -97,7 +95,9 @@ class MissionEquipment(Microservice):
         """The mission takes control of the gimbal from any client (PX4's acquire_gimbal_control)."""
         if not self._in_control:
             self._in_control = True
-            self._command_gimbal(_CONFIGURE, float(self._parts.system_id), float(_AUTOPILOT), _KEEP, _KEEP)
+            self._command_gimbal(
+                _CONFIGURE, float(self._parts.system_id), float(AUTOPILOT_COMPONENT), _KEEP, _KEEP
+            )
 
     def _point_mount(self, item: MissionItem) -> None:
         """Convert DO_MOUNT_CONTROL, DO_MOUNT_CONFIGURE of gimbal protocol v1 to v2."""
@@ -122,7 +122,7 @@ class MissionEquipment(Microservice):
             frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         message = mavlink.MAVLink_command_int_message(
             self._parts.system_id,
-            _GIMBAL,
+            GIMBAL_COMPONENT,
             frame,
             mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
             0,
@@ -155,7 +155,7 @@ class MissionEquipment(Microservice):
     # sending
 
     def _command_gimbal(self, command: int, *parameters: float) -> None:
-        self._command(_GIMBAL, command, *parameters)
+        self._command(GIMBAL_COMPONENT, command, *parameters)
 
     def _command(self, component: int, command: int, *parameters: float) -> None:
         values = (*parameters, *(0.0,) * (7 - len(parameters)))

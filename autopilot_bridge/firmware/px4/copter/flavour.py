@@ -18,11 +18,10 @@ from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.firmware.px4.services import SERVICES
 from autopilot_bridge.firmware.px4.texts import copter_notices
 from autopilot_bridge.flight.multicopter.land_detector import LandDetector
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.simulation_marks import PX4_SITL_UID
 from autopilot_bridge.services.channel import AddressRule
 from flightsim.airframe import AirframeKind
-
-_AUTOPILOT_COMPONENT: Final = 1
 
 _MODES: Final = load_data("px4.copter", "modes.toml")
 _SELECTABLE: Final = modes(_MODES["selectable"])
@@ -86,7 +85,7 @@ IDENTITY: Final = Identity(
 
 
 def _command_address(system_id: int) -> AddressRule:
-    return AddressRule(system_id=system_id, component_ids=frozenset({_AUTOPILOT_COMPONENT}), any_system=False)
+    return AddressRule(system_id=system_id, component_ids=frozenset({AUTOPILOT_COMPONENT}), any_system=False)
 
 
 PX4: Final = Flavour(
