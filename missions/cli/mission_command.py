@@ -92,6 +92,8 @@ class DeclaredOption(FlightOption):
         valued: dict[str, Any] = {"metavar": user.placeholder, "type": DeclaredType(user)}
         if kind is bool:
             valued = {"is_flag": True}
+        elif texts and (choices := choices_of(get_args(kind)[0])):
+            valued = {"multiple": True, "type": click.Choice(choices)}
         elif texts:
             valued = {"multiple": True, "metavar": user.placeholder}
         elif choices := choices_of(kind):

@@ -1,70 +1,50 @@
 """The command lines of the package's studies."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-import click
-
-from missions.cli.mission_command import Given, declared_options, made
-from missions.cli.options import FiniteRange
+from missions.base.options import PlanOptions
+from missions.cli.mission_command import FlightOption, Given, declared_options, made
+from missions.cli.option_classes import named
 from missions.cli.study_command import StudyCommand
 from missions.multi_target.options import MultiTargetOptions
+from missions.studies.options import (
+    HandoffStudyOptions,
+    IdentificationStudyOptions,
+    LissajousStudyOptions,
+    LocalizationStudyOptions,
+    MagneticStudyOptions,
+    VisionStudyOptions,
+)
 
 if TYPE_CHECKING:
     from missions.studies.study import Study
 
 
-def _handoff(given: Given) -> "Study[Any, Any]":
-    from missions.studies.handoff import study
-
-    return study(
-        given["comparison"],
-        given["belief"],
-        given["window"],
-        given["trade_off"],
-        given["camera"],
-        given["timeout"],
-        given["rate"],
-    )
+T = TypeVar("T")
 
 
-def _lissajous_localization(given: Given) -> "Study[Any, Any]":
-    from missions.studies.lissajous_localization import study
+def _study(name: str, kind: type[PlanOptions]) -> "Callable[[Given], Study[Any, Any]]":
+    """What makes the study of a module of `missions.studies` from its options."""
 
-    return study(given["equations"])
+    def build(given: Given) -> "Study[Any, Any]":
+        study: Callable[[PlanOptions], Study[Any, Any]] = named((f"missions.studies.{name}", "study"))
+        return study(_made(kind, declared_options(kind), given))
 
-
-def _lissajous_search(given: Given) -> "Study[Any, Any]":
-    from missions.studies.lissajous_search import study
-
-    return study(speed=given["speed"], target_speed=given["target_speed"])
-
-
-def _magnetic_identification(given: Given) -> "Study[Any, Any]":
-    from missions.studies.magnetic_identification import study
-
-    return study(train=given["train"])
-
-
-def _magnetic_search(given: Given) -> "Study[Any, Any]":
-    from missions.occupancy.parameters import Identify
-    from missions.studies.magnetic_search import study
-
-    return study([Identify(way) for way in given["identify"]], flights=given["flights"])
+    return build
 
 
 def _multi_target(given: Given) -> "Study[Any, Any]":
     from missions.studies.multi_target_search import study
 
-    specified = {name for name, value in given.items() if value is not None}
-    return study(made(MultiTargetOptions, _PLANNING, given, specified).planning)
+    return study(_made(MultiTargetOptions, _PLANNING, given).planning)
 
 
-def _vision_search(given: Given) -> "Study[Any, Any]":
-    from missions.studies.vision_search import study
-
-    return study(given["model"], given["side"], given["passes"])
+def _made(kind: type[T], options: Iterable[FlightOption], given: Given) -> T:
+    return made(
+        kind, options, given, {name for name, value in given.items() if value not in (None, (), False)}
+    )
 
 
 _PLANNING: Final = tuple(
@@ -83,52 +63,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "Image points stand for pixels, unless --camera pixels renders and searches all frames. The "
                 "folder gets handoff.png: correct decisions against the time that they take."
             ),
-            options=(
-                click.Option(
-                    ["--comparison"],
-                    type=click.Choice(["evidence", "paper", "rms", "all"]),
-                    default="evidence",
-                    help=(
-                        "What decides: probabilities from all pairs of tracks, the paper's thresholds, the "
-                        "same with the root mean square as residual, or all three."
-                    ),
-                ),
-                click.Option(
-                    ["--belief"],
-                    type=click.Choice(["particles", "gaussians"]),
-                    default="gaussians",
-                    help="What estimates the relative pose.",
-                ),
-                click.Option(
-                    ["--window"],
-                    type=click.IntRange(10, 600),
-                    default=100,
-                    help="Samples of the windows that are compared, at 10 Hz or the rate of a slower camera.",
-                ),
-                click.Option(
-                    ["--trade-off"],
-                    is_flag=True,
-                    help="Windows of 25 to 100 samples with several thresholds (figure 9), not --window.",
-                ),
-                click.Option(
-                    ["--camera"],
-                    type=click.Choice(["points", "pixels"]),
-                    default="points",
-                    help="Moving points by a model, or found in rendered pictures; slow.",
-                ),
-                click.Option(
-                    ["--timeout"],
-                    type=click.FloatRange(1.0, 3600.0),
-                    default=900.0,
-                    help="A trial without a decision ends then, s.",
-                ),
-                click.Option(
-                    ["--rate"],
-                    type=FiniteRange(2.0, 60.0),
-                    help="Frames, Hz. [default: 10; with --camera pixels: 30]",
-                ),
-            ),
-            build=_handoff,
+            options=declared_options(HandoffStudyOptions),
+            build=_study("handoff", HandoffStudyOptions),
         ),
         "lissajous-localization": StudyCommand(
             help=(
@@ -139,15 +75,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "beside the paper's Table IV. There are 20 cells. The folder gets figure_6.png and "
                 "figure_7.png."
             ),
-            options=(
-                click.Option(
-                    ["--equations"],
-                    type=click.Choice(["corrected", "printed", "both"]),
-                    default="both",
-                    help="The paper's as they must be, as they are printed, or both.",
-                ),
-            ),
-            build=_lissajous_localization,
+            options=declared_options(LocalizationStudyOptions),
+            build=_study("lissajous_localization", LocalizationStudyOptions),
         ),
         "lissajous-search": StudyCommand(
             help=(
@@ -156,21 +85,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "The tag is read off rendered pictures. The folder gets search.png, the share of searches "
                 "that have found it over time."
             ),
-            options=(
-                click.Option(
-                    ["--speed"],
-                    type=FiniteRange(min=0.5, max=10.0),
-                    default=5.0,
-                    help="Of the vehicle, m/s; the paper does not give it.",
-                ),
-                click.Option(
-                    ["--target-speed"],
-                    type=FiniteRange(min=0.0, max=5.0),
-                    default=0.3,
-                    help="Of the target, m/s; the paper does not give it.",
-                ),
-            ),
-            build=_lissajous_search,
+            options=declared_options(LissajousStudyOptions),
+            build=_study("lissajous_search", LissajousStudyOptions),
         ),
         "magnetic-identification": StudyCommand(
             help=(
@@ -180,14 +96,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "larger offsets, more noise and deeper targets. The folder gets roc.png, and passes.png with "
                 "figures 4 to 6."
             ),
-            options=(
-                click.Option(
-                    ["--train"],
-                    is_flag=True,
-                    help="Fit the classifier to the rows (needs the extra `learn`); writes classifier.toml.",
-                ),
-            ),
-            build=_magnetic_identification,
+            options=declared_options(IdentificationStudyOptions),
+            build=_study("magnetic_identification", IdentificationStudyOptions),
         ),
         "magnetic-search": StudyCommand(
             help=(
@@ -197,17 +107,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "evidence of classes, in the worlds of fly occupancy. The searchers are points that turn at "
                 "one rate, or aircraft on SITL."
             ),
-            options=(
-                click.Option(
-                    ["--identify"],
-                    type=click.Choice(["threshold", "trace", "bayes"]),
-                    multiple=True,
-                    default=("threshold", "trace", "bayes"),
-                    help="Ways that are compared; repeat.",
-                ),
-                click.Option(["--flights"], is_flag=True, help="Flights of fly occupancy, not points."),
-            ),
-            build=_magnetic_search,
+            options=declared_options(MagneticStudyOptions),
+            build=_study("magnetic_search", MagneticStudyOptions),
         ),
         "multi-target": StudyCommand(
             help=(
@@ -226,19 +127,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "consistency; the measured pose errors; the error budget of Table II. The folder gets "
                 "errors.png."
             ),
-            options=(
-                click.Option(["--model"], default="aerosonde", help="Of the vehicles."),
-                click.Option(
-                    ["--side"],
-                    type=FiniteRange(min=100.0, max=5000.0),
-                    default=1000.0,
-                    help="Of the searched square, m.",
-                ),
-                click.Option(
-                    ["--passes"], type=click.IntRange(1, 100), default=4, help="Over the target, of each."
-                ),
-            ),
-            build=_vision_search,
+            options=declared_options(VisionStudyOptions),
+            build=_study("vision_search", VisionStudyOptions),
         ),
     }
 )

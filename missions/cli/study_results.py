@@ -62,7 +62,7 @@ def _study_of(place: "StudyFolder", results: "Results") -> "Study[Any, Any] | No
         return None
     try:
         study = declared.build(place.identity()["arguments"])
-    except (PlanError, KeyError, ValueError):  # an argument that this version doesn't have
+    except (PlanError, KeyError, ValueError, click.UsageError):  # an argument that this version doesn't have
         return None
     return study if RowSchema.of(study.row).names == set(results.fields) else None
 

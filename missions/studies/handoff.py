@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from missions.studies.design import listed
 from missions.studies.handoff_paired import PairedTrial
 from missions.studies.handoff_surface import draw_surface
-from missions.studies.handoff_trial import TIMEOUT_S, Cell, Comparison, Handoff, HandoffTrial, PoseBelief
+from missions.studies.handoff_trial import Cell, Comparison, Handoff, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting
+from missions.studies.options import Comparisons, HandoffStudyOptions, Points
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, rate_of
 from missions.studies.study import Study
@@ -42,61 +43,40 @@ _BINS: Final = (-1.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.995, 0.999, 1.0)
 _COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
 
 
-def study(
-    comparison: str = Comparison.EVIDENCE.value,
-    belief: str = PoseBelief.GAUSSIANS.value,
-    window: int = 100,
-    trade_off: bool = False,
-    camera: str = "points",
-    timeout_s: float = TIMEOUT_S,
-    rate_hz: float | None = None,
-) -> Study[Cell, Handoff]:
+def study(options: HandoffStudyOptions | None = None) -> Study[Cell, Handoff]:
     """The study.
 
     Args:
-        comparison: "evidence", "paper", "rms", or "all" of them.
-        belief: what estimates the relative pose: "particles" or "gaussians".
-        window: samples of the windows.
-        trade_off: windows and residual thresholds of figure 9 instead of one of each.
-        camera: "points" of a model, or "pixels": found in rendered pictures.
-        timeout_s: time without a decision that is a failure.
-        rate_hz: of the frames; None: 10 Hz for points, 30 Hz for pixels.
+        options: None: the defaults.
     """
-    pixels = camera == "pixels"
-    rate_hz = rate_hz or (PIXELS_HZ if pixels else HandoffSetting().rate_hz)
-    kinds = tuple(Comparison) if comparison == "all" else (Comparison(comparison),)
+    o = options or HandoffStudyOptions()
+    pixels = o.camera is Points.PIXELS
+    rate_hz = o.rate_hz or (PIXELS_HZ if pixels else HandoffSetting().rate_hz)
+    kinds = tuple(Comparison) if o.comparison is Comparisons.ALL else (Comparison(o.comparison.value),)
     cells = [
-        Cell(comparison=kind.value, window=samples, residual_m=residual_m, belief=belief)
+        Cell(comparison=kind.value, window=samples, residual_m=residual_m, belief=o.belief.value)
         for kind in kinds
-        for samples in (WINDOWS if trade_off else (window,))
-        for residual_m in (RESIDUALS_M[kind] if trade_off else (_residual_m(kind),))
+        for samples in (WINDOWS if o.trade_off else (o.window,))
+        for residual_m in (RESIDUALS_M[kind] if o.trade_off else (_residual_m(kind),))
     ]
-    trial = HandoffTrial(setting=HandoffSetting(rate_hz=rate_hz), pixels=pixels, timeout_s=timeout_s)
+    trial = HandoffTrial(setting=HandoffSetting(rate_hz=rate_hz), pixels=pixels, timeout_s=o.timeout_s)
     return Study(
         name="handoff",
         description=(
             "Moving-target handoff without GPS: five walking targets, of which one is the tracker's "
             "(Tolman et al. 2021)."
         ),
-        trial=PairedTrial(trial=trial, cells=tuple(cells)) if trade_off else trial,
+        trial=PairedTrial(trial=trial, cells=tuple(cells)) if o.trade_off else trial,
         parameters=Cell,
         row=Handoff,
         design=listed([asdict(cell) for cell in cells]),
         runs=500,
         success="correct",
         metrics=("time_s", "converged_s", "track_error_m"),
-        options={
-            "comparison": comparison,
-            "belief": belief,
-            "window": window,
-            "trade_off": trade_off,
-            "camera": camera,
-            "timeout_s": timeout_s,
-            "rate_hz": rate_hz,
-        },
+        options={**asdict(o), "rate_hz": rate_hz},
         summarise=summarise,
         report=lines_of,
-        draw=partial(draw_trade_off, timeout_s=timeout_s) if trade_off else draw,
+        draw=partial(draw_trade_off, timeout_s=o.timeout_s) if o.trade_off else draw,
     )
 
 

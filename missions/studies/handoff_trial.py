@@ -25,13 +25,13 @@ from estimators.relative_pose import (
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
 from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
+from missions.studies.options import TIMEOUT_S, PoseBelief
 
 Array = NDArray[np.float64]
 Early = tuple[float, bool]
 """Score of a track, and whether it is of the tracked target."""
 
 _EVERY_S: Final = 0.1  # between two samples of a window
-TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
 _DETECTED: Final = 0.8  # what the trackers expect, whatever the distance
 _SURE: Final = 0.995  # with a smaller probability of the identity, which limits that of the decision, the
@@ -46,13 +46,6 @@ class Comparison(StrEnum):
     PAPER = "paper"  # equations 44 to 47, T_r limits the Frobenius norm
     RMS = "rms"  # the same, T_r limits the root mean square
     EVIDENCE = "evidence"
-
-
-class PoseBelief(StrEnum):
-    """What estimates the relative pose."""
-
-    PARTICLES = "particles"
-    GAUSSIANS = "gaussians"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,16 +8,18 @@ from missions.studies.design import listed
 from missions.studies.lissajous_setting import CELLS, READINGS
 from missions.studies.lissajous_table import lines_of, summarise
 from missions.studies.lissajous_trial import Cell, Errors, LocalizationTrial, compile_study, sample_run
+from missions.studies.options import LocalizationStudyOptions
 from missions.studies.results import Results
 from missions.studies.study import Study
 
 
-def study(equations: str = "both") -> Study[Cell, Errors]:
+def study(options: LocalizationStudyOptions | None = None) -> Study[Cell, Errors]:
     """The study.
 
     Args:
-        equations: "corrected", "printed" or "both".
+        options: None: the defaults.
     """
+    equations = (options or LocalizationStudyOptions()).equations.value
     return Study(
         name="lissajous-localization",
         description=(

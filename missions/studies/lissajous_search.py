@@ -20,6 +20,7 @@ from missions.pattern_search.tag_target import TagTarget
 from missions.pattern_search.world import tag_search_world
 from missions.studies.design import grid
 from missions.studies.flights import fly_trial
+from missions.studies.options import LissajousStudyOptions
 from missions.studies.results import Results
 from missions.studies.statistics import paired_difference, rate_of
 from missions.studies.study import Study
@@ -123,24 +124,24 @@ class SearchTrial:
         )
 
 
-def study(speed: float = 5.0, target_speed: float = 0.3) -> Study[Cell, Searched]:
+def study(options: LissajousStudyOptions | None = None) -> Study[Cell, Searched]:
     """The study.
 
     Args:
-        speed: of the vehicle, m/s.
-        target_speed: of the target, m/s.
+        options: None: the defaults.
     """
+    o = options or LissajousStudyOptions()
     return Study(
         name="lissajous-search",
         description="Seven patterns search for a walking tag: Table I of Steckenrider et al. 2020.",
-        trial=SearchTrial(speed_m_s=speed, target_speed_m_s=target_speed),
+        trial=SearchTrial(speed_m_s=o.speed_m_s, target_speed_m_s=o.target_speed_m_s),
         parameters=Cell,
         row=Searched,
         design=grid(pattern=tuple(PATTERNS)),
         runs=100,
         success="completed",
         metrics=("search_s", "error_m"),
-        options={"speed": speed, "target_speed": target_speed},
+        options={"speed": o.speed_m_s, "target_speed": o.target_speed_m_s},
         summarise=summarise,
         report=lines_of,
         draw=draw,

@@ -18,6 +18,7 @@ from estimators.tracking.metrics import calibration_error
 from missions.studies.design import grid
 from missions.studies.magnetic_training import fitted_tables, require_training, write_tables
 from missions.studies.magnetic_trial import CONDITIONS, PASSES, Cell, EncounterRow, trial
+from missions.studies.options import IdentificationStudyOptions
 from missions.studies.results import Results
 from missions.studies.study import Study
 
@@ -155,15 +156,16 @@ class Output:
             )
 
 
-def study(*, train: bool = False) -> Study[Cell, EncounterRow]:
+def study(options: IdentificationStudyOptions | None = None) -> Study[Cell, EncounterRow]:
     """The study.
 
     Args:
-        train: fit the classifier to the rows; `classifier.toml` is written to the folder.
+        options: None: the defaults.
 
     Raises:
         PlanError: scikit-learn is missing.
     """
+    train = (options or IdentificationStudyOptions()).train
     if train:
         require_training()
     return Study(

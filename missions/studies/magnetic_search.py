@@ -6,7 +6,6 @@ search takes seconds, or they fly: a trial is then the flight of that command.
 """
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -22,6 +21,7 @@ from missions.occupancy.world import occupancy_world
 from missions.occupancy.world_searchers import search_with_points
 from missions.studies.design import grid
 from missions.studies.flights import fly_trial
+from missions.studies.options import MagneticStudyOptions
 from missions.studies.results import Results
 from missions.studies.study import Study
 from missions.worlds.defaults import default_world
@@ -169,18 +169,18 @@ def report(results: Results) -> list[str]:
     ]
 
 
-def study(ways: Collection[Identify] = tuple(Identify), *, flights: bool = False) -> Study[Cell, SearchRow]:
+def study(options: MagneticStudyOptions | None = None) -> Study[Cell, SearchRow]:
     """The study.
 
     Args:
-        ways: of identification that are compared, the threshold first.
-        flights: the searchers are aircraft on SITL, not points.
+        options: None: the defaults.
     """
-    compared = [way.value for way in Identify if way in ways]
+    o = options or MagneticStudyOptions()
+    compared = [way.value for way in Identify if way in o.identify]
     return Study(
         name="magnetic-search",
         description="A team names a magnetic target among false anomalies: Lum et al. 2005, figure 8.",
-        trial=flight if flights else trial,
+        trial=flight if o.flights else trial,
         parameters=Cell,
         row=SearchRow,
         design=grid(identify=compared),
@@ -188,7 +188,7 @@ def study(ways: Collection[Identify] = tuple(Identify), *, flights: bool = False
         success="target_named",
         metrics=("time_s", "error_m", "passes"),
         baseline=0,
-        options={"flights": flights},
+        options={"flights": o.flights},
         summarise=summarise,
         report=report,
     )

@@ -5,6 +5,7 @@ Source: Tisdale et al. 2008.
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +16,7 @@ from estimators.tracking.camera_likelihood import ground_spread
 from estimators.tracking.camera_sight import CameraSight, DetectionRate, PoseErrors, SightModel
 from flightsim.foundation.vectors import from_euler, product
 from missions.studies.design import grid
+from missions.studies.options import VisionStudyOptions
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, paired_difference, rate_of
 from missions.studies.study import Study
@@ -46,28 +48,27 @@ _POSE: Final = (
 _COLOURS: Final = {"one": "#1769aa", "two": "#c2410c"}
 
 
-def study(model: str = "aerosonde", side_m: float = 1000.0, passes: int = 4) -> Study[Cell, Localized]:
+def study(options: VisionStudyOptions | None = None) -> Study[Cell, Localized]:
     """The study.
 
     Args:
-        model: of the vehicles.
-        side_m: of the searched square.
-        passes: over the target, of each vehicle.
+        options: None: the defaults.
     """
+    o = options or VisionStudyOptions()
     return Study(
         name="vision-search",
         description=(
             "One and two aircraft search for a tag with downward cameras and localize it: Tisdale et al. "
             "2008, with a fine grid, a coarse grid and particles over the same flights."
         ),
-        trial=VisionSearchTrial(model=model, side_m=side_m, passes=passes),
+        trial=VisionSearchTrial(model=o.model, side_m=o.side_m, passes=o.passes),
         parameters=Cell,
         row=Localized,
         design=grid(aircraft=tuple(TEAMS)),
         runs=50,
         success="completed",
         metrics=(),
-        options={"model": model, "side_m": side_m, "passes": passes},
+        options=asdict(o),
         summarise=summarise,
         report=lines_of,
         draw=draw,

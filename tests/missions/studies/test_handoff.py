@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from missions.studies.handoff_pixels import PixelWorld
 from missions.studies.handoff_surface import draw_surface
 from missions.studies.handoff_trial import Cell, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld
+from missions.studies.options import Comparisons, HandoffStudyOptions, Points
+
+ALL = HandoffStudyOptions(comparison=Comparisons.ALL, trade_off=True)
 
 
 def test_targets_stay_in_their_area_and_the_noise_is_the_papers():
@@ -71,7 +75,7 @@ def test_a_trial_that_is_too_short_is_a_timeout():
 
 
 def test_the_summary_has_the_papers_figures(tmp_path):
-    made = study("evidence", "gaussians")
+    made = study()
     result = run_study(made, runs=2, engine=Inline(), out=tmp_path / "handoff")
     folder = Path(result.folder)
     summary = json.loads((folder / "summary.json").read_text())
@@ -87,16 +91,16 @@ def test_the_summary_has_the_papers_figures(tmp_path):
 
 
 def test_the_trade_off_has_windows_and_thresholds():
-    made = study("all", trade_off=True)
+    made = study(ALL)
     cells = [(cell["comparison"], cell["window"], cell["residual_m"]) for cell in made.design.cells]
     assert ("paper", 100, 15.0) in cells and ("rms", 25, 1.0) in cells and ("evidence", 50, 15.0) in cells
     assert len(set(cells)) == len(cells) == 21
-    assert run_trial(study("evidence", "gaussians", window=50), 0, runs=1)["window"] == 50
+    assert run_trial(study(HandoffStudyOptions(window=50)), 0, runs=1)["window"] == 50
 
 
 def test_pixels_have_the_papers_frames_and_ranges_keep_their_10_hz():
-    rates = [study("evidence", camera=camera).options["rate_hz"] for camera in ("points", "pixels")]
-    assert rates == [10.0, 30.0] and study("evidence", rate_hz=5.0).options["rate_hz"] == 5.0
+    rates = [study(HandoffStudyOptions(camera=camera)).options["rate_hz"] for camera in Points]
+    assert rates == [10.0, 30.0] and study(HandoffStudyOptions(rate_hz=5.0)).options["rate_hz"] == 5.0
     world, known = HandoffWorld(HandoffSetting(rate_hz=30.0, range_missing=0.0), 1), []
     for _ in range(30):
         world.advance((0.2, 0.2))
@@ -115,7 +119,7 @@ def test_the_surface_of_the_trade_off_is_drawn_without_decisions_too(tmp_path):
 
 
 def test_all_cells_of_the_trade_off_judge_one_flight():
-    trial = study("all", "gaussians", trade_off=True, timeout_s=1.0).trial
+    trial = study(replace(ALL, timeout_s=1.0)).trial
     rows = [trial(cell, 1) for cell in trial.cells]
     assert len(rows) == 21 and all(row == rows[0] for row in rows)
     assert rows[0].timeout and rows[0].cause == "pose never converged"
@@ -123,7 +127,7 @@ def test_all_cells_of_the_trade_off_judge_one_flight():
 
 @pytest.mark.slow
 def test_a_flight_is_decided_by_some_cells_and_not_by_others():
-    trial = study("all", "gaussians", trade_off=True, timeout_s=120.0).trial
+    trial = study(replace(ALL, timeout_s=120.0)).trial
     rows = {(cell.comparison, cell.window, cell.residual_m): trial(cell, 3) for cell in trial.cells}
     assert all(rows["evidence", window, 15.0].correct for window in (25, 50, 100))
     assert rows["paper", 100, 10.0].timeout

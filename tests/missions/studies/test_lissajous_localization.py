@@ -13,6 +13,7 @@ from missions.studies.lissajous_localization import study
 from missions.studies.lissajous_setting import CELLS, PAPER, Equations, block_of
 from missions.studies.lissajous_table import cells_of, lines_of
 from missions.studies.lissajous_trial import errors_of, sample_run, simulate
+from missions.studies.options import LocalizationStudyOptions
 
 RUNS = 100
 
@@ -52,7 +53,9 @@ AS_PRINTED = {
 
 def localized(folder, *, runs, equations="both", engine=None, seed=0, **options) -> Results:
     given = {"runs": runs, "seed": seed, "engine": engine or Inline(), "picture": False}
-    return run_study(study(equations), out=folder / "study", **given, **options).results
+    return run_study(
+        study(LocalizationStudyOptions(equations=equations)), out=folder / "study", **given, **options
+    ).results
 
 
 @pytest.fixture(scope="module")

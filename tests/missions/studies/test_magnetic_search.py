@@ -15,6 +15,7 @@ from missions.occupancy.world import drawn_target
 from missions.occupancy.world_searchers import search_with_points
 from missions.studies import run_study, run_trial
 from missions.studies.magnetic_search import report, study, summarise
+from missions.studies.options import MagneticStudyOptions
 
 SMALL = OccupancyOptions(
     vehicles=2,
@@ -85,7 +86,7 @@ def test_searches_that_have_not_ended_are_not_counted():
 
 
 def test_without_the_threshold_nothing_is_compared_with_it():
-    chosen = study([Identify.BAYES, Identify.TRACE])
+    chosen = study(MagneticStudyOptions(identify=(Identify.BAYES, Identify.TRACE)))
     assert [cell["identify"] for cell in chosen.design.cells] == ["trace", "bayes"]
     columns = {
         "target_named": [[1, 0], [1, 1]],
@@ -113,7 +114,7 @@ def test_the_evidence_names_the_target_among_five_false_anomalies(run):
 
 @pytest.mark.slow
 def test_a_flight_of_the_study_is_that_of_its_command(tmp_path):
-    chosen = study([Identify.BAYES], flights=True)
+    chosen = study(MagneticStudyOptions(identify=(Identify.BAYES,), flights=True))
     result = run_study(chosen, runs=1, out=tmp_path / "study", keep_logs="all", picture=False)
     row = result.results.table.to_pylist()[0]
     words = ["fly", "occupancy", "--vehicles", "3", "--identify", "bayes", "--false-anomalies", "5"]

@@ -8,6 +8,7 @@ import pytest
 
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.design import grid
+from missions.studies.options import VisionStudyOptions
 from missions.studies.study import Study, run_of
 from missions.studies.vision_search import draw, error_budget, lines_of, study, summarise
 from missions.studies.vision_search_trial import BELIEFS, Cell, Localized, VisionSearchTrial
@@ -89,7 +90,7 @@ def test_the_error_budget_is_that_of_the_paper():
 
 @pytest.mark.slow
 def test_a_trial_flies_and_replays_its_log_through_three_beliefs():
-    made = study(model="iris", side_m=120.0, passes=2)
+    made = study(VisionStudyOptions(model="iris", side_m=120.0, passes=2))
     assert made.trial == VisionSearchTrial(model="iris", side_m=120.0, passes=2)
     row = run_trial(made, 0, runs=1)
     assert row["completed"] and row["localized"]

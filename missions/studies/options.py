@@ -1,0 +1,116 @@
+"""Options of the studies of this package."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from flightsim.foundation.options import option
+from missions.base.options import PlanOptions
+from missions.occupancy.parameters import Identify
+
+TIMEOUT_S: Final = 900.0  # paper: 15 minutes
+
+
+class Equations(StrEnum):
+    """The equations of Steckenrider et al. 2020: as they must be, as they are printed, or both."""
+
+    CORRECTED = "corrected"
+    PRINTED = "printed"
+    BOTH = "both"
+
+
+class Comparisons(StrEnum):
+    """What decides in the study of the handoff."""
+
+    EVIDENCE = "evidence"
+    """Probabilities from all pairs of tracks."""
+    PAPER = "paper"
+    """The paper's thresholds."""
+    RMS = "rms"
+    """The paper's thresholds, with the root mean square as residual."""
+    ALL = "all"
+    """All three."""
+
+
+class PoseBelief(StrEnum):
+    """Representation of a relative pose."""
+
+    PARTICLES = "particles"
+    GAUSSIANS = "gaussians"
+
+
+class Points(StrEnum):
+    """Where the moving points of a camera come from: a model, or rendered pictures."""
+
+    POINTS = "points"
+    PIXELS = "pixels"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandoffStudyOptions(PlanOptions):
+    """Options of the study `handoff`."""
+
+    comparison: Comparisons = option(
+        Comparisons.EVIDENCE, help="Comparison that decides: evidence, the paper's thresholds, rms, or all."
+    )
+    belief: PoseBelief = option(PoseBelief.GAUSSIANS, help="Representation of the relative pose.")
+    window: int = option(
+        100, least=10, most=600, help="Samples of the windows, at 10 Hz or the rate of a slower camera."
+    )
+    trade_off: bool = option(
+        False, help="Windows of 25 to 100 samples with several thresholds (figure 9), not `window`."
+    )
+    camera: Points = option(Points.POINTS, help="Source of the moving points: a model, or pictures; slow.")
+    timeout_s: float = option(
+        TIMEOUT_S, least=1.0, most=3600.0, help="Time without a decision after which a trial ends."
+    )
+    rate_hz: float | None = option(
+        None, least=2.0, most=60.0, varies="10; with camera pixels: 30", help="Rate of the frames."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalizationStudyOptions(PlanOptions):
+    """Options of the study `lissajous-localization`."""
+
+    equations: Equations = option(
+        Equations.BOTH, help="Equations of the paper: as they must be, as they are printed, or both."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LissajousStudyOptions(PlanOptions):
+    """Options of the study `lissajous-search`."""
+
+    speed_m_s: float = option(
+        5.0, least=0.5, most=10.0, help="Speed of the vehicle; the paper does not give it."
+    )
+    target_speed_m_s: float = option(
+        0.3, least=0.0, most=5.0, help="Speed of the target; the paper does not give it."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentificationStudyOptions(PlanOptions):
+    """Options of the study `magnetic-identification`."""
+
+    train: bool = option(
+        False, help="Fit of the classifier to the rows (needs the extra learn), in classifier.toml."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MagneticStudyOptions(PlanOptions):
+    """Options of the study `magnetic-search`."""
+
+    identify: tuple[Identify, ...] = option(tuple(Identify), help="Ways that are compared; repeat.")
+    flights: bool = option(False, help="Flights of fly occupancy in place of points.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisionStudyOptions(PlanOptions):
+    """Options of the study `vision-search`."""
+
+    model: str = option("aerosonde", help="Model of the vehicles.")
+    side_m: float = option(1000.0, least=100.0, most=5000.0, help="Side of the searched square.")
+    passes: int = option(4, least=1, most=100, help="Passes over the target, of each vehicle.")
