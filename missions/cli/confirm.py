@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from missions.errors import MissionError
+
 if TYPE_CHECKING:
     from missions.preflight.before_flight import Confirm, Look
 
@@ -109,7 +111,6 @@ def confirmation(
 
     async def confirm(looks: "Sequence[Look]") -> bool:
         from autopilot_bridge.mavlink.plain_text import plain_text
-        from missions.errors import MissionError
 
         problems = sum(len(look.problems) for look in looks)
         with screen():

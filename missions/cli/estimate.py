@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from autopilot_bridge.errors import AddressError, BridgeError
+from estimators.errors import EstimatorError
 from estimators.names import ESTIMATORS
 from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.status_line import StatusLine
+from missions.errors import PlanError
 
 if TYPE_CHECKING:
     from missions.estimation.live import LiveProgress
@@ -77,10 +80,7 @@ are kept), 2 usage, 130 interrupted before --duration was over.
 @click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
 @key_option()
 def estimate(**given: Any) -> int:
-    from autopilot_bridge.errors import AddressError, BridgeError
-    from estimators.errors import EstimatorError
     from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warnings_of
-    from missions.errors import PlanError
     from missions.estimation.live import LiveRequest
     from missions.estimation.live import estimate as run_estimator
 

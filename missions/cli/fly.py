@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from autopilot_bridge.errors import AddressError, BridgeError
 from estimators.names import ESTIMATORS
 from missions.catalogue import NAMES
 from missions.cli.confirm import confirmation
@@ -19,6 +20,7 @@ from missions.cli.options import SECONDS, SPEEDUP, FiniteRange, in_options, repo
 from missions.cli.params import STRICT_HELP, known_to_all
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.world import WORLD_HELP, world_of
+from missions.errors import MissionError, PlanError
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
@@ -153,7 +155,6 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_results("--no-picture", is_flag=True, help="Don't draw track.png.")
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
-    from missions.errors import PlanError
     from missions.process.ending import signal_of
 
     try:
@@ -260,8 +261,6 @@ def _fly(given: dict[str, Any]) -> int:
         from autopilot_bridge.parameter_files import left_out
 
         report(f"--params: {left_out(request.left_out_parameters, _NAMES_SHOWN)}")
-    from autopilot_bridge.errors import AddressError, BridgeError
-    from missions.errors import MissionError
     from missions.runs.session import fly as fly_mission
 
     line = ProgressLine()

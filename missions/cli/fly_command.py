@@ -12,6 +12,7 @@ from flightsim.foundation.plug_ins import plug_ins
 from missions.catalogue import GROUP
 from missions.cli.mission_command import MISSION_GROUP, FlightOption, MissionCommand, Scope
 from missions.cli.mission_commands import COMMANDS, FILE, OWN
+from missions.errors import PlanError
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 
 _OWN: Final = "a mission of your own"
@@ -25,7 +26,6 @@ def _command_of(mission: str) -> MissionCommand:
         return COMMANDS[mission]
     if _is_file(mission):
         return OWN if mission.endswith(".py") else FILE
-    from missions.errors import PlanError
     from missions.library import find_mission
 
     try:

@@ -11,6 +11,7 @@ import click
 
 from missions.cli.options import report
 from missions.cli.status_line import StatusLine, announce_compiling
+from missions.how_left import lines
 
 if TYPE_CHECKING:
     from missions.runs.session import Flight, RunResult
@@ -237,7 +238,6 @@ def print_result(result: "RunResult") -> int:
 
 
 def _report_how_left(result: "RunResult") -> None:
-    from missions.how_left import lines
 
     for line in lines(result.left):
         report(line)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from autopilot_bridge.errors import BridgeError
+from estimators.errors import NothingThere
 from missions.cli.options import FiniteRange, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.status_line import StatusLine
@@ -85,7 +86,6 @@ def _open(path: Path, dialect: str | None) -> "Log":
 
 
 def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
-    from estimators.errors import NothingThere
     from estimators.logs.condition import Condition
     from estimators.logs.raw_records import window
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from estimators.errors import EstimatorError, LogError
 from missions.cli.options import FiniteRange, in_options
 
 if TYPE_CHECKING:
@@ -54,7 +55,6 @@ def make(**given: Any) -> int:
     The map is for fly --map, and for the parameter map_file of estimators. Line data need columns with names:
     longitude, latitude, and the field.
     """
-    from estimators.errors import EstimatorError, LogError
     from estimators.logs.new_file import new_file
     from estimators.survey.map_import import MapImport, imported_map
     from estimators.survey.map_values import Values
@@ -110,7 +110,6 @@ def export(file: Path, out: Path) -> int:
 
     Points without data are NaN. Home, height, error and line spacing are metadata of the file.
     """
-    from estimators.errors import EstimatorError, LogError
     from estimators.survey.map_export import exported_map
     from flightsim.foundation.magnetic_map_file import MagneticMapError, read_map_file
 

@@ -20,6 +20,7 @@ from flightsim.foundation.options import (
 )
 from missions.cli.option_classes import named
 from missions.cli.options import DeclaredType, in_options
+from missions.errors import PlanError
 
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
@@ -171,7 +172,6 @@ def made(
 
 def _in_option(error: ValueError, options: Iterable[DeclaredOption]) -> Exception:
     """An error of a field as one that names the option which sets it; another one as it is."""
-    from missions.errors import PlanError
 
     cause = error if isinstance(error, OptionError) else error.__cause__
     if isinstance(cause, OptionError):

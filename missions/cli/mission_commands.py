@@ -9,6 +9,8 @@ import click
 from missions.catalogue import PATTERNS
 from missions.cli.mission_command import Given, MissionCommand, option
 from missions.cli.option_classes import MISSION_FILE, OPTIONS, PARTS, PATTERN
+from missions.errors import PlanError
+from missions.survey.options import CALIBRATION_ALTITUDE_M
 
 _OF_LISSAJOUS: Final = ("pattern", "ratio", "phase", "period")
 _PATTERN_HAS_NOT: Final = ("allow-below-home",)
@@ -57,7 +59,6 @@ def _of_handoff(given: Given, chosen: Collection[str]) -> Mapping[str, Any]:
 
 
 def _of_survey(_: Given, chosen: Collection[str]) -> Mapping[str, Any]:
-    from missions.survey.options import CALIBRATION_ALTITUDE_M
 
     high = "calibrate" in chosen and "altitude" not in chosen
     return {"altitude_m": CALIBRATION_ALTITUDE_M} if high else {}
@@ -78,7 +79,6 @@ def arguments_of(pairs: tuple[str, ...]) -> dict[str, str]:
     Raises:
         PlanError: one is not of this form.
     """
-    from missions.errors import PlanError
 
     values = {}
     for pair in pairs:

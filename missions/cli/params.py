@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from autopilot_bridge.parameters import ParameterError
+
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
 
@@ -26,7 +28,6 @@ def known_to_all(
     """
     from autopilot_bridge.firmware import get_flavour
     from autopilot_bridge.parameter_files import known_parameters
-    from autopilot_bridge.parameters import ParameterError
     from flightsim.airframe import load_airframe
 
     known = dict(values)

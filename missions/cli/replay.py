@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from estimators.errors import EstimatorError
 from estimators.names import ESTIMATORS
 from missions.cli.options import FiniteRange, in_options, report
+from missions.errors import PlanError
 
 if TYPE_CHECKING:
     from missions.estimation.report import EstimationResult
@@ -66,10 +68,8 @@ def replay(**given: Any) -> int:
 
     Exit codes: 0 done, 1 a log could not be read or lacks what the estimator needs, 2 usage.
     """
-    from estimators.errors import EstimatorError
     from estimators.logs import LogError
     from estimators.reports import notes_of, table_lines, warnings_of
-    from missions.errors import PlanError
     from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
     from missions.estimation.report import EstimationResult
 

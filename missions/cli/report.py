@@ -4,7 +4,9 @@ from pathlib import Path
 
 import click
 
+from autopilot_bridge.errors import BridgeError
 from missions.cli.options import in_options
+from missions.errors import MissionError, PlanError
 
 
 @click.command()
@@ -21,8 +23,6 @@ def report(path: Path, out: Path | None, no_picture: bool) -> int:
 
     FOLDER is its run folder, which is completed; LOG is a telemetry log. Nothing is overwritten.
     """
-    from autopilot_bridge.errors import BridgeError
-    from missions.errors import MissionError, PlanError
     from missions.flown.recovery import recover
 
     try:

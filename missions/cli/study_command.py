@@ -18,6 +18,7 @@ import click
 from missions.cli.mission_command import Given
 from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.status_line import StatusLine
+from missions.errors import MissionError, PlanError
 
 if TYPE_CHECKING:
     from missions.studies.engine import Engine, Progress
@@ -102,7 +103,6 @@ def engine_options() -> list[click.Parameter]:
 
 
 def _run(declared: StudyCommand, name: str, given: dict[str, Any]) -> int:
-    from missions.errors import MissionError, PlanError
 
     try:
         return run_declared(declared, name, given)
@@ -146,7 +146,6 @@ def _take_up(declared: StudyCommand, study: str, given: dict[str, Any], identity
     Raises:
         PlanError: a value is not accepted, or names a file.
     """
-    from missions.errors import PlanError
 
     context = click.get_current_context()
     own = {option.name for option in declared.options}
@@ -349,7 +348,6 @@ def file_command() -> StudyCommand:
 
 def _study_in(path: Path, pairs: tuple[str, ...]) -> "Study[Any, Any]":
     from missions.cli.mission_commands import arguments_of
-    from missions.errors import PlanError
     from missions.studies.job import load_study_module
     from missions.studies.study import Study
     from missions.studies.trial_runner import error_text

@@ -7,6 +7,7 @@ import click
 
 from missions.cli.options import in_options, report
 from missions.cli.study_library import STUDIES
+from missions.errors import PlanError
 
 if TYPE_CHECKING:
     from missions.studies.folder import StudyFolder
@@ -24,7 +25,6 @@ def show(folder: str, failed: bool, as_json: bool) -> int:
     Figures, intervals and notes are computed again from its rows. The studies of this program print their own
     tables; one of a Python file prints the table of every study.
     """
-    from missions.errors import PlanError
     from missions.studies.folder import StudyFolder
     from missions.studies.running import read_results
     from missions.studies.summary import failures_of, study_table, summary_of
@@ -54,7 +54,6 @@ def show(folder: str, failed: bool, as_json: bool) -> int:
 
 def _study_of(place: "StudyFolder", results: "Results") -> "Study[Any, Any] | None":
     """The study of this program that the results are of; None: they are of a file or of another version."""
-    from missions.errors import PlanError
     from missions.studies.rows import RowSchema
 
     declared = STUDIES.get(results.name)
@@ -77,7 +76,6 @@ def compare(**given: Any) -> int:
     Trials with equal seeds and parameters are compared in pairs. Where the studies have none, their means are
     compared without pairs.
     """
-    from missions.errors import PlanError
     from missions.studies.comparison import compared, lines_of
     from missions.studies.running import read_results
 

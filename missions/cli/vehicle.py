@@ -11,6 +11,7 @@ from missions.cli.status_line import StatusLine
 from missions.cli.vehicle_actions import disarm, hold, land, return_, watch
 from missions.cli.vehicle_link import FAILED, address, confirm, connected, print_json, run, with_client
 from missions.cli.vehicle_params import params
+from missions.preflight.finding import Level
 
 if TYPE_CHECKING:
     from missions.preflight.finding import Finding
@@ -202,7 +203,6 @@ def erase(yes: bool, **given: Any) -> int:
 def doctor(**given: Any) -> int:
     """How it is, and what keeps it from arming. Exit code 1 when something stands against a flight."""
     from autopilot_bridge.clock import unix_time_us
-    from missions.preflight.finding import Level
     from missions.vehicle_client.doctor import examine
 
     findings: list[Finding] = run(

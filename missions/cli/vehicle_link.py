@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from autopilot_bridge.errors import AddressError, BridgeError
+from autopilot_bridge.parameters import ParameterError
 from missions.cli.confirm import YES_WORDS, ask, can_ask, is_yes
 from missions.cli.options import FiniteRange, in_options
+from missions.errors import MissionError, PlanError, VehicleTimeout
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Address
@@ -46,7 +49,6 @@ def connected(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def address(text: str) -> "Address":
     """Parse a connection string of the command line."""
-    from autopilot_bridge.errors import AddressError
     from autopilot_bridge.links import VEHICLE_FORMS, parse_address
 
     try:
@@ -57,10 +59,6 @@ def address(text: str) -> "Address":
 
 def run(work: Coroutine[Any, Any, T]) -> T:
     """Run a coroutine to its end. An error is printed as one line, and the exit code gives its class."""
-    from autopilot_bridge.errors import BridgeError
-    from autopilot_bridge.parameters import ParameterError
-    from missions.errors import MissionError, PlanError
-
     try:
         return asyncio.run(work)
     except (PlanError, ParameterError) as error:
@@ -74,7 +72,6 @@ def with_client(
 ) -> T:
     """Run `work` with the vehicle that the options name; with `asks`, only if the vehicle answers."""
     link = address(given["connect"])
-    from missions.errors import VehicleTimeout
     from missions.vehicle_client.client import open_client
     from missions.vehicle_client.listening import SIGNED, listen
 

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from autopilot_bridge.mavlink.plain_text import plain_text
+from estimators.errors import LogError
 from missions.cli.options import in_options, report
 from missions.cli.vehicle_link import FAILED, confirm, connected, print_json, with_client
+from missions.errors import PlanError
 
 if TYPE_CHECKING:
     from missions.vehicle_client.client import VehicleClient
@@ -85,7 +87,6 @@ def set_(name: str, value: float, **given: Any) -> int:
 @connected
 def save(file: Path, **given: Any) -> int:
     """Save all parameters to FILE: .params (QGroundControl), .parm or .param (ArduPilot, MAVProxy)."""
-    from estimators.errors import LogError
     from estimators.logs.new_file import new_file
     from missions.vehicle_client.parameters import format_values, read_all
 
@@ -192,7 +193,6 @@ def _print_differences(found: "list[Difference]") -> None:
 def _defaults(client: "VehicleClient") -> dict[str, float]:
     from autopilot_bridge.firmware import get_flavour
     from flightsim.airframe import AirframeKind
-    from missions.errors import PlanError
 
     if not client.flavour or client.kind is None:
         raise PlanError("defaults are known of PX4 and ArduPilot, for multicopters and aircraft; give a file")

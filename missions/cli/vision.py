@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from autopilot_bridge.errors import AddressError, BridgeError
+from estimators.errors import EstimatorError
 from missions.cli.fly_command import chosen_names
 from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
 from missions.cli.status_line import StatusLine
+from missions.errors import PlanError
 
 if TYPE_CHECKING:
     from estimators.handoff.motion_watch import MotionWatchParameters
@@ -113,9 +116,6 @@ def vision(**given: Any) -> int:
     Exit codes: 0 done, 1 there was no video, or the link was silent, 2 usage, 130 interrupted before
     --duration was over.
     """
-    from autopilot_bridge.errors import AddressError, BridgeError
-    from estimators.errors import EstimatorError
-    from missions.errors import PlanError
     from missions.estimation.vision import FAILED, INTERRUPTED, VisionRequest, watch
 
     progress = _ProgressLine()

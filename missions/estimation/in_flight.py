@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from estimators.errors import EstimatorError
 from missions.base.request import RunRequest
 from missions.errors import PlanError
 
@@ -45,7 +46,6 @@ def refused_in_plan() -> Iterator[None]:
     Raises:
         PlanError: in place of an EstimatorError.
     """
-    from estimators.errors import EstimatorError
 
     try:
         yield

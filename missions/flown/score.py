@@ -18,7 +18,7 @@ from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, quaternions_from_euler
 from missions.flown.records import FlightRecords, place_of, positions_ned_m
-from missions.flown.track import waypoint_misses_m
+from missions.flown.track import follow_path, waypoint_misses_m
 from missions.vehicle.notes import PATTERN, FlightNotes
 
 Array = NDArray[np.float64]
@@ -193,7 +193,6 @@ def path_errors_m(path_ned_m: Array, track: Track) -> Array:
     """
     if len(path_ned_m) < 2 or not len(track.time_s):
         return np.zeros(0)
-    from missions.flown.track import follow_path
 
     errors = np.empty(len(track.time_s))
     resumed = np.zeros(len(track.time_s), dtype=np.int64)

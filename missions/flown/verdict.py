@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.received import GAP_S
+from missions.flown.score import path_errors_m
 from missions.kind import VehicleKind
 from missions.vehicle.notes import PATTERN, CutShort, FlightNotes, Phase
 
@@ -39,7 +40,6 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
         notes, score: notes and score of one vehicle.
         max_error_m: the user's bound in place of `PATH_BOUND_M`; it also applies to waypoints.
     """
-    from missions.flown.score import path_errors_m
 
     commanded = notes.commanded
     if commanded is None:

@@ -1,6 +1,6 @@
 """Workers on a Ray cluster: one actor for each processor, wherever the cluster has it.
 
-Ray is imported when a study runs on it: it is an extra of the package.
+Ray is an extra of the package; this module is imported when a study runs on it.
 """
 
 import logging
@@ -19,6 +19,12 @@ from missions.studies.crew import Broken, Crew, Died, Event, Ready, Worker, supe
 from missions.studies.job import Job, PackedJob
 from missions.studies.rows import TrialResult
 from missions.studies.trial_runner import TrialRunner, error_text
+
+try:
+    import ray
+    from ray import cloudpickle
+except ImportError:  # an extra of this project
+    ray = cloudpickle = None
 
 __all__ = ["RayCluster"]
 
@@ -53,10 +59,8 @@ class RayCluster:
     name = "ray"
 
     def __init__(self, address: str = LOCAL, *, workers: int | None = None) -> None:
-        try:
-            import ray  # noqa: F401
-        except ImportError as error:
-            raise PlanError("Ray is not installed: pip install 'flightstack[ray]'") from error
+        if ray is None:
+            raise PlanError("Ray is not installed: pip install 'flightstack[ray]'")
         if workers is not None and workers < 1:
             raise PlanError(f"`workers` {workers} is not possible; 1 or more are")
         self.address, self._most = address, workers
@@ -68,9 +72,6 @@ class RayCluster:
         Raises:
             MissionError: the cluster can't be reached.
         """
-        import ray
-        from ray import cloudpickle
-
         with tempfile.TemporaryDirectory(prefix="flightstack-study-", ignore_cleanup_errors=True) as folder:
             packed = job.packed(cloudpickle.dumps)
             moved = _gathered(packed, job, Path(folder))
@@ -92,8 +93,6 @@ def _connect(address: str, workers: int | None, files: Path | None) -> None:
     Raises:
         MissionError: there is none.
     """
-    import ray
-
     where = address
     if address == LOCAL:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -208,8 +207,6 @@ class _Actor(Worker):
         self.answer = self.handle.run.remote(list(indices))
 
     def kill(self) -> None:
-        import ray
-
         ray.kill(self.handle)
 
 
@@ -219,8 +216,6 @@ class _Actors(Crew):
     whole_batches = True
 
     def __init__(self, packed: PackedJob, names: Mapping[Path, str], most: int | None) -> None:
-        import ray
-
         super().__init__()
         self._kind = ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(_RayWorker)
         self._job, self._names, self._most = ray.put(packed), ray.put(dict(names)), most
@@ -228,8 +223,6 @@ class _Actors(Crew):
 
     @property
     def capacity(self) -> int:
-        import ray
-
         now_s = wall_time_s()
         if now_s - self._looked_s >= _LOOK_S:
             self._looked_s = now_s
@@ -241,8 +234,6 @@ class _Actors(Crew):
         return _Actor(self._kind, self._job, self._names)
 
     def events(self, timeout_s: float) -> Iterable[tuple[Worker, Event]]:
-        import ray
-
         owing = {w.answer: w for w in self.workers if isinstance(w, _Actor) and (w.batch or not w.ready)}
         if not owing:
             ray.wait([ray.put(None)], timeout=timeout_s)
@@ -271,8 +262,6 @@ class _Actors(Crew):
                 yield worker, said
 
     def close(self, *, at_once: bool) -> None:
-        import ray
-
         for worker in self.workers:
             with suppress(ray.exceptions.RayError, ConnectionError):
                 worker.kill()
