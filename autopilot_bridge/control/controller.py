@@ -12,16 +12,32 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.foundation.kernels import bound
+from flightsim.foundation.records import Record, Vector3, Vector4, record_array, the_record
 from flightsim.interface import MAX_ACTUATORS
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Array = NDArray[np.float64]
+StateArray = NDArray[np.void]
 P = TypeVar("P", bound="DataclassInstance")
 
 
-class Controller(ABC, Generic[P]):
+class ControllerState(Record):
+    """The part of the state that all controllers have."""
+
+    dt: float  # physics step, s
+    divisor: float  # physics steps per step of the outer loops
+    ground_contact: float  # 1.0 while something else than rotors or wings may carry the vehicle
+    q_setpoint: Vector4  # q_ned_from_frd
+    rate_setpoint: Vector3  # FRD, rad/s
+    vel_setpoint: Vector3  # NED, m/s; NaN where it isn't controlled
+
+
+S = TypeVar("S", bound=ControllerState)
+
+
+class Controller(ABC, Generic[P, S]):
     """Control laws on arrays, which one compiled step reads and writes.
 
     Args:
@@ -29,7 +45,7 @@ class Controller(ABC, Generic[P]):
         physics_rate_hz: rate at which `step` is called.
         nav: navigation state, layout `navigation.layout`, shared with the filter.
         kernel: the step: (nav, setpoint, parameters, state, `scratch` ..., actuators).
-        layout: the module that names the places of the state.
+        state: the record of the state.
         setpoint: the module that names the places of the setpoint, and its levels.
         outer_rate_hz: least rate of the outer loops.
         scratch: further arrays of the kernel.
@@ -51,7 +67,7 @@ class Controller(ABC, Generic[P]):
         physics_rate_hz: float,
         nav: Array,
         kernel: Callable[..., None],
-        layout: ModuleType,
+        state: type[S],
         setpoint: ModuleType,
         outer_rate_hz: float,
         scratch: tuple[Array, ...] = (),
@@ -63,18 +79,18 @@ class Controller(ABC, Generic[P]):
                 f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({NAV_SIZE},) is accepted"
             )
         self._packed: Array = np.zeros(len(astuple(parameters)))
-        self._state: Array = np.zeros(layout.STATE_SIZE)
-        self._contact = self._state[layout.GROUND_CONTACT : layout.GROUND_CONTACT + 1]
-        self.attitude_setpoint = self._state[layout.Q_SETPOINT : layout.Q_SETPOINT + 4]
-        self.rate_setpoint_frd_rad_s = self._state[layout.RATE_SETPOINT : layout.RATE_SETPOINT + 3]
-        self.velocity_setpoint_ned_m_s = self._state[layout.VEL_SETPOINT : layout.VEL_SETPOINT + 3]
+        states = record_array(state)
+        self._state: S = the_record(states, state)
+        self.attitude_setpoint: Array = self._state.q_setpoint
+        self.rate_setpoint_frd_rad_s: Array = self._state.rate_setpoint
+        self.velocity_setpoint_ned_m_s: Array = self._state.vel_setpoint
         self.setpoint: Array = np.full(setpoint.SETPOINT_SIZE, np.nan)
         self.setpoint[setpoint.LEVEL] = setpoint.OFF
         self.actuators: Array = np.zeros(MAX_ACTUATORS)
-        self._state[layout.DT] = 1.0 / physics_rate_hz
-        self._state[layout.DIVISOR] = max(1.0, math.floor(physics_rate_hz / outer_rate_hz))
+        self._state.dt = 1.0 / physics_rate_hz
+        self._state.divisor = max(1.0, math.floor(physics_rate_hz / outer_rate_hz))
         self.step: Callable[[], None] = bound(
-            kernel, nav, self.setpoint, self._packed, self._state, *scratch, self.actuators
+            kernel, nav, self.setpoint, self._packed, states, *scratch, self.actuators
         )
         self.set_parameters(parameters)
 
@@ -99,4 +115,4 @@ class Controller(ABC, Generic[P]):
 
     def set_ground_contact(self, contact: bool) -> None:
         """Set whether the ground or a launcher may carry part of the weight; integrators rest meanwhile."""
-        self._contact[0] = 1.0 if contact else 0.0
+        self._state.ground_contact = 1.0 if contact else 0.0

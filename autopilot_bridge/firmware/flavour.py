@@ -59,7 +59,7 @@ class SensorBits:
 class ControllerFactory(Protocol):
     """Makes the control laws."""
 
-    def __call__(self, parameters: Any, *, physics_rate_hz: int, nav: Array) -> Controller[Any]: ...
+    def __call__(self, parameters: Any, *, physics_rate_hz: int, nav: Array) -> Controller[Any, Any]: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

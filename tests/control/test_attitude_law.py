@@ -16,6 +16,7 @@ from autopilot_bridge.control.multicopter.attitude import (
     rate_control,
 )
 from flightsim.foundation.random_streams import RandomStreams
+from flightsim.foundation.records import new_record
 from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
@@ -155,10 +156,10 @@ def of_axes(name: str) -> Array:
 
 
 def rate_state() -> Array:
-    s = np.zeros(c.STATE_SIZE)
-    s[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3] = 0.10, -0.20, 0.05
-    s[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3] = 2.0, -3.0, 1.5
-    s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3] = 0.05, -0.06, 0.04
+    s = new_record(c.MulticopterState)
+    s.rate_previous = 0.10, -0.20, 0.05
+    s.rate_derivative = 2.0, -3.0, 1.5
+    s.rate_integral = 0.05, -0.06, 0.04
     return s
 
 
@@ -168,22 +169,20 @@ def test_rate_law() -> None:
     before = s.copy()
     rates, wanted = np.array([0.3, -0.5, 0.2]), np.array([0.8, 0.4, -0.6])
     rate_control(rates, wanted, p, s, DT_S, True)
-    slope = (rates - before[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3]) / DT_S
+    slope = (rates - before.rate_previous) / DT_S
     time_constant_s = 1.0 / (2.0 * math.pi * 25.0)
-    old = before[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3]
+    old = before.rate_derivative
     derivative = old + DT_S / (DT_S + time_constant_s) * (slope - old)
     error = wanted - rates
-    integral = before[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3]
+    integral = before.rate_integral
     torque = (
         of_axes("k") * (of_axes("p") * error + integral - of_axes("d") * derivative) + of_axes("ff") * wanted
     )
     fade = 1.0 - (error / math.radians(400.0)) ** 2  # the integrator rests in flips (PX4)
-    np.testing.assert_allclose(s[c.UNALLOCATED : c.UNALLOCATED + 3], torque, rtol=1e-12)
-    np.testing.assert_allclose(s[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3], derivative, rtol=1e-12)
-    np.testing.assert_allclose(
-        s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3], integral + fade * of_axes("i") * error * DT_S, rtol=1e-12
-    )
-    np.testing.assert_array_equal(s[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3], rates)
+    np.testing.assert_allclose(s.unallocated, torque, rtol=1e-12)
+    np.testing.assert_allclose(s.rate_derivative, derivative, rtol=1e-12)
+    np.testing.assert_allclose(s.rate_integral, integral + fade * of_axes("i") * error * DT_S, rtol=1e-12)
+    np.testing.assert_array_equal(s.rate_previous, rates)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -206,18 +205,16 @@ def test_integrator_waits_while_the_motors_cannot_give_more(
     axis: int, missing: float, error: float, integrates: bool
 ) -> None:
     s, p = rate_state(), packed(**PID)
-    s[c.UNALLOCATED + axis] = missing
-    before = s[c.RATE_INTEGRAL + axis]
+    s.unallocated[axis] = missing
+    before = s.rate_integral[axis]
     wanted = np.zeros(3)
     wanted[axis] = error
     rate_control(np.zeros(3), wanted, p, s, DT_S, True)
-    moved = s[c.RATE_INTEGRAL + axis] - before
+    moved = s.rate_integral[axis] - before
     assert (moved * error > 0.0) if integrates else moved == 0.0
     others = [k for k in range(3) if k != axis]
     # no error, no change
-    np.testing.assert_array_equal(
-        s[[c.RATE_INTEGRAL + k for k in others]], rate_state()[[c.RATE_INTEGRAL + k for k in others]]
-    )
+    np.testing.assert_array_equal(s.rate_integral[others], rate_state().rate_integral[others])
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -225,15 +222,15 @@ def test_integrator_has_its_limit_and_its_switch(sign: float) -> None:
     s, p = rate_state(), packed(**PID)
     for _ in range(2000):
         rate_control(np.zeros(3), np.full(3, sign * 0.5), p, s, DT_S, True)
-        s[c.UNALLOCATED : c.UNALLOCATED + 3] = 0.0  # all of it is given
-    np.testing.assert_allclose(s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3], sign * of_axes("integral_max"))
+        s.unallocated = 0.0  # all of it is given
+    np.testing.assert_allclose(s.rate_integral, sign * of_axes("integral_max"))
     rate_control(np.zeros(3), np.full(3, -sign * 0.5), p, s, DT_S, False)
-    np.testing.assert_allclose(s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3], sign * of_axes("integral_max"))
+    np.testing.assert_allclose(s.rate_integral, sign * of_axes("integral_max"))
 
 
 @pytest.mark.parametrize("rate_deg_s", [401.0, 800.0])
 def test_integrator_rests_in_flips(rate_deg_s: float) -> None:
     s, p = rate_state(), packed(**PID)
-    before = s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3].copy()
+    before = s.rate_integral.copy()
     rate_control(np.zeros(3), np.full(3, math.radians(rate_deg_s)), p, s, DT_S, True)
-    np.testing.assert_array_equal(s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3], before)
+    np.testing.assert_array_equal(s.rate_integral, before)

@@ -1,6 +1,7 @@
 """Where the multicopter's cascade starts at each level, what it fills in, and what it forgets at rest."""
 
 import math
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from autopilot_bridge.control.multicopter.attitude import attitude_control
 from autopilot_bridge.control.multicopter.mixer import ALLOCATION, command_from_thrust
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
+from flightsim.foundation.records import new_record
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.control.test_attitude_law import packed
 from tests.rotations import rotation_matrix
@@ -34,8 +36,8 @@ class Rig:
         self.controller = MulticopterController(parameters, physics_rate_hz=RATE_HZ, nav=self.nav)
         self.setpoint = self.controller.setpoint
         self.setpoint[sp.LEVEL] = level
-        self.state: Array = self.controller._state
-        self.state[c.AIRBORNE] = 1.0
+        self.state = self.controller._state
+        self.state.airborne = 1.0
 
     def step(self, steps: int = 1) -> Array:
         for _ in range(steps):
@@ -112,13 +114,13 @@ def test_no_attitude_is_level_flight_at_the_present_heading(bad: float) -> None:
 @pytest.mark.parametrize(("given", "flown"), [(0.4, 0.4), (1.7, 1.0), (-0.3, 0.0)])
 def test_given_thrust_is_flown_and_the_vertical_loop_forgets(given: float, flown: float) -> None:
     rig = Rig(sp.ATTITUDE)
-    rig.state[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3] = rig.state[c.BUMP + 2] = 0.5
+    rig.state.vel_integral = rig.state.bump[2] = 0.5
     rig.setpoint[sp.THRUST] = given
     rig.step()
-    assert rig.state[c.THRUST_SETPOINT] == flown
-    assert math.isnan(rig.state[c.ACC_SETPOINT + 2])
-    assert not rig.state[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3].any()
-    assert rig.state[c.BUMP + 2] == 0.0
+    assert rig.state.thrust_setpoint == flown
+    assert math.isnan(rig.state.acc_setpoint[2])
+    assert not rig.state.vel_integral.any()
+    assert rig.state.bump[2] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -147,11 +149,11 @@ def test_without_thrust_the_vertical_part_of_the_trajectory_is_flown(
 def test_collective_makes_up_for_the_tilt(tilt: float, lift: float) -> None:
     rig = Rig(sp.ATTITUDE)
     quaternion_from_euler(tilt, 0.0, YAW, rig.nav[n.Q_NED_FROM_FRD])
-    rig.state[c.LAST_LEVEL] = sp.ATTITUDE  # flown so for a while, and the thrust was the setpoint's
-    rig.state[c.THRUST_GIVEN] = rig.state[c.THRUST_LAGGED] = 0.45
+    rig.state.last_level = sp.ATTITUDE  # flown so for a while, and the thrust was the setpoint's
+    rig.state.thrust_given = rig.state.thrust_lagged = 0.45
     rig.nav[n.FORCE + 2] = -G
     rig.step()
-    assert rig.state[c.THRUST_SETPOINT] == pytest.approx(0.45 / lift, rel=1e-3)
+    assert rig.state.thrust_setpoint == pytest.approx(0.45 / lift, rel=1e-3)
 
 
 def test_trajectory_runs_at_the_position_rate() -> None:
@@ -162,23 +164,23 @@ def test_trajectory_runs_at_the_position_rate() -> None:
     for k in range(8):
         rig.nav[n.VEL] = 0.1 * (k + 1)
         rig.step()
-        setpoints.append(rig.state[c.ACC_SETPOINT])
+        setpoints.append(rig.state.acc_setpoint[0])
     changed = np.flatnonzero(np.diff(setpoints))
     assert (changed + 1).tolist() == [3, 7]  # every fourth step of 250 Hz: 62.5 Hz
     rig.setpoint[sp.LEVEL] = sp.ATTITUDE
     rig.step()
     rig.setpoint[sp.LEVEL] = sp.TRAJECTORY
-    before = rig.state[c.VEL_SETPOINT]
+    before = rig.state.vel_setpoint[0]
     rig.setpoint[sp.VEL] = 2.0
     rig.step()  # and at once where the level changes
-    assert rig.state[c.VEL_SETPOINT] != before
+    assert rig.state.vel_setpoint[0] != before
 
 
 @pytest.mark.parametrize(("rate_hz", "divisor"), [(50.0, 1.0), (62.5, 1.0), (250.0, 4.0), (400.0, 6.0)])
 def test_position_rate_is_a_divisor_of_the_physics_rate(rate_hz: float, divisor: float) -> None:
     controller = MulticopterController(physics_rate_hz=rate_hz, nav=np.zeros(n.NAV_SIZE))
-    assert controller._state[c.DIVISOR] == divisor
-    assert controller._state[c.DT] == pytest.approx(1.0 / rate_hz)
+    assert controller._state.divisor == divisor
+    assert controller._state.dt == pytest.approx(1.0 / rate_hz)
 
 
 @pytest.mark.parametrize("rate_hz", [49.9, 4000.1])
@@ -199,23 +201,24 @@ def test_at_rest_everything_starts_again(level: float) -> None:
     actuators = rig.step()
     idle = rig.controller.parameters.motor_idle if level == sp.IDLE else 0.0
     assert actuators.tolist() == [idle] * 4 + [0.0] * (len(actuators) - 4)
-    expected = np.zeros(c.HOVER - c.COUNTER)
-    expected[0] = 4.0  # the position loop runs at the first step
-    expected[c.START_DOWN_M - c.COUNTER] = -20.0
-    expected[c.Q_SETPOINT - c.COUNTER] = 1.0
-    expected[c.RATE_PREVIOUS - c.COUNTER] = 0.1
-    expected[c.RATE_PREVIOUS + 2 - c.COUNTER] = 0.3
-    np.testing.assert_allclose(rig.state[c.COUNTER : c.HOVER], expected)
+    expected = new_record(c.MulticopterState)
+    expected.counter = 4.0  # the position loop runs at the first step
+    expected.start_down_m = -20.0
+    expected.q_setpoint[0] = 1.0
+    expected.rate_previous[:] = 0.1, 0.0, 0.3
+    kept = {"dt", "divisor", "hover", "hover_variance", "motor_thrust"}
+    for name in set(get_type_hints(c.MulticopterState)) - kept:
+        np.testing.assert_allclose(getattr(rig.state, name), getattr(expected, name), err_msg=name)
     assert rig.controller.hover_thrust == hover
     assert rig.controller.thrust == 0.0
-    assert rig.state[c.THRUST_LAGGED] == 0.0
+    assert rig.state.thrust_lagged == 0.0
 
 
 def test_take_off_from_an_unknown_height_counts_from_zero() -> None:
     rig = Rig(sp.IDLE)
     rig.nav[n.POS + 2] = math.nan
     rig.step()
-    assert rig.state[c.START_DOWN_M] == 0.0
+    assert rig.state.start_down_m == 0.0
 
 
 @pytest.mark.parametrize("place", [n.Q, n.Q + 1, n.Q + 2, n.Q + 3, n.RATES, n.RATES + 1, n.RATES + 2])
@@ -225,8 +228,8 @@ def test_without_attitude_or_rates_the_motors_idle(place: int, level: float) -> 
     rig.step()
     rig.nav[place] = math.nan
     assert rig.step()[:4].tolist() == [rig.controller.parameters.motor_idle] * 4
-    assert np.isfinite(rig.state[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3]).all()
-    assert np.isfinite(rig.state[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3]).all()
+    assert np.isfinite(rig.state.rate_integral).all()
+    assert np.isfinite(rig.state.rate_derivative).all()
     assert np.isfinite(rig.controller.attitude_setpoint).all()
 
 
@@ -234,13 +237,13 @@ def test_integrators_wait_on_the_ground_until_the_thrust_lifts() -> None:
     """The legs hold the vehicle: an integrator would only store a kick for the take-off."""
     for thrust, airborne, integrates in ((0.2, 0.0, False), (0.35, 0.0, True), (0.2, 1.0, True)):
         rig = Rig(sp.RATES)
-        rig.state[c.AIRBORNE] = airborne
+        rig.state.airborne = airborne
         rig.nav[n.POS + 2] = 0.0
-        rig.state[c.START_DOWN_M] = 0.0
+        rig.state.start_down_m = 0.0
         rig.setpoint[sp.RATES_FRD_RAD_S] = 0.1
         rig.setpoint[sp.THRUST] = thrust
         rig.step()
-        assert bool(rig.state[c.RATE_INTEGRAL]) is integrates
+        assert bool(rig.state.rate_integral[0]) is integrates
 
 
 def test_start_of_the_state() -> None:
@@ -251,7 +254,7 @@ def test_start_of_the_state() -> None:
     assert controller.thrust == 0.0
     for contact in (True, False):
         controller.set_ground_contact(contact)
-        assert controller._state[c.GROUND_CONTACT] == float(contact)
+        assert controller._state.ground_contact == float(contact)
 
 
 def test_hover_thrust_is_the_parameter_where_it_is_not_estimated() -> None:
@@ -266,7 +269,7 @@ def test_trajectory_flies_its_thrust_vector() -> None:
     rig = Rig(sp.TRAJECTORY)
     rig.setpoint[sp.VEL_NED_M_S] = 0.0
     rig.setpoint[sp.ACC_NED_M_S2] = 1.0, -0.5, 0.0
-    rig.state[c.LAST_LEVEL] = sp.TRAJECTORY
+    rig.state.last_level = sp.TRAJECTORY
     rig.step()
     down = rotation_matrix(rig.controller.attitude_setpoint)[:, 2]
     np.testing.assert_allclose(down / down[2], [-1.0 / G, 0.5 / G, 1.0], atol=1e-6)

@@ -2,38 +2,38 @@
 
 from types import ModuleType
 
+import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
+from autopilot_bridge.control.controller import ControllerState
 from autopilot_bridge.control.fixed_wing import layout as wing
 from autopilot_bridge.control.fixed_wing import setpoint as wing_setpoint
 from autopilot_bridge.control.multicopter import layout as copter
 from autopilot_bridge.control.multicopter import setpoint as copter_setpoint
-
-RATES = {"RATE_SETPOINT": 3, "RATE_INTEGRAL": 3, "RATE_PREVIOUS": 3, "RATE_DERIVATIVE": 3, "UNALLOCATED": 3}
-WIDTHS: dict[ModuleType, dict[str, int]] = {
-    copter: {
-        "VEL_INTEGRAL": 3,
-        "ACC_FILTERED": 3,
-        "DRAG": 3,
-        "BUMP": 3,
-        "ACC_SETPOINT": 3,
-        "VEL_SETPOINT": 3,
-        "Q_SETPOINT": 4,
-        "MOTOR_THRUST": 4,
-        **RATES,
-    },
-    wing: {"Q_SETPOINT": 4, "VEL_SETPOINT": 3, **RATES},
-}
+from autopilot_bridge.control.multicopter.position import update_airborne
+from autopilot_bridge.navigation.layout import NAV_SIZE
+from flightsim.foundation.records import new_record, record_array, the_record
 
 
-@pytest.mark.parametrize("layout", [copter, wing], ids=["copter", "wing"])
-def test_the_state_is_filled_without_gaps_or_overlaps(layout: ModuleType) -> None:
-    names = [name for name in vars(layout) if name.isupper()]
-    state = names[names.index("DT") : names.index("STATE_SIZE")]
-    places = [
-        getattr(layout, name) + offset for name in state for offset in range(WIDTHS[layout].get(name, 1))
-    ]
-    assert places == list(range(layout.STATE_SIZE))
+@pytest.mark.parametrize("kind", [copter.MulticopterState, wing.FixedWingState])
+def test_the_state_is_a_record_of_numbers_without_gaps(kind: type[ControllerState]) -> None:
+    array = record_array(kind)
+    record = the_record(array, kind)
+    assert record_array(kind).dtype.itemsize == array.view(np.float64).size * 8
+    record.dt, record.vel_setpoint[2] = 0.25, 3.0
+    assert array["dt"][0] == 0.25 and array["vel_setpoint"][0, 2] == 3.0
+    array["q_setpoint"][0] = 1.0
+    assert record.q_setpoint.tolist() == [1.0] * 4
+
+
+def test_another_array_in_the_place_of_the_state_does_not_compile() -> None:
+    nav, state = np.zeros(NAV_SIZE), new_record(copter.MulticopterState)
+    update_airborne(nav, state)
+    with pytest.raises(TypingError, match="airborne"):
+        update_airborne(nav, nav)  # type: ignore[arg-type]
+    with pytest.raises((TypingError, KeyError), match="airborne"):  # a record without the field
+        update_airborne(nav, new_record(wing.FixedWingState))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("setpoint", [copter_setpoint, wing_setpoint], ids=["copter", "wing"])

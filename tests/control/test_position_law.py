@@ -19,6 +19,7 @@ from autopilot_bridge.control.multicopter.position import (
 )
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
+from flightsim.foundation.records import new_record
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.rotations import rotation_matrix
 
@@ -36,14 +37,18 @@ def packed(**values: float | bool) -> Array:
 
 def flying() -> tuple[Array, Array, Array]:
     """(navigation state, setpoint, controller state) of a hover 20 m up, nose to the east."""
-    nav, setpoint, s = np.zeros(n.NAV_SIZE), np.full(sp.SETPOINT_SIZE, math.nan), np.zeros(c.STATE_SIZE)
+    nav, setpoint, s = (
+        np.zeros(n.NAV_SIZE),
+        np.full(sp.SETPOINT_SIZE, math.nan),
+        new_record(c.MulticopterState),
+    )
     yaw = 0.5 * math.pi
     quaternion_from_euler(0.0, 0.0, yaw, nav[n.Q_NED_FROM_FRD])
     nav[n.YAW] = yaw
     nav[n.POS_NED_M] = 10.0, -5.0, -20.0
-    s[c.HOVER], s[c.AIRBORNE] = HOVER, 1.0
-    s[c.THRUST_GIVEN] = s[c.THRUST_LAGGED] = HOVER
-    s[c.HOVER_VARIANCE] = 0.002
+    s.hover, s.airborne = HOVER, 1.0
+    s.thrust_given = s.thrust_lagged = HOVER
+    s.hover_variance = 0.002
     return nav, setpoint, s
 
 
@@ -53,7 +58,7 @@ def vector(s: Array, first: int) -> Array:
 
 def thrust_vector(s: Array) -> Array:
     """NED, in units of the hover thrust: what the attitude and the collective give."""
-    return -rotation_matrix(s[c.Q_SETPOINT : c.Q_SETPOINT + 4])[:, 2] * s[c.THRUST_SETPOINT] / s[c.HOVER]
+    return -rotation_matrix(s.q_setpoint)[:, 2] * s.thrust_setpoint / s.hover
 
 
 def test_cascade() -> None:
@@ -66,10 +71,10 @@ def test_cascade() -> None:
     setpoint[sp.ACC_NED_M_S2] = 0.4, 0.2, -0.3
     setpoint[sp.YAW_RAD], setpoint[sp.YAW_RATE_RAD_S] = 0.3, 0.6
     nav[n.VEL_NED_M_S] = 0.2, 0.1, -0.1
-    s[c.ACC_FILTERED : c.ACC_FILTERED + 3] = 0.3, -0.2, 0.15
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3] = 0.1, 0.25, -0.2
-    s[c.DRAG : c.DRAG + 2] = -0.5, 0.35
-    s[c.BUMP : c.BUMP + 3] = 0.05, -0.07, 0.09
+    s.acc_filtered = 0.3, -0.2, 0.15
+    s.vel_integral = 0.1, 0.25, -0.2
+    s.drag[:2] = -0.5, 0.35
+    s.bump = 0.05, -0.07, 0.09
     before = s.copy()
     trajectory_control(nav, setpoint, p, s, DT_S, False)
 
@@ -81,22 +86,16 @@ def test_cascade() -> None:
     ki = np.array([q.vel_xy_i_1_s2, q.vel_xy_i_1_s2, q.vel_z_i_1_s2])
     kd = np.array([q.vel_xy_d, q.vel_xy_d, q.vel_z_d])
     acceleration = (
-        setpoint[sp.ACC_NED_M_S2]
-        + kp * error
-        + vector(before, c.VEL_INTEGRAL)
-        - kd * vector(before, c.ACC_FILTERED)
-        + vector(before, c.BUMP)
+        setpoint[sp.ACC_NED_M_S2] + kp * error + before.vel_integral - kd * before.acc_filtered + before.bump
     )
-    np.testing.assert_allclose(vector(s, c.VEL_SETPOINT), velocity)
-    np.testing.assert_allclose(vector(s, c.ACC_SETPOINT), acceleration)
+    np.testing.assert_allclose(s.vel_setpoint, velocity)
+    np.testing.assert_allclose(s.acc_setpoint, acceleration)
     wanted = acceleration - [-0.5, 0.35, 0.0]
     np.testing.assert_allclose(thrust_vector(s), (wanted - [0.0, 0.0, G]) / G, atol=1e-9)
-    np.testing.assert_allclose(
-        vector(s, c.VEL_INTEGRAL), vector(before, c.VEL_INTEGRAL) + ki * error * DT_S, rtol=1e-12
-    )
-    np.testing.assert_allclose(vector(s, c.BUMP), vector(before, c.BUMP) * math.exp(-DT_S / BUMP_TIME_S))
-    assert s[c.YAW_RATE_FF] == 0.6
-    nose = rotation_matrix(s[c.Q_SETPOINT : c.Q_SETPOINT + 4])[:, 0]
+    np.testing.assert_allclose(s.vel_integral, before.vel_integral + ki * error * DT_S, rtol=1e-12)
+    np.testing.assert_allclose(s.bump, before.bump * math.exp(-DT_S / BUMP_TIME_S))
+    assert s.yaw_rate_ff == 0.6
+    nose = rotation_matrix(s.q_setpoint)[:, 0]
     assert math.atan2(nose[1], nose[0]) == pytest.approx(0.3, abs=1e-9)
 
 
@@ -123,7 +122,7 @@ def test_what_is_not_given_of_an_axis_is_filled(
     setpoint[sp.POS + axis] += position
     setpoint[sp.VEL + axis] = velocity
     setpoint[sp.ACC + axis] = acceleration
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3] = 0.3
+    s.vel_integral = 0.3
     trajectory_control(nav, setpoint, p, s, DT_S, False)
     gain = p[c.POS_Z_P] if axis == 2 else p[c.POS_XY_P]
     wanted = {
@@ -135,40 +134,40 @@ def test_what_is_not_given_of_an_axis_is_filled(
     }[expected]
     velocities = np.zeros(3)
     velocities[axis] = wanted
-    np.testing.assert_allclose(vector(s, c.VEL_SETPOINT), velocities, atol=1e-12)
+    np.testing.assert_allclose(s.vel_setpoint, velocities, atol=1e-12)
     if expected == "free":  # the acceleration alone, and the integrator starts anew
-        assert s[c.ACC_SETPOINT + axis] == pytest.approx(0.4)
-        assert s[c.VEL_INTEGRAL + axis] == 0.0
+        assert s.acc_setpoint[axis] == pytest.approx(0.4)
+        assert s.vel_integral[axis] == 0.0
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_unknown_velocity_is_not_controlled(axis: int) -> None:
     nav, setpoint, s = flying()
     nav[n.VEL + axis] = math.nan
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3] = 0.3
+    s.vel_integral = 0.3
     setpoint[sp.VEL_NED_M_S] = 0.5
     trajectory_control(nav, setpoint, packed(), s, DT_S, False)
-    assert s[c.ACC_SETPOINT + axis] == 0.0
-    assert s[c.VEL_INTEGRAL + axis] == 0.0
-    assert np.isfinite(s[c.Q_SETPOINT : c.Q_SETPOINT + 4]).all()
+    assert s.acc_setpoint[axis] == 0.0
+    assert s.vel_integral[axis] == 0.0
+    assert np.isfinite(s.q_setpoint).all()
 
 
 def test_drag_is_fought_only_on_axes_whose_velocity_is_controlled() -> None:
     nav, setpoint, s = flying()
     setpoint[sp.VEL_NED_M_S] = math.nan, 0.0, 0.0
     setpoint[sp.ACC] = 0.0
-    s[c.DRAG : c.DRAG + 2] = 0.6, -0.8
-    s[c.BUMP : c.BUMP + 2] = 0.4, 0.0
+    s.drag[:2] = 0.6, -0.8
+    s.bump[:2] = 0.4, 0.0
     trajectory_control(nav, setpoint, packed(), s, DT_S, False)
     assert thrust_vector(s) == pytest.approx([0.0, 0.8 / G, -1.0], abs=1e-9)
-    assert s[c.BUMP] == 0.0
+    assert s.bump[0] == 0.0
     setpoint[sp.VEL_NED_M_S] = 0.0, math.nan, 0.0
     setpoint[sp.ACC_NED_M_S2] = math.nan, 0.0, math.nan
-    s[c.BUMP : c.BUMP + 2] = 0.0, 0.4
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3] = 0.0
+    s.bump[:2] = 0.0, 0.4
+    s.vel_integral = 0.0
     trajectory_control(nav, setpoint, packed(), s, DT_S, False)
     assert thrust_vector(s) == pytest.approx([-0.6 / G, 0.0, -1.0], abs=1e-9)
-    assert s[c.BUMP + 1] == 0.0
+    assert s.bump[1] == 0.0
 
 
 @pytest.mark.parametrize("direction", np.linspace(0.0, 2.0 * math.pi, 7)[:-1])
@@ -177,11 +176,11 @@ def test_position_error_alone_is_flown_at_the_speed_limit(direction: float) -> N
     unit = np.array([math.cos(direction), math.sin(direction), 0.0])
     setpoint[sp.POS_NED_M] = nav[n.POS_NED_M] + 100.0 * unit
     trajectory_control(nav, setpoint, packed(speed_xy_max_m_s=6.0), s, DT_S, False)
-    np.testing.assert_allclose(vector(s, c.VEL_SETPOINT), 6.0 * unit, atol=1e-9)
+    np.testing.assert_allclose(s.vel_setpoint, 6.0 * unit, atol=1e-9)
     # together with a feed-forward: the position's share has its right of way
     setpoint[sp.VEL_NED_M_S] = 3.0 * unit
     trajectory_control(nav, setpoint, packed(speed_xy_max_m_s=6.0), s, DT_S, False)
-    np.testing.assert_allclose(vector(s, c.VEL_SETPOINT), 6.0 * unit, atol=1e-9)
+    np.testing.assert_allclose(s.vel_setpoint, 6.0 * unit, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +210,7 @@ def test_feed_forward_gives_way_at_the_speed_limit(
         inside = np.linalg.norm(np.array(share) + k * np.array(forward)) <= limit
         low, high = (k, high) if inside else (low, k)
     expected = np.array(share) + low * np.array(forward)
-    np.testing.assert_allclose(s[c.VEL_SETPOINT : c.VEL_SETPOINT + 2], expected, atol=1e-6)
+    np.testing.assert_allclose(s.vel_setpoint[:2], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(("axis", "other"), [(0, 1), (1, 0)])
@@ -220,8 +219,8 @@ def test_an_axis_without_a_velocity_takes_nothing_of_the_speed_limit(axis: int, 
     setpoint[sp.VEL_NED_M_S] = 0.0
     setpoint[sp.VEL + axis], setpoint[sp.VEL + other], setpoint[sp.ACC + other] = 6.0, math.nan, 0.5
     trajectory_control(nav, setpoint, packed(speed_xy_max_m_s=6.0), s, DT_S, False)
-    assert s[c.VEL_SETPOINT + axis] == pytest.approx(6.0)
-    assert math.isnan(s[c.VEL_SETPOINT + other])
+    assert s.vel_setpoint[axis] == pytest.approx(6.0)
+    assert math.isnan(s.vel_setpoint[other])
 
 
 @pytest.mark.parametrize(("error_m", "velocity"), [(-50.0, -3.0), (50.0, 1.5), (-0.5, -0.5), (0.5, 0.5)])
@@ -230,7 +229,7 @@ def test_climb_and_descent_have_limits_of_their_own(error_m: float, velocity: fl
     setpoint[sp.POS + 2] = nav[n.POS + 2] + error_m
     p = packed(speed_up_max_m_s=3.0, speed_down_max_m_s=1.5)
     trajectory_control(nav, setpoint, p, s, DT_S, False)
-    assert s[c.VEL_SETPOINT + 2] == pytest.approx(velocity)
+    assert s.vel_setpoint[2] == pytest.approx(velocity)
 
 
 @pytest.mark.parametrize("bearing", [0.0, 2.0, 4.0])
@@ -249,7 +248,7 @@ def test_tilt_limit_and_tracking_anti_windup(bearing: float) -> None:
     wanted = 12.0 + 0.5 * p[c.VEL_XY_P]
     back = 2.0 / p[c.VEL_XY_P] * (wanted - G * tangent)
     integral = p[c.VEL_XY_I] * (0.5 - back) * DT_S
-    np.testing.assert_allclose(vector(s, c.VEL_INTEGRAL), integral * unit, atol=1e-9)
+    np.testing.assert_allclose(s.vel_integral, integral * unit, atol=1e-9)
 
 
 def test_climb_at_full_thrust_leaves_a_margin_for_the_path() -> None:
@@ -258,13 +257,13 @@ def test_climb_at_full_thrust_leaves_a_margin_for_the_path() -> None:
     setpoint[sp.VEL_NED_M_S] = 0.0
     setpoint[sp.ACC_NED_M_S2] = 8.0, 0.0, -20.0
     trajectory_control(nav, setpoint, p, s, DT_S, False)
-    assert s[c.THRUST_SETPOINT] == pytest.approx(0.9)
+    assert s.thrust_setpoint == pytest.approx(0.9)
     flown = thrust_vector(s) * HOVER
     # the margin of 0.3 x 0.9, and no more
     np.testing.assert_allclose(flown, [0.27, 0.0, -math.sqrt(0.9**2 - 0.27**2)], atol=1e-9)
     # a smaller wish is met, and the climb gets the rest
     setpoint[sp.ACC_NED_M_S2] = 2.0, 0.0, -20.0
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 3] = 0.0
+    s.vel_integral = 0.0
     trajectory_control(nav, setpoint, p, s, DT_S, False)
     side = HOVER * 2.0 / G
     np.testing.assert_allclose(thrust_vector(s) * HOVER, [side, 0.0, -math.sqrt(0.9**2 - side**2)], atol=1e-9)
@@ -274,29 +273,29 @@ def test_climb_at_full_thrust_leaves_a_margin_for_the_path() -> None:
 def test_horizontal_integrator_is_bounded_by_gravity(angle: float) -> None:
     nav, setpoint, s = flying()
     direction = np.array([math.cos(angle), math.sin(angle)])
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 2] = 1.5 * G * direction
-    s[c.DRAG : c.DRAG + 2] = 1.5 * G * direction  # so that the thrust is not limited
+    s.vel_integral[:2] = 1.5 * G * direction
+    s.drag[:2] = 1.5 * G * direction  # so that the thrust is not limited
     setpoint[sp.VEL_NED_M_S] = 0.0
     trajectory_control(nav, setpoint, packed(), s, DT_S, False)
-    np.testing.assert_allclose(s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 2], G * direction, rtol=1e-9)
+    np.testing.assert_allclose(s.vel_integral[:2], G * direction, rtol=1e-9)
 
 
 def test_on_the_ground_horizontal_integrators_stay_empty() -> None:
     nav, setpoint, s = flying()
-    s[c.AIRBORNE] = 0.0
-    s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 2] = 0.4
+    s.airborne = 0.0
+    s.vel_integral[:2] = 0.4
     setpoint[sp.VEL_NED_M_S] = 1.0
     trajectory_control(nav, setpoint, packed(), s, DT_S, False)
-    assert not s[c.VEL_INTEGRAL : c.VEL_INTEGRAL + 2].any()
+    assert not s.vel_integral[:2].any()
 
 
 def test_yaw_that_is_not_given_is_the_present_one() -> None:
     nav, setpoint, s = flying()
     setpoint[sp.VEL_NED_M_S] = 0.0
     trajectory_control(nav, setpoint, packed(), s, DT_S, False)
-    nose = rotation_matrix(s[c.Q_SETPOINT : c.Q_SETPOINT + 4])[:, 0]
+    nose = rotation_matrix(s.q_setpoint)[:, 0]
     assert nose == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
-    assert s[c.YAW_RATE_FF] == 0.0
+    assert s.yaw_rate_ff == 0.0
 
 
 def test_free_fall_points_no_thrust_and_keeps_the_least() -> None:
@@ -304,8 +303,8 @@ def test_free_fall_points_no_thrust_and_keeps_the_least() -> None:
     setpoint[sp.VEL_NED_M_S] = 0.0
     setpoint[sp.ACC_NED_M_S2] = 0.0, 0.0, 2.0 * G
     trajectory_control(nav, setpoint, packed(thrust_min=0.12), s, DT_S, False)
-    assert s[c.THRUST_SETPOINT] == 0.12
-    assert rotation_matrix(s[c.Q_SETPOINT : c.Q_SETPOINT + 4])[:, 2] == pytest.approx([0.0, 0.0, 1.0])
+    assert s.thrust_setpoint == 0.12
+    assert rotation_matrix(s.q_setpoint)[:, 2] == pytest.approx([0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("airborne", [True, False])
@@ -313,8 +312,8 @@ def test_entering_starts_from_the_thrust_that_is_flown(airborne: bool) -> None:
     """At the switch, the thrust vector stays as it is, and goes over to the new one with its time."""
     nav, setpoint, s = flying()
     quaternion_from_euler(0.15, -0.25, 0.9, nav[n.Q_NED_FROM_FRD])
-    s[c.AIRBORNE], s[c.THRUST_GIVEN] = float(airborne), 0.56
-    s[c.DRAG : c.DRAG + 2] = 0.3, -0.4
+    s.airborne, s.thrust_given = float(airborne), 0.56
+    s.drag[:2] = 0.3, -0.4
     setpoint[sp.VEL_NED_M_S] = 1.0, -0.7, 0.3
     trajectory_control(nav, setpoint, packed(), s, DT_S, True)
     present = -rotation_matrix(nav[n.Q_NED_FROM_FRD])[:, 2] * 0.56 / HOVER
@@ -322,7 +321,7 @@ def test_entering_starts_from_the_thrust_that_is_flown(airborne: bool) -> None:
         np.testing.assert_allclose(thrust_vector(s), present, atol=1e-9)
     else:
         assert np.abs(thrust_vector(s) - present).max() > 0.05
-        assert not s[c.BUMP : c.BUMP + 3].any()
+        assert not s.bump.any()
 
 
 def test_the_vertical_jump_is_bounded_and_a_tilt_counts_up_to_its_limit() -> None:
@@ -334,10 +333,10 @@ def test_the_vertical_jump_is_bounded_and_a_tilt_counts_up_to_its_limit() -> Non
     ):
         nav, setpoint, s = flying()
         quaternion_from_euler(tilt, 0.0, 0.0, nav[n.Q_NED_FROM_FRD])
-        s[c.THRUST_GIVEN] = thrust
+        s.thrust_given = thrust
         setpoint[sp.VEL_NED_M_S] = 0.0
         vertical_control(nav, setpoint, packed(), s, DT_S, True)
-        assert s[c.ACC_SETPOINT + 2] == pytest.approx(bump, rel=1e-9)
+        assert s.acc_setpoint[2] == pytest.approx(bump, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -355,29 +354,29 @@ def test_vertical_integrator_waits_at_the_limits_of_the_thrust(
     acceleration: float, error: float, integrates: bool
 ) -> None:
     nav, setpoint, s = flying()
-    s[c.VEL_SETPOINT + 2] = error
+    s.vel_setpoint[2] = error
     setpoint[sp.ACC + 2] = acceleration
     p = packed()
     vertical_control(nav, setpoint, p, s, DT_S, False)
-    assert s[c.VEL_INTEGRAL + 2] == pytest.approx(p[c.VEL_Z_I] * error * DT_S if integrates else 0.0)
+    assert s.vel_integral[2] == pytest.approx(p[c.VEL_Z_I] * error * DT_S if integrates else 0.0)
 
 
 @pytest.mark.parametrize(("error", "integrates"), [(0.2, False), (-0.2, True)])
 def test_before_lift_off_the_integrator_pulls_upwards_only(error: float, integrates: bool) -> None:
     nav, setpoint, s = flying()
-    s[c.AIRBORNE] = 0.0
-    s[c.VEL_SETPOINT + 2] = error
+    s.airborne = 0.0
+    s.vel_setpoint[2] = error
     vertical_control(nav, setpoint, packed(), s, DT_S, False)
-    assert bool(s[c.VEL_INTEGRAL + 2]) is integrates
+    assert bool(s.vel_integral[2]) is integrates
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_vertical_integrator_is_bounded_by_gravity(sign: float) -> None:
     nav, setpoint, s = flying()
-    s[c.VEL_INTEGRAL + 2] = sign * 2.0 * G
+    s.vel_integral[2] = sign * 2.0 * G
     setpoint[sp.ACC + 2] = -sign * 2.0 * G
     vertical_control(nav, setpoint, packed(), s, DT_S, False)
-    assert s[c.VEL_INTEGRAL + 2] == sign * G
+    assert s.vel_integral[2] == sign * G
 
 
 @pytest.mark.parametrize(
@@ -400,15 +399,15 @@ def test_low_pass_gain() -> None:
 def test_acceleration_filter_and_missing_samples() -> None:
     nav, _, s = flying()
     p = packed()
-    s[c.ACC_FILTERED : c.ACC_FILTERED + 3] = old = np.array([0.5, -0.4, 0.3])
+    s.acc_filtered = old = np.array([0.5, -0.4, 0.3])
     nav[n.ACC_NED_M_S2] = 1.0, 2.0, -3.0
     update_filters(nav, p, s, DT_S)
     alpha = DT_S / (DT_S + 1.0 / (2.0 * math.pi * MulticopterParameters().vel_derivative_cutoff_hz))
     expected = old + alpha * (np.array([1.0, 2.0, -3.0]) - old)
-    np.testing.assert_allclose(vector(s, c.ACC_FILTERED), expected, rtol=1e-12)
+    np.testing.assert_allclose(s.acc_filtered, expected, rtol=1e-12)
     nav[n.ACC_NED_M_S2] = math.nan
     update_filters(nav, p, s, DT_S)
-    np.testing.assert_allclose(vector(s, c.ACC_FILTERED), expected, rtol=1e-12)
+    np.testing.assert_allclose(s.acc_filtered, expected, rtol=1e-12)
 
 
 def drag_after_one_step(
@@ -418,12 +417,12 @@ def drag_after_one_step(
     nav, _, s = flying()
     quaternion_from_euler(0.2, -0.3, 1.1, nav[n.Q_NED_FROM_FRD])
     nav[n.SPECIFIC_FORCE_FRD_M_S2] = force
-    s[c.DRAG : c.DRAG + 3] = 0.4, -0.6, 0.0
+    s.drag = 0.4, -0.6, 0.0
     for name, value in changes.items():
-        s[getattr(c, name)] = value
+        setattr(s, name.lower(), value)
     update_filters(nav, packed(drag_compensation_cutoff_hz=cutoff_hz), s, DT_S)
     across = rotation_matrix(nav[n.Q_NED_FROM_FRD]) @ [force[0], force[1], 0.0]
-    return vector(s, c.DRAG), across[:2]
+    return s.drag, across[:2]
 
 
 def test_drag_is_the_measured_force_across_the_thrust_axis() -> None:
@@ -453,18 +452,18 @@ def test_drag_is_the_measured_force_across_the_thrust_axis() -> None:
 )
 def test_airborne_by_motion_under_power(climb_m: float, vertical_m_s: float, airborne: float) -> None:
     nav, _, s = flying()
-    s[c.AIRBORNE], s[c.START_DOWN_M] = 0.0, -20.0 + climb_m
+    s.airborne, s.start_down_m = 0.0, -20.0 + climb_m
     nav[n.VEL + 2] = vertical_m_s
     update_airborne(nav, s)
-    assert s[c.AIRBORNE] == airborne
+    assert s.airborne == airborne
 
 
 def test_hover_thrust_filter_is_a_kalman_filter() -> None:
     """One state h; the accelerometer along the thrust axis reads g T / h (PX4's hover thrust estimator)."""
     nav, _, s = flying()
     p = packed()
-    s[c.THRUST_LAGGED], s[c.THRUST_GIVEN] = 0.52, 0.60
-    s[c.ACC_SETPOINT + 2], s[c.VEL_INTEGRAL + 2] = -0.7, 0.2
+    s.thrust_lagged, s.thrust_given = 0.52, 0.60
+    s.acc_setpoint[2], s.vel_integral[2] = -0.7, 0.2
     nav[n.FORCE + 2] = -11.0
     estimate_hover_thrust(nav, p, s, DT_S)
     lagged = 0.52 + 0.08 * DT_S / MulticopterParameters().rotor_time_constant_s
@@ -472,11 +471,11 @@ def test_hover_thrust_filter_is_a_kalman_filter() -> None:
     variance = 0.002 + 0.0036**2 * DT_S
     gain = variance * h / (h * variance * h + 1.0)
     hover = HOVER + gain * (11.0 - G * lagged / HOVER)
-    assert s[c.THRUST_LAGGED] == pytest.approx(lagged)
-    assert s[c.HOVER] == pytest.approx(hover, rel=1e-12)
-    assert s[c.HOVER_VARIANCE] == pytest.approx((1.0 - gain * h) * variance, rel=1e-12)
+    assert s.thrust_lagged == pytest.approx(lagged)
+    assert s.hover == pytest.approx(hover, rel=1e-12)
+    assert s.hover_variance == pytest.approx((1.0 - gain * h) * variance, rel=1e-12)
     # the thrust of this moment stays: hover (1 - acc / g) before and after, the integrator makes up
-    moved = s[c.VEL_INTEGRAL + 2] - 0.2
+    moved = s.vel_integral[2] - 0.2
     assert hover * (1.0 - (-0.7 + moved) / G) == pytest.approx(HOVER * (1.0 - -0.7 / G))
 
 
@@ -484,38 +483,38 @@ def test_hover_thrust_is_not_learnt_from_outliers_or_on_the_ground() -> None:
     nav, _, s = flying()
     nav[n.FORCE + 2] = -G - 3.1 * math.sqrt((G / HOVER) ** 2 * 0.002 + 1.0)
     estimate_hover_thrust(nav, packed(), s, DT_S)
-    assert s[c.HOVER] == HOVER
+    assert s.hover == HOVER
     grown = (0.002 + 0.0036**2 * DT_S) * (1.0 + 2.0 * DT_S)
-    assert s[c.HOVER_VARIANCE] == pytest.approx(grown, rel=1e-9)
+    assert s.hover_variance == pytest.approx(grown, rel=1e-9)
     nav[n.FORCE + 2] = -G - 2.9 * math.sqrt((G / HOVER) ** 2 * 0.002 + 1.0)
     estimate_hover_thrust(nav, packed(), s, DT_S)
-    assert s[c.HOVER] < HOVER
+    assert s.hover < HOVER
     for change in ({"AIRBORNE": 0.0}, {"GROUND_CONTACT": 1.0}, {"force": math.nan}, {"parameter": 0.0}):
         nav, _, s = flying()
         nav[n.FORCE + 2] = change.get("force", -11.0)
         for name in change.keys() & {"AIRBORNE", "GROUND_CONTACT"}:
-            s[getattr(c, name)] = change[name]
+            setattr(s, name.lower(), change[name])
         estimate_hover_thrust(nav, packed(use_hover_thrust_estimate="parameter" not in change), s, DT_S)
-        assert s[c.HOVER] == HOVER
-        assert s[c.HOVER_VARIANCE] == 0.002
+        assert s.hover == HOVER
+        assert s.hover_variance == 0.002
 
 
 @pytest.mark.parametrize(("start", "force", "bound"), [(HOVER, -1e-3, 0.9), (0.12, -40.0, 0.05)])
 def test_hover_thrust_stays_within_what_can_be(start: float, force: float, bound: float) -> None:
     nav, _, s = flying()
-    s[c.HOVER] = s[c.THRUST_GIVEN] = s[c.THRUST_LAGGED] = start
+    s.hover = s.thrust_given = s.thrust_lagged = start
     nav[n.FORCE + 2] = force
     for _ in range(2000):
         estimate_hover_thrust(nav, packed(), s, DT_S)
-        assert 0.05 <= s[c.HOVER] <= 0.9
-        assert 0.003**2 <= s[c.HOVER_VARIANCE] <= 0.04
-    assert s[c.HOVER] == bound
+        assert 0.05 <= s.hover <= 0.9
+        assert 0.003**2 <= s.hover_variance <= 0.04
+    assert s.hover == bound
 
 
 @pytest.mark.parametrize("rotor_s", [0.0, 0.001])
 def test_quick_rotors_give_at_once_what_is_commanded(rotor_s: float) -> None:
     nav, _, s = flying()
-    s[c.THRUST_GIVEN] = 0.7
+    s.thrust_given = 0.7
     nav[n.FORCE + 2] = -G
     estimate_hover_thrust(nav, packed(rotor_time_constant_s=rotor_s), s, DT_S)
-    assert s[c.THRUST_LAGGED] == pytest.approx(0.7)
+    assert s.thrust_lagged == pytest.approx(0.7)

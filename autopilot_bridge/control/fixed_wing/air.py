@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
@@ -41,41 +42,41 @@ def acceleration_along_flow(nav: Array) -> float:
 
 
 @kernel
-def update_air(nav: Array, p: Array, s: Array, dt: float) -> None:
+def update_air(nav: Array, p: Array, s: FixedWingState, dt: float) -> None:
     """One step: writes EAS, EAS_RATE, EAS_TO_TAS and EAS_KNOWN."""
     measured = nav[n.AIRSPEED_M_S]
     known = math.isfinite(measured)
-    if s[c.EAS_TO_TAS] <= 0.0:
-        s[c.EAS_TO_TAS] = 1.0
+    if s.eas_to_tas <= 0.0:
+        s.eas_to_tas = 1.0
     if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav[n.AIRSPEED_TRUE_M_S]):
-        s[c.EAS_TO_TAS] = min(3.0, max(0.8, nav[n.AIRSPEED_TRUE_M_S] / measured))
+        s.eas_to_tas = min(3.0, max(0.8, nav[n.AIRSPEED_TRUE_M_S] / measured))
     if not known:
-        s[c.EAS] = p[c.AIRSPEED_TRIM]
-        s[c.EAS_RATE] = 0.0
-        s[c.EAS_KNOWN] = 0.0
+        s.eas = p[c.AIRSPEED_TRIM]
+        s.eas_rate = 0.0
+        s.eas_known = 0.0
         return
     measured = max(0.0, measured)
-    if s[c.EAS_KNOWN] == 0.0:
-        s[c.EAS] = measured
-        s[c.EAS_RATE] = 0.0
-        s[c.EAS_KNOWN] = 1.0
+    if s.eas_known == 0.0:
+        s.eas = measured
+        s.eas_rate = 0.0
+        s.eas_known = 1.0
         return
-    forward = acceleration_along_flow(nav) / s[c.EAS_TO_TAS]
+    forward = acceleration_along_flow(nav) / s.eas_to_tas
     if not math.isfinite(forward):
-        forward = s[c.EAS_RATE]
+        forward = s.eas_rate
     # gains of the continuous filter, from its Riccati equation
     speed_information = 1.0 / p[c.AIRSPEED_NOISE]
     process = p[c.AIRSPEED_PROCESS]
     rate_information = process / (p[c.AIRSPEED_RATE_NOISE] * p[c.AIRSPEED_RATE_NOISE])
     total = speed_information + rate_information
     root = math.sqrt(process * (2.0 * speed_information + rate_information))
-    speed = s[c.EAS] + dt * s[c.EAS_RATE]
+    speed = s.eas + dt * s.eas_rate
     speed_error = measured - speed
-    rate_error = forward - s[c.EAS_RATE]
-    s[c.EAS] = max(
+    rate_error = forward - s.eas_rate
+    s.eas = max(
         0.0, speed + dt * (speed_information * root * speed_error + rate_information * rate_error) / total
     )
-    s[c.EAS_RATE] += (
+    s.eas_rate += (
         dt
         * (
             speed_information * speed_information * process * speed_error

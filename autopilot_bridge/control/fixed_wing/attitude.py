@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.lateral import ROLL_MAX_RAD, stall_speed
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -32,15 +33,15 @@ _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 
 
 @kernel
-def attitude_control(nav: Array, p: Array, s: Array) -> None:
+def attitude_control(nav: Array, p: Array, s: FixedWingState) -> None:
     """Write RATE_SETPOINT (FRD) for ROLL_SETPOINT and PITCH_SETPOINT."""
     roll, pitch = nav[n.ROLL], nav[n.PITCH]
-    roll_rate = wrap_pi(s[c.ROLL_SETPOINT] - roll) / p[c.ROLL_TC]
-    pitch_rate = (s[c.PITCH_SETPOINT] - pitch) / p[c.PITCH_TC]
-    airspeed = max(0.7 * p[c.AIRSPEED_MIN], s[c.EAS]) * s[c.EAS_TO_TAS]
+    roll_rate = wrap_pi(s.roll_setpoint - roll) / p[c.ROLL_TC]
+    pitch_rate = (s.pitch_setpoint - pitch) / p[c.PITCH_TC]
+    airspeed = max(0.7 * p[c.AIRSPEED_MIN], s.eas) * s.eas_to_tas
     bank = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, roll))
     turn_rate = GRAVITY_M_S2 * math.tan(bank) * math.cos(pitch) / airspeed
-    if s[c.GROUND_CONTACT] != 0.0:
+    if s.ground_contact != 0.0:
         turn_rate = 0.0
     cos_roll, sin_roll = math.cos(roll), math.sin(roll)
     cos_pitch, sin_pitch = math.cos(pitch), math.sin(pitch)
@@ -48,78 +49,78 @@ def attitude_control(nav: Array, p: Array, s: Array) -> None:
     y = cos_roll * pitch_rate + cos_pitch * sin_roll * turn_rate
     z = -sin_roll * pitch_rate + cos_pitch * cos_roll * turn_rate
     slip = nav[n.FORCE + 1]
-    if s[c.GROUND_CONTACT] == 0.0 and math.isfinite(slip):
+    if s.ground_contact == 0.0 and math.isfinite(slip):
         z -= p[c.SIDESLIP_GAIN] * min(_SLIP_MAX_M_S2, max(-_SLIP_MAX_M_S2, slip))
-    s[c.RATE_SETPOINT] = min(p[c.ROLL_RATE_MAX], max(-p[c.ROLL_RATE_MAX], x))
-    s[c.RATE_SETPOINT + 1] = min(p[c.PITCH_RATE_UP], max(-p[c.PITCH_RATE_DOWN], y))
-    s[c.RATE_SETPOINT + 2] = min(p[c.YAW_RATE_MAX], max(-p[c.YAW_RATE_MAX], z))
+    s.rate_setpoint[0] = min(p[c.ROLL_RATE_MAX], max(-p[c.ROLL_RATE_MAX], x))
+    s.rate_setpoint[1] = min(p[c.PITCH_RATE_UP], max(-p[c.PITCH_RATE_DOWN], y))
+    s.rate_setpoint[2] = min(p[c.YAW_RATE_MAX], max(-p[c.YAW_RATE_MAX], z))
 
 
 @kernel
-def rate_control(nav: Array, p: Array, s: Array, surfaces: Array, rolling: bool) -> None:
+def rate_control(nav: Array, p: Array, s: FixedWingState, surfaces: Array, rolling: bool) -> None:
     """surfaces (3,) = aileron, elevator, rudder that fly RATE_SETPOINT; `rolling`: on the runway, integrators
     wait."""
-    dt = s[c.DT]
+    dt = s.dt
     scale = 1.0
     if p[c.AIRSPEED_SCALING] != 0.0:
-        airspeed = min(1.5 * p[c.AIRSPEED_MAX], max(stall_speed(p), s[c.EAS]))
+        airspeed = min(1.5 * p[c.AIRSPEED_MAX], max(stall_speed(p), s.eas))
         scale = p[c.SCALING_AIRSPEED] / airspeed
     alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
     for i in range(3):
         g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
         rate = min(_RATE_LIMIT_RAD_S, max(-_RATE_LIMIT_RAD_S, nav[n.RATES + i]))
-        wanted = s[c.RATE_SETPOINT + i]
+        wanted = s.rate_setpoint[i]
         error = wanted - rate
-        raw = (rate - s[c.RATE_PREVIOUS + i]) / dt
-        s[c.RATE_PREVIOUS + i] = rate
-        s[c.RATE_DERIVATIVE + i] += alpha * (raw - s[c.RATE_DERIVATIVE + i])
-        moment = p[g] * error + s[c.RATE_INTEGRAL + i] - p[g + 2] * s[c.RATE_DERIVATIVE + i]
+        raw = (rate - s.rate_previous[i]) / dt
+        s.rate_previous[i] = rate
+        s.rate_derivative[i] += alpha * (raw - s.rate_derivative[i])
+        moment = p[g] * error + s.rate_integral[i] - p[g + 2] * s.rate_derivative[i]
         surface = scale * (scale * moment + p[g + 3] * wanted) + p[c.TRIM_SURFACES + i]
-        missing = s[c.UNALLOCATED + i]
-        if s[c.GROUND_CONTACT] != 0.0:
-            s[c.RATE_INTEGRAL + i] = 0.0  # the wheels hold the vehicle: it would only store a kick
+        missing = s.unallocated[i]
+        if s.ground_contact != 0.0:
+            s.rate_integral[i] = 0.0  # the wheels hold the vehicle: it would only store a kick
         elif not (rolling or (missing > 0.0 and error > 0.0) or (missing < 0.0 and error < 0.0)):
             limit = p[g + 4]
-            s[c.RATE_INTEGRAL + i] = min(limit, max(-limit, s[c.RATE_INTEGRAL + i] + p[g + 1] * error * dt))
+            s.rate_integral[i] = min(limit, max(-limit, s.rate_integral[i] + p[g + 1] * error * dt))
         surfaces[i] = surface
 
 
 @kernel
-def ease_on_runway(p: Array, s: Array, surfaces: Array) -> None:
+def ease_on_runway(p: Array, s: FixedWingState, surfaces: Array) -> None:
     """Aileron and elevator fade in with the airspeed of the take-off roll.
 
     Without airspeed they have no effect; in a wind from behind the wrong one, and turn the vehicle over.
     """
-    share = min(1.0, s[c.EAS] / (_ROLLING_SPEED_SHARE * stall_speed(p)))
+    share = min(1.0, s.eas / (_ROLLING_SPEED_SHARE * stall_speed(p)))
     surfaces[0] = share * min(1.0, max(-1.0, surfaces[0]))
     surfaces[1] = share * min(1.0, max(-1.0, surfaces[1]))
 
 
 @kernel
-def limit_surfaces(p: Array, s: Array, yaw_stick: float, surfaces: Array) -> None:
+def limit_surfaces(p: Array, s: FixedWingState, yaw_stick: float, surfaces: Array) -> None:
     """Add to the rudder what goes with the aileron and the stick; stop at the stops."""
     aileron = min(1.0, max(-1.0, surfaces[0]))
     surfaces[2] += p[c.ROLL_TO_RUDDER] * aileron + yaw_stick
     for i in range(3):
         limited = min(1.0, max(-1.0, surfaces[i]))
-        s[c.UNALLOCATED + i] = surfaces[i] - limited
+        s.unallocated[i] = surfaces[i] - limited
         surfaces[i] = limited
 
 
 @kernel
-def wheel_control(nav: Array, sp: Array, p: Array, s: Array) -> float:
+def wheel_control(nav: Array, sp: Array, p: Array, s: FixedWingState) -> float:
     """Steering -1..1 that holds the setpoint's heading on the ground; its yaw rate is the rudder's too."""
     error = wrap_pi(sp[to.STEERING_HEADING_RAD] - nav[n.YAW])
     limit = p[c.WHEEL_RATE_MAX]
     wanted = min(limit, max(-limit, error / p[c.WHEEL_TC]))
-    s[c.RATE_SETPOINT + 2] = wanted
+    s.rate_setpoint[2] = wanted
     speed = math.sqrt(nav[n.VEL] * nav[n.VEL] + nav[n.VEL + 1] * nav[n.VEL + 1])
     slow = _WHEEL_SPEED_SHARE * p[c.AIRSPEED_MIN]
     scale = slow / speed if speed > slow else 1.0  # false for NaN
     rate_error = wanted - nav[n.RATES + 2]
-    command = scale * (p[c.WHEEL_FF] * wanted + scale * (p[c.WHEEL_P] * rate_error + s[c.WHEEL_INTEGRAL]))
+    command = scale * (p[c.WHEEL_FF] * wanted + scale * (p[c.WHEEL_P] * rate_error + s.wheel_integral))
     if speed > 1.0 and abs(command) < 1.0:
         limit = p[c.WHEEL_INTEGRAL_MAX]
-        integral = s[c.WHEEL_INTEGRAL] + p[c.WHEEL_I] * rate_error * s[c.DT]
-        s[c.WHEEL_INTEGRAL] = min(limit, max(-limit, integral))
+        integral = s.wheel_integral + p[c.WHEEL_I] * rate_error * s.dt
+        s.wheel_integral = min(limit, max(-limit, integral))
     return min(1.0, max(-1.0, command))

@@ -4,8 +4,8 @@ import math
 from typing import Final
 
 from autopilot_bridge.control.controller import Array, Controller
-from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.control.fixed_wing.step import control_step
 
@@ -13,7 +13,7 @@ GUIDANCE_RATE_HZ: Final = 50.0
 _HOVER_THRUST: Final = 0.5
 
 
-class FixedWingController(Controller[FixedWingParameters]):
+class FixedWingController(Controller[FixedWingParameters, FixedWingState]):
     """Lateral guidance, total-energy control, attitude and rate control of a fixed wing.
 
     What a setpoint at level FLY leaves open (NaN) is filled as follows, so that no NaN reaches an actuator.
@@ -48,7 +48,7 @@ class FixedWingController(Controller[FixedWingParameters]):
             physics_rate_hz=physics_rate_hz,
             nav=nav,
             kernel=control_step,
-            layout=c,
+            state=FixedWingState,
             setpoint=setpoint,
             outer_rate_hz=GUIDANCE_RATE_HZ,
         )
@@ -62,57 +62,57 @@ class FixedWingController(Controller[FixedWingParameters]):
     @property
     def thrust(self) -> float:
         """Throttle given, 0..1."""
-        return float(self._state[c.THROTTLE])
+        return float(self._state.throttle)
 
     @property
     def roll_setpoint_rad(self) -> float:
         """Bank angle wanted of the attitude loop."""
-        return float(self._state[c.ROLL_SETPOINT])
+        return float(self._state.roll_setpoint)
 
     @property
     def pitch_setpoint_rad(self) -> float:
         """Pitch angle wanted of the attitude loop."""
-        return float(self._state[c.PITCH_SETPOINT])
+        return float(self._state.pitch_setpoint)
 
     @property
     def roll_limit_rad(self) -> float:
         """Bank limit in force in the lateral guidance."""
-        return float(self._state[c.ROLL_LIMITED])
+        return float(self._state.roll_limited)
 
     @property
     def lateral_acceleration_setpoint_m_s2(self) -> float:
         """Wanted lateral acceleration, to the right."""
-        return float(self._state[c.LATERAL_ACCELERATION])
+        return float(self._state.lateral_acceleration)
 
     @property
     def course_setpoint_rad(self) -> float:
         """Course being flown, -pi..pi; NaN where none is."""
-        return float(self._state[c.COURSE_SETPOINT])
+        return float(self._state.course_setpoint)
 
     @property
     def heading_setpoint_rad(self) -> float:
         """Heading through the air being flown, -pi..pi; NaN where none is."""
-        return float(self._state[c.HEADING_SETPOINT])
+        return float(self._state.heading_setpoint)
 
     @property
     def down_reference_m(self) -> float:
         """Height (local down, m) the energy control follows at this moment; NaN where none is."""
-        controlled = self._state[c.HEIGHT_CONTROLLED] != 0.0
-        return -float(self._state[c.HEIGHT_REFERENCE]) if controlled else math.nan
+        controlled = self._state.height_controlled != 0.0
+        return -float(self._state.height_reference) if controlled else math.nan
 
     @property
     def airspeed_setpoint_m_s(self) -> float:
         """Equivalent airspeed being flown, limits applied."""
-        return float(self._state[c.AIRSPEED_SETPOINT])
+        return float(self._state.airspeed_setpoint)
 
     @property
     def airspeed_error_m_s(self) -> float:
         """Wanted less filtered equivalent airspeed; NaN where the airspeed isn't known."""
-        if self._state[c.EAS_KNOWN] == 0.0:
+        if self._state.eas_known == 0.0:
             return math.nan
-        return float(self._state[c.AIRSPEED_SETPOINT] - self._state[c.EAS])
+        return float(self._state.airspeed_setpoint - self._state.eas)
 
     @property
     def underspeed(self) -> float:
         """How much too slow the vehicle is for the energy control: 0 not at all, 1 near the stall."""
-        return float(self._state[c.UNDERSPEED])
+        return float(self._state.underspeed)

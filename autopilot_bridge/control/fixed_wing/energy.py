@@ -19,6 +19,7 @@ from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.vertical import follow_height, pitch_for_climb, reset_height
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
@@ -44,26 +45,26 @@ def _clip(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def _load_factor(s: Array) -> float:
+def _load_factor(s: FixedWingState) -> float:
     """Load factor of a level turn at the commanded bank."""
-    return 1.0 / max(0.2, math.cos(s[c.ROLL_SETPOINT]))
+    return 1.0 / max(0.2, math.cos(s.roll_setpoint))
 
 
 @kernel
-def _underspeed(p: Array, s: Array, load_factor: float) -> float:
+def _underspeed(p: Array, s: FixedWingState, load_factor: float) -> float:
     """How much too slow the vehicle is: 0 not at all, 1 near the stall."""
-    if s[c.EAS_KNOWN] == 0.0:
+    if s.eas_known == 0.0:
         return 0.0
     raised = math.sqrt(load_factor)
     stall = stall_speed(p)
     room = p[c.AIRSPEED_MIN] - stall
     full = raised * (stall + _UNDERSPEED_FULL * room)
     start = raised * (stall + _UNDERSPEED_START * room)
-    return _clip((start - s[c.EAS]) / max(1e-3, start - full), 0.0, 1.0)
+    return _clip((start - s.eas) / max(1e-3, start - full), 0.0, 1.0)
 
 
 @kernel
-def _update_powerless(p: Array, s: Array, dt: float, flown: bool, energy_rate: float) -> float:
+def _update_powerless(p: Array, s: FixedWingState, dt: float, flown: bool, energy_rate: float) -> float:
     """How sure it is that full throttle doesn't keep the energy up: a failed motor, or air that sinks.
 
     Height can't be held then, and the airspeed must be (PX4's uncommanded descent, ArduPilot's bad descent).
@@ -71,11 +72,11 @@ def _update_powerless(p: Array, s: Array, dt: float, flown: bool, energy_rate: f
     acceleration. A gust that takes airspeed isn't in it: that gives it back, and to give up height and
     airspeed for it would cost much more.
     """
-    full = s[c.THROTTLE] >= _FULL_THROTTLE * p[c.THROTTLE_MAX]
-    falling = energy_rate < 0.0 and s[c.ENERGY_RATE_SETPOINT] > energy_rate
+    full = s.throttle >= _FULL_THROTTLE * p[c.THROTTLE_MAX]
+    falling = energy_rate < 0.0 and s.energy_rate_setpoint > energy_rate
     step = dt / _POWERLESS_S if flown and full and falling else -dt / _POWERLESS_S
-    s[c.POWERLESS] = _clip(s[c.POWERLESS] + step, 0.0, 1.0)
-    return max(0.0, (s[c.POWERLESS] - _POWERLESS_DOUBT) / (1.0 - _POWERLESS_DOUBT))
+    s.powerless = _clip(s.powerless + step, 0.0, 1.0)
+    return max(0.0, (s.powerless - _POWERLESS_DOUBT) / (1.0 - _POWERLESS_DOUBT))
 
 
 @kernel
@@ -92,7 +93,7 @@ def _trim_throttle(airspeed: float, p: Array) -> float:
 
 
 @kernel
-def _trim_pitch(airspeed: float, p: Array, s: Array) -> float:
+def _trim_pitch(airspeed: float, p: Array, s: FixedWingState) -> float:
     """Pitch of level flight at an airspeed and the commanded bank.
 
     The lift angle grows with the load factor and falls with the square of airspeed; in a level turn
@@ -106,24 +107,24 @@ def _trim_pitch(airspeed: float, p: Array, s: Array) -> float:
 
 
 @kernel
-def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bool) -> float:
+def _wanted_climb(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float, hold: bool) -> float:
     """Climb rate to fly, m/s; NaN: no climb rate is commanded. `hold`: the present height by default."""
     height, climb = -nav[n.POS + 2], -nav[n.VEL + 2]
     wanted, rate = -sp[to.DOWN_M], sp[to.HEIGHT_RATE_M_S]
     if math.isfinite(wanted) or not (math.isfinite(rate) or not hold):
         if not math.isfinite(height):
             return 0.0 if not math.isfinite(rate) else rate
-        if s[c.HEIGHT_CONTROLLED] == 0.0:
+        if s.height_controlled == 0.0:
             reset_height(height, climb, s)
         slope = rate if math.isfinite(rate) else 0.0
         if not math.isfinite(wanted):
-            wanted = s[c.HEIGHT_REFERENCE]
-        elif s[c.HEIGHT_CONTROLLED] == 0.0:
-            s[c.HEIGHT_RATE_REFERENCE] -= slope
+            wanted = s.height_reference
+        elif s.height_controlled == 0.0:
+            s.height_rate_reference -= slope
         follow_height(wanted, slope, height, p, s, dt)
         return _clip(
-            (s[c.HEIGHT_REFERENCE] - height) / p[c.HEIGHT_TC]
-            + p[c.HEIGHT_RATE_FF] * s[c.HEIGHT_RATE_REFERENCE]
+            (s.height_reference - height) / p[c.HEIGHT_TC]
+            + p[c.HEIGHT_RATE_FF] * s.height_rate_reference
             + slope,
             -p[c.SINK_MAX],
             p[c.CLIMB_MAX],
@@ -133,7 +134,7 @@ def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bo
 
 
 @kernel
-def _fly_pitch(sp: Array, p: Array, s: Array, dt: float, speed: float, under: float) -> None:
+def _fly_pitch(sp: Array, p: Array, s: FixedWingState, dt: float, speed: float, under: float) -> None:
     """PITCH_SETPOINT that flies the rate of the energy balance; `speed` is the true airspeed."""
     lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p[c.PITCH_MIN]
     highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p[c.PITCH_MAX]
@@ -141,107 +142,107 @@ def _fly_pitch(sp: Array, p: Array, s: Array, dt: float, speed: float, under: fl
     lowest = (1.0 - under) * lowest + under * min(lowest, p[c.PITCH_MIN])
     highest = max(highest, lowest)
     per_rad = speed * GRAVITY_M_S2
-    wanted = s[c.BALANCE_RATE_SETPOINT] / per_rad
-    missing = wanted - s[c.BALANCE_RATE] / per_rad
-    previous = s[c.PITCH_SETPOINT]
+    wanted = s.balance_rate_setpoint / per_rad
+    missing = wanted - s.balance_rate / per_rad
+    previous = s.pitch_setpoint
     step = p[c.PITCH_I] * missing * dt
     winding = (previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)
-    if s[c.GROUND_CONTACT] == 0.0 and not winding:
-        s[c.PITCH_INTEGRAL] = _clip(s[c.PITCH_INTEGRAL] + step, lowest - highest, highest - lowest)
+    if s.ground_contact == 0.0 and not winding:
+        s.pitch_integral = _clip(s.pitch_integral + step, lowest - highest, highest - lowest)
     pitch = (
-        _trim_pitch(s[c.AIRSPEED_SETPOINT], p, s)
+        _trim_pitch(s.airspeed_setpoint, p, s)
         + p[c.PITCH_DAMPING] * missing
         + p[c.BALANCE_FF] * wanted
-        + s[c.PITCH_INTEGRAL]
+        + s.pitch_integral
     )
     change = dt * p[c.VERTICAL_ACCELERATION] / speed
-    s[c.PITCH_SETPOINT] = _clip(_clip(pitch, lowest, highest), previous - change, previous + change)
+    s.pitch_setpoint = _clip(_clip(pitch, lowest, highest), previous - change, previous + change)
 
 
 @kernel
-def _fly_climb_by_pitch(nav: Array, sp: Array, p: Array, s: Array, dt: float, climb: float) -> None:
+def _fly_climb_by_pitch(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float, climb: float) -> None:
     """PITCH_SETPOINT that flies a climb rate whatever becomes of the airspeed."""
     lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p[c.PITCH_MIN]
     highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p[c.PITCH_MAX]
-    s[c.PITCH_SETPOINT] = pitch_for_climb(nav, p, s, dt, climb, lowest, max(lowest, highest))
+    s.pitch_setpoint = pitch_for_climb(nav, p, s, dt, climb, lowest, max(lowest, highest))
 
 
 @kernel
-def _fly_throttle(sp: Array, p: Array, s: Array, dt: float, under: float) -> None:
+def _fly_throttle(sp: Array, p: Array, s: FixedWingState, dt: float, under: float) -> None:
     """THROTTLE that flies the rate of the total energy."""
     lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
     if math.isfinite(sp[to.THROTTLE_MAX]):
         highest = _clip(sp[to.THROTTLE_MAX], 0.0, highest)
         lowest = min(lowest, highest)
     rate_max, rate_min = GRAVITY_M_S2 * p[c.CLIMB_MAX], -GRAVITY_M_S2 * p[c.SINK_MIN]
-    wanted = s[c.ENERGY_RATE_SETPOINT]
-    trim = _clip(_trim_throttle(s[c.AIRSPEED_SETPOINT], p), lowest, highest)
+    wanted = s.energy_rate_setpoint
+    trim = _clip(_trim_throttle(s.airspeed_setpoint, p), lowest, highest)
     if wanted >= 0.0:
         throttle = trim + wanted / rate_max * (highest - trim)
     else:
         throttle = trim + wanted / rate_min * (lowest - trim)
-    missing = (wanted - s[c.ENERGY_RATE]) / (rate_max - rate_min)
-    previous = s[c.THROTTLE]
-    known = s[c.EAS_KNOWN] != 0.0
-    if known and s[c.GROUND_CONTACT] == 0.0:
+    missing = (wanted - s.energy_rate) / (rate_max - rate_min)
+    previous = s.throttle
+    known = s.eas_known != 0.0
+    if known and s.ground_contact == 0.0:
         step = p[c.THROTTLE_I] * missing * dt * (1.0 - under)
         if not ((previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)):
-            s[c.THROTTLE_INTEGRAL] = _clip(s[c.THROTTLE_INTEGRAL] + step, -1.0, 1.0)
+            s.throttle_integral = _clip(s.throttle_integral + step, -1.0, 1.0)
     # without airspeed a positive integral stays: it was needed when there was one (PX4)
-    integral = s[c.THROTTLE_INTEGRAL] if known else max(0.0, s[c.THROTTLE_INTEGRAL])
+    integral = s.throttle_integral if known else max(0.0, s.throttle_integral)
     throttle += p[c.THROTTLE_DAMPING] * missing + integral
     throttle = _clip(under * highest + (1.0 - under) * throttle, lowest, highest)
     if p[c.THROTTLE_SLEW] > 0.0:
         change = p[c.THROTTLE_SLEW] * dt
         throttle = _clip(throttle, previous - change, previous + change)
-    s[c.THROTTLE] = _clip(throttle, lowest, highest)
+    s.throttle = _clip(throttle, lowest, highest)
 
 
 @kernel
-def _wanted_speed_rate(p: Array, s: Array, speed: float, weight: float) -> float:
+def _wanted_speed_rate(p: Array, s: FixedWingState, speed: float, weight: float) -> float:
     """Rate of change of the true airspeed to fly, m/s^2, within what half of the power can do."""
-    if s[c.EAS_KNOWN] == 0.0:
+    if s.eas_known == 0.0:
         return 0.0
     faster = 0.5 * GRAVITY_M_S2 * p[c.CLIMB_MAX] / speed
     slower = -0.5 * GRAVITY_M_S2 * p[c.SINK_MIN] / speed
     if weight >= 2.0:
         faster, slower = _PITCH_ONLY_ACCELERATION_M_S2, -_PITCH_ONLY_ACCELERATION_M_S2
-    return _clip((s[c.AIRSPEED_SETPOINT] * s[c.EAS_TO_TAS] - speed) / p[c.AIRSPEED_TC], slower, faster)
+    return _clip((s.airspeed_setpoint * s.eas_to_tas - speed) / p[c.AIRSPEED_TC], slower, faster)
 
 
 @kernel
-def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
+def energy_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float, entering: bool) -> None:
     """One guidance step: writes PITCH_SETPOINT, THROTTLE and what led to them."""
     pitch_given, throttle_given = math.isfinite(sp[to.PITCH_RAD]), math.isfinite(sp[to.THROTTLE])
-    powered, known = p[c.POWERED] != 0.0, s[c.EAS_KNOWN] != 0.0
+    powered, known = p[c.POWERED] != 0.0, s.eas_known != 0.0
     climb = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
-    if entering or s[c.GROUND_CONTACT] != 0.0:
+    if entering or s.ground_contact != 0.0:
         reset_height(-nav[n.POS + 2], climb, s)
-        s[c.PITCH_INTEGRAL] = 0.0
-        s[c.THROTTLE_INTEGRAL] = 0.0
+        s.pitch_integral = 0.0
+        s.throttle_integral = 0.0
     load_factor = _load_factor(s)
     wanted_climb = _wanted_climb(nav, sp, p, s, dt, not pitch_given and not throttle_given)
     climb_given = math.isfinite(wanted_climb)
-    flare = throttle_given and not pitch_given and climb_given and s[c.HEIGHT_CONTROLLED] == 0.0
-    s[c.HEIGHT_RATE_SETPOINT] = wanted_climb
-    s[c.VEL_SETPOINT + 2] = -wanted_climb
+    flare = throttle_given and not pitch_given and climb_given and s.height_controlled == 0.0
+    s.height_rate_setpoint = wanted_climb
+    s.vel_setpoint[2] = -wanted_climb
     under = 0.0 if flare else _underspeed(p, s, load_factor)
-    s[c.UNDERSPEED] = under
+    s.underspeed = under
     energy_flown = powered and known and climb_given and not (pitch_given or throttle_given)
-    speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
+    speed = max(_MIN_SPEED_M_S, s.eas * s.eas_to_tas)
     potential_rate = GRAVITY_M_S2 * climb
-    kinetic_rate = speed * s[c.EAS_RATE] * s[c.EAS_TO_TAS]
+    kinetic_rate = speed * s.eas_rate * s.eas_to_tas
     acceleration = acceleration_along_flow(nav)
     inertial_rate = speed * acceleration if math.isfinite(acceleration) else kinetic_rate
     powerless = _update_powerless(p, s, dt, energy_flown, potential_rate + inertial_rate)
 
     airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
     airspeed = sp[to.AIRSPEED_M_S] if math.isfinite(sp[to.AIRSPEED_M_S]) else p[c.AIRSPEED_TRIM]
-    airspeed = max(airspeed, s[c.AIRSPEED_FLOOR])
+    airspeed = max(airspeed, s.airspeed_floor)
     # a glide lasts longest, with room left over the stall, a little above the lowest airspeed
     airspeed -= powerless * max(0.0, airspeed - _GLIDE_SHARE * airspeed_min)
     airspeed = under * airspeed_min + (1.0 - under) * airspeed
-    s[c.AIRSPEED_SETPOINT] = _clip(airspeed, airspeed_min, p[c.AIRSPEED_MAX])
+    s.airspeed_setpoint = _clip(airspeed, airspeed_min, p[c.AIRSPEED_MAX])
 
     weight = p[c.SPEED_WEIGHT] if powered else 2.0
     if not known or flare:
@@ -257,28 +258,28 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     wanted_kinetic_rate = speed * _wanted_speed_rate(p, s, speed, weight)
 
     height_share, speed_share = _clip(2.0 - weight, 0.0, 1.0), _clip(weight, 0.0, 1.0)
-    s[c.BALANCE_RATE] = height_share * potential_rate - speed_share * kinetic_rate
-    s[c.BALANCE_RATE_SETPOINT] = height_share * wanted_potential_rate - speed_share * wanted_kinetic_rate
+    s.balance_rate = height_share * potential_rate - speed_share * kinetic_rate
+    s.balance_rate_setpoint = height_share * wanted_potential_rate - speed_share * wanted_kinetic_rate
     share = 1.0 if entering else min(1.0, dt / (dt + p[c.ENERGY_RATE_TC]))
-    s[c.ENERGY_RATE] += share * (potential_rate + kinetic_rate - s[c.ENERGY_RATE])
-    s[c.ENERGY_RATE_SETPOINT] = _clip(
+    s.energy_rate += share * (potential_rate + kinetic_rate - s.energy_rate)
+    s.energy_rate_setpoint = _clip(
         wanted_potential_rate + wanted_kinetic_rate + p[c.TURN_ENERGY] * (load_factor - 1.0),
         -GRAVITY_M_S2 * p[c.SINK_MIN],
         GRAVITY_M_S2 * p[c.CLIMB_MAX],
     )
 
     if pitch_given:
-        s[c.PITCH_SETPOINT] = _clip(sp[to.PITCH_RAD], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
+        s.pitch_setpoint = _clip(sp[to.PITCH_RAD], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
     elif flare and known and p[c.LIFT_ANGLE] > 0.0:
         _fly_climb_by_pitch(nav, sp, p, s, dt, wanted_climb)
     else:
-        if s[c.CLIMB_FLOWN] != 0.0:
-            s[c.CLIMB_FLOWN] = 0.0
-            s[c.PITCH_INTEGRAL] = 0.0
+        if s.climb_flown != 0.0:
+            s.climb_flown = 0.0
+            s.pitch_integral = 0.0
         _fly_pitch(sp, p, s, dt, speed, under)
     if throttle_given:
-        s[c.THROTTLE] = _clip(sp[to.THROTTLE], 0.0, 1.0)
+        s.throttle = _clip(sp[to.THROTTLE], 0.0, 1.0)
     elif powered:
         _fly_throttle(sp, p, s, dt, under)
     else:
-        s[c.THROTTLE] = 0.0
+        s.throttle = 0.0

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -66,31 +67,31 @@ def airspeed_for_ground_speed(course: float, ground_speed: float, wind_n: float,
 
 
 @kernel
-def bank_limit(sp: Array, p: Array, s: Array) -> float:
+def bank_limit(sp: Array, p: Array, s: FixedWingState) -> float:
     """Largest bank angle, rad: of parameters, setpoint, load factor, and stall at the present airspeed."""
     limit = min(p[c.ROLL_LIMIT], math.acos(1.0 / p[c.LOAD_FACTOR_MAX]))
     if sp[to.ROLL_LIMIT_RAD] >= 0.0:  # false for NaN
         limit = min(limit, sp[to.ROLL_LIMIT_RAD])
-    if p[c.STALL_PREVENTION] != 0.0 and s[c.EAS_KNOWN] != 0.0:
-        ratio = s[c.EAS] / (p[c.STALL_MARGIN] * stall_speed(p))
+    if p[c.STALL_PREVENTION] != 0.0 and s.eas_known != 0.0:
+        ratio = s.eas / (p[c.STALL_MARGIN] * stall_speed(p))
         by_stall = math.acos(1.0 / (ratio * ratio)) if ratio > 1.0 else 0.0
         limit = min(limit, max(by_stall, _BANK_ALWAYS_RAD))
     return limit
 
 
 @kernel
-def lateral_control(nav: Array, sp: Array, p: Array, s: Array, dt: float) -> None:
+def lateral_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float) -> None:
     """One guidance step: writes ROLL_SETPOINT and what led to it."""
-    true_airspeed = s[c.EAS] * s[c.EAS_TO_TAS]
+    true_airspeed = s.eas * s.eas_to_tas
     limit = bank_limit(sp, p, s)
-    s[c.ROLL_LIMITED] = limit
-    s[c.HEADING_SETPOINT] = math.nan
-    s[c.COURSE_SETPOINT] = math.nan
-    s[c.AIRSPEED_FLOOR] = 0.0
+    s.roll_limited = limit
+    s.heading_setpoint = math.nan
+    s.course_setpoint = math.nan
+    s.airspeed_floor = 0.0
     if math.isfinite(sp[to.ROLL_RAD]):
         roll = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, sp[to.ROLL_RAD]))
-        s[c.ROLL_SETPOINT] = roll
-        s[c.LATERAL_ACCELERATION] = GRAVITY_M_S2 * math.tan(roll)
+        s.roll_setpoint = roll
+        s.lateral_acceleration = GRAVITY_M_S2 * math.tan(roll)
         return
     acceleration = (
         sp[to.LATERAL_ACCELERATION_M_S2] if math.isfinite(sp[to.LATERAL_ACCELERATION_M_S2]) else 0.0
@@ -107,10 +108,9 @@ def lateral_control(nav: Array, sp: Array, p: Array, s: Array, dt: float) -> Non
         airspeed = max(1.0, math.sqrt(air_n * air_n + air_e * air_e))
         present = math.atan2(air_e, air_n)
         wanted = heading_for_course(sp[to.COURSE_RAD], airspeed, wind_n, wind_e)
-        s[c.COURSE_SETPOINT] = wrap_pi(sp[to.COURSE_RAD])
-        s[c.AIRSPEED_FLOOR] = (
-            airspeed_for_ground_speed(sp[to.COURSE_RAD], p[c.GROUND_SPEED_MIN], wind_n, wind_e)
-            / s[c.EAS_TO_TAS]
+        s.course_setpoint = wrap_pi(sp[to.COURSE_RAD])
+        s.airspeed_floor = (
+            airspeed_for_ground_speed(sp[to.COURSE_RAD], p[c.GROUND_SPEED_MIN], wind_n, wind_e) / s.eas_to_tas
         )
     elif math.isfinite(sp[to.HEADING_RAD]):
         present = yaw
@@ -120,8 +120,8 @@ def lateral_control(nav: Array, sp: Array, p: Array, s: Array, dt: float) -> Non
         # beyond a right angle: turn at full strength, whichever way is shorter
         turn = math.sin(error) if abs(error) < 0.5 * math.pi else math.copysign(1.0, error)
         acceleration += p[c.HEADING_P] * true_airspeed * turn
-        s[c.HEADING_SETPOINT] = wanted
-    s[c.LATERAL_ACCELERATION] = acceleration
+        s.heading_setpoint = wanted
+    s.lateral_acceleration = acceleration
     roll = min(limit, max(-limit, math.atan(acceleration / GRAVITY_M_S2)))
     step = p[c.ROLL_SLEW] * dt
-    s[c.ROLL_SETPOINT] += min(step, max(-step, roll - s[c.ROLL_SETPOINT]))
+    s.roll_setpoint += min(step, max(-step, roll - s.roll_setpoint))

@@ -1,10 +1,11 @@
-"""Indices into the controller's two float64 arrays: parameters and state."""
+"""The controller's state as a record, and indices into the float64 array of its parameters."""
 
 from dataclasses import fields
 from typing import Final
 
+from autopilot_bridge.control.controller import ControllerState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from flightsim.foundation.layouts import Slots
+from flightsim.foundation.records import Vector3
 
 PARAMETER_NAMES: Final = tuple(field.name for field in fields(FixedWingParameters))
 
@@ -77,52 +78,48 @@ WHEEL_I: Final = _index("wheel_i")
 WHEEL_INTEGRAL_MAX: Final = _index("wheel_integral_max")
 WHEEL_FF: Final = _index("wheel_ff")
 
-_at = Slots()
-# state, kept until the physics rate changes
-DT: Final = _at.place()  # physics step, s
-DIVISOR: Final = _at.place()  # physics steps per guidance step
-GROUND_CONTACT: Final = _at.place()  # 1.0 while the wheels or the launcher may carry the vehicle
-# state of a flight: zero at levels OFF and IDLE
-COUNTER: Final = _at.place()  # physics steps since guidance ran
-LAST_LEVEL: Final = _at.place()
-FLYING: Final = _at.place()  # 1.0 once guidance has run since the level became FLY
-# air
-EAS: Final = _at.place()  # filtered equivalent airspeed, m/s; trim airspeed when it isn't known
-EAS_RATE: Final = _at.place()  # its rate, m/s^2
-EAS_TO_TAS: Final = _at.place()  # true over equivalent airspeed
-EAS_KNOWN: Final = _at.place()  # 1.0 while the airspeed is known
-# lateral
-HEADING_SETPOINT: Final = _at.place()  # through the air, rad; NaN where none is flown
-COURSE_SETPOINT: Final = _at.place()
-LATERAL_ACCELERATION: Final = _at.place()  # wanted, m/s^2
-ROLL_SETPOINT: Final = _at.place()
-ROLL_LIMITED: Final = _at.place()  # bank limit in force
-# longitudinal
-HEIGHT_REFERENCE: Final = _at.place()  # up, local, m
-HEIGHT_RATE_REFERENCE: Final = _at.place()  # of the height trajectory, m/s
-HEIGHT_CONTROLLED: Final = _at.place()  # 1.0 while the reference is flown
-HEIGHT_RATE_SETPOINT: Final = _at.place()  # wanted climb rate, m/s; NaN where none is flown
-AIRSPEED_SETPOINT: Final = _at.place()  # equivalent, limits applied, m/s
-PITCH_INTEGRAL: Final = _at.place()  # rad
-THROTTLE_INTEGRAL: Final = _at.place()
-ENERGY_RATE: Final = _at.place()  # specific total energy rate, low-passed, m^2/s^3
-ENERGY_RATE_SETPOINT: Final = _at.place()
-BALANCE_RATE: Final = _at.place()  # specific energy balance rate
-BALANCE_RATE_SETPOINT: Final = _at.place()
-UNDERSPEED: Final = _at.place()  # 0 none .. 1 full
-PITCH_SETPOINT: Final = _at.place()
-THROTTLE: Final = _at.place()
-# attitude
-Q_SETPOINT: Final = _at.place(4)  # q_ned_from_frd
-RATE_SETPOINT: Final = _at.place(3)  # FRD, rad/s
-RATE_INTEGRAL: Final = _at.place(3)  # surface
-RATE_PREVIOUS: Final = _at.place(3)  # FRD, rad/s
-RATE_DERIVATIVE: Final = _at.place(3)  # FRD, rad/s^2, low-passed
-UNALLOCATED: Final = _at.place(3)  # surface command beyond the stops
-WHEEL_INTEGRAL: Final = _at.place()
-VEL_SETPOINT: Final = _at.place(3)  # NED, m/s; only the vertical one is flown
-AIRSPEED_FLOOR: Final = _at.place()  # equivalent airspeed that the least ground speed requires, m/s
-POWERLESS: Final = _at.place()  # 0 the throttle does its work .. 1 the energy falls at full throttle
-CLIMB_FLOWN: Final = _at.place()  # 1.0 while pitch alone flies the vertical speed
-LIFTLESS_PITCH: Final = _at.place()  # pitch over the path without lift, rad, low-passed
-STATE_SIZE: Final = _at.size
+
+class FixedWingState(ControllerState):
+    """The controller's state, of a flight from `counter` on: zero at levels OFF and IDLE."""
+
+    # state, kept until the physics rate changes
+    # state of a flight: zero at levels OFF and IDLE
+    counter: float  # physics steps since guidance ran
+    last_level: float
+    flying: float  # 1.0 once guidance has run since the level became FLY
+    # air
+    eas: float  # filtered equivalent airspeed, m/s; trim airspeed when it isn't known
+    eas_rate: float  # its rate, m/s^2
+    eas_to_tas: float  # true over equivalent airspeed
+    eas_known: float  # 1.0 while the airspeed is known
+    # lateral
+    heading_setpoint: float  # through the air, rad; NaN where none is flown
+    course_setpoint: float
+    lateral_acceleration: float  # wanted, m/s^2
+    roll_setpoint: float
+    roll_limited: float  # bank limit in force
+    # longitudinal
+    height_reference: float  # up, local, m
+    height_rate_reference: float  # of the height trajectory, m/s
+    height_controlled: float  # 1.0 while the reference is flown
+    height_rate_setpoint: float  # wanted climb rate, m/s; NaN where none is flown
+    airspeed_setpoint: float  # equivalent, limits applied, m/s
+    pitch_integral: float  # rad
+    throttle_integral: float
+    energy_rate: float  # specific total energy rate, low-passed, m^2/s^3
+    energy_rate_setpoint: float
+    balance_rate: float  # specific energy balance rate
+    balance_rate_setpoint: float
+    underspeed: float  # 0 none .. 1 full
+    pitch_setpoint: float
+    throttle: float
+    # attitude
+    rate_integral: Vector3  # surface
+    rate_previous: Vector3  # FRD, rad/s
+    rate_derivative: Vector3  # FRD, rad/s^2, low-passed
+    unallocated: Vector3  # surface command beyond the stops
+    wheel_integral: float
+    airspeed_floor: float  # equivalent airspeed that the least ground speed requires, m/s
+    powerless: float  # 0 the throttle does its work .. 1 the energy falls at full throttle
+    climb_flown: float  # 1.0 while pitch alone flies the vertical speed
+    liftless_pitch: float  # pitch over the path without lift, rad, low-passed

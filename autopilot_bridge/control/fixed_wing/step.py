@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.controller import StateArray
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import update_air
 from autopilot_bridge.control.fixed_wing.attitude import (
@@ -18,6 +18,7 @@ from autopilot_bridge.control.fixed_wing.attitude import (
 )
 from autopilot_bridge.control.fixed_wing.energy import PITCH_LIMIT_RAD, energy_control
 from autopilot_bridge.control.fixed_wing.lateral import lateral_control
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import quaternion_from_euler
@@ -36,64 +37,116 @@ def _given(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def _rest(nav: Array, s: Array, actuators: Array) -> None:
+def _clear_guidance(s: FixedWingState) -> None:
+    s.flying = 0.0
+    s.eas = 0.0
+    s.eas_rate = 0.0
+    s.eas_to_tas = 0.0
+    s.eas_known = 0.0
+    s.heading_setpoint = 0.0
+    s.course_setpoint = 0.0
+    s.lateral_acceleration = 0.0
+    s.roll_setpoint = 0.0
+    s.roll_limited = 0.0
+    s.height_reference = 0.0
+    s.height_rate_reference = 0.0
+    s.height_controlled = 0.0
+    s.height_rate_setpoint = 0.0
+    s.airspeed_setpoint = 0.0
+    s.pitch_integral = 0.0
+    s.throttle_integral = 0.0
+    s.energy_rate = 0.0
+    s.energy_rate_setpoint = 0.0
+    s.balance_rate = 0.0
+    s.balance_rate_setpoint = 0.0
+    s.underspeed = 0.0
+    s.pitch_setpoint = 0.0
+    s.throttle = 0.0
+
+
+@kernel
+def _rest(nav: Array, s: FixedWingState, actuators: Array) -> None:
     """Propeller stopped, surfaces neutral, every integrator and filter at its start."""
     for i in range(actuators.shape[0]):
         actuators[i] = 0.0
-    for i in range(c.COUNTER, c.STATE_SIZE):
-        s[i] = 0.0
-    s[c.COUNTER] = s[c.DIVISOR]
-    s[c.Q_SETPOINT] = 1.0
-    s[c.HEADING_SETPOINT] = math.nan
-    s[c.COURSE_SETPOINT] = math.nan
+    _clear_guidance(s)
+    s.last_level = 0.0
+    s.rate_setpoint[:] = 0.0
+    s.rate_integral[:] = 0.0
+    s.rate_derivative[:] = 0.0
+    s.unallocated[:] = 0.0
+    s.wheel_integral = 0.0
+    s.airspeed_floor = 0.0
+    s.powerless = 0.0
+    s.climb_flown = 0.0
+    s.liftless_pitch = 0.0
+    s.q_setpoint[:] = 0.0
+    s.counter = s.divisor
+    s.q_setpoint[0] = 1.0
+    s.heading_setpoint = math.nan
+    s.course_setpoint = math.nan
     for i in range(3):
-        s[c.VEL_SETPOINT + i] = math.nan
+        s.vel_setpoint[i] = math.nan
         rate = nav[n.RATES + i]
-        s[c.RATE_PREVIOUS + i] = rate if math.isfinite(rate) else 0.0
+        s.rate_previous[i] = rate if math.isfinite(rate) else 0.0
 
 
 @kernel
-def _sum_of_guidance(s: Array) -> float:
+def _sum_of_guidance(s: FixedWingState) -> float:
     """Finite as long as all is that guidance carries on from step to step."""
-    total = s[c.EAS] + s[c.EAS_RATE] + s[c.EAS_TO_TAS] + s[c.ENERGY_RATE]
-    for i in range(c.ROLL_SETPOINT, c.HEIGHT_CONTROLLED):
-        total += s[i]
-    for i in range(c.AIRSPEED_SETPOINT, c.Q_SETPOINT):
-        total += s[i]
-    return total
+    return (
+        s.eas
+        + s.eas_rate
+        + s.eas_to_tas
+        + s.energy_rate
+        + s.roll_setpoint
+        + s.roll_limited
+        + s.height_reference
+        + s.height_rate_reference
+        + s.airspeed_setpoint
+        + s.pitch_integral
+        + s.throttle_integral
+        + s.energy_rate
+        + s.energy_rate_setpoint
+        + s.balance_rate
+        + s.balance_rate_setpoint
+        + s.underspeed
+        + s.pitch_setpoint
+        + s.throttle
+    )
 
 
 @kernel
-def _guide(nav: Array, sp: Array, p: Array, s: Array, level: float) -> None:
+def _guide(nav: Array, sp: Array, p: Array, s: FixedWingState, level: float) -> None:
     """The 50 Hz part: airspeed filter, lateral guidance, energy control."""
-    dt = s[c.DT] * s[c.DIVISOR]
+    dt = s.dt * s.divisor
     update_air(nav, p, s, dt)
     if level != to.FLY:
-        s[c.FLYING] = 0.0
-        s[c.VEL_SETPOINT + 2] = math.nan
-        s[c.HEADING_SETPOINT] = math.nan
-        s[c.COURSE_SETPOINT] = math.nan
-        s[c.HEIGHT_CONTROLLED] = 0.0
-        s[c.UNDERSPEED] = 0.0
-        s[c.ROLL_SETPOINT] = nav[n.ROLL]
-        s[c.PITCH_SETPOINT] = nav[n.PITCH]
-        s[c.THROTTLE] = _given(sp[to.THROTTLE], 0.0, 1.0)
+        s.flying = 0.0
+        s.vel_setpoint[2] = math.nan
+        s.heading_setpoint = math.nan
+        s.course_setpoint = math.nan
+        s.height_controlled = 0.0
+        s.underspeed = 0.0
+        s.roll_setpoint = nav[n.ROLL]
+        s.pitch_setpoint = nav[n.PITCH]
+        s.throttle = _given(sp[to.THROTTLE], 0.0, 1.0)
         return
-    entering = s[c.FLYING] == 0.0
+    entering = s.flying == 0.0
     if entering:  # from the attitude flown so far, so that the switch isn't felt
-        s[c.FLYING] = 1.0
-        s[c.ROLL_SETPOINT] = nav[n.ROLL]
-        s[c.PITCH_SETPOINT] = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav[n.PITCH]))
+        s.flying = 1.0
+        s.roll_setpoint = nav[n.ROLL]
+        s.pitch_setpoint = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav[n.PITCH]))
     lateral_control(nav, sp, p, s, dt)
     energy_control(nav, sp, p, s, dt, entering)
     if not math.isfinite(_sum_of_guidance(s)):  # absurd inputs have overflowed: begin again
-        for i in range(c.FLYING, c.Q_SETPOINT):
-            s[i] = 0.0
+        _clear_guidance(s)
 
 
 @kernel
-def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) -> None:
-    """Write the actuators (MAX_ACTUATORS,) from navigation state, setpoint, parameters and the state `s`."""
+def control_step(nav: Array, sp: Array, p: Array, states: StateArray, actuators: Array) -> None:
+    """Write the actuators (MAX_ACTUATORS,) from navigation state, setpoint, parameters and state (1,)."""
+    s = states[0]
     level = sp[to.LEVEL]
     flown = level == to.FLY or level == to.RATES or level == to.SURFACES_DIRECT
     known = True
@@ -107,11 +160,11 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
         _rest(nav, s, actuators)
         return
 
-    s[c.COUNTER] += 1.0
-    if known and (s[c.COUNTER] >= s[c.DIVISOR] or level != s[c.LAST_LEVEL]):
-        s[c.COUNTER] = 0.0
+    s.counter += 1.0
+    if known and (s.counter >= s.divisor or level != s.last_level):
+        s.counter = 0.0
         _guide(nav, sp, p, s, level)
-    s[c.LAST_LEVEL] = level
+    s.last_level = level
 
     surfaces = actuators[0:3]  # in the kernels' order: aileron, elevator, rudder
     yaw_stick = _given(sp[to.YAW_STICK], -1.0, 1.0)
@@ -119,15 +172,15 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
     if direct:
         for i in range(3):
             surfaces[i] = _given(sp[_SURFACES + i], -1.0, 1.0)
-            s[c.RATE_INTEGRAL + i] = 0.0
-            s[c.RATE_SETPOINT + i] = 0.0
-        s[c.THROTTLE] = _given(sp[to.THROTTLE], 0.0, 1.0)
+            s.rate_integral[i] = 0.0
+            s.rate_setpoint[i] = 0.0
+        s.throttle = _given(sp[to.THROTTLE], 0.0, 1.0)
         steering = surfaces[2]
     else:
         if level == to.RATES:
             for i in range(3):
-                s[c.RATE_SETPOINT + i] = _given(sp[_RATES + i], -20.0, 20.0)
-            s[c.THROTTLE] = _given(sp[to.THROTTLE], 0.0, 1.0)
+                s.rate_setpoint[i] = _given(sp[_RATES + i], -20.0, 20.0)
+            s.throttle = _given(sp[to.THROTTLE], 0.0, 1.0)
         else:
             attitude_control(nav, p, s)
         rolling = math.isfinite(sp[to.STEERING_HEADING_RAD])
@@ -135,7 +188,7 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
             steering = min(1.0, max(-1.0, wheel_control(nav, sp, p, s) + yaw_stick))
             yaw_stick = steering  # the rudder helps the wheels
         else:
-            s[c.WHEEL_INTEGRAL] = 0.0
+            s.wheel_integral = 0.0
         rate_control(nav, p, s, surfaces, rolling)
         if rolling:
             ease_on_runway(p, s, surfaces)
@@ -143,11 +196,9 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
     aileron, elevator, rudder = surfaces[0], surfaces[1], surfaces[2]
     actuators[AILERON] = aileron
     actuators[ELEVATOR] = elevator
-    actuators[THROTTLE] = s[c.THROTTLE]
+    actuators[THROTTLE] = s.throttle
     actuators[RUDDER] = rudder
     actuators[FLAPS] = _given(sp[to.FLAPS], 0.0, 1.0)
     actuators[STEERING] = steering
     actuators[BRAKE] = _given(sp[to.BRAKE], 0.0, 1.0)
-    quaternion_from_euler(
-        s[c.ROLL_SETPOINT], s[c.PITCH_SETPOINT], nav[n.YAW], s[c.Q_SETPOINT : c.Q_SETPOINT + 4]
-    )
+    quaternion_from_euler(s.roll_setpoint, s.pitch_setpoint, nav[n.YAW], s.q_setpoint)

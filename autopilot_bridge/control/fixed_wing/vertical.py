@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
+from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -43,28 +44,28 @@ def _angle_of_attack(airspeed: float, load_factor: float, p: Array) -> float:
 
 @kernel
 def pitch_for_climb(
-    nav: Array, p: Array, s: Array, dt: float, climb: float, lowest: float, highest: float
+    nav: Array, p: Array, s: FixedWingState, dt: float, climb: float, lowest: float, highest: float
 ) -> float:
     """Pitch setpoint, rad, that flies a climb rate within limits of the pitch."""
-    airspeed = nav[n.AIRSPEED_M_S] if math.isfinite(nav[n.AIRSPEED_M_S]) else s[c.EAS]
+    airspeed = nav[n.AIRSPEED_M_S] if math.isfinite(nav[n.AIRSPEED_M_S]) else s.eas
     airspeed = max(airspeed, stall_speed(p))
-    speed = max(s[c.EAS], stall_speed(p)) * s[c.EAS_TO_TAS]
+    speed = max(s.eas, stall_speed(p)) * s.eas_to_tas
     actual = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
     missing = climb - actual
     share = min(_ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN / p[c.PITCH_TC] * missing / GRAVITY_M_S2))
-    load_factor = (1.0 + share) / max(0.5, math.cos(s[c.ROLL_SETPOINT]))
+    load_factor = (1.0 + share) / max(0.5, math.cos(s.roll_setpoint))
     path = min(_STEEPEST_RAD, max(-_STEEPEST_RAD, actual / speed))
     pitch = _angle_of_attack(airspeed, load_factor, p) + path
-    if s[c.CLIMB_FLOWN] == 0.0:  # from the pitch flown so far
-        s[c.CLIMB_FLOWN] = 1.0
-        s[c.LIFTLESS_PITCH] = s[c.PITCH_SETPOINT] - pitch
+    if s.climb_flown == 0.0:  # from the pitch flown so far
+        s.climb_flown = 1.0
+        s.liftless_pitch = s.pitch_setpoint - pitch
     felt = -nav[n.FORCE + 2] / GRAVITY_M_S2
     if math.isfinite(felt):
         liftless = nav[n.PITCH] - path - _angle_of_attack(airspeed, felt, p)
         lag_s = _GUST_LAG * p[c.PITCH_TC]
-        s[c.LIFTLESS_PITCH] += dt / (dt + lag_s) * (liftless - s[c.LIFTLESS_PITCH])
-    s[c.LIFTLESS_PITCH] = min(_GUST_MAX_RAD, max(-_GUST_MAX_RAD, s[c.LIFTLESS_PITCH]))
-    wanted = pitch + s[c.LIFTLESS_PITCH]
+        s.liftless_pitch += dt / (dt + lag_s) * (liftless - s.liftless_pitch)
+    s.liftless_pitch = min(_GUST_MAX_RAD, max(-_GUST_MAX_RAD, s.liftless_pitch))
+    wanted = pitch + s.liftless_pitch
     wanted += _HASTE * (wanted - nav[n.PITCH])
     return min(highest, max(lowest, wanted))
 
@@ -74,31 +75,31 @@ _LEASH: Final = 1.2  # the reference runs no further ahead than what would ask f
 
 
 @kernel
-def reset_height(height: float, climb: float, s: Array) -> None:
+def reset_height(height: float, climb: float, s: FixedWingState) -> None:
     """Start the trajectory from the present height and climb rate, both up."""
-    s[c.HEIGHT_REFERENCE] = height if math.isfinite(height) else 0.0
-    s[c.HEIGHT_RATE_REFERENCE] = climb if math.isfinite(climb) else 0.0
-    s[c.HEIGHT_CONTROLLED] = 0.0
+    s.height_reference = height if math.isfinite(height) else 0.0
+    s.height_rate_reference = climb if math.isfinite(climb) else 0.0
+    s.height_controlled = 0.0
 
 
 @kernel
-def follow_height(wanted: float, slope: float, height: float, p: Array, s: Array, dt: float) -> None:
+def follow_height(wanted: float, slope: float, height: float, p: Array, s: FixedWingState, dt: float) -> None:
     """Move the reference towards `wanted`, which itself climbs with `slope`, within the rates for steps.
 
     Heights up, m; rates m/s. The reference's rate, HEIGHT_RATE_REFERENCE, is that over the slope.
     """
     acceleration = p[c.HEIGHT_ACCELERATION]
-    left = wanted - s[c.HEIGHT_REFERENCE]
+    left = wanted - s.height_reference
     size = abs(left)
     linear = acceleration / (_CLOSING_1_S * _CLOSING_1_S)
     speed = size * _CLOSING_1_S if size <= linear else math.sqrt(acceleration * (2.0 * size - linear))
     rate = math.copysign(speed, left)
     rate = min(min(p[c.CLIMB_TARGET], p[c.CLIMB_MAX]), max(-min(p[c.SINK_TARGET], p[c.SINK_MAX]), rate))
     change = acceleration * dt
-    s[c.HEIGHT_RATE_REFERENCE] += min(change, max(-change, rate - s[c.HEIGHT_RATE_REFERENCE]))
-    reference = s[c.HEIGHT_REFERENCE] + (s[c.HEIGHT_RATE_REFERENCE] + slope) * dt
+    s.height_rate_reference += min(change, max(-change, rate - s.height_rate_reference))
+    reference = s.height_reference + (s.height_rate_reference + slope) * dt
     # where the vehicle can't follow (a glider, a stopped motor), the reference waits for it
     ahead = _LEASH * p[c.CLIMB_MAX] * p[c.HEIGHT_TC]
     behind = _LEASH * p[c.SINK_MAX] * p[c.HEIGHT_TC]
-    s[c.HEIGHT_REFERENCE] = min(height + ahead, max(height - behind, reference))
-    s[c.HEIGHT_CONTROLLED] = 1.0
+    s.height_reference = min(height + ahead, max(height - behind, reference))
+    s.height_controlled = 1.0

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.multicopter import layout as c
+from autopilot_bridge.control.multicopter.layout import MulticopterState
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis, multiply
 
@@ -114,24 +115,26 @@ def limit_rates(rate_sp: Array, p: Array) -> None:
 
 
 @kernel
-def rate_control(rates: Array, rate_sp: Array, p: Array, s: Array, dt: float, integrate: bool) -> None:
+def rate_control(
+    rates: Array, rate_sp: Array, p: Array, s: MulticopterState, dt: float, integrate: bool
+) -> None:
     """Torques of the rate PID, left in UNALLOCATED of the state `s` for the mixer."""
     alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
     for i in range(3):
         g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
         error = rate_sp[i] - rates[i]
-        raw = (rates[i] - s[c.RATE_PREVIOUS + i]) / dt
-        s[c.RATE_PREVIOUS + i] = rates[i]
-        s[c.RATE_DERIVATIVE + i] += alpha * (raw - s[c.RATE_DERIVATIVE + i])
+        raw = (rates[i] - s.rate_previous[i]) / dt
+        s.rate_previous[i] = rates[i]
+        s.rate_derivative[i] += alpha * (raw - s.rate_derivative[i])
         torque = (
-            p[g + 4] * (p[g] * error + s[c.RATE_INTEGRAL + i] - p[g + 2] * s[c.RATE_DERIVATIVE + i])
+            p[g + 4] * (p[g] * error + s.rate_integral[i] - p[g + 2] * s.rate_derivative[i])
             + p[g + 3] * rate_sp[i]
         )
-        missing = s[c.UNALLOCATED + i]
+        missing = s.unallocated[i]
         winding = (missing > 0.01 and error > 0.0) or (missing < -0.01 and error < 0.0)
         if integrate and not winding:
             fade = error / _INTEGRAL_FADE_RAD_S
             step = max(0.0, 1.0 - fade * fade) * p[g + 1] * error * dt
             limit = p[g + 5]
-            s[c.RATE_INTEGRAL + i] = min(limit, max(-limit, s[c.RATE_INTEGRAL + i] + step))
-        s[c.UNALLOCATED + i] = torque
+            s.rate_integral[i] = min(limit, max(-limit, s.rate_integral[i] + step))
+        s.unallocated[i] = torque

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.control.controller import Array, Controller
+from autopilot_bridge.control.controller import Array, Controller, StateArray
 from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import (
@@ -14,6 +14,7 @@ from autopilot_bridge.control.multicopter.attitude import (
     limit_rates,
     rate_control,
 )
+from autopilot_bridge.control.multicopter.layout import MulticopterState
 from autopilot_bridge.control.multicopter.mixer import MOTORS, allocate, command_from_thrust
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.control.multicopter.position import (
@@ -41,29 +42,46 @@ def _finite4(v: Array, start: int) -> bool:
 
 
 @kernel
-def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
+def _rest(nav: Array, s: MulticopterState, command: float, actuators: Array) -> None:
     """Motors at one command, every integrator and filter at its start."""
     for i in range(actuators.shape[0]):
         actuators[i] = command if i < MOTORS else 0.0
-    for i in range(c.COUNTER, c.HOVER):
-        s[i] = 0.0
-    s[c.COUNTER] = s[c.DIVISOR]
-    s[c.Q_SETPOINT] = 1.0
-    s[c.START_DOWN_M] = nav[n.POS + 2] if math.isfinite(nav[n.POS + 2]) else 0.0
+    s.counter = 0.0
+    s.last_level = 0.0
+    s.airborne = 0.0
+    s.start_down_m = 0.0
+    s.vel_integral[:] = 0.0
+    s.acc_filtered[:] = 0.0
+    s.drag[:] = 0.0
+    s.bump[:] = 0.0
+    s.acc_setpoint[:] = 0.0
+    s.vel_setpoint[:] = 0.0
+    s.q_setpoint[:] = 0.0
+    s.rate_setpoint[:] = 0.0
+    s.thrust_setpoint = 0.0
+    s.yaw_rate_ff = 0.0
+    s.rate_integral[:] = 0.0
+    s.rate_previous[:] = 0.0
+    s.rate_derivative[:] = 0.0
+    s.unallocated[:] = 0.0
+    s.yaw_torque = 0.0
+    s.counter = s.divisor
+    s.q_setpoint[0] = 1.0
+    s.start_down_m = nav[n.POS + 2] if math.isfinite(nav[n.POS + 2]) else 0.0
     for i in range(3):
         rate = nav[n.RATES + i]
-        s[c.RATE_PREVIOUS + i] = rate if math.isfinite(rate) else 0.0
-    s[c.THRUST_GIVEN] = 0.0
-    s[c.THRUST_LAGGED] = 0.0
+        s.rate_previous[i] = rate if math.isfinite(rate) else 0.0
+    s.thrust_given = 0.0
+    s.thrust_lagged = 0.0
 
 
 @kernel
-def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
+def _collective(nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float, entering: bool) -> float:
     """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
     if math.isfinite(sp[to.THRUST]):
-        s[c.VEL_INTEGRAL + 2] = 0.0
-        s[c.BUMP + 2] = 0.0
-        s[c.ACC_SETPOINT + 2] = math.nan  # the vertical isn't controlled
+        s.vel_integral[2] = 0.0
+        s.bump[2] = 0.0
+        s.acc_setpoint[2] = math.nan  # the vertical isn't controlled
         return min(1.0, max(0.0, sp[to.THRUST]))
     # same speed limits and position P as in flight along a trajectory
     vz = sp[to.VEL + 2]
@@ -72,16 +90,17 @@ def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: 
         vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
     elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
         vz = 0.0
-    s[c.VEL_SETPOINT + 2] = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz)) if vz == vz else vz
+    s.vel_setpoint[2] = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz)) if vz == vz else vz
     up = vertical_control(nav, sp, p, s, dt, entering)
     _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
     return min(p[c.THRUST_MAX], max(p[c.THRUST_MIN], up / max(_MIN_COS_TILT, cos_tilt)))
 
 
 @kernel
-def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: Array) -> None:
+def _step(nav: Array, sp: Array, p: Array, states: StateArray, scratch: Array, actuators: Array) -> None:
+    s = states[0]
     level = sp[to.LEVEL]
-    dt = s[c.DT]
+    dt = s.dt
     if not level >= to.IDLE:  # OFF, and NaN
         _rest(nav, s, 0.0, actuators)
         return
@@ -91,30 +110,30 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
         _rest(nav, s, p[c.MOTOR_IDLE], actuators)
         return
 
-    switched = level != s[c.LAST_LEVEL]
-    s[c.COUNTER] += 1.0
-    if s[c.COUNTER] >= s[c.DIVISOR] or switched:
-        dt_outer = s[c.DT] * s[c.DIVISOR]
-        s[c.COUNTER] = 0.0
+    switched = level != s.last_level
+    s.counter += 1.0
+    if s.counter >= s.divisor or switched:
+        dt_outer = s.dt * s.divisor
+        s.counter = 0.0
         update_airborne(nav, s)
         estimate_hover_thrust(nav, p, s, dt_outer)
         update_filters(nav, p, s, dt_outer)
         if level == to.TRAJECTORY:
             trajectory_control(nav, sp, p, s, dt_outer, switched)
         else:
-            s[c.VEL_INTEGRAL] = 0.0
-            s[c.VEL_INTEGRAL + 1] = 0.0
-            entering = math.isnan(s[c.ACC_SETPOINT + 2]) or s[c.LAST_LEVEL] == 0.0
-            s[c.THRUST_SETPOINT] = _collective(nav, sp, p, s, dt_outer, entering)
-            s[c.YAW_RATE_FF] = sp[to.YAW_RATE_RAD_S] if math.isfinite(sp[to.YAW_RATE_RAD_S]) else 0.0
-    s[c.LAST_LEVEL] = level
+            s.vel_integral[0] = 0.0
+            s.vel_integral[1] = 0.0
+            entering = math.isnan(s.acc_setpoint[2]) or s.last_level == 0.0
+            s.thrust_setpoint = _collective(nav, sp, p, s, dt_outer, entering)
+            s.yaw_rate_ff = sp[to.YAW_RATE_RAD_S] if math.isfinite(sp[to.YAW_RATE_RAD_S]) else 0.0
+    s.last_level = level
 
-    rate_sp = s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
+    rate_sp = s.rate_setpoint
     if level == to.RATES:
         for i in range(3):
             rate_sp[i] = sp[to.BODY_RATES + i] if math.isfinite(sp[to.BODY_RATES + i]) else 0.0
     else:
-        q_sp = s[c.Q_SETPOINT : c.Q_SETPOINT + 4]
+        q_sp = s.q_setpoint
         if level == to.ATTITUDE:
             norm = 0.0
             for i in range(4):
@@ -126,32 +145,25 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
             else:  # no attitude to fly: level, nose as it is
                 q_sp[0], q_sp[1], q_sp[2] = math.cos(0.5 * nav[n.YAW]), 0.0, 0.0
                 q_sp[3] = math.sin(0.5 * nav[n.YAW])
-        attitude_control(nav[n.Q_NED_FROM_FRD], q_sp, s[c.YAW_RATE_FF], p, rate_sp, scratch)
+        attitude_control(nav[n.Q_NED_FROM_FRD], q_sp, s.yaw_rate_ff, p, rate_sp, scratch)
         if level == to.ATTITUDE:
             for i in range(3):
                 if math.isfinite(sp[to.BODY_RATES + i]):
                     rate_sp[i] += sp[to.BODY_RATES + i]
     limit_rates(rate_sp, p)
 
-    thrust = s[c.THRUST_SETPOINT]
+    thrust = s.thrust_setpoint
     # on the ground the legs hold the vehicle: an integrator would only store a kick for take-off
-    integrate = s[c.AIRBORNE] != 0.0 or thrust > 0.6 * s[c.HOVER]
+    integrate = s.airborne != 0.0 or thrust > 0.6 * s.hover
     rate_control(rates, rate_sp, p, s, dt, integrate)
     if p[c.YAW_TORQUE_CUTOFF] > 0.0:
         alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.YAW_TORQUE_CUTOFF]))
-        s[c.YAW_TORQUE] += alpha * (s[c.UNALLOCATED + 2] - s[c.YAW_TORQUE])
+        s.yaw_torque += alpha * (s.unallocated[2] - s.yaw_torque)
     else:
-        s[c.YAW_TORQUE] = s[c.UNALLOCATED + 2]
-    motor = s[c.MOTOR_THRUST : c.MOTOR_THRUST + MOTORS]
-    allocate(
-        s[c.UNALLOCATED],
-        s[c.UNALLOCATED + 1],
-        s[c.YAW_TORQUE],
-        thrust,
-        motor,
-        s[c.UNALLOCATED : c.UNALLOCATED + 3],
-    )
-    s[c.THRUST_GIVEN] = 0.25 * (motor[0] + motor[1] + motor[2] + motor[3])
+        s.yaw_torque = s.unallocated[2]
+    motor = s.motor_thrust
+    allocate(s.unallocated[0], s.unallocated[1], s.yaw_torque, thrust, motor, s.unallocated)
+    s.thrust_given = 0.25 * (motor[0] + motor[1] + motor[2] + motor[3])
     for i in range(MOTORS):
         command = command_from_thrust(motor[i], p[c.THRUST_MODEL])
         command = max(p[c.MOTOR_IDLE], command)
@@ -160,7 +172,7 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
         actuators[i] = 0.0
 
 
-class MulticopterController(Controller[MulticopterParameters]):
+class MulticopterController(Controller[MulticopterParameters, MulticopterState]):
     """Cascaded control of a quad-X: position, velocity, attitude, body rates, mixing.
 
     The setpoint's level chooses where the cascade starts. Fields that are not set (NaN) are filled as
@@ -187,29 +199,29 @@ class MulticopterController(Controller[MulticopterParameters]):
             physics_rate_hz=physics_rate_hz,
             nav=nav,
             kernel=_step,
-            layout=c,
+            state=MulticopterState,
             setpoint=to,
             outer_rate_hz=POSITION_RATE_HZ,
             scratch=(np.zeros(8),),
         )
         state = self._state
-        state[c.COUNTER] = state[c.DIVISOR]
-        state[c.Q_SETPOINT] = 1.0
-        state[c.HOVER_VARIANCE] = 0.01
-        state[c.HOVER] = self.parameters.hover_thrust
+        state.counter = state.divisor
+        state.q_setpoint[0] = 1.0
+        state.hover_variance = 0.01
+        state.hover = self.parameters.hover_thrust
 
     def set_parameters(self, parameters: MulticopterParameters) -> None:
         """Replace gains and limits, in flight too; the hover-thrust estimate is kept while it is in use."""
         super().set_parameters(parameters)
         if not parameters.use_hover_thrust_estimate:
-            self._state[c.HOVER] = parameters.hover_thrust
+            self._state.hover = parameters.hover_thrust
 
     @property
     def hover_thrust(self) -> float:
         """Estimate of the collective that hovers, 0..1."""
-        return float(self._state[c.HOVER])
+        return float(self._state.hover)
 
     @property
     def thrust(self) -> float:
         """Collective given by the motors after desaturation, 0..1."""
-        return float(self._state[c.THRUST_GIVEN])
+        return float(self._state.thrust_given)

@@ -1,13 +1,11 @@
-"""Indices into the controller's two float64 arrays: parameters and state.
-
-Compiled kernels freeze these numbers: when the layout changes, remove the compile caches of this package.
-"""
+"""The controller's state as a record, and indices into the float64 array of its parameters."""
 
 from dataclasses import fields
 from typing import Final
 
+from autopilot_bridge.control.controller import ControllerState
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
-from flightsim.foundation.layouts import Slots
+from flightsim.foundation.records import Vector3, Vector4
 
 PARAMETER_NAMES: Final = tuple(field.name for field in fields(MulticopterParameters))
 
@@ -45,32 +43,28 @@ THRUST_MODEL: Final = _index("thrust_model_factor")
 MOTOR_IDLE: Final = _index("motor_idle")
 ROTOR_TIME_CONSTANT: Final = _index("rotor_time_constant_s")
 
-_at = Slots()
-DT: Final = _at.place()  # physics step, s
-DIVISOR: Final = _at.place()  # physics steps per position-loop step
-COUNTER: Final = _at.place()  # physics steps since the position loop ran
-LAST_LEVEL: Final = _at.place()
-AIRBORNE: Final = _at.place()  # latched by motion after the motors started
-START_DOWN_M: Final = _at.place()  # nav down coordinate when the motors started
-VEL_INTEGRAL: Final = _at.place(3)  # NED, m/s^2
-ACC_FILTERED: Final = _at.place(3)  # NED, m/s^2
-DRAG: Final = _at.place(3)  # NED, m/s^2: measured acceleration across the thrust axis, low-passed
-BUMP: Final = _at.place(3)  # NED, m/s^2: decaying offset that makes level switches smooth
-ACC_SETPOINT: Final = _at.place(3)  # NED, m/s^2
-VEL_SETPOINT: Final = _at.place(3)  # NED, m/s
-Q_SETPOINT: Final = _at.place(4)  # q_ned_from_frd
-RATE_SETPOINT: Final = _at.place(3)  # FRD, rad/s
-THRUST_SETPOINT: Final = _at.place()  # collective, 0..1
-YAW_RATE_FF: Final = _at.place()  # about NED down, rad/s
-RATE_INTEGRAL: Final = _at.place(3)  # FRD, normalised torque
-RATE_PREVIOUS: Final = _at.place(3)  # FRD, rad/s
-RATE_DERIVATIVE: Final = _at.place(3)  # FRD, rad/s^2, low-passed
-UNALLOCATED: Final = _at.place(3)  # normalised torque the mixer could not give
-YAW_TORQUE: Final = _at.place()  # low-passed yaw torque
-HOVER: Final = _at.place()  # hover thrust estimate
-HOVER_VARIANCE: Final = _at.place()
-THRUST_LAGGED: Final = _at.place()  # collective as the rotors should give it by now
-MOTOR_THRUST: Final = _at.place(4)  # 4 normalised motor thrusts
-THRUST_GIVEN: Final = _at.place()  # mean of the motor thrusts after desaturation
-GROUND_CONTACT: Final = _at.place()  # 1.0 while something else than the rotors may carry the vehicle
-STATE_SIZE: Final = _at.size
+
+class MulticopterState(ControllerState):
+    """The controller's state."""
+
+    counter: float  # physics steps since the position loop ran
+    last_level: float
+    airborne: float  # latched by motion after the motors started
+    start_down_m: float  # nav down coordinate when the motors started
+    vel_integral: Vector3  # NED, m/s^2
+    acc_filtered: Vector3  # NED, m/s^2
+    drag: Vector3  # NED, m/s^2: measured acceleration across the thrust axis, low-passed
+    bump: Vector3  # NED, m/s^2: decaying offset that makes level switches smooth
+    acc_setpoint: Vector3  # NED, m/s^2
+    thrust_setpoint: float  # collective, 0..1
+    yaw_rate_ff: float  # about NED down, rad/s
+    rate_integral: Vector3  # FRD, normalised torque
+    rate_previous: Vector3  # FRD, rad/s
+    rate_derivative: Vector3  # FRD, rad/s^2, low-passed
+    unallocated: Vector3  # normalised torque the mixer could not give
+    yaw_torque: float  # low-passed yaw torque
+    hover: float  # hover thrust estimate
+    hover_variance: float
+    thrust_lagged: float  # collective as the rotors should give it by now
+    motor_thrust: Vector4  # 4 normalised motor thrusts
+    thrust_given: float  # mean of the motor thrusts after desaturation

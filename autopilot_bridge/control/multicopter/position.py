@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import body_z_of, quaternion_from_thrust_axis
+from autopilot_bridge.control.multicopter.layout import MulticopterState
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -46,24 +47,22 @@ def lowpass_gain(dt: float, cutoff_hz: float) -> float:
 
 
 @kernel
-def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
+def estimate_hover_thrust(nav: Array, p: Array, s: MulticopterState, dt: float) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
     On the ground this is not valid: the decreasing thrust after a touchdown would be learnt as hover thrust,
     and the landing would not be detected.
     """
-    s[c.THRUST_LAGGED] += (s[c.THRUST_GIVEN] - s[c.THRUST_LAGGED]) * min(
-        1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT])
-    )
+    s.thrust_lagged += (s.thrust_given - s.thrust_lagged) * min(1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT]))
     measured = -nav[n.FORCE + 2]
-    if p[c.USE_HOVER_ESTIMATE] == 0.0 or s[c.AIRBORNE] == 0.0 or s[c.GROUND_CONTACT] != 0.0:
+    if p[c.USE_HOVER_ESTIMATE] == 0.0 or s.airborne == 0.0 or s.ground_contact != 0.0:
         return
     if not math.isfinite(measured):
         return
-    variance = s[c.HOVER_VARIANCE] + _HOVER_PROCESS_STD_1_S * _HOVER_PROCESS_STD_1_S * dt
-    hover = s[c.HOVER]
-    predicted = GRAVITY_M_S2 * s[c.THRUST_LAGGED] / hover
+    variance = s.hover_variance + _HOVER_PROCESS_STD_1_S * _HOVER_PROCESS_STD_1_S * dt
+    hover = s.hover
+    predicted = GRAVITY_M_S2 * s.thrust_lagged / hover
     slope = -predicted / hover
     innovation = measured - predicted
     spread = slope * slope * variance + _HOVER_ACCEL_STD_M_S2 * _HOVER_ACCEL_STD_M_S2
@@ -72,42 +71,42 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
         new = min(_MAX_HOVER, max(_MIN_HOVER, hover + gain * innovation))
         variance = (1.0 - gain * slope) * variance
         # shift the vertical integrator so that the better estimate doesn't jerk the thrust
-        acc_z = s[c.ACC_SETPOINT + 2]
+        acc_z = s.acc_setpoint[2]
         if math.isfinite(acc_z):
-            s[c.VEL_INTEGRAL + 2] += (acc_z - GRAVITY_M_S2) * hover / new + GRAVITY_M_S2 - acc_z
-        s[c.HOVER] = new
+            s.vel_integral[2] += (acc_z - GRAVITY_M_S2) * hover / new + GRAVITY_M_S2 - acc_z
+        s.hover = new
     else:
         variance *= 1.0 + 2.0 * dt  # gated out: grow, so that a wrong start can't lock the filter out
-    s[c.HOVER_VARIANCE] = min(0.04, max(_HOVER_MIN_STD * _HOVER_MIN_STD, variance))
+    s.hover_variance = min(0.04, max(_HOVER_MIN_STD * _HOVER_MIN_STD, variance))
 
 
 @kernel
-def update_airborne(nav: Array, s: Array) -> None:
+def update_airborne(nav: Array, s: MulticopterState) -> None:
     """Latch AIRBORNE once the vehicle has moved vertically under power; OFF and IDLE clear it."""
-    if s[c.AIRBORNE] == 0.0 and (
-        abs(nav[n.VEL + 2]) > _AIRBORNE_SPEED_M_S or s[c.START_DOWN_M] - nav[n.POS + 2] > _AIRBORNE_CLIMB_M
+    if s.airborne == 0.0 and (
+        abs(nav[n.VEL + 2]) > _AIRBORNE_SPEED_M_S or s.start_down_m - nav[n.POS + 2] > _AIRBORNE_CLIMB_M
     ):
-        s[c.AIRBORNE] = 1.0
+        s.airborne = 1.0
 
 
 @kernel
-def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
+def update_filters(nav: Array, p: Array, s: MulticopterState, dt: float) -> None:
     """Low-passed acceleration (the velocity derivative) and measured drag."""
     alpha = lowpass_gain(dt, p[c.VEL_D_CUTOFF])
     for i in range(3):
         acc = nav[n.ACC + i]
         if math.isfinite(acc):
-            s[c.ACC_FILTERED + i] += alpha * (acc - s[c.ACC_FILTERED + i])
-    if p[c.DRAG_CUTOFF] <= 0.0 or s[c.AIRBORNE] == 0.0:
-        s[c.DRAG] = 0.0
-        s[c.DRAG + 1] = 0.0
+            s.acc_filtered[i] += alpha * (acc - s.acc_filtered[i])
+    if p[c.DRAG_CUTOFF] <= 0.0 or s.airborne == 0.0:
+        s.drag[0] = 0.0
+        s.drag[1] = 0.0
         return
     w, x, y, z = nav[n.Q], nav[n.Q + 1], nav[n.Q + 2], nav[n.Q + 3]
     x_north, x_east, _ = body_axis(w, x, y, z, 0)
     y_north, y_east, _ = body_axis(w, x, y, z, 1)
     fx, fy = nav[n.FORCE], nav[n.FORCE + 1]
     north, east = x_north * fx + y_north * fy, x_east * fx + y_east * fy
-    if s[c.GROUND_CONTACT] != 0.0:
+    if s.ground_contact != 0.0:
         # a sideways force of the ground is no drag: tilting against it would overturn the vehicle
         north, east = 0.0, 0.0
     size = math.sqrt(north * north + east * east)
@@ -117,12 +116,12 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
         north *= _DRAG_MAX_M_S2 / size
         east *= _DRAG_MAX_M_S2 / size
     beta = lowpass_gain(dt, p[c.DRAG_CUTOFF])
-    s[c.DRAG] += beta * (north - s[c.DRAG])
-    s[c.DRAG + 1] += beta * (east - s[c.DRAG + 1])
+    s.drag[0] += beta * (north - s.drag[0])
+    s.drag[1] += beta * (east - s.drag[1])
 
 
 @kernel
-def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
+def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: MulticopterState) -> None:
     """VEL_SETPOINT from position P and feed-forward, limited; NaN where the velocity isn't controlled."""
     px, py = 0.0, 0.0  # share of the position loop, which keeps its right of way under the speed limit
     vx, vy = sp[to.VEL], sp[to.VEL + 1]
@@ -153,8 +152,8 @@ def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
         k = min(1.0, max(0.0, k))
         fx *= k
         fy *= k
-    s[c.VEL_SETPOINT] = px + fx if math.isfinite(vx) else math.nan
-    s[c.VEL_SETPOINT + 1] = py + fy if math.isfinite(vy) else math.nan
+    s.vel_setpoint[0] = px + fx if math.isfinite(vx) else math.nan
+    s.vel_setpoint[1] = py + fy if math.isfinite(vy) else math.nan
 
     vz = sp[to.VEL + 2]
     ez = sp[to.POS + 2] - nav[n.POS + 2]
@@ -164,7 +163,7 @@ def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
         vz = 0.0
     if math.isfinite(vz):
         vz = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz))
-    s[c.VEL_SETPOINT + 2] = vz
+    s.vel_setpoint[2] = vz
 
 
 @kernel
@@ -174,71 +173,75 @@ def _finite_or_zero(value: float) -> float:
 
 @kernel
 def _acceleration_axis(
-    axis: int, nav: Array, sp: Array, kp: float, kd: float, s: Array
+    axis: int, nav: Array, sp: Array, kp: float, kd: float, s: MulticopterState
 ) -> tuple[float, float, bool]:
     """(acceleration, velocity error, controlled) of one NED axis."""
     acc = _finite_or_zero(sp[to.ACC + axis])
-    error = s[c.VEL_SETPOINT + axis] - nav[n.VEL + axis]
+    error = s.vel_setpoint[axis] - nav[n.VEL + axis]
     if not math.isfinite(error):
-        s[c.VEL_INTEGRAL + axis] = 0.0
+        s.vel_integral[axis] = 0.0
         return acc, 0.0, False
-    return (acc + kp * error + s[c.VEL_INTEGRAL + axis] - kd * s[c.ACC_FILTERED + axis], error, True)
+    return (acc + kp * error + s.vel_integral[axis] - kd * s.acc_filtered[axis], error, True)
 
 
 @kernel
-def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
+def vertical_control(
+    nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float, entering: bool
+) -> float:
     """Vertical thrust (positive up, normalised, before tilt) from the vertical part of the setpoint."""
     acc, error, controlled = _acceleration_axis(2, nav, sp, p[c.VEL_Z_P], p[c.VEL_Z_D], s)
-    hover = s[c.HOVER]
-    if entering and s[c.AIRBORNE] != 0.0:
+    hover = s.hover
+    if entering and s.airborne != 0.0:
         # start from the thrust flown so far, so that the switch isn't felt
         _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
-        present = GRAVITY_M_S2 * (1.0 - s[c.THRUST_GIVEN] * max(0.3, cos_tilt) / hover)
-        s[c.BUMP + 2] = min(5.0, max(-5.0, present - acc))
-    acc += s[c.BUMP + 2]
-    s[c.BUMP + 2] *= math.exp(-dt / _BUMP_TIME_S)
-    s[c.ACC_SETPOINT + 2] = acc
+        present = GRAVITY_M_S2 * (1.0 - s.thrust_given * max(0.3, cos_tilt) / hover)
+        s.bump[2] = min(5.0, max(-5.0, present - acc))
+    acc += s.bump[2]
+    s.bump[2] *= math.exp(-dt / _BUMP_TIME_S)
+    s.acc_setpoint[2] = acc
     up = hover * (1.0 - acc / GRAVITY_M_S2)
     if controlled:
         at_min = up <= p[c.THRUST_MIN] and error >= 0.0
         at_max = up >= p[c.THRUST_MAX] and error <= 0.0
         # before lift-off only upwards: the ground holds the vehicle back, not a lack of sinking
-        grounded = s[c.AIRBORNE] == 0.0 and error >= 0.0
+        grounded = s.airborne == 0.0 and error >= 0.0
         if not (at_min or at_max or grounded):
-            new = s[c.VEL_INTEGRAL + 2] + p[c.VEL_Z_I] * error * dt
-            s[c.VEL_INTEGRAL + 2] = min(GRAVITY_M_S2, max(-GRAVITY_M_S2, new))
+            new = s.vel_integral[2] + p[c.VEL_Z_I] * error * dt
+            s.vel_integral[2] = min(GRAVITY_M_S2, max(-GRAVITY_M_S2, new))
     return min(p[c.THRUST_MAX], max(0.0, up))
 
 
 @kernel
-def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
+def trajectory_control(
+    nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float, entering: bool
+) -> None:
     """One step of the position loop: writes Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF."""
     _velocity_setpoint(nav, sp, p, s)
     ax, error_x, control_x = _acceleration_axis(0, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
     ay, error_y, control_y = _acceleration_axis(1, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
-    hover = s[c.HOVER]
+    hover = s.hover
     thrust_max = p[c.THRUST_MAX]
-    if entering and s[c.AIRBORNE] != 0.0:
+    if entering and s.airborne != 0.0:
         zx, zy, _ = body_z_of(nav[n.Q_NED_FROM_FRD])
-        pull = GRAVITY_M_S2 * s[c.THRUST_GIVEN] / hover
-        s[c.BUMP] = -zx * pull + s[c.DRAG] - ax
-        s[c.BUMP + 1] = -zy * pull + s[c.DRAG + 1] - ay
+        pull = GRAVITY_M_S2 * s.thrust_given / hover
+        s.bump[0] = -zx * pull + s.drag[0] - ax
+        s.bump[1] = -zy * pull + s.drag[1] - ay
     # drag is fought only for a wanted velocity: without one it is what brings the vehicle to rest in the air
-    drag_x, drag_y = s[c.DRAG], s[c.DRAG + 1]
+    drag_x, drag_y = s.drag[0], s.drag[1]
     if not control_x:
         drag_x = 0.0
-        s[c.BUMP] = 0.0
+        s.bump[0] = 0.0
     if not control_y:
         drag_y = 0.0
-        s[c.BUMP + 1] = 0.0
+        s.bump[1] = 0.0
     up = vertical_control(nav, sp, p, s, dt, entering)
-    ax += s[c.BUMP]
-    ay += s[c.BUMP + 1]
+    ax += s.bump[0]
+    ay += s.bump[1]
     decay = math.exp(-dt / _BUMP_TIME_S)
-    s[c.BUMP] *= decay
-    s[c.BUMP + 1] *= decay
-    s[c.ACC_SETPOINT] = ax
-    s[c.ACC_SETPOINT + 1] = ay
+    s.bump[0] *= decay
+    s.bump[1] *= decay
+    s.acc_setpoint[0] = ax
+    s.acc_setpoint[1] = ay
 
     # horizontal thrust for the wanted acceleration against the measured drag, in units of hover thrust / g
     wanted_x, wanted_y = ax - drag_x, ay - drag_y
@@ -262,26 +265,26 @@ def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, ent
         back = 2.0 / p[c.VEL_XY_P]
         error_x -= back * missing_x
         error_y -= back * missing_y
-    if s[c.AIRBORNE] != 0.0:
+    if s.airborne != 0.0:
         if control_x:
-            s[c.VEL_INTEGRAL] += p[c.VEL_XY_I] * error_x * dt
+            s.vel_integral[0] += p[c.VEL_XY_I] * error_x * dt
         if control_y:
-            s[c.VEL_INTEGRAL + 1] += p[c.VEL_XY_I] * error_y * dt
-        size = math.sqrt(s[c.VEL_INTEGRAL] ** 2 + s[c.VEL_INTEGRAL + 1] ** 2)
+            s.vel_integral[1] += p[c.VEL_XY_I] * error_y * dt
+        size = math.sqrt(s.vel_integral[0] ** 2 + s.vel_integral[1] ** 2)
         if size > GRAVITY_M_S2:
-            s[c.VEL_INTEGRAL] *= GRAVITY_M_S2 / size
-            s[c.VEL_INTEGRAL + 1] *= GRAVITY_M_S2 / size
+            s.vel_integral[0] *= GRAVITY_M_S2 / size
+            s.vel_integral[1] *= GRAVITY_M_S2 / size
     else:
-        s[c.VEL_INTEGRAL] = 0.0
-        s[c.VEL_INTEGRAL + 1] = 0.0
+        s.vel_integral[0] = 0.0
+        s.vel_integral[1] = 0.0
 
     thrust = math.sqrt(tx * tx + ty * ty + up * up)
     zx, zy, zz = 0.0, 0.0, 1.0
     if thrust > 1e-6:
         zx, zy, zz = -tx / thrust, -ty / thrust, up / thrust
-    s[c.THRUST_SETPOINT] = max(thrust, p[c.THRUST_MIN])
+    s.thrust_setpoint = max(thrust, p[c.THRUST_MIN])
     yaw = sp[to.YAW_RAD]
     if not math.isfinite(yaw):
         yaw = nav[n.YAW]
-    s[c.YAW_RATE_FF] = _finite_or_zero(sp[to.YAW_RATE_RAD_S])
-    quaternion_from_thrust_axis(zx, zy, zz, yaw, s[c.Q_SETPOINT : c.Q_SETPOINT + 4])
+    s.yaw_rate_ff = _finite_or_zero(sp[to.YAW_RATE_RAD_S])
+    quaternion_from_thrust_axis(zx, zy, zz, yaw, s.q_setpoint)

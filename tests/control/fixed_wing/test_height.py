@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from autopilot_bridge.control.fixed_wing import FixedWingParameters
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.vertical import follow_height, reset_height
+from flightsim.foundation.records import new_record
 from tests.control.fixed_wing.test_lateral import packed
 
 DT_S = 0.02
@@ -16,13 +17,13 @@ PARAMETERS = FixedWingParameters()
 
 def trajectory(wanted: float, slope: float, duration_s: float, held_at: float | None = None) -> np.ndarray:
     """(height, rate over the slope) of a vehicle that follows perfectly, or stays at `held_at`."""
-    p, s = packed(PARAMETERS), np.zeros(c.STATE_SIZE)
+    p, s = packed(PARAMETERS), new_record(c.FixedWingState)
     reset_height(100.0, 0.0, s)
     rows = []
     for k in range(round(duration_s / DT_S)):
-        height = s[c.HEIGHT_REFERENCE] if held_at is None else held_at
+        height = s.height_reference if held_at is None else held_at
         follow_height(wanted + slope * k * DT_S, slope, height, p, s, DT_S)
-        rows.append((s[c.HEIGHT_REFERENCE], s[c.HEIGHT_RATE_REFERENCE]))
+        rows.append((s.height_reference, s.height_rate_reference))
     return np.array(rows)
 
 

@@ -16,6 +16,7 @@ from autopilot_bridge.control.fixed_wing.lateral import (
     heading_for_course,
     stall_speed,
 )
+from flightsim.foundation.records import new_record
 
 angles = st.floats(-math.pi, math.pi)
 winds = st.floats(-40.0, 40.0)
@@ -84,10 +85,10 @@ def test_airspeed_for_ground_speed(course: float, wanted: float, north: float, e
 @given(st.floats(5.0, 40.0), st.floats(1.0, 80.0))
 def test_bank_is_limited_so_that_the_turn_does_not_stall(airspeed: float, limit_deg: float) -> None:
     parameters = FixedWingParameters(load_factor_max=4.0, roll_limit_rad=math.radians(70.0))
-    p, s = packed(parameters), np.zeros(c.STATE_SIZE)
+    p, s = packed(parameters), new_record(c.FixedWingState)
     setpoint = np.full(sp.SETPOINT_SIZE, math.nan)
     setpoint[sp.ROLL_LIMIT_RAD] = math.radians(limit_deg)
-    s[c.EAS], s[c.EAS_KNOWN] = airspeed, 1.0
+    s.eas, s.eas_known = airspeed, 1.0
     bank = bank_limit(setpoint, p, s)
     assert bank <= math.radians(min(limit_deg, 70.0)) + 1e-9
     stall_in_turn = parameters.airspeed_stall_m_s / math.sqrt(math.cos(bank))

@@ -24,6 +24,7 @@ from autopilot_bridge.control.fixed_wing.lateral import heading_for_course, late
 from autopilot_bridge.control.fixed_wing.vertical import follow_height, reset_height
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
+from flightsim.foundation.records import new_record
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.control.fixed_wing.test_lateral import packed
 
@@ -41,15 +42,15 @@ def flying(
     *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, airspeed: float = AIRSPEED, climb: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """(navigation state, setpoint, controller state) of flight without wind, 100 m up."""
-    nav, setpoint, s = np.zeros(n.NAV_SIZE), np.full(sp.SETPOINT_SIZE, math.nan), np.zeros(c.STATE_SIZE)
+    nav, setpoint, s = np.zeros(n.NAV_SIZE), np.full(sp.SETPOINT_SIZE, math.nan), new_record(c.FixedWingState)
     quaternion_from_euler(roll, pitch, yaw, nav[n.Q_NED_FROM_FRD])
     nav[n.EULER_RAD] = roll, pitch, yaw
     nav[n.POS + 2] = -100.0
     nav[n.VEL_NED_M_S] = airspeed * math.cos(yaw), airspeed * math.sin(yaw), -climb
     nav[n.SPECIFIC_FORCE_FRD_M_S2] = 0.0, 0.0, -G
     nav[n.AIRSPEED_M_S] = nav[n.AIRSPEED_TRUE_M_S] = airspeed
-    s[c.DT], s[c.DIVISOR] = PHYSICS_S, GUIDANCE_S / PHYSICS_S
-    s[c.EAS], s[c.EAS_TO_TAS], s[c.EAS_KNOWN], s[c.FLYING] = airspeed, 1.0, 1.0, 1.0
+    s.dt, s.divisor = PHYSICS_S, GUIDANCE_S / PHYSICS_S
+    s.eas, s.eas_to_tas, s.eas_known, s.flying = airspeed, 1.0, 1.0, 1.0
     return nav, setpoint, s
 
 
@@ -67,8 +68,8 @@ def rates_of(euler_rates: tuple[float, float, float], roll: float, pitch: float)
 def test_attitude_law(roll: float, pitch: float, ratio: float) -> None:
     """Euler rates: the errors over their time constants, and the turn of coordinated flight."""
     nav, _, s = flying(roll=roll, pitch=pitch)
-    s[c.EAS_TO_TAS] = ratio
-    s[c.ROLL_SETPOINT], s[c.PITCH_SETPOINT] = roll + 0.15, pitch - 0.05
+    s.eas_to_tas = ratio
+    s.roll_setpoint, s.pitch_setpoint = roll + 0.15, pitch - 0.05
     p = parameters(
         roll_time_constant_s=0.5,
         pitch_time_constant_s=0.3,
@@ -80,34 +81,34 @@ def test_attitude_law(roll: float, pitch: float, ratio: float) -> None:
     attitude_control(nav, p, s)
     turn = G * math.tan(roll) * math.cos(pitch) / (AIRSPEED * ratio)
     expected = rates_of((0.15 / 0.5, -0.05 / 0.3, turn), roll, pitch)
-    np.testing.assert_allclose(s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3], expected, atol=1e-5)
+    np.testing.assert_allclose(s.rate_setpoint, expected, atol=1e-5)
 
 
 def test_attitude_law_on_the_ground_asks_for_no_turn() -> None:
     nav, _, s = flying(roll=0.3)
-    s[c.ROLL_SETPOINT], s[c.GROUND_CONTACT] = 0.3, 1.0
+    s.roll_setpoint, s.ground_contact = 0.3, 1.0
     nav[n.FORCE + 1] = 2.0
     attitude_control(nav, parameters(sideslip_gain_rad_s_per_m_s2=0.1), s)
-    np.testing.assert_allclose(s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3], 0.0, atol=1e-12)
+    np.testing.assert_allclose(s.rate_setpoint, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("bank", [math.radians(100.0), -math.radians(100.0)])
 def test_turn_rate_is_that_of_at_most_eighty_degrees(bank: float) -> None:
     nav, _, s = flying(roll=bank)
-    s[c.ROLL_SETPOINT] = bank
+    s.roll_setpoint = bank
     p = parameters(pitch_rate_max_up_rad_s=9.0, pitch_rate_max_down_rad_s=9.0, yaw_rate_max_rad_s=9.0)
     attitude_control(nav, p, s)
     turn = math.copysign(G * math.tan(math.radians(80.0)) / AIRSPEED, bank)
     expected = [0.0, math.sin(bank) * turn, math.cos(bank) * turn]
-    np.testing.assert_allclose(s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3], expected, atol=1e-9)
+    np.testing.assert_allclose(s.rate_setpoint, expected, atol=1e-9)
 
 
 def test_slow_flight_turns_as_at_seven_tenths_of_the_lowest_airspeed() -> None:
     nav, _, s = flying(roll=0.4, airspeed=3.0)
-    s[c.ROLL_SETPOINT] = 0.4
+    s.roll_setpoint = 0.4
     attitude_control(nav, parameters(yaw_rate_max_rad_s=9.0), s)
     turn = G * math.tan(0.4) / (0.7 * 10.0)
-    assert s[c.RATE_SETPOINT + 2] == pytest.approx(math.cos(0.4) * turn)
+    assert s.rate_setpoint[2] == pytest.approx(math.cos(0.4) * turn)
 
 
 @pytest.mark.parametrize(
@@ -117,13 +118,13 @@ def test_yaw_rate_leans_against_lateral_acceleration(slip: float, counted: float
     nav, _, s = flying()
     nav[n.FORCE + 1] = slip
     attitude_control(nav, parameters(sideslip_gain_rad_s_per_m_s2=0.1), s)
-    assert s[c.RATE_SETPOINT + 2] == pytest.approx(-0.1 * counted)
+    assert s.rate_setpoint[2] == pytest.approx(-0.1 * counted)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_rate_setpoints_have_limits(sign: float) -> None:
     nav, _, s = flying()
-    s[c.ROLL_SETPOINT], s[c.PITCH_SETPOINT] = sign * 1.4, sign * 1.3
+    s.roll_setpoint, s.pitch_setpoint = sign * 1.4, sign * 1.3
     nav[n.FORCE + 1] = -sign * 3.0
     p = parameters(
         roll_rate_max_rad_s=0.9,
@@ -134,14 +135,14 @@ def test_rate_setpoints_have_limits(sign: float) -> None:
     )
     attitude_control(nav, p, s)
     limits = [0.9, 0.8, 0.2] if sign > 0.0 else [-0.9, -0.7, -0.2]
-    np.testing.assert_allclose(s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3], limits)
+    np.testing.assert_allclose(s.rate_setpoint, limits)
 
 
 def test_roll_error_is_the_shorter_way_round() -> None:
     nav, _, s = flying(roll=3.0)
-    s[c.ROLL_SETPOINT] = -3.0
+    s.roll_setpoint = -3.0
     attitude_control(nav, parameters(roll_rate_max_rad_s=9.0), s)
-    assert s[c.RATE_SETPOINT] == pytest.approx((2.0 * math.pi - 6.0) / 0.4)
+    assert s.rate_setpoint[0] == pytest.approx((2.0 * math.pi - 6.0) / 0.4)
 
 
 RATE_GAINS = {
@@ -174,10 +175,10 @@ def of_axes(name: str) -> Array:
 def rate_state() -> tuple[Array, Array]:
     nav, _, s = flying()
     nav[n.RATES_FRD_RAD_S] = 0.3, -0.2, 0.1
-    s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3] = 0.8, 0.5, -0.4
-    s[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3] = 0.25, -0.1, 0.15
-    s[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3] = 1.0, -2.0, 0.5
-    s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3] = 0.05, -0.04, 0.03
+    s.rate_setpoint = 0.8, 0.5, -0.4
+    s.rate_previous = 0.25, -0.1, 0.15
+    s.rate_derivative = 1.0, -2.0, 0.5
+    s.rate_integral = 0.05, -0.04, 0.03
     return nav, s
 
 
@@ -193,21 +194,21 @@ def test_rate_law(airspeed: float, scaled_with: float | None) -> None:
         p, scale = parameters(**RATE_GAINS, airspeed_scaling=False), 1.0
     else:
         p, scale = parameters(**RATE_GAINS), 15.0 / scaled_with
-    s[c.EAS] = airspeed
+    s.eas = airspeed
     before, surfaces = s.copy(), np.zeros(3)
     rate_control(nav, p, s, surfaces, False)
-    rates, wanted = nav[n.RATES_FRD_RAD_S], before[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
+    rates, wanted = nav[n.RATES_FRD_RAD_S], before.rate_setpoint
     error = wanted - rates
-    old = before[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3]
-    slope = (rates - before[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3]) / PHYSICS_S
+    old = before.rate_derivative
+    slope = (rates - before.rate_previous) / PHYSICS_S
     derivative = old + PHYSICS_S / (PHYSICS_S + 1.0 / (2.0 * math.pi * 12.0)) * (slope - old)
-    integral = before[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3]
+    integral = before.rate_integral
     moment = of_axes("p") * error + integral - of_axes("d") * derivative
     expected = scale**2 * moment + scale * of_axes("ff") * wanted + [0.01, -0.03, 0.02]
     np.testing.assert_allclose(surfaces, expected, rtol=1e-12)
-    np.testing.assert_allclose(s[c.RATE_DERIVATIVE : c.RATE_DERIVATIVE + 3], derivative, rtol=1e-12)
-    np.testing.assert_array_equal(s[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3], rates)
-    moved = s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3] - integral
+    np.testing.assert_allclose(s.rate_derivative, derivative, rtol=1e-12)
+    np.testing.assert_array_equal(s.rate_previous, rates)
+    moved = s.rate_integral - integral
     np.testing.assert_allclose(moved, of_axes("i") * error * PHYSICS_S, rtol=1e-9)
 
 
@@ -228,11 +229,11 @@ def test_rate_integrators_wait_at_the_stops(
 ) -> None:
     nav, s = rate_state()
     nav[n.RATES_FRD_RAD_S] = 0.0
-    s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3] = 0.0
-    s[c.RATE_SETPOINT + axis], s[c.UNALLOCATED + axis] = error, missing
-    before = s[c.RATE_INTEGRAL + axis]
+    s.rate_setpoint = 0.0
+    s.rate_setpoint[axis], s.unallocated[axis] = error, missing
+    before = s.rate_integral[axis]
     rate_control(nav, parameters(**RATE_GAINS), s, np.zeros(3), False)
-    assert bool((s[c.RATE_INTEGRAL + axis] - before) * error > 0.0) is integrates
+    assert bool((s.rate_integral[axis] - before) * error > 0.0) is integrates
 
 
 @pytest.mark.parametrize(
@@ -242,23 +243,21 @@ def test_rate_integrators_wait_on_the_runway_and_are_empty_on_the_ground(
     contact: float, rolling: bool, integral: list[float]
 ) -> None:
     nav, s = rate_state()
-    s[c.GROUND_CONTACT] = contact
+    s.ground_contact = contact
     rate_control(nav, parameters(**RATE_GAINS), s, np.zeros(3), rolling)
-    np.testing.assert_array_equal(s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3], integral)
+    np.testing.assert_array_equal(s.rate_integral, integral)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_rate_integrators_and_gyro_readings_have_limits(sign: float) -> None:
     nav, s = rate_state()
     nav[n.RATES_FRD_RAD_S] = -sign * 1e4
-    s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3] = 0.0
+    s.rate_setpoint = 0.0
     for _ in range(200):
-        s[c.UNALLOCATED : c.UNALLOCATED + 3] = 0.0
+        s.unallocated = 0.0
         rate_control(nav, parameters(**RATE_GAINS), s, np.zeros(3), False)
-    np.testing.assert_allclose(s[c.RATE_INTEGRAL : c.RATE_INTEGRAL + 3], sign * of_axes("integral_max"))
-    np.testing.assert_array_equal(
-        s[c.RATE_PREVIOUS : c.RATE_PREVIOUS + 3], -sign * 40.0
-    )  # no gyro reads more
+    np.testing.assert_allclose(s.rate_integral, sign * of_axes("integral_max"))
+    np.testing.assert_array_equal(s.rate_previous, -sign * 40.0)  # no gyro reads more
 
 
 def test_surfaces_fade_in_on_the_runway() -> None:
@@ -278,14 +277,12 @@ def test_rudder_goes_with_aileron_and_stick_and_stops_at_its_stop() -> None:
     surfaces = np.array([0.5, -1.4, 0.1])
     limit_surfaces(parameters(roll_to_rudder_ff=0.4), s, 0.15, surfaces)
     np.testing.assert_allclose(surfaces, [0.5, -1.0, 0.45])
-    np.testing.assert_allclose(s[c.UNALLOCATED : c.UNALLOCATED + 3], [0.0, -0.4, 0.0], atol=1e-12)
+    np.testing.assert_allclose(s.unallocated, [0.0, -0.4, 0.0], atol=1e-12)
     for sign in (1.0, -1.0):  # of the aileron, only what it can give
         surfaces = sign * np.array([3.0, 0.2, 0.9])
         limit_surfaces(parameters(roll_to_rudder_ff=0.4), s, 0.0, surfaces)
         np.testing.assert_allclose(surfaces, sign * np.array([1.0, 0.2, 1.0]))
-        np.testing.assert_allclose(
-            s[c.UNALLOCATED : c.UNALLOCATED + 3], sign * np.array([2.0, 0.0, 0.3]), atol=1e-12
-        )
+        np.testing.assert_allclose(s.unallocated, sign * np.array([2.0, 0.0, 0.3]), atol=1e-12)
 
 
 WHEEL = {
@@ -305,31 +302,31 @@ def test_wheel_law(speed: float, scale: float, error: float, wanted: float) -> N
     the speed, as the wheels' and the rudder's effect grows (PX4)."""
     nav, setpoint, s = flying(yaw=1.0, airspeed=speed)
     setpoint[sp.STEERING_HEADING_RAD] = 1.0 + error
-    nav[n.RATES + 2], s[c.WHEEL_INTEGRAL] = 0.05, 0.04
+    nav[n.RATES + 2], s.wheel_integral = 0.05, 0.04
     command = wheel_control(nav, setpoint, parameters(**WHEEL), s)
     rate_error = wanted - 0.05
-    assert s[c.RATE_SETPOINT + 2] == pytest.approx(wanted)
+    assert s.rate_setpoint[2] == pytest.approx(wanted)
     assert command == pytest.approx(scale * 0.25 * wanted + scale**2 * (0.6 * rate_error + 0.04))
-    assert s[c.WHEEL_INTEGRAL] == pytest.approx(0.04 + 0.2 * rate_error * PHYSICS_S)
+    assert s.wheel_integral == pytest.approx(0.04 + 0.2 * rate_error * PHYSICS_S)
 
 
 def test_wheel_integrator_rests_at_rest_and_at_the_stops() -> None:
     nav, setpoint, s = flying(airspeed=0.9)
     setpoint[sp.STEERING_HEADING_RAD] = 0.2
     wheel_control(nav, setpoint, parameters(**WHEEL), s)
-    assert s[c.WHEEL_INTEGRAL] == 0.0
+    assert s.wheel_integral == 0.0
     for sign in (1.0, -1.0):
         nav, setpoint, s = flying(airspeed=4.0)
         setpoint[sp.STEERING_HEADING_RAD] = sign * 0.2
         stiff = parameters(**(WHEEL | {"wheel_p": 9.0}))
         assert wheel_control(nav, setpoint, stiff, s) == sign
-        assert s[c.WHEEL_INTEGRAL] == 0.0
+        assert s.wheel_integral == 0.0
         nav[n.RATES + 2] = sign * 0.35  # little is missing, for long
-        s[c.WHEEL_INTEGRAL] = sign * 0.2999
+        s.wheel_integral = sign * 0.2999
         p = parameters(**WHEEL)
         for _ in range(10):
             wheel_control(nav, setpoint, p, s)
-        assert s[c.WHEEL_INTEGRAL] == sign * 0.3
+        assert s.wheel_integral == sign * 0.3
     nav[n.VEL_NED_M_S] = math.nan
     assert math.isfinite(wheel_control(nav, setpoint, parameters(**WHEEL), s))
 
@@ -344,7 +341,7 @@ def test_airspeed_filter_is_the_steady_state_kalman_filter() -> None:
     cov = solve_continuous_are(a.T, np.eye(2), np.diag([0.0, process**2]), noises)
     gain = cov @ np.linalg.inv(noises)
     nav, _, s = flying(airspeed=15.3)
-    s[c.EAS], s[c.EAS_RATE] = 15.0, 0.4
+    s.eas, s.eas_rate = 15.0, 0.4
     nav[n.ACC] = 0.9
     p = parameters(
         airspeed_noise_m_s=noise,
@@ -355,30 +352,30 @@ def test_airspeed_filter_is_the_steady_state_kalman_filter() -> None:
     predicted = 15.0 + GUIDANCE_S * 0.4
     innovation = np.array([15.3 - predicted, 0.9 - 0.4])
     np.testing.assert_allclose(
-        [s[c.EAS], s[c.EAS_RATE]], np.array([predicted, 0.4]) + GUIDANCE_S * gain @ innovation, rtol=1e-9
+        [s.eas, s.eas_rate], np.array([predicted, 0.4]) + GUIDANCE_S * gain @ innovation, rtol=1e-9
     )
 
 
 def test_airspeed_starts_at_what_is_measured_and_is_the_trim_without() -> None:
     nav, _, s = flying(airspeed=13.0)
-    s[c.EAS_KNOWN], s[c.EAS_RATE] = 0.0, 0.7
+    s.eas_known, s.eas_rate = 0.0, 0.7
     update_air(nav, parameters(), s, GUIDANCE_S)
-    assert (s[c.EAS], s[c.EAS_RATE], s[c.EAS_KNOWN]) == (13.0, 0.0, 1.0)
-    s[c.EAS_RATE] = 0.7
+    assert (s.eas, s.eas_rate, s.eas_known) == (13.0, 0.0, 1.0)
+    s.eas_rate = 0.7
     nav[n.AIRSPEED_M_S] = math.nan
     update_air(nav, parameters(), s, GUIDANCE_S)
-    assert (s[c.EAS], s[c.EAS_RATE], s[c.EAS_KNOWN]) == (15.0, 0.0, 0.0)
+    assert (s.eas, s.eas_rate, s.eas_known) == (15.0, 0.0, 0.0)
 
 
 def test_airspeed_is_never_negative() -> None:
     nav, _, s = flying()
     nav[n.AIRSPEED_M_S] = -4.0
-    s[c.EAS_KNOWN] = 0.0
+    s.eas_known = 0.0
     update_air(nav, parameters(), s, GUIDANCE_S)
-    assert s[c.EAS] == 0.0
+    assert s.eas == 0.0
     nav[n.ACC] = -30.0
     update_air(nav, parameters(), s, GUIDANCE_S)
-    assert s[c.EAS] == 0.0
+    assert s.eas == 0.0
 
 
 @pytest.mark.parametrize(
@@ -387,9 +384,9 @@ def test_airspeed_is_never_negative() -> None:
 )
 def test_true_over_equivalent_airspeed(equivalent: float, true: float, ratio: float) -> None:
     nav, _, s = flying()
-    nav[n.AIRSPEED_M_S], nav[n.AIRSPEED_TRUE_M_S], s[c.EAS_TO_TAS] = equivalent, true, 1.1
+    nav[n.AIRSPEED_M_S], nav[n.AIRSPEED_TRUE_M_S], s.eas_to_tas = equivalent, true, 1.1
     update_air(nav, parameters(), s, GUIDANCE_S)
-    assert s[c.EAS_TO_TAS] == pytest.approx(ratio)
+    assert s.eas_to_tas == pytest.approx(ratio)
 
 
 def test_acceleration_is_taken_as_equivalent() -> None:
@@ -401,18 +398,18 @@ def test_acceleration_is_taken_as_equivalent() -> None:
     other_nav, _, other = flying()
     other_nav[n.ACC] = 0.5
     update_air(other_nav, parameters(), other, GUIDANCE_S)
-    assert s[c.EAS_TO_TAS] == 2.0
-    assert s[c.EAS_RATE] == pytest.approx(other[c.EAS_RATE])
-    assert s[c.EAS_RATE] > 0.0
+    assert s.eas_to_tas == 2.0
+    assert s.eas_rate == pytest.approx(other.eas_rate)
+    assert s.eas_rate > 0.0
 
 
 def test_unknown_acceleration_leaves_the_rate_to_the_airspeed() -> None:
     nav, _, s = flying()
     nav[n.ACC] = math.nan
-    s[c.EAS_RATE] = 0.5
-    s[c.EAS] = 15.0 - GUIDANCE_S * 0.5  # so that the airspeed is as predicted
+    s.eas_rate = 0.5
+    s.eas = 15.0 - GUIDANCE_S * 0.5  # so that the airspeed is as predicted
     update_air(nav, parameters(), s, GUIDANCE_S)
-    assert s[c.EAS_RATE] == pytest.approx(0.5)
+    assert s.eas_rate == pytest.approx(0.5)
 
 
 def test_acceleration_along_the_flow() -> None:
@@ -446,37 +443,37 @@ def test_acceleration_along_the_flow() -> None:
 def test_heading_error_is_a_lateral_acceleration(yaw: float, error: float, turn: float) -> None:
     nav, setpoint, s = flying(yaw=yaw)
     setpoint[sp.HEADING_RAD], setpoint[sp.LATERAL_ACCELERATION_M_S2] = yaw + error, 0.5
-    s[c.EAS_TO_TAS] = 1.1
+    s.eas_to_tas = 1.1
     lateral_control(nav, setpoint, parameters(roll_slew_rad_s=1e3), s, GUIDANCE_S)
     acceleration = 0.5 + 0.8885 * AIRSPEED * 1.1 * turn
-    assert s[c.LATERAL_ACCELERATION] == pytest.approx(acceleration)
-    limit = s[c.ROLL_LIMITED]
-    assert s[c.ROLL_SETPOINT] == pytest.approx(np.clip(math.atan(acceleration / G), -limit, limit))
-    assert math.remainder(s[c.HEADING_SETPOINT] - yaw - error, 2.0 * math.pi) == pytest.approx(0.0)
-    assert math.isnan(s[c.COURSE_SETPOINT])
-    assert s[c.AIRSPEED_FLOOR] == 0.0
+    assert s.lateral_acceleration == pytest.approx(acceleration)
+    limit = s.roll_limited
+    assert s.roll_setpoint == pytest.approx(np.clip(math.atan(acceleration / G), -limit, limit))
+    assert math.remainder(s.heading_setpoint - yaw - error, 2.0 * math.pi) == pytest.approx(0.0)
+    assert math.isnan(s.course_setpoint)
+    assert s.airspeed_floor == 0.0
 
 
 def test_course_is_flown_by_the_velocity_through_the_air() -> None:
     nav, setpoint, s = flying(yaw=1.3)  # the nose is elsewhere: sideslip
     nav[n.VEL_NED_M_S], nav[n.WIND_NED_M_S] = (14.0, 3.0, 0.0), (2.0, -4.0, 0.0)
     setpoint[sp.COURSE_RAD] = 0.6 + 2.0 * math.pi
-    s[c.EAS_TO_TAS] = 1.2
+    s.eas_to_tas = 1.2
     p = parameters(roll_slew_rad_s=1e3, ground_speed_min_m_s=9.0)
     lateral_control(nav, setpoint, p, s, GUIDANCE_S)
     airspeed = math.hypot(12.0, 7.0)
     heading = heading_for_course(0.6, airspeed, 2.0, -4.0)
-    assert s[c.HEADING_SETPOINT] == pytest.approx(heading)
-    assert s[c.COURSE_SETPOINT] == pytest.approx(0.6)
+    assert s.heading_setpoint == pytest.approx(heading)
+    assert s.course_setpoint == pytest.approx(0.6)
     error = heading - math.atan2(7.0, 12.0)
-    assert s[c.LATERAL_ACCELERATION] == pytest.approx(0.8885 * AIRSPEED * 1.2 * math.sin(error))
+    assert s.lateral_acceleration == pytest.approx(0.8885 * AIRSPEED * 1.2 * math.sin(error))
     # least airspeed for 9 m/s over ground along the course
     course = np.array([math.cos(0.6), math.sin(0.6)])
     needed = 9.0 * course - [2.0, -4.0] + 0.0
     across = np.array([-course[1], course[0]])
     along_wind, cross_wind = course @ [2.0, -4.0], across @ [2.0, -4.0]
-    assert s[c.AIRSPEED_FLOOR] == pytest.approx(math.hypot(9.0 - along_wind, cross_wind) / 1.2)
-    assert np.linalg.norm(needed) == pytest.approx(s[c.AIRSPEED_FLOOR] * 1.2)
+    assert s.airspeed_floor == pytest.approx(math.hypot(9.0 - along_wind, cross_wind) / 1.2)
+    assert np.linalg.norm(needed) == pytest.approx(s.airspeed_floor * 1.2)
 
 
 def test_without_wind_or_velocity_a_course_is_flown_by_what_is_known() -> None:
@@ -486,14 +483,14 @@ def test_without_wind_or_velocity_a_course_is_flown_by_what_is_known() -> None:
     p = parameters(roll_slew_rad_s=1e3)
     lateral_control(nav, setpoint, p, s, GUIDANCE_S)  # no wind: by the velocity over ground
     gain = 0.8885 * AIRSPEED
-    assert s[c.LATERAL_ACCELERATION] == pytest.approx(gain * math.sin(1.2 - 0.5 * math.pi))
+    assert s.lateral_acceleration == pytest.approx(gain * math.sin(1.2 - 0.5 * math.pi))
     nav[n.VEL_NED_M_S] = math.nan
     lateral_control(nav, setpoint, p, s, GUIDANCE_S)  # nor a velocity: by the nose and the airspeed
-    assert s[c.LATERAL_ACCELERATION] == pytest.approx(gain * math.sin(1.2 - 0.4))
+    assert s.lateral_acceleration == pytest.approx(gain * math.sin(1.2 - 0.4))
     nav[n.WIND_NED_M_S] = 3.0, 0.0, 0.0
     lateral_control(nav, setpoint, p, s, GUIDANCE_S)
     heading = heading_for_course(1.2, AIRSPEED, 3.0, 0.0)
-    assert s[c.LATERAL_ACCELERATION] == pytest.approx(gain * math.sin(heading - 0.4))
+    assert s.lateral_acceleration == pytest.approx(gain * math.sin(heading - 0.4))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -514,10 +511,10 @@ def test_bank_given_past_the_guidance(roll: float, flown: float) -> None:
     nav, setpoint, s = flying()
     setpoint[sp.ROLL_RAD], setpoint[sp.COURSE_RAD] = roll, 1.0
     lateral_control(nav, setpoint, parameters(), s, GUIDANCE_S)
-    assert s[c.ROLL_SETPOINT] == flown
-    assert s[c.LATERAL_ACCELERATION] == pytest.approx(G * math.tan(flown))
-    assert math.isnan(s[c.COURSE_SETPOINT])
-    assert math.isnan(s[c.HEADING_SETPOINT])
+    assert s.roll_setpoint == flown
+    assert s.lateral_acceleration == pytest.approx(G * math.tan(flown))
+    assert math.isnan(s.course_setpoint)
+    assert math.isnan(s.heading_setpoint)
 
 
 def test_a_course_can_be_flown_from_rest() -> None:
@@ -525,7 +522,7 @@ def test_a_course_can_be_flown_from_rest() -> None:
     nav, setpoint, s = flying(yaw=0.4, airspeed=0.0)
     setpoint[sp.COURSE_RAD] = 1.2
     lateral_control(nav, setpoint, parameters(), s, GUIDANCE_S)
-    assert s[c.HEADING_SETPOINT] == pytest.approx(1.2)
+    assert s.heading_setpoint == pytest.approx(1.2)
 
 
 @pytest.mark.parametrize("airspeed", [7.0, 3.0, 7.75])
@@ -533,7 +530,7 @@ def test_a_slow_wing_may_still_bank_by_fifteen_degrees(airspeed: float) -> None:
     nav, setpoint, s = flying(airspeed=airspeed)
     setpoint[sp.LATERAL_ACCELERATION_M_S2] = 20.0
     lateral_control(nav, setpoint, parameters(roll_slew_rad_s=1e3), s, GUIDANCE_S)
-    assert s[c.ROLL_SETPOINT] == pytest.approx(math.radians(15.0))
+    assert s.roll_setpoint == pytest.approx(math.radians(15.0))
 
 
 # -- heights
@@ -553,16 +550,16 @@ def test_height_trajectory_closes_in_proportion_and_brakes_before(
     )
     _, _, s = flying()
     reset_height(100.0, 0.0, s)
-    s[c.HEIGHT_RATE_REFERENCE] = sign * rate
+    s.height_rate_reference = sign * rate
     follow_height(100.0 + sign * left, 0.5, 100.0, p, s, GUIDANCE_S)
-    assert s[c.HEIGHT_RATE_REFERENCE] == pytest.approx(sign * rate)
-    assert s[c.HEIGHT_REFERENCE] == pytest.approx(100.0 + (sign * rate + 0.5) * GUIDANCE_S)
-    assert s[c.HEIGHT_CONTROLLED] == 1.0
+    assert s.height_rate_reference == pytest.approx(sign * rate)
+    assert s.height_reference == pytest.approx(100.0 + (sign * rate + 0.5) * GUIDANCE_S)
+    assert s.height_controlled == 1.0
     # a rate of its own changes with the acceleration
-    s[c.HEIGHT_RATE_REFERENCE] = 0.0
-    s[c.HEIGHT_REFERENCE] = 100.0
+    s.height_rate_reference = 0.0
+    s.height_reference = 100.0
     follow_height(100.0 + sign * left, 0.5, 100.0, p, s, GUIDANCE_S)
-    assert s[c.HEIGHT_RATE_REFERENCE] == pytest.approx(sign * 1.2 * GUIDANCE_S)
+    assert s.height_rate_reference == pytest.approx(sign * 1.2 * GUIDANCE_S)
 
 
 @pytest.mark.parametrize(
@@ -583,7 +580,7 @@ def test_height_trajectory_has_the_lower_of_its_rates(
         _, _, s = flying()
         reset_height(100.0, rate, s)
         follow_height(wanted, 0.0, 100.0, p, s, GUIDANCE_S)
-        assert s[c.HEIGHT_RATE_REFERENCE] == pytest.approx(rate)
+        assert s.height_rate_reference == pytest.approx(rate)
 
 
 def test_height_reference_waits_for_the_vehicle() -> None:
@@ -592,17 +589,17 @@ def test_height_reference_waits_for_the_vehicle() -> None:
         _, _, s = flying()
         reset_height(reference, 0.0, s)
         follow_height(reference, 0.0, 100.0, p, s, GUIDANCE_S)
-        assert s[c.HEIGHT_REFERENCE] == pytest.approx(held)
+        assert s.height_reference == pytest.approx(held)
 
 
 @pytest.mark.parametrize(("height", "climb"), [(math.nan, 2.0), (80.0, math.nan), (80.0, 2.0)])
 def test_height_trajectory_starts_where_the_vehicle_is(height: float, climb: float) -> None:
     _, _, s = flying()
-    s[c.HEIGHT_CONTROLLED] = 1.0
+    s.height_controlled = 1.0
     reset_height(height, climb, s)
-    assert s[c.HEIGHT_REFERENCE] == (80.0 if math.isfinite(height) else 0.0)
-    assert s[c.HEIGHT_RATE_REFERENCE] == (2.0 if math.isfinite(climb) else 0.0)
-    assert s[c.HEIGHT_CONTROLLED] == 0.0
+    assert s.height_reference == (80.0 if math.isfinite(height) else 0.0)
+    assert s.height_rate_reference == (2.0 if math.isfinite(climb) else 0.0)
+    assert s.height_controlled == 0.0
 
 
 # -- total energy
@@ -644,8 +641,8 @@ def test_energy_law(weight: float, climb: float) -> None:
     trim, feed-forward, damping and integrator. Values of a step worked out on paper."""
     nav, setpoint, s = flying(airspeed=16.0, climb=0.3)
     p = parameters(**(ENERGY | {"speed_weight": weight}))
-    s[c.EAS_RATE], s[c.ENERGY_RATE], s[c.EAS_TO_TAS] = 0.2, 5.0, 1.1
-    s[c.PITCH_INTEGRAL], s[c.THROTTLE_INTEGRAL], s[c.THROTTLE], s[c.PITCH_SETPOINT] = 0.02, 0.03, 0.5, 0.04
+    s.eas_rate, s.energy_rate, s.eas_to_tas = 0.2, 5.0, 1.1
+    s.pitch_integral, s.throttle_integral, s.throttle, s.pitch_setpoint = 0.02, 0.03, 0.5, 0.04
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = climb, 17.0
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
 
@@ -658,26 +655,26 @@ def test_energy_law(weight: float, climb: float) -> None:
     share = GUIDANCE_S / (GUIDANCE_S + 0.5)
     energy = 5.0 + share * (potential + kinetic - 5.0)
     wanted = np.clip(wanted_potential + wanted_kinetic, -G * 2.5, G * 4.0)
-    assert s[c.ENERGY_RATE] == pytest.approx(energy)
-    assert s[c.ENERGY_RATE_SETPOINT] == pytest.approx(wanted)
+    assert s.energy_rate == pytest.approx(energy)
+    assert s.energy_rate_setpoint == pytest.approx(wanted)
     missing = (wanted - energy) / (G * 4.0 + G * 2.5)
     trim = 0.5 + (0.8 - 0.5) * (17.0 - 15.0) / (20.0 - 15.0)
     throttle = trim + (wanted / (G * 4.0) * (1.0 - trim) if wanted >= 0.0 else wanted / (G * 2.5) * trim)
     integral = 0.03 + 0.4 * missing * GUIDANCE_S
-    assert s[c.THROTTLE_INTEGRAL] == pytest.approx(integral)
-    assert s[c.THROTTLE] == pytest.approx(np.clip(throttle + 0.3 * missing + integral, 0.0, 1.0))
+    assert s.throttle_integral == pytest.approx(integral)
+    assert s.throttle == pytest.approx(np.clip(throttle + 0.3 * missing + integral, 0.0, 1.0))
 
     height_share, speed_share = min(1.0, 2.0 - weight), min(1.0, weight)
     balance = (height_share * potential - speed_share * kinetic) / (true * G)
     balance_wanted = (height_share * wanted_potential - speed_share * wanted_kinetic) / (true * G)
     pitch_missing = balance_wanted - balance
     pitch_integral = 0.02 + 0.6 * pitch_missing * GUIDANCE_S
-    assert s[c.PITCH_INTEGRAL] == pytest.approx(pitch_integral)
-    assert s[c.PITCH_SETPOINT] == pytest.approx(
+    assert s.pitch_integral == pytest.approx(pitch_integral)
+    assert s.pitch_setpoint == pytest.approx(
         trim_pitch(17.0) + 0.5 * pitch_missing + 0.9 * balance_wanted + pitch_integral
     )
-    assert s[c.HEIGHT_RATE_SETPOINT] == climb
-    assert s[c.VEL_SETPOINT + 2] == -climb
+    assert s.height_rate_setpoint == climb
+    assert s.vel_setpoint[2] == -climb
 
 
 @pytest.mark.parametrize(
@@ -688,17 +685,17 @@ def test_trim_throttle_lies_between_the_three_that_are_known(airspeed: float, th
     nav, setpoint, s = flying(airspeed=airspeed)
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = 0.0, airspeed
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.THROTTLE] == pytest.approx(throttle)
+    assert s.throttle == pytest.approx(throttle)
     unknown = parameters(**(ENERGY | {"trim_throttle_min_speed": 0.0, "trim_throttle_max_speed": 0.0}))
     energy_control(nav, setpoint, unknown, s, GUIDANCE_S, False)
-    assert s[c.THROTTLE] == pytest.approx(0.5)
+    assert s.throttle == pytest.approx(0.5)
     # ends at the same airspeed as the trim give no slope
     flat = parameters(**(ENERGY | {"airspeed_min_m_s": 14.9995, "airspeed_max_m_s": 15.0005}))
     for wanted in (14.0, 16.0):
         setpoint[sp.AIRSPEED_M_S] = wanted
         nav, _, s = flying(airspeed=15.0)
         energy_control(nav, setpoint, flat, s, GUIDANCE_S, False)
-        assert s[c.THROTTLE] == pytest.approx(0.5, abs=2e-3)
+        assert s.throttle == pytest.approx(0.5, abs=2e-3)
 
 
 def test_trim_throttle_is_known_near_the_trim_airspeed_too() -> None:
@@ -706,41 +703,41 @@ def test_trim_throttle_is_known_near_the_trim_airspeed_too() -> None:
     near = parameters(**(ENERGY | {"airspeed_min_m_s": 14.5, "airspeed_max_m_s": 15.5}))
     for wanted, throttle in ((14.5, 0.35), (14.75, 0.425), (15.25, 0.65), (15.5, 0.8)):
         nav, setpoint, s = flying(airspeed=15.2)
-        s[c.EAS] = wanted + 1e-12
+        s.eas = wanted + 1e-12
         setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = 0.0, wanted
         p = near.copy()
         p[c.AIRSPEED_STALL] = 7.0
         p[c.THROTTLE_DAMPING] = p[c.THROTTLE_I] = 0.0
-        s[c.ENERGY_RATE_SETPOINT] = 0.0
+        s.energy_rate_setpoint = 0.0
         energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-        under = s[c.UNDERSPEED]
-        assert s[c.THROTTLE] == pytest.approx(under + (1.0 - under) * throttle, abs=1e-6)
+        under = s.underspeed
+        assert s.throttle == pytest.approx(under + (1.0 - under) * throttle, abs=1e-6)
 
 
 @pytest.mark.parametrize("bank", [0.7, -0.7])
 def test_a_turn_asks_for_lift_energy_and_airspeed(bank: float) -> None:
     nav, setpoint, s = flying(airspeed=15.0)
-    s[c.ROLL_SETPOINT] = bank
+    s.roll_setpoint = bank
     setpoint[sp.HEIGHT_RATE_M_S] = 0.0
     p = parameters(**ENERGY)
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
     load_factor = 1.0 / math.cos(0.7)
-    assert s[c.ENERGY_RATE_SETPOINT] == pytest.approx(12.0 * (load_factor - 1.0))
-    assert s[c.PITCH_SETPOINT] == pytest.approx(trim_pitch(15.0, load_factor))
+    assert s.energy_rate_setpoint == pytest.approx(12.0 * (load_factor - 1.0))
+    assert s.pitch_setpoint == pytest.approx(trim_pitch(15.0, load_factor))
     setpoint[sp.AIRSPEED_M_S] = 10.0  # the lowest airspeed grows with the root of the load factor
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-    assert s[c.AIRSPEED_SETPOINT] == pytest.approx(10.0 * math.sqrt(load_factor))
+    assert s.airspeed_setpoint == pytest.approx(10.0 * math.sqrt(load_factor))
 
 
 @pytest.mark.parametrize("bank", [1.5, -1.5])
 def test_load_factor_of_a_bank_counts_up_to_five(bank: float) -> None:
     nav, setpoint, s = flying(airspeed=15.0)
-    s[c.ROLL_SETPOINT] = bank
+    s.roll_setpoint = bank
     setpoint[sp.HEIGHT_RATE_M_S] = 0.0
     p = parameters(**(ENERGY | {"turn_energy_rate_m2_s3": 2.0}))
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
     # the lowest airspeed of that turn is above the highest of all: 5 m/s faster, over the time constant
-    assert s[c.ENERGY_RATE_SETPOINT] == pytest.approx(2.0 * (5.0 - 1.0) + 15.0 * 5.0 / 4.0)
+    assert s.energy_rate_setpoint == pytest.approx(2.0 * (5.0 - 1.0) + 15.0 * 5.0 / 4.0)
 
 
 @pytest.mark.parametrize(
@@ -751,19 +748,19 @@ def test_underspeed_lies_between_stall_and_lowest_airspeed(airspeed: float, unde
     nav, setpoint, s = flying(airspeed=airspeed)
     setpoint[sp.HEIGHT_RATE_M_S] = 0.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.UNDERSPEED] == pytest.approx(under, abs=1e-9)
-    s[c.EAS_KNOWN] = 0.0
+    assert s.underspeed == pytest.approx(under, abs=1e-9)
+    s.eas_known = 0.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.UNDERSPEED] == 0.0
+    assert s.underspeed == 0.0
 
 
 def test_underspeed_grows_with_the_bank() -> None:
     bank = math.acos(1.0 / 1.44)  # the root of the load factor is 1.2
     nav, setpoint, s = flying(airspeed=1.2 * 8.95)
-    s[c.ROLL_SETPOINT] = bank
+    s.roll_setpoint = bank
     setpoint[sp.HEIGHT_RATE_M_S] = 0.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.UNDERSPEED] == pytest.approx(0.5)
+    assert s.underspeed == pytest.approx(0.5)
 
 
 def test_pitch_setpoint_changes_with_the_vertical_acceleration() -> None:
@@ -771,9 +768,9 @@ def test_pitch_setpoint_changes_with_the_vertical_acceleration() -> None:
     for climb, sign in ((4.0, 1.0), (-4.0, -1.0)):
         nav, setpoint, s = flying()
         setpoint[sp.HEIGHT_RATE_M_S] = climb
-        s[c.PITCH_SETPOINT] = 0.02
+        s.pitch_setpoint = 0.02
         energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-        assert s[c.PITCH_SETPOINT] == pytest.approx(0.02 + sign * GUIDANCE_S * 3.0 / AIRSPEED)
+        assert s.pitch_setpoint == pytest.approx(0.02 + sign * GUIDANCE_S * 3.0 / AIRSPEED)
 
 
 @pytest.mark.parametrize(
@@ -790,10 +787,10 @@ def test_pitch_setpoint_changes_with_the_vertical_acceleration() -> None:
 def test_pitch_integrator_waits_at_the_limits(previous: float, climb: float, integrates: bool) -> None:
     nav, setpoint, s = flying()
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.PITCH_MIN_RAD], setpoint[sp.PITCH_MAX_RAD] = climb, -0.1, 0.1
-    s[c.PITCH_SETPOINT] = previous
+    s.pitch_setpoint = previous
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert bool(s[c.PITCH_INTEGRAL] * climb > 0.0) is integrates
-    assert abs(s[c.PITCH_SETPOINT]) <= 0.1
+    assert bool(s.pitch_integral * climb > 0.0) is integrates
+    assert abs(s.pitch_setpoint) <= 0.1
 
 
 @pytest.mark.parametrize(
@@ -810,40 +807,40 @@ def test_pitch_integrator_waits_at_the_limits(previous: float, climb: float, int
 def test_throttle_integrator_waits_at_the_limits(previous: float, climb: float, integrates: bool) -> None:
     nav, setpoint, s = flying()
     setpoint[sp.HEIGHT_RATE_M_S] = climb
-    s[c.THROTTLE] = previous
+    s.throttle = previous
     p = parameters(**(ENERGY | {"throttle_min": 0.2, "throttle_max": 0.9}))
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-    assert bool(s[c.THROTTLE_INTEGRAL] * climb > 0.0) is integrates
+    assert bool(s.throttle_integral * climb > 0.0) is integrates
 
 
 def test_integrators_rest_on_the_ground_and_start_empty() -> None:
     for entering, contact in ((True, 0.0), (False, 1.0)):
         nav, setpoint, s = flying(climb=1.0)
         setpoint[sp.HEIGHT_RATE_M_S] = 0.0
-        s[c.PITCH_INTEGRAL] = s[c.THROTTLE_INTEGRAL] = 0.3
-        s[c.GROUND_CONTACT] = contact
+        s.pitch_integral = s.throttle_integral = 0.3
+        s.ground_contact = contact
         p = parameters(**(ENERGY | {"pitch_integral_1_s": 0.0, "throttle_integral_1_s": 0.0}))
         energy_control(nav, setpoint, p, s, GUIDANCE_S, entering)
-        assert s[c.PITCH_INTEGRAL] == 0.0
-        assert s[c.THROTTLE_INTEGRAL] == 0.0
+        assert s.pitch_integral == 0.0
+        assert s.throttle_integral == 0.0
         if entering:
-            assert s[c.ENERGY_RATE] == pytest.approx(G * 1.0)
+            assert s.energy_rate == pytest.approx(G * 1.0)
     nav, setpoint, s = flying(climb=1.0)
-    s[c.GROUND_CONTACT] = 1.0
+    s.ground_contact = 1.0
     setpoint[sp.HEIGHT_RATE_M_S] = 0.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.PITCH_INTEGRAL] == 0.0
-    assert s[c.THROTTLE_INTEGRAL] == 0.0
+    assert s.pitch_integral == 0.0
+    assert s.throttle_integral == 0.0
 
 
 def test_without_airspeed_the_throttle_keeps_a_positive_integral() -> None:
     for integral, kept in ((0.1, 0.1), (-0.1, 0.0)):
         nav, setpoint, s = flying()
-        s[c.EAS_KNOWN], s[c.THROTTLE_INTEGRAL] = 0.0, integral
+        s.eas_known, s.throttle_integral = 0.0, integral
         setpoint[sp.HEIGHT_RATE_M_S] = 0.0
         energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-        assert s[c.THROTTLE] == pytest.approx(0.5 + kept)
-        assert s[c.THROTTLE_INTEGRAL] == integral
+        assert s.throttle == pytest.approx(0.5 + kept)
+        assert s.throttle_integral == integral
 
 
 @pytest.mark.parametrize(("wanted", "limit", "given"), [(4.0, 0.6, 0.6), (4.0, 2.0, 1.0), (4.0, -1.0, 0.0)])
@@ -851,40 +848,40 @@ def test_throttle_limit_of_the_setpoint(wanted: float, limit: float, given: floa
     nav, setpoint, s = flying()
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.THROTTLE_MAX] = wanted, limit
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.THROTTLE] == pytest.approx(given)
+    assert s.throttle == pytest.approx(given)
 
 
 @pytest.mark.parametrize(("climb", "sign"), [(4.0, 1.0), (-3.0, -1.0)])
 def test_throttle_slews(climb: float, sign: float) -> None:
     nav, setpoint, s = flying()
-    s[c.THROTTLE] = 0.4 if sign > 0.0 else 0.6
+    s.throttle = 0.4 if sign > 0.0 else 0.6
     setpoint[sp.HEIGHT_RATE_M_S] = climb
     p = parameters(**(ENERGY | {"throttle_slew_1_s": 0.5}))
-    before = s[c.THROTTLE]
+    before = s.throttle
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-    assert s[c.THROTTLE] == pytest.approx(before + sign * 0.5 * GUIDANCE_S)
+    assert s.throttle == pytest.approx(before + sign * 0.5 * GUIDANCE_S)
 
 
 def test_height_error_is_a_climb_rate() -> None:
     nav, setpoint, s = flying()
-    s[c.HEIGHT_CONTROLLED], s[c.HEIGHT_REFERENCE], s[c.HEIGHT_RATE_REFERENCE] = 1.0, 101.5, 0.4
+    s.height_controlled, s.height_reference, s.height_rate_reference = 1.0, 101.5, 0.4
     setpoint[sp.DOWN_M], setpoint[sp.HEIGHT_RATE_M_S] = -101.9, 0.2
     p = parameters(**ENERGY)
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
     rate = 0.4 + min(1.5 * GUIDANCE_S, max(-1.5 * GUIDANCE_S, 0.8 * 0.4 - 0.4))
     reference = 101.5 + (rate + 0.2) * GUIDANCE_S
-    assert s[c.HEIGHT_REFERENCE] == pytest.approx(reference)
-    assert s[c.HEIGHT_RATE_SETPOINT] == pytest.approx((reference - 100.0) / 3.0 + 0.7 * rate + 0.2)
+    assert s.height_reference == pytest.approx(reference)
+    assert s.height_rate_setpoint == pytest.approx((reference - 100.0) / 3.0 + 0.7 * rate + 0.2)
 
 
 @pytest.mark.parametrize(("down", "rate"), [(-1000.0, 4.0), (800.0, -5.0)])
 def test_climb_rate_of_a_height_has_limits(down: float, rate: float) -> None:
     nav, setpoint, s = flying()
-    s[c.HEIGHT_CONTROLLED], s[c.HEIGHT_REFERENCE] = 1.0, 100.0 + 30.0 * math.copysign(1.0, rate)
-    s[c.HEIGHT_RATE_REFERENCE] = rate
+    s.height_controlled, s.height_reference = 1.0, 100.0 + 30.0 * math.copysign(1.0, rate)
+    s.height_rate_reference = rate
     setpoint[sp.DOWN_M] = down
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.HEIGHT_RATE_SETPOINT] == rate
+    assert s.height_rate_setpoint == rate
 
 
 def test_a_slope_is_joined_at_the_climb_rate_that_is_flown() -> None:
@@ -892,8 +889,8 @@ def test_a_slope_is_joined_at_the_climb_rate_that_is_flown() -> None:
     nav, setpoint, s = flying(climb=1.0)
     setpoint[sp.DOWN_M], setpoint[sp.HEIGHT_RATE_M_S] = -100.0, 1.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.HEIGHT_RATE_REFERENCE] == pytest.approx(0.0)
-    assert s[c.HEIGHT_REFERENCE] == pytest.approx(100.0 + GUIDANCE_S)
+    assert s.height_rate_reference == pytest.approx(0.0)
+    assert s.height_reference == pytest.approx(100.0 + GUIDANCE_S)
 
 
 @pytest.mark.parametrize(("given", "expected"), [(math.nan, 0.0), (0.7, 0.7)])
@@ -902,7 +899,7 @@ def test_unknown_height_is_not_controlled(given: float, expected: float) -> None
     nav[n.POS + 2] = math.nan
     setpoint[sp.DOWN_M], setpoint[sp.HEIGHT_RATE_M_S] = -120.0, given
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.HEIGHT_RATE_SETPOINT] == expected
+    assert s.height_rate_setpoint == expected
 
 
 @pytest.mark.parametrize(
@@ -912,24 +909,24 @@ def test_pitch_and_throttle_given_past_the_energy_control(pitch: float, flown: f
     nav, setpoint, s = flying()
     setpoint[sp.PITCH_RAD], setpoint[sp.THROTTLE] = pitch, 1.4
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.PITCH_SETPOINT] == flown
-    assert s[c.THROTTLE] == 1.0
+    assert s.pitch_setpoint == flown
+    assert s.throttle == 1.0
     setpoint[sp.THROTTLE] = -0.3
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.THROTTLE] == 0.0
-    assert math.isnan(s[c.HEIGHT_RATE_SETPOINT])
+    assert s.throttle == 0.0
+    assert math.isnan(s.height_rate_setpoint)
 
 
 def test_throttle_given_alone_leaves_the_airspeed_to_the_pitch() -> None:
     nav, setpoint, s = flying(airspeed=16.0)
     setpoint[sp.THROTTLE], setpoint[sp.AIRSPEED_M_S] = 0.7, 15.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.BALANCE_RATE_SETPOINT] == pytest.approx(16.0 * 1.0 / 4.0)  # kinetic alone, slower: nose up
+    assert s.balance_rate_setpoint == pytest.approx(16.0 * 1.0 / 4.0)  # kinetic alone, slower: nose up
     for wanted, limited in ((30.0, -1.5), (1.0, 1.5)):  # at most 1.5 m/s^2
         setpoint[sp.AIRSPEED_M_S] = wanted
         p = parameters(**(ENERGY | {"airspeed_time_constant_s": 0.5}))
         energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-        assert s[c.BALANCE_RATE_SETPOINT] == pytest.approx(16.0 * limited)
+        assert s.balance_rate_setpoint == pytest.approx(16.0 * limited)
 
 
 def test_flare_flies_its_height_rate_alone() -> None:
@@ -937,8 +934,8 @@ def test_flare_flies_its_height_rate_alone() -> None:
     setpoint[sp.THROTTLE], setpoint[sp.HEIGHT_RATE_M_S] = 0.0, -0.5
     p = parameters(**(ENERGY | {"lift_angle_rad": 0.0}))
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-    assert s[c.UNDERSPEED] == 0.0
-    assert s[c.BALANCE_RATE_SETPOINT] == pytest.approx(G * -0.5)
+    assert s.underspeed == 0.0
+    assert s.balance_rate_setpoint == pytest.approx(G * -0.5)
 
 
 def test_a_glider_flies_its_airspeed_by_pitch() -> None:
@@ -946,11 +943,11 @@ def test_a_glider_flies_its_airspeed_by_pitch() -> None:
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = 2.0, 15.0
     glider = parameters(**(ENERGY | {"powered": False}))
     energy_control(nav, setpoint, glider, s, GUIDANCE_S, False)
-    assert s[c.BALANCE_RATE_SETPOINT] == pytest.approx(16.0 * 0.25)
-    assert s[c.THROTTLE] == 0.0
-    s[c.EAS_KNOWN] = 0.0  # its glide, by the attitude it should have
+    assert s.balance_rate_setpoint == pytest.approx(16.0 * 0.25)
+    assert s.throttle == 0.0
+    s.eas_known = 0.0  # its glide, by the attitude it should have
     energy_control(nav, setpoint, glider, s, GUIDANCE_S, False)
-    assert s[c.BALANCE_RATE_SETPOINT] == pytest.approx(-G * 2.5)
+    assert s.balance_rate_setpoint == pytest.approx(-G * 2.5)
 
 
 def test_failed_motor_is_noticed_and_height_given_up() -> None:
@@ -961,46 +958,46 @@ def test_failed_motor_is_noticed_and_height_given_up() -> None:
     p = parameters(**ENERGY)
     weights = []
     for _ in range(round(3.0 / GUIDANCE_S) + 2):
-        s[c.THROTTLE] = 1.0
+        s.throttle = 1.0
         energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-        weights.append(s[c.POWERLESS])
+        weights.append(s.powerless)
     assert weights[round(1.5 / GUIDANCE_S) - 1] == pytest.approx(0.5)
-    assert s[c.POWERLESS] == 1.0
-    assert s[c.AIRSPEED_SETPOINT] == pytest.approx(11.0)
-    assert s[c.BALANCE_RATE] == pytest.approx(-15.0 * s[c.EAS_RATE])  # pitch flies the airspeed alone
+    assert s.powerless == 1.0
+    assert s.airspeed_setpoint == pytest.approx(11.0)
+    assert s.balance_rate == pytest.approx(-15.0 * s.eas_rate)  # pitch flies the airspeed alone
     # and forgotten as slowly once there is power again
     nav[n.VEL + 2] = -1.0
-    s[c.THROTTLE] = 1.0
+    s.throttle = 1.0
     energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
-    assert s[c.POWERLESS] == pytest.approx(1.0 - GUIDANCE_S / 3.0)
+    assert s.powerless == pytest.approx(1.0 - GUIDANCE_S / 3.0)
 
 
 @pytest.mark.parametrize("doubt", ["throttle", "given", "airspeed", "acceleration"])
 def test_a_motor_is_not_blamed_without_reason(doubt: str) -> None:
     nav, setpoint, s = flying(airspeed=15.0, climb=-3.0)
     setpoint[sp.HEIGHT_RATE_M_S] = 0.0
-    s[c.THROTTLE] = 0.9 if doubt == "throttle" else 1.0
+    s.throttle = 0.9 if doubt == "throttle" else 1.0
     if doubt == "given":
         setpoint[sp.PITCH_RAD] = 0.0
     if doubt == "airspeed":
-        s[c.EAS_KNOWN] = 0.0
+        s.eas_known = 0.0
     if doubt == "acceleration":  # height becomes speed: the energy stays
         nav[n.ACC] = 3.0
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.POWERLESS] == 0.0
+    assert s.powerless == 0.0
 
 
 def test_a_climb_out_gives_way_before_the_stall() -> None:
     nav, setpoint, s = flying(airspeed=8.2)
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.PITCH_MIN_RAD] = 3.0, 0.2
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.UNDERSPEED] == pytest.approx(1.0)
-    assert s[c.PITCH_SETPOINT] < 0.2
-    assert s[c.THROTTLE] == 1.0
+    assert s.underspeed == pytest.approx(1.0)
+    assert s.pitch_setpoint < 0.2
+    assert s.throttle == 1.0
     nav, setpoint, s = flying(airspeed=15.0)
     setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.PITCH_MIN_RAD] = -3.0, 0.2
     energy_control(nav, setpoint, parameters(**ENERGY), s, GUIDANCE_S, False)
-    assert s[c.PITCH_SETPOINT] == pytest.approx(0.2)
+    assert s.pitch_setpoint == pytest.approx(0.2)
 
 
 def test_unknown_climb_rate_counts_as_level() -> None:

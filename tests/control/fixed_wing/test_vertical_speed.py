@@ -12,6 +12,7 @@ from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.vertical import pitch_for_climb
 from autopilot_bridge.navigation import layout as n
 from flightsim.environment import CosineGust, Environment
+from flightsim.foundation.records import new_record
 from tests.control.fixed_wing.aerosonde import AEROSONDE
 from tests.control.fixed_wing.rig import Rig
 from tests.control.fixed_wing.test_lateral import packed
@@ -31,13 +32,13 @@ class Law:
     def __init__(
         self, *, airspeed_m_s: float = 25.0, climb_m_s: float = 0.0, pitch_rad: float, bank_rad: float = 0.0
     ) -> None:
-        self.nav, self.p, self.s = np.zeros(n.NAV_SIZE), packed(PARAMETERS), np.zeros(c.STATE_SIZE)
-        self.nav[n.AIRSPEED_M_S] = self.s[c.EAS] = airspeed_m_s
+        self.nav, self.p, self.s = np.zeros(n.NAV_SIZE), packed(PARAMETERS), new_record(c.FixedWingState)
+        self.nav[n.AIRSPEED_M_S] = self.s.eas = airspeed_m_s
         self.nav[DOWN] = -climb_m_s
         self.nav[PITCH] = pitch_rad
-        self.s[c.EAS_TO_TAS] = 1.0
-        self.s[c.ROLL_SETPOINT] = bank_rad
-        self.s[c.CLIMB_FLOWN] = 1.0  # as if flown so for a while
+        self.s.eas_to_tas = 1.0
+        self.s.roll_setpoint = bank_rad
+        self.s.climb_flown = 1.0  # as if flown so for a while
         self.feel(self.load_factor(airspeed_m_s, pitch_rad - climb_m_s / airspeed_m_s))
 
     @staticmethod
@@ -112,7 +113,7 @@ def test_stays_within_its_limits(pitch_rad: float, climb_m_s: float, load_factor
     low, high = math.radians(0.0), math.radians(4.0)
     for _ in range(250):
         assert low <= law.pitch(climb_m_s, low, high) <= high
-    assert abs(law.s[c.LIFTLESS_PITCH]) <= 0.2
+    assert abs(law.s.liftless_pitch) <= 0.2
 
 
 @given(st.floats(-0.05, 0.05))
@@ -122,27 +123,27 @@ def test_lift_that_a_downdraught_takes_is_made_up_by_pitch(gust_rad: float) -> N
     law = Law(pitch_rad=pitch)
     law.feel(law.load_factor(25.0, pitch - gust_rad))
     law.pitch(0.0)
-    assert law.s[c.LIFTLESS_PITCH] == pytest.approx(gust_rad / 11.0, abs=1e-12)  # 0.02 s of a lag of 0.2 s
+    assert law.s.liftless_pitch == pytest.approx(gust_rad / 11.0, abs=1e-12)  # 0.02 s of a lag of 0.2 s
     for _ in range(100):
         law.pitch(0.0)
-    assert law.s[c.LIFTLESS_PITCH] == pytest.approx(gust_rad, abs=1e-5)
+    assert law.s.liftless_pitch == pytest.approx(gust_rad, abs=1e-5)
     assert law.pitch(0.0) == pytest.approx(pitch + 2.0 * gust_rad, abs=1e-4)
 
 
 def test_forces_that_are_not_known_change_nothing() -> None:
     law = Law(pitch_rad=level_pitch(25.0))
-    law.s[c.LIFTLESS_PITCH] = 0.02
+    law.s.liftless_pitch = 0.02
     law.nav[FORCE_DOWN] = math.nan
     law.pitch(0.0)
-    assert law.s[c.LIFTLESS_PITCH] == 0.02
+    assert law.s.liftless_pitch == 0.02
 
 
 def test_takes_over_from_the_pitch_flown_so_far() -> None:
     law = Law(pitch_rad=0.1)
     law.nav[FORCE_DOWN] = math.nan
-    law.s[c.CLIMB_FLOWN], law.s[c.PITCH_SETPOINT] = 0.0, 0.1
+    law.s.climb_flown, law.s.pitch_setpoint = 0.0, 0.1
     assert law.pitch(0.0) == pytest.approx(0.1, abs=1e-9)
-    assert law.s[c.CLIMB_FLOWN] == 1.0
+    assert law.s.climb_flown == 1.0
 
 
 def test_unknown_airspeed_and_climb_leave_a_pitch() -> None:
