@@ -5,6 +5,7 @@ from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 
+import click
 import pytest
 
 from estimators.library import estimator_class
@@ -13,12 +14,14 @@ from flightsim.foundation.options import Declared, Options, declared, user_optio
 from missions.cli import options_page
 from missions.cli.fly import fly
 from missions.cli.fly_command import _COMMANDS, chosen_names
+from missions.cli.main import command_line
 from missions.cli.mission_command import DeclaredOption
 
 PAGE = Path(__file__).parents[1] / "docs/options.md"
 NO_NOUNS = re.compile(
-    r"(an?|and|as|at|by|don't|for|from|give|how|if|in|its?|of|on|or|so|that|the|their|these|they|this|to|what)"
-    r"|(where|which|with|without|draw|find|fly|keep|leave|look|make|print|run|show|speak|take|use)",
+    r"(an?|and|as|at|by|don't|for|from|give|how|if|in|its?|of|on|or|so|that|the|their|these|they|this|to)\b"
+    r"|(what(?!:)|where|which|with|without|draw|find|fly|keep|leave|look|make|print|show|speak|take|use)\b"
+    r"|run (?!folder)",
     re.IGNORECASE,
 )
 """Words with which a text would begin that can't be read alone, or that is a command."""
@@ -54,6 +57,31 @@ def test_texts_begin_with_a_noun_and_stand_alone():
         if not text[0].isupper() or NO_NOUNS.match(text) or not sentences:
             wrong.append((kind.__name__, name, text))
     assert wrong == []
+
+
+def helps(command, path="flightstack"):
+    """Where and what of each text of the command line that is not one of a field."""
+    for parameter in command.params:
+        if (
+            isinstance(parameter, click.Option)
+            and not isinstance(parameter, DeclaredOption)
+            and parameter.help
+        ):
+            yield f"{path} {parameter.opts[0]}", parameter.help
+    if isinstance(command, click.Group):
+        with click.Context(command) as context:
+            for name in command.list_commands(context):
+                yield from helps(command.get_command(context, name), f"{path} {name}")
+
+
+def test_the_other_texts_of_the_command_line_begin_with_a_noun_too():
+    found = {
+        where: text for where, text in helps(command_line) if where.split()[-1] not in ("--help", "--version")
+    }
+    assert len(found) > 150
+    assert {
+        where: text for where, text in found.items() if not text[0].isupper() or NO_NOUNS.match(text)
+    } == {}
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)

@@ -48,33 +48,33 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @click.command(cls=FlyCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("mission")
 @_link("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
-@_link("--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:...")
+@_link("--connect", multiple=True, metavar="URL", help="Vehicle elsewhere: udpin:0.0.0.0:14550, serial:...")
 @_link(
     "--system-id",
     multiple=True,
     type=click.IntRange(1, 255),
     metavar="ID",
-    help="Of the vehicle, where several are on its link; one for each --connect. [default: the first]",
+    help="System id, where several vehicles are on a link; one for each --connect. [default: the first]",
 )
 @_embedded("--world", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=WORLD_HELP)
 @_embedded(
     "--autopilot",
     type=click.Choice(["px4", "ardupilot"]),
-    help="Its firmware's ways. [default: px4, or what a mission file is for]",
+    help="Firmware whose ways the autopilot has. [default: px4, or what a mission file is for]",
 )
 @_embedded(
     "--model",
     multiple=True,
     metavar="NAME|PATH",
-    help="Its vehicle; one for all of a team, or one for each (repeat, or A,B,C). "
+    help="Model of the vehicle; one for all of a team, or one for each (repeat, or A,B,C). "
     "[default: iris, or an aircraft where the mission needs one]",
 )
 @_embedded(
     "--launch",
     type=click.Choice(["runway", "catapult", "hand"]),
-    help="How aircraft get into the air. [default: as described with the model]",
+    help="Launch of aircraft. [default: as described with the model]",
 )
-@_embedded("--home", help="lat,lon,alt[,heading]. [default: the firmware's own]")
+@_embedded("--home", help="Place of the home: lat,lon,alt[,heading]. [default: the firmware's own]")
 @_embedded("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
 @_embedded(
     "--wind",
@@ -92,7 +92,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 @_embedded(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
-    help="[default: none; orbit, occupancy, handoff: light]",
+    help="Turbulence of the air. [default: none; orbit, occupancy, handoff: light]",
 )
 @_embedded(
     "--gps",
@@ -105,7 +105,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     help="Forecast: wind to plan turns for, m/s, at the height of the flight. [default: --wind where it is "
     "given, as it is at 100 m or the mission's altitude, else 5]",
 )
-@_embedded("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
+@_embedded("--speedup", type=SPEEDUP, help="Simulated seconds per second at most. [default: no limit]")
 @_flight("--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params).")
 @_flight("--strict-params", is_flag=True, needs=("params", ()), help=STRICT_HELP)
 @_results("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
@@ -113,19 +113,19 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     "--on-failure",
     type=click.Choice(["return", "land", "hold"]),
     default="return",
-    help="Or on Ctrl-C, SIGTERM, SIGHUP.",
+    help="Command to the vehicle after a failure, or on Ctrl-C, SIGTERM, SIGHUP.",
 )
 @_elsewhere(
     "--yes",
     is_flag=True,
-    help="Fly a vehicle that may be real without asking, when nothing is found against it.",
+    help="Flight of a vehicle that may be real without a question, when nothing is found against it.",
 )
 @_elsewhere(
     "--check",
     is_flag=True,
-    help="Look at the vehicle and ask before the flight, also if it proves to be a simulation.",
+    help="Checks and a question before the flight, also if the vehicle proves to be a simulation.",
 )
-@_elsewhere("--regain", type=SECONDS, help="So long a lost link may take to come back, s. [default: 60]")
+@_elsewhere("--regain", type=SECONDS, help="Time in which a lost link may come back, s. [default: 60]")
 @_flight(
     "--max-error",
     type=float,
@@ -139,7 +139,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     help="Time that the battery lasts in flight, min: a longer mission is named before the takeoff, and "
     "refused on a vehicle that may be real. [default: as the vehicle reports it]",
 )
-@_link("--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS.")
+@_link("--onboard", is_flag=True, help="Messages as the vehicle's companion computer (191), not as a GCS.")
 @_estimator(
     "--estimator", metavar="NAME|FILE.py", help=f"Estimator beside the flight: {', '.join(ESTIMATORS)}."
 )
@@ -150,9 +150,9 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     "--export-plan",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Don't fly: write the mission that would be uploaded (.plan, .waypoints).",
+    help="File for the mission that would be uploaded (.plan, .waypoints), in place of a flight.",
 )
-@_results("--no-picture", is_flag=True, help="Don't draw track.png.")
+@_results("--no-picture", is_flag=True, help="No picture track.png.")
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
     from missions.process.ending import signal_of

@@ -34,7 +34,9 @@ def _log_argument(command: Command) -> Command:
 
 def _dialect_option(command: Command) -> Command:
     return click.option(
-        "--dialect", metavar="NAME|FILE.xml", help="Of a telemetry log. [default: all of MAVLink's messages]"
+        "--dialect",
+        metavar="NAME|FILE.xml",
+        help="Dialect of a telemetry log. [default: all of MAVLink's messages]",
     )(command)
 
 
@@ -226,7 +228,7 @@ def mutate(
     "--link",
     required=True,
     metavar="URL",
-    help="Where to: udpout:127.0.0.1:14550, tcpin:127.0.0.1:5760, serial:/dev/ttyUSB0:57600, ...",
+    help="Link: udpout:127.0.0.1:14550, tcpin:127.0.0.1:5760, serial:/dev/ttyUSB0:57600, ...",
 )
 @click.option(
     "--speed",

@@ -19,18 +19,23 @@ def magnetic_map() -> None:
 
 @magnetic_map.command(context_settings={"show_default": True})
 @click.argument("source", type=click.Path(path_type=Path, dir_okay=False))
-@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="The map (.npz).")
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Map (.npz) that is written.",
+)
 @click.option(
     "--values",
     type=click.Choice(["total", "anomaly-wmm", "anomaly-igrf"]),
     default="total",
     help="Total field, or an anomaly that the main field of a model is added to.",
 )
-@click.option("--year", type=float, default=2026.0, help="Of that main field.")
+@click.option("--year", type=float, default=2026.0, help="Year of that main field.")
 @click.option("--home", metavar="LAT,LON,ALT", help="Origin of the map. [default: middle of the data, 0 m]")
 @click.option("--height", type=FiniteRange(), default=100.0, help="Above home, what the map is valid at, m.")
-@click.option("--spacing", type=float, default=100.0, help="Of the map's grid lines, m.")
-@click.option("--line-spacing", type=float, help="Of the survey's lines, m; needed for line data.")
+@click.option("--spacing", type=float, default=100.0, help="Distance of the map's grid lines, m.")
+@click.option("--line-spacing", type=float, help="Distance of the survey's lines, m; needed for line data.")
 @click.option("--error", type=float, help="Standard deviation that the survey states, nT.")
 @click.option(
     "--no-data",
@@ -103,7 +108,7 @@ def info(file: Path) -> int:
     "--out",
     required=True,
     type=click.Path(path_type=Path, dir_okay=False),
-    help="The GeoTIFF (.tif) or netCDF file (.nc).",
+    help="GeoTIFF (.tif) or netCDF file (.nc) that is written.",
 )
 def export(file: Path, out: Path) -> int:
     """Write a map as GeoTIFF or netCDF in degrees of WGS84, for QGIS, GDAL, rasterio and xarray.

@@ -10,7 +10,7 @@ from autopilot_bridge.parameters import ParameterError
 if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
 
-STRICT_HELP = "A name in the --params file that the vehicle does not have is an error, not left out."
+STRICT_HELP = "Names in the --params file that the vehicle does not have are an error, not left out."
 
 
 def known_to_all(

@@ -24,7 +24,7 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     "--estimator",
     required=True,
     metavar="NAME|FILE.py",
-    help=f"{', '.join(ESTIMATORS)}, or a Python file with an Estimator of your own.",
+    help=f"Estimator: {', '.join(ESTIMATORS)}, or a Python file with an Estimator of your own.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
 @click.option(
@@ -35,7 +35,7 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     type=click.Choice(["autopilot", "truth", "both"]),
     default="both",
     show_default=True,
-    help="What the estimates are compared with; of both, the autopilot's word leads the summary.",
+    help="Reference that the estimates are compared with; of both, the autopilot's word leads the summary.",
 )
 @click.option(
     "--from",
@@ -51,13 +51,15 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     metavar="N",
     help="Boot of the vehicle, as log info numbers them. [default: all]",
 )
-@click.option("--dialect", metavar="NAME|FILE.xml", help="Of the logs. [default: all of MAVLink's messages]")
+@click.option(
+    "--dialect", metavar="NAME|FILE.xml", help="Dialect of the logs. [default: all of MAVLink's messages]"
+)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     help="Run folder, or folder of theirs. [default: runs/ESTIMATOR-N]",
 )
-@click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
+@click.option("--no-picture", is_flag=True, help="No picture errors.png.")
 def replay(**given: Any) -> int:
     """Run an estimator over each LOG and compare it with the autopilot and, where the log has it, the truth.
 

@@ -17,7 +17,7 @@ from missions.errors import MissionError, PlanError
     metavar="FOLDER",
     help="Folder for the results of a LOG. [default: runs/LOG-N]",
 )
-@click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
+@click.option("--no-picture", is_flag=True, help="No picture track.png.")
 def report(path: Path, out: Path | None, no_picture: bool) -> int:
     """Make summary.json and track.png of a flight whose program has crashed or was killed.
 

@@ -125,7 +125,7 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
 @click.option(
     "--launch",
     type=click.Choice(["runway", "catapult", "hand"]),
-    help="How aircraft get into the air. [default: as described with the model]",
+    help="Launch of aircraft. [default: as described with the model]",
 )
 @click.option("--count", type=click.IntRange(1, 250), default=1, show_default=True, help="Vehicles.")
 @click.option(
@@ -142,7 +142,9 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     help="Link with onboard streams instead of the usual ports; with --count, all vehicles share it.",
 )
 @click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
-@click.option("--home", help="lat,lon,alt[,heading]; default: where the firmware's own SITL stands.")
+@click.option(
+    "--home", help="Place of the home: lat,lon,alt[,heading]; default: where the firmware's own SITL stands."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option(
     "--wind",
@@ -176,7 +178,7 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     "targets",
     multiple=True,
     metavar="NORTH,EAST[,SPEED,HEADING]",
-    help="A target on the ground for cameras: m from home, m/s and degrees. Repeat for more.",
+    help="Target on the ground for cameras: m from home, m/s and degrees. Repeat for more.",
 )
 @click.option(
     "--map",
@@ -185,7 +187,9 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     help="Magnetic map (.npz, as `fly occupancy` publishes it); every vehicle carries a survey magnetometer.",
 )
 @click.option(
-    "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
+    "--map-target",
+    metavar="NORTH,EAST",
+    help="Place of a target's magnetic signature, m from the map's home.",
 )
 @key_option()
 @click.option(
@@ -193,13 +197,13 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
     type=click.Choice(["none", "serial", "local", "all"]),
     default="serial",
     show_default=True,
-    help="Which links take unsigned frames while there is a key: none, serial ones, this machine's too, all.",
+    help="Links that take unsigned frames while there is a key: none, serial ones, this machine's too, all.",
 )
 @click.option(
     "--signing-store",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Keep keys that clients set, and times, over restarts.",
+    help="File that keeps keys that clients set, and times, over restarts.",
 )
 @video_options
 @storage_option

@@ -70,7 +70,7 @@ class StudyCommand:
 def engine_options() -> list[click.Parameter]:
     """The options of every study."""
     return [
-        click.Option(["--runs"], type=click.IntRange(1, 1_000_000), help="Per cell. [default: the study's]"),
+        click.Option(["--runs"], type=click.IntRange(1, 1_000_000), help="Runs per cell. [default: its own]"),
         click.Option(["--seed"], type=click.IntRange(min=0), default=0, help="One seed makes one table."),
         click.Option(
             ["--workers"], type=click.IntRange(1, 4096),
@@ -78,7 +78,7 @@ def engine_options() -> list[click.Parameter]:
         ),
         click.Option(
             ["--ray"], metavar="ADDRESS",
-            help="On a Ray cluster: HOST:PORT of its head, ray://HOST:PORT, auto, or local for one of this "
+            help="Ray cluster: HOST:PORT of its head, ray://HOST:PORT, auto, or local for one of this "
             "machine. Needs the extra `ray`.",
         ),
         click.Option(
@@ -94,10 +94,10 @@ def engine_options() -> list[click.Parameter]:
             ["--time-limit"], type=_LIMIT, metavar="S",
             help="Terminate a trial after so many seconds of wall time. [default: no limit]",
         ),
-        click.Option(["--no-picture"], is_flag=True, help="Draw no pictures."),
+        click.Option(["--no-picture"], is_flag=True, help="No pictures."),
         click.Option(
             ["--trial"], type=click.IntRange(min=0), metavar="N",
-            help="Run this trial only, in this process, and print its row.",
+            help="Number of a trial that is run alone, in this process.",
         ),
     ]  # fmt: skip
 

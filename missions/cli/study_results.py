@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @click.command(context_settings={"show_default": True})
 @click.argument("folder", metavar="DIR|URI")
 @click.option("--failed", is_flag=True, help="List the trials without success, with the command of each.")
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Summary as JSON.")
 def show(folder: str, failed: bool, as_json: bool) -> int:
     """Print the table of a study, complete or not.
 
@@ -69,7 +69,7 @@ def _study_of(place: "StudyFolder", results: "Results") -> "Study[Any, Any] | No
 @click.command()
 @click.argument("first", metavar="DIR|URI")
 @click.argument("second", metavar="DIR|URI")
-@click.option("--json", "as_json", is_flag=True, help="Print the differences as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Differences as JSON.")
 def compare(**given: Any) -> int:
     """Compare two studies: the differences second - first in cells with the same parameters.
 

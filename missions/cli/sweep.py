@@ -315,7 +315,7 @@ SWEEP: Final = StudyCommand(
             ["--sampling"],
             type=click.Choice(["latin-hypercube", "random"]),
             default="latin-hypercube",
-            help="How values of LOW..HIGH are drawn over the runs.",
+            help="Way in which values of LOW..HIGH are drawn over the runs.",
         ),
     ),
     build=_build,

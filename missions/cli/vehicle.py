@@ -173,7 +173,7 @@ def _duration(seconds: float) -> str:
 
 
 @logs.command()
-@click.option("--yes", is_flag=True, help="Don't ask.")
+@click.option("--yes", is_flag=True, help="No question.")
 @connected
 def erase(yes: bool, **given: Any) -> int:
     """Delete all logs of the vehicle, after asking."""

@@ -86,9 +86,11 @@ def hold(**given: Any) -> int:
 
 @click.command()
 @click.option(
-    "--force", is_flag=True, help="In the air too, after a question: the motors stop, and the vehicle falls."
+    "--force",
+    is_flag=True,
+    help="Disarming in the air too, after a question: the motors stop, and the vehicle falls.",
 )
-@click.option("--yes", is_flag=True, help="With --force: don't ask.")
+@click.option("--yes", is_flag=True, help="No question, with --force.")
 @acting
 def disarm(force: bool, yes: bool, **given: Any) -> int:
     """Disarm it on the ground; in the air it is refused, unless --force is given and confirmed."""

@@ -26,17 +26,21 @@ _OPTIONS = (
         "--connect",
         required=True,
         metavar="URL",
-        help="udpin:0.0.0.0:14550, tcp:HOST:5760, serial:DEVICE:BAUD",
+        help="Vehicle's link: udpin:0.0.0.0:14550, tcp:HOST:5760, serial:DEVICE:BAUD",
     ),
-    click.option("--system-id", type=click.IntRange(1, 255), help="Where several are on the link."),
+    click.option(
+        "--system-id",
+        type=click.IntRange(1, 255),
+        help="System id of the vehicle, where several are on the link.",
+    ),
     click.option(
         "--timeout",
         type=FiniteRange(0.5, 600.0),
         default=10.0,
         show_default=True,
-        help="For its heartbeat, s.",
+        help="Time for the vehicle's heartbeat, s.",
     ),
-    click.option("--json", "as_json", is_flag=True, help="Print JSON, for scripts."),
+    click.option("--json", "as_json", is_flag=True, help="Output as JSON, for scripts."),
 )
 
 

@@ -115,7 +115,7 @@ def save(file: Path, **given: Any) -> int:
 
 @params.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--yes", is_flag=True, help="Don't ask.")
+@click.option("--yes", is_flag=True, help="No question.")
 @connected
 def load(file: Path, yes: bool, **given: Any) -> int:
     """Set the parameters in FILE that differ on the vehicle, after asking; each is read back."""

@@ -17,7 +17,7 @@ def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "--pictures",
         type=click.Path(path_type=Path, file_okay=False),
         metavar="DIR",
-        help="Keep photos and videos that the cameras take, in a new folder.",
+        help="New folder for photos and videos that the cameras take.",
     )(command)
     command = click.option(
         "--video-rate",
@@ -30,7 +30,7 @@ def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option(
         "--video",
         metavar="[HOST:]PORT|off",
-        help="Where to serve the cameras' video (RTSP). [default: 127.0.0.1, from port 8554 on]",
+        help="Address of the cameras' video (RTSP). [default: 127.0.0.1, from port 8554 on]",
     )(command)
 
 

@@ -74,8 +74,10 @@ class _ProgressLine:
     help="Describes the camera: intrinsics, distortion, mount, latency (.toml, docs/vision.md), or a "
     "calibration of ROS or OpenCV (.yaml).",
 )  # fmt: skip
-@click.option("--connect", metavar="URL", help="Of a stream: the vehicle's link.")
-@click.option("--log", type=click.Path(path_type=Path), metavar="FILE.tlog", help="Of a recording: its log.")
+@click.option("--connect", metavar="URL", help="Vehicle's link, of a stream.")
+@click.option(
+    "--log", type=click.Path(path_type=Path), metavar="FILE.tlog", help="Vehicle's log, of a recording."
+)
 @click.option(
     "--detect", type=click.Choice(["tags", "motion"]), default="tags", show_default=True,
     help="Tags, or what moves on the ground (of a camera on a gimbal).",
@@ -90,7 +92,10 @@ class _ProgressLine:
     help="Pressure altitude of the ground, for motion. [default: that before the vehicle is armed]",
 )  # fmt: skip
 @click.option(
-    "--component-id", type=int, metavar="N", help="Of the camera, 100 to 105. [default: 100; 28 for motion]"
+    "--component-id",
+    type=int,
+    metavar="N",
+    help="Component id of the camera, 100 to 105. [default: 100; 28 for motion]",
 )
 @click.option("--duration", type=_SECONDS, metavar="S", help="Vehicle time. [default: until Ctrl-C]")
 @click.option(
@@ -101,7 +106,7 @@ class _ProgressLine:
     "--rate", type=FiniteRange(min=0.0, min_open=True, max=1000.0), metavar="HZ",
     help="Frames per second of a recording without times (raw H.264).",
 )  # fmt: skip
-@click.option("--film", is_flag=True, help="Keep the searched pictures of a stream as lossless video; large.")
+@click.option("--film", is_flag=True, help="Lossless video of the searched pictures of a stream; large.")
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/vision-N]")
 @key_option()
 def vision(**given: Any) -> int:
