@@ -7,9 +7,11 @@ from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
 from autopilot_bridge.firmware.flavour import Flavour, Identity, ModeDisplay
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.telemetry.fields import fields
 from autopilot_bridge.telemetry.streams import Values
 
 MAVLINK_VERSION: Final = 3
+_AUTOPILOT_VERSION: Final = fields("AUTOPILOT_VERSION")
 PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 GEOFENCE: Final = mavlink.MAV_SYS_STATUS_GEOFENCE
 GPS: Final = mavlink.MAV_SYS_STATUS_SENSOR_GPS
@@ -168,17 +170,15 @@ def _sensors(commander: Commander) -> tuple[tuple[int, bool], ...]:
 
 def autopilot_version(identity: Identity) -> Values:
     """Field values of AUTOPILOT_VERSION (148)."""
-    return (
-        identity.capabilities,
-        identity.flight_sw_version,
-        identity.middleware_sw_version,
-        identity.os_sw_version,
-        identity.board_version,
-        identity.flight_custom_version,
-        bytes(8),
-        bytes(8),
-        identity.vendor_id,
-        identity.product_id,
-        identity.uid,
-        identity.uid2,
+    return _AUTOPILOT_VERSION(
+        capabilities=identity.capabilities,
+        flight_sw_version=identity.flight_sw_version,
+        middleware_sw_version=identity.middleware_sw_version,
+        os_sw_version=identity.os_sw_version,
+        board_version=identity.board_version,
+        flight_custom_version=identity.flight_custom_version,
+        vendor_id=identity.vendor_id,
+        product_id=identity.product_id,
+        uid=identity.uid,
+        uid2=identity.uid2,
     )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_ids
@@ -182,20 +182,17 @@ class ArdupilotMessages(CommonMessages):
         """EXTENDED_SYS_STATE (245): a copter reports VTOL in multicopter state."""
         return (mavlink.MAV_VTOL_STATE_MC, int(self.context.landed_state))
 
-    def battery_status(self) -> Values | None:
+    def battery_status(self) -> Any:
         """BATTERY_STATUS (147): kind of battery unknown, energy in hectojoules from charge and voltage."""
         values = super().battery_status()
         battery = self.view.battery
         if values is None or battery is None:
             return None
         energy_hj = round(battery[0] * battery[2] * _SECONDS_PER_HOUR / 100.0)
-        return (
-            values[0],
-            mavlink.MAV_BATTERY_FUNCTION_UNKNOWN,
-            mavlink.MAV_BATTERY_TYPE_UNKNOWN,
-            *values[3:7],
-            energy_hj,
-            *values[8:],
+        return values._replace(
+            battery_function=mavlink.MAV_BATTERY_FUNCTION_UNKNOWN,
+            type=mavlink.MAV_BATTERY_TYPE_UNKNOWN,
+            energy_consumed=energy_hj,
         )
 
     def position_target_local_ned(self) -> Values | None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_rates
@@ -13,10 +13,13 @@ from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.messages.common import NAN, CommonMessages
 from autopilot_bridge.services.parts import AutopilotParts
+from autopilot_bridge.telemetry.fields import fields
 from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 
 _M = mavlink
+_ESTIMATOR_STATUS: Final = fields("ESTIMATOR_STATUS")
+_ORBIT_EXECUTION_STATUS: Final = fields("ORBIT_EXECUTION_STATUS")
 _ACTUATOR_OUTPUTS: Final = 32  # fields of ACTUATOR_OUTPUT_STATUS
 
 _DATA: Final = load_data("px4", "messages.toml")
@@ -114,24 +117,24 @@ class Px4Messages(CommonMessages):
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
     @streams(_M.MAVLINK_MSG_ID_ESTIMATOR_STATUS)
-    def estimator_status(self) -> Values:
+    def estimator_status(self) -> Any:
         """ESTIMATOR_STATUS (230). PX4's ratios are squared: (innovation / gate)^2."""
         health = self.parts.navigation.health
-        return (
-            self.view.time_us,
-            estimator_flags(health),
-            health.velocity_test_ratio**2,
-            health.position_horizontal_test_ratio**2,
-            health.position_vertical_test_ratio**2,
-            health.magnetometer_test_ratio**2,
-            health.height_above_ground_test_ratio**2,
-            NAN,
-            health.position_horizontal_accuracy_m,
-            health.position_vertical_accuracy_m,
+        return _ESTIMATOR_STATUS(
+            time_usec=self.view.time_us,
+            flags=estimator_flags(health),
+            vel_ratio=health.velocity_test_ratio**2,
+            pos_horiz_ratio=health.position_horizontal_test_ratio**2,
+            pos_vert_ratio=health.position_vertical_test_ratio**2,
+            mag_ratio=health.magnetometer_test_ratio**2,
+            hagl_ratio=health.height_above_ground_test_ratio**2,
+            tas_ratio=NAN,
+            pos_horiz_accuracy=health.position_horizontal_accuracy_m,
+            pos_vert_accuracy=health.position_vertical_accuracy_m,
         )
 
     @streams(_M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS)
-    def orbit_execution_status(self) -> Values | None:
+    def orbit_execution_status(self) -> Any:
         """ORBIT_EXECUTION_STATUS (360), while circling."""
         orbit = self.parts.commander.tasks.orbit
         frame = self.context.frame
@@ -139,13 +142,13 @@ class Px4Messages(CommonMessages):
             return None
         radius_m, north_m, east_m, down_m = orbit
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(north_m, east_m, down_m)
-        return (
-            self.view.time_us,
-            radius_m,
-            mavlink.MAV_FRAME_GLOBAL_INT,
-            round(lat_deg * 1e7),
-            round(lon_deg * 1e7),
-            alt_m,
+        return _ORBIT_EXECUTION_STATUS(
+            time_usec=self.view.time_us,
+            radius=radius_m,
+            frame=mavlink.MAV_FRAME_GLOBAL_INT,
+            x=round(lat_deg * 1e7),
+            y=round(lon_deg * 1e7),
+            z=alt_m,
         )
 
     @streams(_M.MAVLINK_MSG_ID_CURRENT_MODE)

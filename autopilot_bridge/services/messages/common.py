@@ -1,13 +1,14 @@
 """Messages that are the same in both firmwares (MAVLink common message set)."""
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
+from autopilot_bridge.telemetry.fields import fields
 from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN
 from flightsim import interface
@@ -15,6 +16,11 @@ from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 NAN: Final = math.nan
 _NO_GPS: Final = 0  # GPS_FIX_TYPE
+_NO_TEMPERATURE: Final = 32767
+_SYS_STATUS: Final = fields("SYS_STATUS")
+_GPS_RAW_INT: Final = fields("GPS_RAW_INT")
+_BATTERY_STATUS: Final = fields("BATTERY_STATUS")
+_DISTANCE_SENSOR: Final = fields("DISTANCE_SENSOR")
 
 
 class CommonMessages(Microservice):
@@ -50,7 +56,14 @@ class CommonMessages(Microservice):
             voltage_mv = round(battery[0] * 1000.0)
             current_ca = round(battery[1] * 100.0)
             remaining = round(battery[3] * 100.0)
-        return (present, enabled, health, 0, voltage_mv, current_ca, remaining, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+        return _SYS_STATUS(
+            onboard_control_sensors_present=present,
+            onboard_control_sensors_enabled=enabled,
+            onboard_control_sensors_health=health,
+            voltage_battery=voltage_mv,
+            current_battery=current_ca,
+            battery_remaining=remaining,
+        )
 
     @streams(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
     def system_time(self) -> Values:
@@ -67,7 +80,9 @@ class CommonMessages(Microservice):
         if gps.time_us < 0:
             if not self.gps_sent_before_first:
                 return None
-            return (self.view.time_us, _NO_GPS, 0, 0, 0, UINT16_UNKNOWN, UINT16_UNKNOWN) + (0,) * 9
+            return _GPS_RAW_INT(
+                time_usec=self.view.time_us, fix_type=_NO_GPS, eph=UINT16_UNKNOWN, epv=UINT16_UNKNOWN
+            )
         v = gps.values.tolist()
         silent = self.view.time_us - gps.time_us > self.gps_timeout_us
         fix_type = _NO_GPS if silent else int(v[interface.GPS_FIX_TYPE])
@@ -79,27 +94,29 @@ class CommonMessages(Microservice):
         if fix_type < 2 or not math.isfinite(v[interface.GPS_LAT_DEG]):
             counted = not silent and math.isfinite(v[interface.GPS_SATELLITES])
             satellites = int(v[interface.GPS_SATELLITES]) if counted else 0
-            return (gps.time_us, fix_type, 0, 0, 0, UINT16_UNKNOWN, UINT16_UNKNOWN, 0, 0, satellites) + (
-                0,
-            ) * 6
+            return _GPS_RAW_INT(
+                time_usec=gps.time_us,
+                fix_type=fix_type,
+                eph=UINT16_UNKNOWN,
+                epv=UINT16_UNKNOWN,
+                satellites_visible=satellites,
+            )
         alt_mm = round(v[interface.GPS_ALT_M] * 1000.0)
-        return (
-            gps.time_us,
-            fix_type,
-            round(v[interface.GPS_LAT_DEG] * 1e7),
-            round(v[interface.GPS_LON_DEG] * 1e7),
-            alt_mm,
-            round(v[interface.GPS_HDOP] * 100.0),
-            round(v[interface.GPS_VDOP] * 100.0),
-            speed_cm_s,
-            course_cdeg,
-            int(v[interface.GPS_SATELLITES]),
-            alt_mm,
-            round(v[interface.GPS_EPH_M] * 1000.0),
-            round(v[interface.GPS_EPV_M] * 1000.0),
-            round(v[interface.GPS_SPEED_ACCURACY_M_S] * 1000.0),
-            0,
-            0,
+        return _GPS_RAW_INT(
+            time_usec=gps.time_us,
+            fix_type=fix_type,
+            lat=round(v[interface.GPS_LAT_DEG] * 1e7),
+            lon=round(v[interface.GPS_LON_DEG] * 1e7),
+            alt=alt_mm,
+            eph=round(v[interface.GPS_HDOP] * 100.0),
+            epv=round(v[interface.GPS_VDOP] * 100.0),
+            vel=speed_cm_s,
+            cog=course_cdeg,
+            satellites_visible=int(v[interface.GPS_SATELLITES]),
+            alt_ellipsoid=alt_mm,
+            h_acc=round(v[interface.GPS_EPH_M] * 1000.0),
+            v_acc=round(v[interface.GPS_EPV_M] * 1000.0),
+            vel_acc=round(v[interface.GPS_SPEED_ACCURACY_M_S] * 1000.0),
         )
 
     @streams(mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE)
@@ -236,27 +253,22 @@ class CommonMessages(Microservice):
         return None if values is None else (self.view.time_ms, *values, self.temperature_cdeg())
 
     @streams(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS)
-    def battery_status(self) -> Values | None:
+    def battery_status(self) -> Any:
         """BATTERY_STATUS (147)."""
         battery = self.view.battery
         if battery is None:
             return None
         voltage_v, current_a, used_ah, remaining = battery
-        return (
-            0,
-            mavlink.MAV_BATTERY_FUNCTION_ALL,
-            mavlink.MAV_BATTERY_TYPE_LIPO,
-            32767,
-            (round(voltage_v * 1000.0), *(UINT16_UNKNOWN,) * 9),
-            round(current_a * 100.0),
-            round(used_ah * 1000.0),
-            -1,
-            round(remaining * 100.0),
-            0,
-            int(self.parts.commander.battery_level),
-            (0, 0, 0, 0),
-            0,
-            0,
+        return _BATTERY_STATUS(
+            battery_function=mavlink.MAV_BATTERY_FUNCTION_ALL,
+            type=mavlink.MAV_BATTERY_TYPE_LIPO,
+            temperature=_NO_TEMPERATURE,
+            voltages=(round(voltage_v * 1000.0), *(UINT16_UNKNOWN,) * 9),
+            current_battery=round(current_a * 100.0),
+            current_consumed=round(used_ah * 1000.0),
+            energy_consumed=-1,
+            battery_remaining=round(remaining * 100.0),
+            charge_state=int(self.parts.commander.battery_level),
         )
 
     @streams(mavlink.MAVLINK_MSG_ID_VIBRATION)
@@ -310,17 +322,12 @@ class CommonMessages(Microservice):
         min_m, max_m = values[interface.RANGE_MIN_M], values[interface.RANGE_MAX_M]
         in_range = math.isfinite(distance_m)
         beyond_cm = 0 if self.context.on_ground else round(max_m * 100.0) + 1  # too near, or too far
-        return (
-            reading.time_us // 1000,
-            round(min_m * 100.0),
-            round(max_m * 100.0),
-            round(distance_m * 100.0) if in_range else beyond_cm,
-            mavlink.MAV_DISTANCE_SENSOR_LASER,
-            0,
-            mavlink.MAV_SENSOR_ROTATION_PITCH_270,
-            0,
-            0.0,
-            0.0,
-            (0.0, 0.0, 0.0, 0.0),
-            100 if in_range else 1,
+        return _DISTANCE_SENSOR(
+            time_boot_ms=reading.time_us // 1000,
+            min_distance=round(min_m * 100.0),
+            max_distance=round(max_m * 100.0),
+            current_distance=round(distance_m * 100.0) if in_range else beyond_cm,
+            type=mavlink.MAV_DISTANCE_SENSOR_LASER,
+            orientation=mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+            signal_quality=100 if in_range else 1,
         )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.px4 import messages as px4
@@ -140,15 +140,15 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
             place = (north_m, east_m, frame.origin.alt_m)
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, _PLACE_MASK, *place, *_NOTHING)
 
-    def estimator_status(self) -> Values:
+    def estimator_status(self) -> Any:
         """ESTIMATOR_STATUS (230): with the airspeed's ratio while it is fused."""
         values = super().estimator_status()
         health = self.parts.navigation.health
         if not health.airspeed_in_use:
             return values
-        return (*values[:7], health.airspeed_test_ratio**2, *values[8:])
+        return values._replace(tas_ratio=health.airspeed_test_ratio**2)
 
-    def orbit_execution_status(self) -> Values | None:
+    def orbit_execution_status(self) -> Any:
         """ORBIT_EXECUTION_STATUS (360) in frame 0, as recorded."""
         values = super().orbit_execution_status()
-        return None if values is None else (*values[:2], mavlink.MAV_FRAME_GLOBAL, *values[3:])
+        return None if values is None else values._replace(frame=mavlink.MAV_FRAME_GLOBAL)
