@@ -24,7 +24,7 @@ def fields(message: str) -> Callable[..., Any]:
     described = definition(message)
     lengths = {field.name: (field.length, field.code) for field in described.wire_fields}
     zeros = [_zero(*lengths[name]) for name in described.field_names]
-    return namedtuple(message, described.field_names, defaults=zeros)  # type: ignore[misc]
+    return namedtuple(message, described.field_names, defaults=zeros)
 
 
 def _zero(length: int, code: str) -> Any:
