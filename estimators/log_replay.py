@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.errors import EstimatorError, EstimatorFailure
 from estimators.fleet import GROUND_SYSTEM, Fleet
 from estimators.interface import Estimator, Need
 from estimators.library import make_estimator
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.needs import NOT_STREAMED, Supply, supplies
 from estimators.observations import Observation, observations_beside, read_observations
 from estimators.runner import why_excluded
@@ -223,8 +224,9 @@ def _present(log: "Log", names: Sequence[str]) -> list[str]:
     return [name for name in names if name in known]
 
 
-def _first_system_times(log: "Log") -> Iterator[tuple[int, Message]]:
-    for count, item in enumerate(log.messages(_present(log, ["SYSTEM_TIME"]))):
+def _first_system_times(log: "Log") -> Iterator[tuple[int, wire.SYSTEM_TIME]]:
+    for count, (time_us, message) in enumerate(log.messages(_present(log, ["SYSTEM_TIME"]))):
         if count >= _LEARNT_FROM:
             return
-        yield item
+        if is_a(message, wire.SYSTEM_TIME):
+            yield time_us, message

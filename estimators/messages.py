@@ -9,21 +9,35 @@ import keyword
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from typing import Any, Final
+from typing import Any, ClassVar, Final, TypeGuard, TypeVar, overload
 
 from autopilot_bridge.mavlink import DEFINITIONS, Frame, MessageDefinition
 
-Message = Any
-"""A named tuple made by `message_class`.
 
-It has the fields of the definition (with a trailing underscore if the name is a Python keyword, or `name`,
-which is the message's own) and, before them:
+class Message(tuple[Any, ...]):
+    """A message of any class: a named tuple made by `message_class`.
 
-Attributes:
-    src_system, src_component: ids of the sender.
+    It has the fields of the definition (with a trailing underscore if the name is a Python keyword, or
+    `name`, which is the message's own) after these. Arrays are tuples; strings end at their first zero. The
+    classes with their fields are in `estimators.wire`.
 
-Its class has `name` ("ATTITUDE") and `message_id`. Arrays are tuples; strings end at their first zero.
-"""
+    Attributes:
+        name: "ATTITUDE".
+        src_system, src_component: ids of the sender.
+    """
+
+    __slots__ = ()
+    name: ClassVar[str]
+    message_id: ClassVar[int]
+    _fields: ClassVar[tuple[str, ...]]
+    src_system: int
+    src_component: int
+
+
+MessageT = TypeVar("MessageT", bound=Message)
+ResultT = TypeVar("ResultT")
+OwnerT = TypeVar("OwnerT")
+Handlers = dict[str, Callable[[int, Message], ResultT]]
 
 SOURCE_FIELDS: Final = ("src_system", "src_component")
 _CLASS_ATTRIBUTES: Final = ("name", "message_id")
@@ -39,9 +53,36 @@ def message_class(found: MessageDefinition) -> Any:
     return _dialect_class(found.message_id) if DEFINITIONS.get(found.message_id) is found else _make(found)
 
 
+def is_a(message: Message, kind: type[MessageT]) -> TypeGuard[MessageT]:
+    """Whether it is a message of this name; a log of another dialect has classes of its own."""
+    return message.name == kind.name
+
+
+@overload
+def on(kind: type[MessageT], handle: Callable[[int, MessageT], ResultT]) -> Handlers[ResultT]: ...
+
+
+@overload
+def on(
+    kind: type[MessageT], handle: Callable[[int, OwnerT, MessageT], ResultT]
+) -> dict[str, Callable[[int, OwnerT, Message], ResultT]]: ...
+
+
+def on(kind: type[Message], handle: Callable[..., ResultT]) -> dict[str, Callable[..., ResultT]]:
+    """The entry of a table of handlers, by name: `handle` takes the messages of this class."""
+    return {kind.name: handle}
+
+
 def read_message(frame: Frame) -> Message:
     """Decode the message in a frame of the parser; never raises."""
     return _reader(frame.message_id)(frame)
+
+
+def read_as(frame: Frame, kind: type[MessageT]) -> MessageT:
+    """The message in a frame whose class the caller knows, because it has selected the frame by its id."""
+    message = read_message(frame)
+    assert isinstance(message, kind), f"{kind.name} expected, not {message.name}"
+    return message
 
 
 def rows(made: Any, system_id: int, component_id: int, columns: Iterable[Iterable[Any]]) -> Iterator[Message]:
@@ -63,10 +104,9 @@ def text(raw: bytes) -> str:
 
 def _make(found: MessageDefinition) -> Any:
     names = [*SOURCE_FIELDS, *(field_name(field.name) for field in found.wire_fields)]
-    made = namedtuple(found.name, names)  # type: ignore[misc]  # names are known only at run time
-    made.name = found.name  # type: ignore[attr-defined]
-    made.message_id = found.message_id  # type: ignore[attr-defined]
-    return made
+    fields = namedtuple(found.name, names)  # type: ignore[misc]  # names are known only at run time
+    own = {"__slots__": (), "name": found.name, "message_id": found.message_id}
+    return type(found.name, (fields, Message), own)
 
 
 @cache

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import DEFINITIONS, Frame, FrameEncoder, MAVLinkMessage
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SIMULATOR_COMPONENT
+from estimators import wire
 from estimators.errors import EstimatorError, EstimatorFailure, described
 from estimators.input_guard import NEW_BOOT_US
 from estimators.interface import Estimate, EstimateSet, Estimator, Need, Outcome
-from estimators.messages import Message, read_message
+from estimators.messages import Message, is_a, read_message
 from estimators.needs import message_names
 from estimators.observations import Observation
 from estimators.vehicle_time import TeamTime, VehicleTime
@@ -260,7 +261,11 @@ class Runner:
         """
         name = message.name
         team_time = self._team_time
-        if team_time is not None and name == _SYSTEM_TIME and message.src_component == AUTOPILOT_COMPONENT:
+        if (
+            team_time is not None
+            and is_a(message, wire.SYSTEM_TIME)
+            and message.src_component == AUTOPILOT_COMPONENT
+        ):
             team_time.learn(time_us, message)
         if name not in self.names:
             return None
@@ -314,7 +319,7 @@ class Runner:
             self.system_id = message.src_system
         return bool(message.src_system == self.system_id)
 
-    def learn_times(self, system_times: Iterable[tuple[int, Message]]) -> None:
+    def learn_times(self, system_times: Iterable[tuple[int, wire.SYSTEM_TIME]]) -> None:
         """Learn when the vehicles of a team booted, before their messages are processed.
 
         Args:

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.messages import Message
 from flightsim.foundation.kernels import kernel
 
@@ -66,7 +67,7 @@ class TeamTime:
         self._boots_us: dict[int, int] = {}
         self._reference_us: int | None = None
 
-    def learn(self, time_us: int, message: Message) -> None:
+    def learn(self, time_us: int, message: wire.SYSTEM_TIME) -> None:
         """Process a SYSTEM_TIME of an autopilot, at its vehicle time."""
         if message.time_unix_usec < _LEAST_UNIX_US:
             return

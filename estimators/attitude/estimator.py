@@ -9,6 +9,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.attitude import layout as at
 from estimators.attitude.air import AirData
 from estimators.attitude.estimate import AttitudeEstimate
@@ -24,7 +25,7 @@ from estimators.attitude.samples import DIFFERENTIAL_PRESSURE, INERTIAL_FIELDS, 
 from estimators.attitude.step import start, step
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, on
 
 LEAST_RATE_HZ: Final = 20.0
 WANTED_RATE_HZ: Final = 50.0
@@ -57,14 +58,14 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._airspeed_age_us = round(p.airspeed_age_max_s * 1e6)
         self._air = AirData(p.airspeed, self._airspeed_age_us)
         self._handlers: dict[str, Callable[[int, Message], Outcome]] = {
-            "HEARTBEAT": self._heartbeat,
-            "VFR_HUD": self._vfr_hud,
-            "AIRSPEED": self._airspeed,
-            "SCALED_PRESSURE": self._scaled_pressure,
-            "PARAM_VALUE": self._param_value,
+            **on(wire.HEARTBEAT, self._heartbeat),
+            **on(wire.VFR_HUD, self._vfr_hud),
+            **on(wire.AIRSPEED, self._airspeed),
+            **on(wire.SCALED_PRESSURE, self._scaled_pressure),
+            **on(wire.PARAM_VALUE, self._param_value),
         }
         wanted = _IMU_NAMES if p.imu is ImuSource.AUTO else (p.imu.value,)
-        inertial = {"HIGHRES_IMU": self._highres_imu, "RAW_IMU": self._raw_imu}
+        inertial = {**on(wire.HIGHRES_IMU, self._highres_imu), **on(wire.RAW_IMU, self._raw_imu)}
         for name in wanted:
             self._handlers[name] = inertial.get(name, self._imu)
         self.reset()
@@ -183,7 +184,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
 
     # Slow messages
 
-    def _heartbeat(self, time_us: int, message: Message) -> Outcome:
+    def _heartbeat(self, time_us: int, message: wire.HEARTBEAT) -> Outcome:
         form = FORM_OF_TYPE.get(message.type)
         if form is None:
             return Outcome.IGNORED
@@ -192,10 +193,10 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._disarmed = not message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
         return Outcome.USED
 
-    def _param_value(self, time_us: int, message: Message) -> Outcome:
+    def _param_value(self, time_us: int, message: wire.PARAM_VALUE) -> Outcome:
         return Outcome.USED if self._trim.learn(message.param_id, message.param_value) else Outcome.IGNORED
 
-    def _vfr_hud(self, time_us: int, message: Message) -> Outcome:
+    def _vfr_hud(self, time_us: int, message: wire.VFR_HUD) -> Outcome:
         refused = self._guard.check(
             time_us, "VFR_HUD", (message.airspeed, message.climb, message.throttle), leads=False
         )
@@ -208,7 +209,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._use_airspeed(time_us, self._air.airspeed(time_us, AirspeedSource.VFR_HUD, message.airspeed))
         return Outcome.USED if refused is None else refused
 
-    def _airspeed(self, time_us: int, message: Message) -> Outcome:
+    def _airspeed(self, time_us: int, message: wire.AIRSPEED) -> Outcome:
         if message.id != 0:
             return Outcome.IGNORED
         refused = self._guard.check(time_us, "AIRSPEED", (message.airspeed,), leads=False)
@@ -219,7 +220,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._use_airspeed(time_us, self._air.airspeed(time_us, AirspeedSource.AIRSPEED, message.airspeed))
         return Outcome.USED if refused is None else refused
 
-    def _scaled_pressure(self, time_us: int, message: Message) -> Outcome:
+    def _scaled_pressure(self, time_us: int, message: wire.SCALED_PRESSURE) -> Outcome:
         refused = self._guard.check(
             time_us, "SCALED_PRESSURE", (message.press_abs, message.press_diff), leads=False
         )
@@ -244,7 +245,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
 
     # Inertial messages
 
-    def _highres_imu(self, time_us: int, message: Message) -> Outcome:
+    def _highres_imu(self, time_us: int, message: wire.HIGHRES_IMU) -> Outcome:
         updated = message.fields_updated  # a sender that marks no field as updated is assumed to update all
         if message.id != self._instance or (updated & INERTIAL_FIELDS != INERTIAL_FIELDS and updated):
             return Outcome.IGNORED
@@ -252,7 +253,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._use_airspeed(time_us, self._air.by_pressure(time_us, message.diff_pressure))
         return self._imu(time_us, message)
 
-    def _raw_imu(self, time_us: int, message: Message) -> Outcome:
+    def _raw_imu(self, time_us: int, message: wire.RAW_IMU) -> Outcome:
         if message.id != self._instance:
             return Outcome.IGNORED
         return self._imu(time_us, message)

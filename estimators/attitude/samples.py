@@ -37,7 +37,8 @@ DIFFERENTIAL_PRESSURE: Final = 1 << 10
 def _fields(name: str) -> Callable[[Message], Sample]:
     """Reader of the six values of a message: x, y, z of the accelerometer, then of the gyro."""
     first = message_class(definition(name))._fields.index("xacc")
-    return itemgetter(slice(first, first + 6))
+    read: Callable[[Message], Sample] = itemgetter(slice(first, first + 6))
+    return read
 
 
 def _scaled(name: str) -> Callable[[Message], Sample]:

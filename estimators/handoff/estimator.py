@@ -32,6 +32,7 @@ from autopilot_bridge.mavlink.vehicle_motion import (
     motion_message,
     read_motion_payload,
 )
+from estimators import wire
 from estimators.handoff.dead_reckoning import DeadReckoning, ReckonedPath
 from estimators.handoff.designation import Designation
 from estimators.handoff.estimate import HandoffEstimate
@@ -42,7 +43,7 @@ from estimators.handoff.reports import ReportAssembler, reported_track, reported
 from estimators.handoff.settings import HandoffSettings
 from estimators.handoff.sight import AircraftSight
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.relative_pose.aircraft import AircraftState
 from estimators.relative_pose.estimator import RelativePoseEstimator
 from estimators.relative_pose.reported_aircraft import ReportedAircraft
@@ -58,7 +59,6 @@ _RECEIVED: Final = (
     TRACK_DESIGNATION_PAYLOAD,
     VEHICLE_MOTION_PAYLOAD,
 )
-_INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
 
 
 class HandoffEstimator(Estimator[HandoffSettings]):
@@ -145,15 +145,17 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         self._estimates: tuple[HandoffEstimate, ...] = ()
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        if message.name == "TUNNEL" and message.payload_type in _RECEIVED:
+        if is_a(message, wire.TUNNEL) and message.payload_type in _RECEIVED:
             return self._from_elsewhere(message)
         if message.src_system != self.own:
             return Outcome.IGNORED
-        if message.name in _INERTIAL and message.src_component == AUTOPILOT_COMPONENT:
+        if message.src_component == AUTOPILOT_COMPONENT and (
+            is_a(message, wire.HIGHRES_IMU) or is_a(message, wire.RAW_IMU)
+        ):
             self._now_us = time_us
             if message.time_usec < UNIX_TIME_US:
                 self._offset_us = time_us - message.time_usec
-        if message.name == "TUNNEL":
+        if is_a(message, wire.TUNNEL):
             return self._tunnel(time_us, message)
         outcome = self.sight.take(time_us, message)
         self._ground = None if math.isnan(self.sight.height.ground_m) else self.sight.height.ground_m
@@ -176,7 +178,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
 
     # messages between the aircraft
 
-    def _tunnel(self, time_us: int, message: Message) -> Outcome:
+    def _tunnel(self, time_us: int, message: wire.TUNNEL) -> Outcome:
         if message.payload_type == MOVING_POINTS_PAYLOAD:
             outcome = self.sight.take(time_us, message)
             return self._report(time_us) if outcome is Outcome.UPDATED and self._tracks else outcome
@@ -185,7 +187,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             self._restart()
         return self._compare(time_us) if fused is Outcome.UPDATED else fused
 
-    def _from_elsewhere(self, message: Message) -> Outcome:
+    def _from_elsewhere(self, message: wire.TUNNEL) -> Outcome:
         """Motion, a report or a decision, which the onboard computer of the other aircraft sends, or a
         designation by the operator.
         """

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, Point, moving_points_messages
+from estimators import wire
 from estimators.attitude.air import pressure_pa
 from estimators.handoff.sight import GroundHeight, armed_of
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.tracking.line_of_sight import GimbalAttitude, gimbal_attitude
 from estimators.vision import (
     CameraDescription,
@@ -118,18 +119,18 @@ class MotionWatch:
 
     def handle(self, message: Message) -> None:
         """Take a message of the vehicle."""
-        if message.name == "GIMBAL_DEVICE_ATTITUDE_STATUS":
+        if is_a(message, wire.GIMBAL_DEVICE_ATTITUDE_STATUS):
             attitude = gimbal_attitude(message)
             if attitude is not None:
                 self._gimbal.add(attitude.time_us, attitude)
         elif message.src_component != AUTOPILOT_COMPONENT:
             return
-        elif message.name == "SCALED_PRESSURE":
+        elif is_a(message, wire.SCALED_PRESSURE):
             pascal = pressure_pa(message.press_abs) if np.isfinite(message.press_abs) else None
             if pascal is not None:
                 self._newest_m = pressure_altitude_m(pascal)
                 self._altitude_m.add(message.time_boot_ms * _MILLISECOND_US, self._newest_m)
-        elif message.name == "HEARTBEAT":
+        elif is_a(message, wire.HEARTBEAT):
             self._ground.armed(armed_of(message), self._newest_m)
 
     def detect(self, exposed_us: int, picture: NDArray[np.uint8]) -> Points | None:
@@ -171,7 +172,7 @@ class MotionWatch:
 
     def makes(self, message: Message) -> bool:
         """Whether a message is of a kind that it sends."""
-        return message.name == "TUNNEL" and message.payload_type == MOVING_POINTS_PAYLOAD
+        return is_a(message, wire.TUNNEL) and message.payload_type == MOVING_POINTS_PAYLOAD
 
     def figures(self) -> dict[str, Any]:
         """Entries of `summary.json`."""

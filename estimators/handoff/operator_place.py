@@ -2,8 +2,9 @@
 
 import math
 
+from estimators import wire
 from estimators.interface import Need
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 _OLD_US = 1_000_000
@@ -33,16 +34,16 @@ class OperatorPlace:
 
     def take(self, time_us: int, message: Message) -> None:
         """Process a message of the aircraft."""
-        if message.name == "HOME_POSITION":
+        if is_a(message, wire.HOME_POSITION):
             lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
             if (lat, lon) != (0.0, 0.0) and abs(lat) <= 90.0 and abs(lon) <= 180.0:
                 self._frame = LocalFrame(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt))
-        elif message.name == "GLOBAL_POSITION_INT" and self._frame is not None:
+        elif is_a(message, wire.GLOBAL_POSITION_INT) and self._frame is not None:
             north_m, east_m, _ = self._frame.ned_from_geodetic(
                 message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3
             )
             self._own = (time_us, north_m, east_m)
-        elif message.name == "ATTITUDE" and math.isfinite(message.yaw):
+        elif is_a(message, wire.ATTITUDE) and math.isfinite(message.yaw):
             self._yaw_rad = message.yaw
 
     def level(self, time_us: int) -> tuple[float, float] | None:

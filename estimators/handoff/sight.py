@@ -7,11 +7,12 @@ from typing import Final
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, read_moving_points
+from estimators import wire
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.dead_reckoning import ReckonedPath
 from estimators.handoff.scans import GimbalHistory, Point, PointScan, ScanAssembler, image_point, level_places
 from estimators.interface import Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.relative_pose.aircraft import AircraftState
 from estimators.tracking.line_of_sight import gimbal_attitude
 from estimators.tracking.recursive_ransac import RecursiveRansac
@@ -20,7 +21,7 @@ _PATH_S: Final = 5.0  # time in which scans and reports may be late
 _GROUND_SHARE: Final = 0.05  # of a new height on the ground
 
 
-def armed_of(heartbeat: Message) -> bool:
+def armed_of(heartbeat: wire.HEARTBEAT) -> bool:
     """Whether a heartbeat reports that the vehicle is armed."""
     return bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
 
@@ -98,20 +99,19 @@ class AircraftSight:
         Returns:
             UPDATED: the tracks are those of a new scan.
         """
-        match message.name:
-            case "TUNNEL":
-                return self._tunnel(message)
-            case "GIMBAL_DEVICE_ATTITUDE_STATUS":
-                found = gimbal_attitude(message)
-                if found is None:
-                    return Outcome.IMPLAUSIBLE
-                return Outcome.USED if self._gimbal.add(found) else Outcome.LATE
-            case "HEARTBEAT" if message.src_component == AUTOPILOT_COMPONENT:
-                self.height.armed(armed_of(message), self.state.height_m)
-                return Outcome.USED
+        if is_a(message, wire.TUNNEL):
+            return self._tunnel(message)
+        if is_a(message, wire.GIMBAL_DEVICE_ATTITUDE_STATUS):
+            found = gimbal_attitude(message)
+            if found is None:
+                return Outcome.IMPLAUSIBLE
+            return Outcome.USED if self._gimbal.add(found) else Outcome.LATE
+        if is_a(message, wire.HEARTBEAT) and message.src_component == AUTOPILOT_COMPONENT:
+            self.height.armed(armed_of(message), self.state.height_m)
+            return Outcome.USED
         return Outcome.IGNORED
 
-    def _tunnel(self, message: Message) -> Outcome:
+    def _tunnel(self, message: wire.TUNNEL) -> Outcome:
         if message.payload_type != MOVING_POINTS_PAYLOAD:
             return Outcome.IGNORED
         points = read_moving_points(message.payload_type, message.payload_length, message.payload)

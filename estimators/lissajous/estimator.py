@@ -9,6 +9,7 @@ from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.estimate import LissajousEstimate
@@ -16,7 +17,7 @@ from estimators.lissajous.model import MOTION, course, course_variance
 from estimators.lissajous.motion_filter import off_pattern_remarks
 from estimators.lissajous.parameters import Form, LissajousParameters
 from estimators.lissajous.pattern_frame import PatternFrame, PositionReader, Track, values_of
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from flightsim.foundation.geodesy import GeodeticPosition
 
 _NEEDED_HZ: Final = 2.0
@@ -69,13 +70,13 @@ class LissajousEstimator(Estimator[LissajousParameters]):
             "HOME_POSITION",
         ):
             return Outcome.IGNORED
-        if name == "HOME_POSITION":
+        if is_a(message, wire.HOME_POSITION):
             if not self._reader.take_home(message):
                 return Outcome.IMPLAUSIBLE
             if self._reader.home is not None:
                 self.track.place_pattern(PatternFrame(self.parameters, self._reader.home))
             return Outcome.USED
-        values = values_of(self.parameters.source, message)
+        values = values_of(message)
         refused = self._guard.check(time_us, name, values)
         if refused is Outcome.TIME_JUMP:
             self.track.filter.reset()

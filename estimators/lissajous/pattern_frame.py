@@ -9,10 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from estimators import wire
 from estimators.lissajous.model import Array
 from estimators.lissajous.motion_filter import MotionFilter
 from estimators.lissajous.parameters import LissajousParameters, Source
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 MESSAGES: Final = {
@@ -60,7 +61,7 @@ class PositionReader:
         self.home: GeodeticPosition | None = None
         self._local: LocalFrame | None = None
 
-    def take_home(self, message: Message) -> bool:
+    def take_home(self, message: wire.HOME_POSITION) -> bool:
         """Process a HOME_POSITION; returns False when its position is invalid."""
         if abs(message.latitude) > _MAX_LAT_E7 or abs(message.longitude) > _MAX_LON_E7:
             return False
@@ -77,36 +78,43 @@ class PositionReader:
 
     def read(self, message: Message) -> Fix | None:
         """The position in a message of the source; None when it contains no position (yet)."""
-        if self.source is Source.LOCAL:
+        if is_a(message, wire.LOCAL_POSITION_NED):
             return self._read_local(message)
-        if abs(message.lat) > _MAX_LAT_E7 or abs(message.lon) > _MAX_LON_E7:
+        if is_a(message, wire.GLOBAL_POSITION_INT):
+            velocity = (0.01 * message.vx, 0.01 * message.vy)
+            return self._fix(message.lat, message.lon, message.alt, velocity)
+        if not is_a(message, wire.GPS_RAW_INT):
             return None
-        if self.source is Source.GLOBAL:
-            north_m_s, east_m_s = 0.01 * message.vx, 0.01 * message.vy
-        else:
-            if message.fix_type < _FIX_2D or (message.lat == 0 and message.lon == 0):
-                return None
-            north_m_s = east_m_s = math.nan
-            if message.vel != _NOT_KNOWN and message.cog != _NOT_KNOWN:
-                course_rad = math.radians(0.01 * message.cog)
-                north_m_s = 0.01 * message.vel * math.cos(course_rad)
-                east_m_s = 0.01 * message.vel * math.sin(course_rad)
-        return Fix(1e-7 * message.lat, 1e-7 * message.lon, 1e-3 * message.alt, north_m_s, east_m_s)
+        if message.fix_type < _FIX_2D or (message.lat == 0 and message.lon == 0):
+            return None
+        velocity = (math.nan, math.nan)
+        if message.vel != _NOT_KNOWN and message.cog != _NOT_KNOWN:
+            course_rad = math.radians(0.01 * message.cog)
+            velocity = (0.01 * message.vel * math.cos(course_rad), 0.01 * message.vel * math.sin(course_rad))
+        return self._fix(message.lat, message.lon, message.alt, velocity)
 
-    def _read_local(self, message: Message) -> Fix | None:
+    @staticmethod
+    def _fix(lat_e7: int, lon_e7: int, alt_mm: int, velocity_m_s: tuple[float, float]) -> Fix | None:
+        if abs(lat_e7) > _MAX_LAT_E7 or abs(lon_e7) > _MAX_LON_E7:
+            return None
+        return Fix(1e-7 * lat_e7, 1e-7 * lon_e7, 1e-3 * alt_mm, *velocity_m_s)
+
+    def _read_local(self, message: wire.LOCAL_POSITION_NED) -> Fix | None:
         if self._local is None:
             return None
         lat_deg, lon_deg, alt_m = self._local.geodetic_from_ned(message.x, message.y, message.z)
         return Fix(lat_deg, lon_deg, alt_m, float(message.vx), float(message.vy))
 
 
-def values_of(source: Source, message: Message) -> tuple[float, ...]:
+def values_of(message: Message) -> tuple[float, ...]:
     """The values of a position message that the estimator uses, for the input guard."""
-    if source is Source.GPS:
+    if is_a(message, wire.GPS_RAW_INT):
         return (message.lat, message.lon, message.alt, message.vel, message.cog)
-    if source is Source.GLOBAL:
+    if is_a(message, wire.GLOBAL_POSITION_INT):
         return (message.lat, message.lon, message.alt, message.vx, message.vy)
-    return (message.x, message.y, message.z, message.vx, message.vy)
+    if is_a(message, wire.LOCAL_POSITION_NED):
+        return (message.x, message.y, message.z, message.vx, message.vy)
+    return ()
 
 
 class PatternFrame:

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
+from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.estimate import IdentificationEstimate
 from estimators.magnetic_identification.identifier import Identifier, Progress
 from estimators.magnetic_identification.parameters import IdentificationParameters
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.occupancy.placed_readings import ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map, map_error_of
 from estimators.survey_magnetometer import TOTAL_FIELD_NAME
@@ -114,16 +115,15 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
         return self._off_map + sum(placer.dropped for placer in self._placers.values())
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        name = message.name
-        if name == "NAMED_VALUE_FLOAT":
+        if is_a(message, wire.NAMED_VALUE_FLOAT):
             if message.src_component != MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message)
-        if name == "GLOBAL_POSITION_INT" and message.src_component == AUTOPILOT_COMPONENT:
+        if is_a(message, wire.GLOBAL_POSITION_INT) and message.src_component == AUTOPILOT_COMPONENT:
             return self._on_position(time_us, message)
         return Outcome.IGNORED
 
-    def _on_reading(self, time_us: int, message: Message) -> Outcome:
+    def _on_reading(self, time_us: int, message: wire.NAMED_VALUE_FLOAT) -> Outcome:
         system, total_nt = message.src_system, message.value
         refused = self._guard.check(time_us, (system, "reading"), (total_nt,), leads=False)
         if refused is Outcome.TIME_JUMP:
@@ -138,7 +138,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
         placer.add_reading(time_us, total_nt)
         return refused or Outcome.USED
 
-    def _on_position(self, time_us: int, message: Message) -> Outcome:
+    def _on_position(self, time_us: int, message: wire.GLOBAL_POSITION_INT) -> Outcome:
         system = message.src_system
         place = (message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
         refused = self._guard.check(time_us, (system, "position"), place, leads=False)

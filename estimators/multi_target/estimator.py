@@ -13,8 +13,9 @@ from typing import Any, ClassVar, Final
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.target_scan import read_scan_payload
+from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, on
 from estimators.multi_target.estimate import MultiTargetEstimate, SearchEstimate, TargetRow
 from estimators.multi_target.parameters import MultiTargetParameters
 from estimators.multi_target.scans import Scan, ScanAssembler
@@ -35,7 +36,7 @@ class _Searcher:
 
     scans: ScanAssembler = field(default_factory=ScanAssembler)
     home: GeodeticPosition | None = None
-    position: Message | None = None
+    position: wire.GLOBAL_POSITION_INT | None = None
     offset_us: int = 0  # from its vehicle time to the time common to all
 
 
@@ -53,9 +54,9 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
     def __init__(self, parameters: MultiTargetParameters | None = None) -> None:
         super().__init__(parameters)
         self._handlers: dict[str, Callable[[int, _Searcher, Message], Outcome]] = {
-            "TUNNEL": self._on_scan,
-            "GLOBAL_POSITION_INT": self._on_position,
-            "HOME_POSITION": self._on_home,
+            **on(wire.TUNNEL, self._on_scan),
+            **on(wire.GLOBAL_POSITION_INT, self._on_position),
+            **on(wire.HOME_POSITION, self._on_home),
         }
         self.reset()
 
@@ -93,14 +94,14 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
             searcher = self._searchers[message.src_system] = _Searcher()
         return handler(time_us, searcher, message)
 
-    def _on_home(self, _time_us: int, searcher: _Searcher, message: Message) -> Outcome:
+    def _on_home(self, _time_us: int, searcher: _Searcher, message: wire.HOME_POSITION) -> Outcome:
         lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
         if (lat, lon) == (0.0, 0.0) or not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
             return Outcome.IMPLAUSIBLE
         searcher.home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
         return Outcome.USED
 
-    def _on_position(self, time_us: int, searcher: _Searcher, message: Message) -> Outcome:
+    def _on_position(self, time_us: int, searcher: _Searcher, message: wire.GLOBAL_POSITION_INT) -> Outcome:
         if message.hdg == _NO_HEADING or not (
             abs(message.lat) <= 900_000_000 and abs(message.lon) <= 1_800_000_000
         ):
@@ -111,7 +112,7 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         searcher.offset_us = time_us - message.time_boot_ms * 1000
         return Outcome.USED
 
-    def _on_scan(self, _time_us: int, searcher: _Searcher, message: Message) -> Outcome:
+    def _on_scan(self, _time_us: int, searcher: _Searcher, message: wire.TUNNEL) -> Outcome:
         part = read_scan_payload(message.payload_type, message.payload_length, message.payload)
         if part is None:
             return Outcome.IGNORED

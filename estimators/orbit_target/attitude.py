@@ -6,9 +6,10 @@ from collections import deque
 from typing import Final
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
 from estimators.interface import Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.needs import message_names
 from flightsim.foundation.vectors import Quaternion, between, from_euler, yaw_of
 
@@ -52,7 +53,7 @@ class AutopilotAttitude(AttitudeSource):
         self._kept: deque[tuple[int, Quaternion]] = deque(maxlen=_KEPT)
 
     def take(self, time_us: int, message: Message) -> Outcome:
-        if message.name != ATTITUDE or message.src_component != AUTOPILOT_COMPONENT:
+        if not is_a(message, wire.ATTITUDE) or message.src_component != AUTOPILOT_COMPONENT:
             return Outcome.IGNORED
         return self.add(time_us, message.roll, message.pitch, message.yaw)
 

@@ -14,9 +14,10 @@ from typing import ClassVar, Final, Literal
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a, on
 from estimators.orbit_target.attitude import ATTITUDE, AttitudeSource, AutopilotAttitude, FilterAttitude
 from estimators.orbit_target.tracker import TargetStatus, TargetTracker, TrackerParameters
 from estimators.pressure_height import PressureHeight
@@ -131,15 +132,15 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
             FilterAttitude() if self.parameters.attitude == "filter" else AutopilotAttitude()
         )
         self._handlers: dict[str, Callable[[int, Message], Outcome]] = {
-            "GIMBAL_DEVICE_ATTITUDE_STATUS": self._gimbal,
-            "LANDING_TARGET": self._detection,
+            **on(wire.GIMBAL_DEVICE_ATTITUDE_STATUS, self._gimbal),
+            **on(wire.LANDING_TARGET, self._detection),
         }
         self._own_handlers: dict[str, Callable[[int, Message], Outcome]] = {
-            "HEARTBEAT": self._heartbeat,
-            "VFR_HUD": self._air_data,
-            "SCALED_PRESSURE": self._pressure,
-            "HOME_POSITION": self._on_home,
-            "GLOBAL_POSITION_INT": self._position,
+            **on(wire.HEARTBEAT, self._heartbeat),
+            **on(wire.VFR_HUD, self._air_data),
+            **on(wire.SCALED_PRESSURE, self._pressure),
+            **on(wire.HOME_POSITION, self._on_home),
+            **on(wire.GLOBAL_POSITION_INT, self._position),
         }
         self._guard = InputGuard()
         self.reset()
@@ -180,7 +181,7 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
         self._time_us: int | None = None
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        if message.name != ATTITUDE or message.src_component != AUTOPILOT_COMPONENT:
+        if not is_a(message, wire.ATTITUDE) or message.src_component != AUTOPILOT_COMPONENT:
             return self.take(time_us, message)
         refused = self._guard.check(time_us, ATTITUDE, (message.roll, message.pitch, message.yaw))
         if refused is Outcome.TIME_JUMP:
@@ -224,19 +225,19 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
         self.tracker.detect(found)
         return Outcome.USED
 
-    def _heartbeat(self, _time_us: int, message: Message) -> Outcome:
+    def _heartbeat(self, _time_us: int, message: wire.HEARTBEAT) -> Outcome:
         self._armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         if self._armed and self._height is None and self._ground_pa:
             self._height = PressureHeight(fmean(self._ground_pa))
         return Outcome.USED
 
-    def _air_data(self, _time_us: int, message: Message) -> Outcome:
+    def _air_data(self, _time_us: int, message: wire.VFR_HUD) -> Outcome:
         if not math.isfinite(message.airspeed + message.climb):
             return Outcome.NOT_FINITE
         self._airspeed_m_s, self._climb_m_s = message.airspeed, message.climb
         return Outcome.USED
 
-    def _pressure(self, time_us: int, message: Message) -> Outcome:
+    def _pressure(self, time_us: int, message: wire.SCALED_PRESSURE) -> Outcome:
         static_pa = 100.0 * message.press_abs
         if not _PRESSURES_PA[0] < static_pa < _PRESSURES_PA[1]:
             return Outcome.IMPLAUSIBLE
@@ -249,14 +250,14 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
             self._height.add(time_us, static_pa, self._climb_m_s)
         return Outcome.USED
 
-    def _on_home(self, _time_us: int, message: Message) -> Outcome:
+    def _on_home(self, _time_us: int, message: wire.HOME_POSITION) -> Outcome:
         lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
         if (lat, lon) == (0.0, 0.0) or not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
             return Outcome.IMPLAUSIBLE
         self._home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
         return Outcome.USED
 
-    def _position(self, time_us: int, message: Message) -> Outcome:
+    def _position(self, time_us: int, message: wire.GLOBAL_POSITION_INT) -> Outcome:
         if self._first_us is None:
             self._first_us = time_us
         if self._home is None:

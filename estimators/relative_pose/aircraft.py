@@ -9,12 +9,13 @@ from typing import Final
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.vehicle_motion import VehicleMotion
+from estimators import wire
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
 from estimators.attitude.air import pressure_pa
 from estimators.attitude.parameters import AirspeedSource
 from estimators.attitude.samples import SAMPLES
 from estimators.interface import Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.relative_pose.belief import LevelMotion
 from flightsim.foundation.atmosphere import pressure_altitude_m
 
@@ -93,9 +94,9 @@ class AircraftState:
         if message.src_component != AUTOPILOT_COMPONENT or name in _LEFT_OUT:
             return Outcome.IGNORED
         outcome = self.filter.handle(time_us, message)
-        if name == "SCALED_PRESSURE":
+        if is_a(message, wire.SCALED_PRESSURE):
             self._pressure(time_us, message.press_abs)
-        elif name == "HIGHRES_IMU" and message.abs_pressure > 0.0:
+        elif is_a(message, wire.HIGHRES_IMU) and message.abs_pressure > 0.0:
             self._pressure(time_us, message.abs_pressure)
         if outcome is Outcome.TIME_JUMP:
             self.height_m = self.heading_rad = math.nan
@@ -151,8 +152,17 @@ class AircraftState:
             self.on_motion(time_us, dt_s, motion)
 
     def _compass(self, time_us: int, message: Message, e: AttitudeEstimate) -> None:
-        unit = 1.0 if message.name == "HIGHRES_IMU" else 1e-3
-        x, y, z = unit * message.xmag, unit * message.ymag, unit * message.zmag
+        if is_a(message, wire.HIGHRES_IMU):
+            x, y, z = message.xmag, message.ymag, message.zmag
+        elif (
+            is_a(message, wire.RAW_IMU)
+            or is_a(message, wire.SCALED_IMU)
+            or is_a(message, wire.SCALED_IMU2)
+            or is_a(message, wire.SCALED_IMU3)
+        ):
+            x, y, z = 1e-3 * message.xmag, 1e-3 * message.ymag, 1e-3 * message.zmag
+        else:
+            return
         if not _FIELD_GAUSS[0] < math.sqrt(x * x + y * y + z * z) < _FIELD_GAUSS[1]:
             return
         cr, sr = math.cos(e.roll_rad), math.sin(e.roll_rad)

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink.vehicle_range import read_range_payload
+from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.relative_pose.aircraft import AircraftState
 from estimators.relative_pose.belief import PoseMeasurement, RelativePoseBelief
 from estimators.relative_pose.estimate import RelativePoseEstimate
@@ -69,7 +70,7 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
         p = self.parameters
         if message.src_system not in (p.vehicle, p.other):
             return Outcome.IGNORED
-        if message.name == "TUNNEL":
+        if is_a(message, wire.TUNNEL):
             return self._on_range(time_us, message)
         aircraft = self.own if message.src_system == p.vehicle else self.other
         if isinstance(aircraft, ReportedAircraft):
@@ -84,7 +85,7 @@ class RelativePoseEstimator(Estimator[RelativePoseSettings]):
     def _due(self, time_us: int) -> bool:
         return self._moved_us is not None and time_us - self._moved_us >= _STEP_US
 
-    def _on_range(self, time_us: int, message: Message) -> Outcome:
+    def _on_range(self, time_us: int, message: wire.TUNNEL) -> Outcome:
         measured = read_range_payload(message.payload_type, message.payload_length, message.payload)
         p = self.parameters
         if measured is None or message.src_system != p.vehicle or measured.to_system != p.other:

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
+from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, is_a
 from estimators.occupancy.placed_readings import ReadingCheck
 from estimators.occupancy.survey_map import SurveyMap, load_survey_map
 from estimators.survey.compensation import Compensation, load_compensation
@@ -123,16 +124,18 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         name = message.name
-        if name == "NAMED_VALUE_FLOAT":
+        if is_a(message, wire.NAMED_VALUE_FLOAT):
             if message.src_component != MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message.value)
-        if message.src_component != AUTOPILOT_COMPONENT or name not in ("GLOBAL_POSITION_INT", "ATTITUDE"):
+        if message.src_component != AUTOPILOT_COMPONENT:
             return Outcome.IGNORED
-        if name == "ATTITUDE":
+        if is_a(message, wire.ATTITUDE):
             if self._compensation is None:
                 return Outcome.IGNORED
             values: tuple[float, ...] = (message.roll, message.pitch, message.yaw)
+        elif not is_a(message, wire.GLOBAL_POSITION_INT):
+            return Outcome.IGNORED
         else:
             values = (message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
         refused = self._guard.check(time_us, name, values, leads=False)

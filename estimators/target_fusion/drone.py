@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Outcome
 from estimators.lissajous.model import VX, VY, Array, course, course_variance
@@ -116,7 +117,7 @@ class Drone:
 
     def take_position(self, time_us: int, message: Message) -> Outcome:
         """Process a position message."""
-        refused = self._admit(time_us, message, values_of(self.parameters.source, message), leads=True)
+        refused = self._admit(time_us, message, values_of(message), leads=True)
         if refused not in (None, Outcome.TIME_JUMP):
             return refused
         fix = self.reader.read(message)
@@ -126,11 +127,11 @@ class Drone:
             self._height_m = fix.alt_m - self.reader.home.alt_m
         return refused or Outcome.USED
 
-    def take_home(self, message: Message) -> GeodeticPosition | None:
+    def take_home(self, message: wire.HOME_POSITION) -> GeodeticPosition | None:
         """Process a HOME_POSITION; returns None when its position is invalid."""
         return self.reader.home if self.reader.take_home(message) else None
 
-    def take_attitude(self, time_us: int, message: Message) -> Outcome:
+    def take_attitude(self, time_us: int, message: wire.ATTITUDE) -> Outcome:
         """Process an ATTITUDE."""
         angles = (message.roll, message.pitch, message.yaw)
         refused = self._admit(time_us, message, angles)
@@ -139,7 +140,7 @@ class Drone:
         self._attitudes.add(time_us, from_euler(*angles))
         return refused or Outcome.USED
 
-    def take_gimbal(self, time_us: int, message: Message) -> Outcome:
+    def take_gimbal(self, time_us: int, message: wire.GIMBAL_DEVICE_ATTITUDE_STATUS) -> Outcome:
         """Process a GIMBAL_DEVICE_ATTITUDE_STATUS. The attitude is stored relative to the vehicle's heading,
         for both conventions of the message.
         """
@@ -160,14 +161,14 @@ class Drone:
         self._gimbal.add(time_us, q)
         return refused or Outcome.USED
 
-    def _nose(self, time_us: int, message: Message) -> float | None:
+    def _nose(self, time_us: int, message: wire.GIMBAL_DEVICE_ATTITUDE_STATUS) -> float | None:
         """Heading of the vehicle as reported by the gimbal, else by the autopilot."""
         if math.isfinite(message.delta_yaw) and message.delta_yaw != 0.0:
             return float(message.delta_yaw)
         attitude = self._attitudes.at(time_us)
         return None if attitude is None else yaw_of(attitude)
 
-    def take_detection(self, time_us: int, message: Message) -> Outcome:
+    def take_detection(self, time_us: int, message: wire.LANDING_TARGET) -> Outcome:
         """Process a LANDING_TARGET of the camera; it is placed when all needed data have arrived."""
         values = (message.angle_x, message.angle_y, message.distance, message.size_x, message.size_y)
         if not math.isfinite(sum(values)):

@@ -10,11 +10,12 @@ import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.model import Array
 from estimators.lissajous.motion_filter import off_pattern_remarks
 from estimators.lissajous.pattern_frame import MESSAGES, PatternFrame
-from estimators.messages import Message
+from estimators.messages import Message, on
 from estimators.target_fusion.belief import TargetBelief
 from estimators.target_fusion.drone import Drone
 from estimators.target_fusion.estimate import TargetEstimate
@@ -44,10 +45,10 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         super().__init__(parameters)
         self._handlers: dict[str, Callable[[int, Drone, Message], Outcome]] = {
             MESSAGES[self.parameters.source]: self._on_position,
-            "HOME_POSITION": self._on_home,
-            "ATTITUDE": lambda t, drone, m: drone.take_attitude(t, m),
-            "GIMBAL_DEVICE_ATTITUDE_STATUS": lambda t, drone, m: drone.take_gimbal(t, m),
-            "LANDING_TARGET": lambda t, drone, m: drone.take_detection(t, m),
+            **on(wire.HOME_POSITION, self._on_home),
+            **on(wire.ATTITUDE, _on_attitude),
+            **on(wire.GIMBAL_DEVICE_ATTITUDE_STATUS, _on_gimbal),
+            **on(wire.LANDING_TARGET, _on_detection),
         }
         self.drones: dict[int, Drone] = {}
         self.beliefs: dict[int, TargetBelief] = {}
@@ -115,7 +116,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
     def _on_position(self, time_us: int, drone: Drone, message: Message) -> Outcome:
         return drone.take_position(time_us, message)
 
-    def _on_home(self, time_us: int, drone: Drone, message: Message) -> Outcome:
+    def _on_home(self, time_us: int, drone: Drone, message: wire.HOME_POSITION) -> Outcome:
         home = drone.take_home(message)
         if home is None:
             return Outcome.IMPLAUSIBLE
@@ -257,3 +258,15 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
             "detections_outside_the_gate": float(sum(belief.gated for belief in self.beliefs.values())),
             "detections_not_placed": float(self._unplaced),
         }
+
+
+def _on_attitude(time_us: int, drone: Drone, message: wire.ATTITUDE) -> Outcome:
+    return drone.take_attitude(time_us, message)
+
+
+def _on_gimbal(time_us: int, drone: Drone, message: wire.GIMBAL_DEVICE_ATTITUDE_STATUS) -> Outcome:
+    return drone.take_gimbal(time_us, message)
+
+
+def _on_detection(time_us: int, drone: Drone, message: wire.LANDING_TARGET) -> Outcome:
+    return drone.take_detection(time_us, message)

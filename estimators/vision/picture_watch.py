@@ -19,7 +19,8 @@ from autopilot_bridge.mavlink.camera_scan import (
     detection_message,
 )
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from estimators.messages import Message
+from estimators import wire
+from estimators.messages import Message, is_a
 from estimators.vision.camera_file import CameraDescription
 from estimators.vision.clock_check import ClockCheck
 from estimators.vision.foreign_markers import ForeignMarkers
@@ -75,11 +76,11 @@ class PictureWatch:
         """Take a message of the vehicle."""
         if message.src_component != AUTOPILOT_COMPONENT:
             return
-        if message.name == "GLOBAL_POSITION_INT":  # the distance of a tag needs the height only
+        if is_a(message, wire.GLOBAL_POSITION_INT):  # the distance of a tag needs the height only
             self._track.place(message.time_boot_ms * 1000, (0.0, 0.0, -1e-3 * message.relative_alt))
             return
-        self._track.handle(message)
-        if message.name == "ATTITUDE":
+        if is_a(message, wire.ATTITUDE):
+            self._track.handle(message)
             angles = (message.roll, message.pitch, message.yaw)
             if all(map(math.isfinite, angles)):
                 self.clocks.take_attitude(message.time_boot_ms * 1000, *angles)
@@ -160,7 +161,7 @@ class PictureWatch:
     def makes(self, message: Message) -> bool:
         """Whether a message is of a kind that it sends."""
         return message.name == "LANDING_TARGET" or (
-            message.name == "TUNNEL" and message.payload_type == CAMERA_SCAN_PAYLOAD
+            is_a(message, wire.TUNNEL) and message.payload_type == CAMERA_SCAN_PAYLOAD
         )
 
     def figures(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 from autopilot_bridge.mavlink.camera_scan import CameraScan
-from estimators.messages import Message
+from estimators import wire
 from flightsim.foundation.vectors import Quaternion, Vector, between, from_euler, product, rotate
 
 T = TypeVar("T")
@@ -70,7 +70,7 @@ class VehicleTrack:
         self._attitudes: _Samples[Quaternion] = _Samples()
         self._places: _Samples[Vector] = _Samples()
 
-    def handle(self, message: Message) -> None:
+    def handle(self, message: wire.ATTITUDE) -> None:
         """Take an ATTITUDE (`estimators.messages`) of the autopilot. Other messages are ignored, and so are
         values that are not finite.
         """

@@ -20,8 +20,9 @@ from autopilot_bridge.mavlink.search_likelihood import (
     read_search_likelihood,
     search_likelihood_message,
 )
+from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
-from estimators.messages import Message
+from estimators.messages import Message, on
 from estimators.tracking.area_belief import AreaBelief
 from estimators.tracking.camera_sight import CameraSight
 from estimators.vision_search.estimate import AreaEstimate
@@ -57,11 +58,11 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
     def __init__(self, parameters: VisionSearchParameters | None = None) -> None:
         super().__init__(parameters)
         self._handlers: dict[str, Callable[[int, Camera, Message], Outcome]] = {
-            "ATTITUDE": self._on_attitude,
-            "GLOBAL_POSITION_INT": self._on_position,
-            "HOME_POSITION": self._on_home,
-            "LANDING_TARGET": self._on_detection,
-            "TUNNEL": self._on_tunnel,
+            **on(wire.ATTITUDE, self._on_attitude),
+            **on(wire.GLOBAL_POSITION_INT, self._on_position),
+            **on(wire.HOME_POSITION, self._on_home),
+            **on(wire.LANDING_TARGET, self._on_detection),
+            **on(wire.TUNNEL, self._on_tunnel),
         }
         self._errors = pose_errors_of(self.parameters)
         self.reset()
@@ -112,14 +113,14 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     # the pose
 
-    def _on_attitude(self, _time_us: int, camera: Camera, message: Message) -> Outcome:
+    def _on_attitude(self, _time_us: int, camera: Camera, message: wire.ATTITUDE) -> Outcome:
         if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
             return Outcome.NOT_FINITE
         camera.attitude_us = message.time_boot_ms * 1000
         camera.track.handle(message)
         return Outcome.USED
 
-    def _on_position(self, time_us: int, camera: Camera, message: Message) -> Outcome:
+    def _on_position(self, time_us: int, camera: Camera, message: wire.GLOBAL_POSITION_INT) -> Outcome:
         if not (abs(message.lat) <= 900_000_000 and abs(message.lon) <= 1_800_000_000):
             return Outcome.IMPLAUSIBLE
         camera.position = message
@@ -133,7 +134,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         camera.track.place(message.time_boot_ms * 1000, (north_m, east_m, -message.relative_alt * 1e-3))
         return Outcome.USED
 
-    def _on_home(self, _time_us: int, camera: Camera, message: Message) -> Outcome:
+    def _on_home(self, _time_us: int, camera: Camera, message: wire.HOME_POSITION) -> Outcome:
         lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
         if (lat, lon) == (0.0, 0.0) or not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
             return Outcome.IMPLAUSIBLE
@@ -158,7 +159,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     # the camera
 
-    def _on_detection(self, _time_us: int, camera: Camera, message: Message) -> Outcome:
+    def _on_detection(self, _time_us: int, camera: Camera, message: wire.LANDING_TARGET) -> Outcome:
         if message.src_component not in CAMERA_COMPONENTS:
             return Outcome.IGNORED
         camera.count_detection(message.src_component, int(message.time_usec))
@@ -175,7 +176,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         camera.take_detection(message.src_component, int(message.time_usec), *angles)
         return Outcome.USED
 
-    def _on_tunnel(self, time_us: int, camera: Camera, message: Message) -> Outcome:
+    def _on_tunnel(self, time_us: int, camera: Camera, message: wire.TUNNEL) -> Outcome:
         content = (message.payload_type, message.payload_length, message.payload)
         scan = read_camera_scan(*content)
         if scan is not None and message.src_component in CAMERA_COMPONENTS:

@@ -11,7 +11,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink.camera_scan import CameraScan
 from autopilot_bridge.mavlink.search_likelihood import SearchLikelihood
-from estimators.messages import Message
+from estimators import wire
 from estimators.tracking.camera_sight import MAX_DETECTIONS, CameraSight, PoseErrors
 from estimators.tracking.detection_weights import DetectionWeights
 from estimators.vision.vehicle_track import VehicleTrack
@@ -41,7 +41,7 @@ class Camera:
 
     track: VehicleTrack = field(default_factory=VehicleTrack)
     home: GeodeticPosition | None = None
-    position: Message | None = None
+    position: wire.GLOBAL_POSITION_INT | None = None
     attitude_us: int = -1
     offset_us: int = 0
     counts: Counter[str] = field(default_factory=Counter)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, CameraScan, read_camera_scan
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT
-from estimators.messages import read_message
+from estimators import wire
+from estimators.messages import read_as
 from estimators.vision import VehicleTrack, ground_place
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.vehicle.notes import CutShort
@@ -153,7 +154,7 @@ class TagWatch:
 
     def _on_attitude(self, frame: "Frame") -> None:
         if self._own(frame, AUTOPILOT_COMPONENT):
-            self._track.handle(read_message(frame))
+            self._track.handle(read_as(frame, wire.ATTITUDE))
 
     def _on_position(self, position: Position) -> None:
         assert self._frame is not None
@@ -168,7 +169,7 @@ class TagWatch:
     def _on_detection(self, frame: "Frame") -> None:
         if not self._own(frame, CAMERA_COMPONENT):
             return
-        message = read_message(frame)
+        message = read_as(frame, wire.LANDING_TARGET)
         values = (message.angle_x, message.angle_y, message.distance)
         if message.type != _FIDUCIAL or not all(map(math.isfinite, values)):
             return
@@ -180,7 +181,7 @@ class TagWatch:
     def _on_scan(self, frame: "Frame") -> None:
         if not self._own(frame, CAMERA_COMPONENT):
             return
-        message = read_message(frame)
+        message = read_as(frame, wire.TUNNEL)
         if message.payload_type != CAMERA_SCAN_PAYLOAD:
             return
         scan = read_camera_scan(message.payload_type, message.payload_length, message.payload)

@@ -42,6 +42,9 @@ def test_a_message_has_the_fields_of_its_class_only(tmp_path: Path) -> None:
         "    return message.lat\n"
         "def narrowed(message: MAVLinkMessage) -> int:\n"
         "    return message.lat if isinstance(message, dialect.MAVLink_gps_raw_int_message) else 0\n"
+        "from estimators import wire\n"
+        "def of_a_log(message: wire.GLOBAL_POSITION_INT) -> int:\n"
+        "    return message.latt if message.lat else message.src_system\n"
     )
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--no-error-summary", str(source)],
@@ -51,5 +54,5 @@ def test_a_message_has_the_fields_of_its_class_only(tmp_path: Path) -> None:
         check=False,
     )
     unknown = [line for line in done.stdout.splitlines() if line.endswith("[attr-defined]")]
-    assert [line.split(": error: ")[0].rsplit(":", 1)[1] for line in unknown] == ["5", "7"]
+    assert [line.split(": error: ")[0].rsplit(":", 1)[1] for line in unknown] == ["5", "7", "12"]
     assert 'has no attribute "latt"' in unknown[0]
