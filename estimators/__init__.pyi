@@ -4,6 +4,7 @@ from estimators.comparison import Comparison as Comparison
 from estimators.comparison import comparisons as comparisons
 from estimators.errors import EstimatorError as EstimatorError
 from estimators.errors import LogError as LogError
+from estimators.handoff.settings import HandoffSettings as HandoffSettings
 from estimators.input_guard import InputGuard as InputGuard
 from estimators.interface import Estimate as Estimate
 from estimators.interface import Estimator as Estimator

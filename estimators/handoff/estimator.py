@@ -37,6 +37,7 @@ from estimators.handoff.dead_reckoning import DeadReckoning, ReckonedPath
 from estimators.handoff.designation import Designation
 from estimators.handoff.estimate import HandoffEstimate
 from estimators.handoff.evidence import EvidenceComparison
+from estimators.handoff.models import evidence_of, ransac_of, windows_of
 from estimators.handoff.operator_place import OperatorPlace
 from estimators.handoff.process import HandoffProcess, TrackerReport
 from estimators.handoff.reports import ReportAssembler, reported_track, reported_tracks
@@ -117,10 +118,10 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         self.own = p.other if self._tracks else p.vehicle
         self.partner = p.vehicle if self._tracks else p.other
         self._place = OperatorPlace(p.target_north_m, p.target_east_m)
-        keep_s = 1.5 * p.windows.span_s + 1.0
+        keep_s = 1.5 * windows_of(p).span_s + 1.0
         self.sight = AircraftSight(
             self._state,
-            RecursiveRansac(p.ransac),
+            RecursiveRansac(ransac_of(p)),
             keep_s,
             tilt_sigma_rad=p.tilt_step_rad,
             ground_m=self._ground,
@@ -130,7 +131,11 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         self.partner_motion.on_motion = self._partner_path.advance
         self._partner_now = DeadReckoning()
         self.process = HandoffProcess(
-            self.pose.pose, self.sight.tracks, EvidenceComparison(p.evidence), p.windows, self._partner_now
+            self.pose.pose,
+            self.sight.tracks,
+            EvidenceComparison(evidence_of(p)),
+            windows_of(p),
+            self._partner_now,
         )
         self._assembler = ReportAssembler()
         self._pending: deque[TrackReport] = deque(maxlen=50)

@@ -3,10 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from estimators.handoff.evidence import EvidenceParameters
-from estimators.handoff.process import WindowParameters
 from estimators.relative_pose.parameters import RelativePoseSettings
-from estimators.tracking.recursive_ransac import RansacParameters
 from flightsim.foundation.options import option, other_default
 
 
@@ -52,7 +49,7 @@ class HandoffSettings(RelativePoseSettings):
     )
     clutter_per_m2: float = option(2.5e-5, above=0.0, help="Density of false points.")
     window_s: float = option(10.0, above=0.0, help="Time over which tracks are compared (paper: 100 frames).")
-    decision: float = option(0.99, least=0.0, most=1.0, help="Probability from which a track is decided for.")
+    decision: float = option(0.99, above=0.5, below=1.0, help="Probability that decides for a track.")
     hold_s: float = option(3.0, above=0.0, help="Time for which that probability must last.")
     report_s: float = option(0.2, above=0.0, help="Time between the tracker's reports.")
     motion_s: float = option(0.1, above=0.0, help="Time between the tracker's messages about its motion.")
@@ -63,36 +60,3 @@ class HandoffSettings(RelativePoseSettings):
     def check_together(self) -> None:
         if (self.target_north_m is None) != (self.target_east_m is None):
             raise ValueError("target_north_m and target_east_m make a place together; give both, or neither")
-
-    @property
-    def windows(self) -> WindowParameters:
-        """The windows that are compared."""
-        every_s = 1.0 / self.rate_hz
-        return WindowParameters(samples=max(3, round(self.window_s * self.rate_hz)), every_s=every_s)
-
-    @property
-    def evidence(self) -> EvidenceParameters:
-        """The comparison."""
-        return EvidenceParameters(
-            tilt_sigma_rad=self.tilt_sigma_rad,
-            pose_sigma_m=self.pose_sigma_m,
-            pose_sigma_rad=self.pose_sigma_rad,
-            wrong_sigma_m=4.0 * self.pose_sigma_m,
-            decision=self.decision,
-            hold_s=self.hold_s,
-        )
-
-    @property
-    def ransac(self) -> RansacParameters:
-        """The tracker of this aircraft."""
-        return RansacParameters(
-            noise_density=0.2,
-            clutter_per_m2=self.clutter_per_m2,
-            window=round(2.0 * self.rate_hz),
-            good_age=round(1.0 * self.rate_hz),
-            lost_after=round(1.5 * self.rate_hz),
-            inlier_m=4.0,
-            speed_max_m_s=self.speed_max_m_s,
-            seed_support=round(0.6 * self.rate_hz),
-            seed=2 * self.seed + (self.role == "tracker"),
-        )

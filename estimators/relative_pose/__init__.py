@@ -1,21 +1,5 @@
 """The relative pose of two aircraft from their range, headings, pressures and motion, without GPS."""
 
-from estimators.relative_pose.belief import LevelMotion, PoseMeasurement, PoseMode, RelativePoseBelief
-from estimators.relative_pose.estimate import RelativePoseEstimate
-from estimators.relative_pose.estimator import RelativePoseEstimator
-from estimators.relative_pose.gaussian_bank import GaussianBank
-from estimators.relative_pose.parameters import RelativePoseParameters, RelativePoseSettings
-from estimators.relative_pose.particle_belief import ParticlePose
+from flightsim.foundation.lazy_exports import lazy_exports
 
-__all__ = [
-    "GaussianBank",
-    "LevelMotion",
-    "ParticlePose",
-    "PoseMeasurement",
-    "PoseMode",
-    "RelativePoseBelief",
-    "RelativePoseEstimate",
-    "RelativePoseEstimator",
-    "RelativePoseParameters",
-    "RelativePoseSettings",
-]
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

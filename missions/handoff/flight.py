@@ -214,7 +214,7 @@ class TrackerFlight(HandoffAircraft):
         designate: Callable[[int], None],
     ) -> None:
         super().__init__(vehicle, options, estimator, run)
-        self._operator = TrackOperator(options.confirm_after_s, options.decision, designate)
+        self._operator = TrackOperator(options.confirm_after_s, options.estimator.decision, designate)
 
     def look(self) -> None:
         super().look()

@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
-from flightsim.foundation.options import option
+from estimators.handoff.settings import HandoffSettings
+from flightsim.foundation.options import held, option
 from missions.base.options import MissionOptions
 from missions.gps_off import GpsOff
 
@@ -17,7 +18,11 @@ other side of it (docs/handoff.md).
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandoffOptions(MissionOptions):
-    """A handoff between two aircraft: the first arrives without GPS, the second tracks the target."""
+    """A handoff between two aircraft: the first arrives without GPS, the second tracks the target.
+
+    Attributes:
+        estimator: parameters of the estimators that the mission runs, but for aircraft and target.
+    """
 
     altitude_m: float = option(95.0, help="Height of the first aircraft above home.")
     separation_m: float = option(20.0, above=0.0, help="Height of the second aircraft above the first.")
@@ -44,12 +49,6 @@ class HandoffOptions(MissionOptions):
     takeover_s: float = option(
         60.0, above=0.0, help="Time for which the first aircraft follows the target alone."
     )
-    belief: Literal["particles", "gaussians"] = option(
-        "gaussians", help="Representation of the relative pose."
-    )
-    decision: float = option(
-        0.99, above=0.5, below=1.0, help="Probability from which a track is decided for."
-    )
     confirm_after_s: float = option(
         5.0,
         least=0.0,
@@ -58,7 +57,9 @@ class HandoffOptions(MissionOptions):
     )
     link_loss: float = option(0.02, least=0.0, below=1.0, help="Share of the messages that are lost.")
     link_delay_s: float = option(0.05, least=0.0, most=5.0, help="Mean delay of the messages.")
-    estimator_seed: int = option(0, least=0, help="Seed of the random numbers of filters and link.")
+    estimator: HandoffSettings = held(
+        HandoffSettings(), belief="belief", decision="decision", estimator_seed="seed"
+    )
 
     @property
     def start_ne_m(self) -> tuple[float, float]:

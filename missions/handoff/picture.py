@@ -56,7 +56,7 @@ def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debri
         _draw_ground(ground, truth, moments, begin_s, team.options.radius_m)
     _draw_modes(pose, moments, begin_s)
     _draw_bearing(bearing, truth, moments)
-    _draw_scores(score, moments, team.options.decision)
+    _draw_scores(score, moments, team.options.estimator.decision)
     for axes in (bearing, score):
         for line, (name, time_s) in enumerate(marks.items()):
             axes.axvline(time_s, color=_GREY, linewidth=1.0, linestyle="--")

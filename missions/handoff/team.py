@@ -1,6 +1,7 @@
 """Both aircraft of a handoff."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,15 +27,13 @@ def settings_of(options: HandoffOptions, role: str, vehicle: int, other: int) ->
         role: "handoff" or "tracker".
         vehicle, other: system ids of the handoff aircraft and the tracker.
     """
-    return HandoffSettings(
+    return replace(
+        options.estimator,
         role="tracker" if role == "tracker" else "handoff",
         vehicle=vehicle,
         other=other,
-        belief=options.belief,
-        decision=options.decision,
         target_north_m=options.target_ne_m[0],
         target_east_m=options.target_ne_m[1],
-        seed=options.estimator_seed,
     )
 
 
@@ -54,7 +53,7 @@ class HandoffTeam:
     def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[HandoffOptions]) -> None:
         own = self.options = options[0]
         handoff, tracker = (vehicle.system_id for vehicle in vehicles)
-        stream = RandomStreams(own.estimator_seed).child("handoff", "link")
+        stream = RandomStreams(own.estimator.seed).child("handoff", "link")
         self.watch = HandoffWatch(
             vehicles,
             [settings_of(own, role, handoff, tracker) for role in ("handoff", "tracker")],

@@ -15,24 +15,25 @@ from missions.handoff.walking_targets import PointSource, WalkingTargets
 from missions.handoff.watch import RadioLink
 from missions.handoff.world import handoff_world
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
+from tests.missions.held_options import with_fields
 
 
 @pytest.mark.parametrize(
     ("changes", "reported"),
     [
         ({"radius_m": 0.0}, "`radius_m` 0"),
-        ({"decision": 1.0}, "`decision` 1 is not possible; ask for more than 0.5, less than 1"),
+        ({"decision": 1.0}, "decision 1 is not possible; ask for more than 0.5, less than 1"),
         ({"link_loss": 1.0}, "`link_loss` 1 is not possible; ask for 0 or more, less than 1"),
         ({"link_delay_s": 9.0}, "`link_delay_s` 9 s is not in 0..5 s"),
         ({"target_ne_m": (math.nan, 0.0)}, "`target_ne_m` nan is not a finite number"),
         ({"confirm_after_s": -1.0}, "`confirm_after_s` -1"),
         ({"timeout_s": -1.0}, "`timeout_s` -1"),
-        ({"estimator_seed": -1}, "`estimator_seed` -1"),
+        ({"seed": -1}, "seed -1"),
     ],
 )
 def test_impossible_values_are_named(changes, reported):
-    with pytest.raises(PlanError, match=reported):
-        HandoffOptions(**changes)
+    with pytest.raises(ValueError, match=reported):
+        with_fields(HandoffOptions(), **changes)
 
 
 @pytest.mark.parametrize(
