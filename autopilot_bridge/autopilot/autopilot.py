@@ -176,7 +176,7 @@ class Autopilot:
         self.navigation = NavigationFilter(
             typed.navigation, readings=readings, physics_rate_hz=physics_rate_hz
         )
-        self.controller = flavour.controller(
+        self.controller = flavour.flight.controller(
             typed.controller, physics_rate_hz=physics_rate_hz, nav=self.navigation.state
         )
         self.context = context = FlightContext(
@@ -189,14 +189,14 @@ class Autopilot:
             context,
             policy=flavour.policy,
             parameters=typed.commander,
-            vehicle=flavour.vehicle_tasks(context, stores[MissionType.MISSION], flavour.policy),
+            vehicle=flavour.flight.vehicle_tasks(context, stores[MissionType.MISSION], flavour.policy),
             health=HealthMonitor(
                 readings,
                 NavigationJudgement(self.navigation),
-                airspeed=flavour.has_airspeed,
+                airspeed=flavour.flight.has_airspeed,
                 gps_may_repeat=self.navigation.parameters.gps_may_repeat,
             ),
-            land_detector=flavour.land_detector(),
+            land_detector=flavour.flight.land_detector(),
             thrust=self._thrust,
             missions=stores[MissionType.MISSION],
             fence=stores[MissionType.FENCE],

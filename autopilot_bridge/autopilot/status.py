@@ -77,8 +77,8 @@ class StatusReport:
     def __init__(self, flavour: Flavour, commander: Commander) -> None:
         self._flavour = flavour
         self._commander = commander
-        self._bits = flavour.sensor_bits
-        self._standard_modes = {mode.custom_mode: mode.standard_mode for mode in flavour.listed_modes}
+        self._bits = flavour.identity.sensor_bits
+        self._standard_modes = {mode.custom_mode: mode.standard_mode for mode in flavour.modes.listed}
         self._boot_us = round(flavour.policy.boot_s * 1e6)
 
     def heartbeat(self) -> Values:
@@ -94,17 +94,17 @@ class StatusReport:
             thrust_setpoints=setpoints.thrust_setpoints,
         )
         return (
-            flavour.vehicle_type,
-            flavour.autopilot,
-            flavour.base_mode(display),
-            flavour.custom_modes[commander.mode],
+            flavour.identity.vehicle_type,
+            flavour.identity.autopilot,
+            flavour.modes.base_mode(display),
+            flavour.modes.custom[commander.mode],
             int(commander.system_status),
             MAVLINK_VERSION,
         )
 
     def current_mode(self) -> Values:
         """CURRENT_MODE (436): the mode that is flown and the mode that was commanded."""
-        modes = self._flavour.custom_modes
+        modes = self._flavour.modes.custom
         flown = modes[self._commander.mode]
         return (self._standard_modes.get(flown, 0), flown, modes[self._commander.commanded_mode])
 

@@ -38,14 +38,14 @@ class StatusTextService(Microservice):
 
     def follow(self, event: Event) -> None:
         """Announce an event with the flavour's text."""
-        end = "\t" if self._flavour.sends_events else ""  # marks a text that an EVENT repeats
-        for notice in self._flavour.notices(event):
+        end = "\t" if self._flavour.texts.repeated_by_events else ""  # marks a text that an EVENT repeats
+        for notice in self._flavour.texts.notices(event):
             self.announce(notice.severity, notice.text + end)
 
     def banner(self, channel: Channel) -> None:
         """Send the firmware's identification, as after a parameter list request on a channel."""
         if self._listens(channel):
-            for notice in self._flavour.banner:
+            for notice in self._flavour.texts.banner:
                 for message in self._messages(int(notice.severity), notice.text):
                     channel.send(message)
 
@@ -60,7 +60,7 @@ class StatusTextService(Microservice):
 
     def _listens(self, channel: Channel) -> bool:
         return (
-            not self._flavour.text_needs_heartbeat
+            not self._flavour.texts.need_heartbeat
             or channel.name in self._greeted
             or getattr(channel, "receives_all", False)  # a log
         )

@@ -64,9 +64,12 @@ class ControllerFactory(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """The content of AUTOPILOT_VERSION, PROTOCOL_VERSION and the banner.
+    """What the vehicle says that it is, in HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION and its banner.
 
     Attributes:
+        autopilot: MAV_AUTOPILOT.
+        vehicle_type: MAV_TYPE.
+        sensor_bits: of SYS_STATUS.
         product: name in texts, "ArduCopter V4.6.3 (3fc7011a)".
         capabilities: MAV_PROTOCOL_CAPABILITY bits.
         flight_sw_version: major, minor, patch and FIRMWARE_VERSION_TYPE, a byte each from the top.
@@ -75,6 +78,9 @@ class Identity:
         uid2: 18 bytes of hardware identity.
     """
 
+    autopilot: int
+    vehicle_type: int
+    sensor_bits: SensorBits
     product: str
     capabilities: int
     flight_sw_version: int
@@ -95,41 +101,79 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Modes:
+    """The modes of one firmware.
+
+    Attributes:
+        custom: HEARTBEAT.custom_mode of every mode of this firmware.
+        names: what the firmware calls its modes in texts.
+        base_mode: HEARTBEAT.base_mode.
+        listed: what AVAILABLE_MODES lists, in its order; empty: the firmware has no such message.
+    """
+
+    custom: Mapping[FlightMode, int]
+    names: Mapping[FlightMode, str]
+    base_mode: Callable[[ModeDisplay], int]
+    listed: tuple[ListedMode, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Texts:
+    """The texts of one firmware.
+
+    Attributes:
+        notices: the texts of an event; empty for events this firmware is silent about.
+        banner: texts that follow a parameter list request.
+        need_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
+        repeated_by_events: events are sent as EVENT messages, and texts repeat them.
+    """
+
+    notices: Callable[[Event], tuple[Notice, ...]]
+    banner: tuple[Notice, ...]
+    need_heartbeat: bool
+    repeated_by_events: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightParts:
+    """What flies a class of vehicle, the same for both firmwares.
+
+    Attributes:
+        controller: makes the control laws from `Flavour.controller_parameters`.
+        vehicle_tasks: makes the flight tasks.
+        land_detector: makes the land detector.
+        has_airspeed: a pitot tube belongs to the vehicle and is looked after.
+    """
+
+    controller: ControllerFactory
+    vehicle_tasks: Callable[[FlightContext, MissionStore, CommanderPolicy], VehicleTasks]
+    land_detector: Callable[[], LandDetector]
+    has_airspeed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Flavour:
     """One firmware for one vehicle class.
 
     Attributes:
         name: as the user types it.
         kind: the vehicle class.
-        autopilot: MAV_AUTOPILOT.
-        vehicle_type: MAV_TYPE.
-        custom_modes: HEARTBEAT.custom_mode of every mode of this firmware.
-        mode_names: what the firmware calls its modes in texts.
-        base_mode: HEARTBEAT.base_mode.
-        listed_modes: what AVAILABLE_MODES lists, in its order; empty: the firmware has no such message.
+        identity: what the vehicle says that it is.
+        modes: the firmware's modes, and how it shows them.
+        texts: what it says to the pilot.
+        flight: control laws and flight tasks of the vehicle class.
         policy: what the commander follows.
-        notices: the texts of an event; empty for events this firmware is silent about.
-        banner: texts that follow a parameter list request.
-        identity: versions and capabilities.
         command_address: target ids of commands this firmware takes for its own, for a system id.
         parameter_definitions: the parameter table in listing order.
         airframe: parameter values of the vehicle class that differ from the firmware's defaults, as in an
             airframe file.
         airframe_of: what an aircraft's envelope changes beyond that; None: nothing (a multicopter).
         launch_parameters: parameters that fit the ways an aircraft is launched.
-        sensor_bits: of SYS_STATUS.
-        has_airspeed: a pitot tube belongs to the vehicle and is looked after.
-        controller: makes the control laws from `controller_parameters`.
-        vehicle_tasks: makes the flight tasks.
-        land_detector: makes the land detector.
         commander_parameters, flight_parameters, controller_parameters, navigation_parameters: typed
             parameters from the store's current values; called again after a change. They clamp what a ground
             station may have set beyond reason, and never raise. Those of an aircraft's flight and controller
             take its `envelope` too.
-        text_needs_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
-        sends_events: events are sent as EVENT messages, and texts repeat them.
-        bytewise_parameters: integer parameters travel as bit patterns, not as floats.
         reboot_starts_again: a reboot starts the simulated vehicle again too, at its first place and level
             (ArduPilot's SITL); else only the autopilot boots, as on a vehicle.
         services: what its services do differently.
@@ -138,34 +182,21 @@ class Flavour:
 
     name: str
     kind: AirframeKind
-    autopilot: int
-    vehicle_type: int
-    custom_modes: Mapping[FlightMode, int]
-    mode_names: Mapping[FlightMode, str]
-    base_mode: Callable[[ModeDisplay], int]
-    policy: CommanderPolicy
-    notices: Callable[[Event], tuple[Notice, ...]]
-    banner: tuple[Notice, ...]
     identity: Identity
+    modes: Modes
+    texts: Texts
+    flight: FlightParts
+    policy: CommanderPolicy
     command_address: Callable[[int], AddressRule]
     parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
     airframe: Mapping[str, float]
     airframe_of: "Callable[[FlightEnvelope], Mapping[str, float]] | None"
     launch_parameters: Mapping[LaunchKind, Mapping[str, float]]
-    sensor_bits: SensorBits
-    has_airspeed: bool
-    controller: ControllerFactory
-    vehicle_tasks: Callable[[FlightContext, MissionStore, CommanderPolicy], VehicleTasks]
-    land_detector: Callable[[], LandDetector]
     commander_parameters: Callable[[ParameterStore], CommanderParameters]
     flight_parameters: Callable[..., Any]
     controller_parameters: Callable[..., Any]
     navigation_parameters: Callable[[ParameterStore], NavigationParameters]
-    text_needs_heartbeat: bool
     heartbeat_on_mode_change: bool
-    sends_events: bool
-    bytewise_parameters: bool
     services: FirmwareServices
-    listed_modes: tuple[ListedMode, ...] = ()
     reboot_starts_again: bool = False
     gps_source: Callable[[ParameterStore], GpsSource] = own_receiver

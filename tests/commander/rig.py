@@ -98,8 +98,8 @@ class Rig:
             self.context,
             policy=self.flavour.policy,
             parameters=self.flavour.commander_parameters(self.store),
-            vehicle=self.flavour.vehicle_tasks(self.context, self.missions, self.flavour.policy),
-            health=HealthMonitor(self.readings, self.judgement, airspeed=self.flavour.has_airspeed),
+            vehicle=self.flavour.flight.vehicle_tasks(self.context, self.missions, self.flavour.policy),
+            health=HealthMonitor(self.readings, self.judgement, airspeed=self.flavour.flight.has_airspeed),
             land_detector=self.detector,
             thrust=lambda: 0.3,
             missions=self.missions,
@@ -151,7 +151,7 @@ class Rig:
         return [event for event in self.events if isinstance(event, kind)]
 
     def texts(self) -> list[str]:
-        return [notice.text for event in self.events for notice in self.flavour.notices(event)]
+        return [notice.text for event in self.events for notice in self.flavour.texts.notices(event)]
 
     def put_in_air(self, height_m: float = 10.0) -> None:
         """Armed and hovering, without the way there."""

@@ -200,7 +200,7 @@ def test_every_mode_on_the_ground_and_in_flight(flavour: str) -> None:
             before = rig.commander.mode
             verdict = rig.commander.set_mode(mode)
             assert rig.commander.mode is (mode if verdict.accepted else before)
-            assert rig.commander.mode in rig.flavour.custom_modes
+            assert rig.commander.mode in rig.flavour.modes.custom
             allowed = rig.flavour.policy.flown_modes if flying else rig.flavour.policy.ground_modes
             if mode not in allowed:
                 assert verdict.result is rig.flavour.policy.mode_denied

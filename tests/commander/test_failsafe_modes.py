@@ -54,7 +54,7 @@ def test_every_failsafe_ends_in_a_mode_of_the_vehicle(name: str, kind: AirframeK
     ):
         situation = Situation(mode=mode, position=position, home_set=home, armed=True, airborne=True)
         flown = failsafe_mode(action, situation, flavour.policy, sticks_valid=sticks)
-        assert flown in flavour.custom_modes and flown in flavour.mode_names, (action, situation)
+        assert flown in flavour.modes.custom and flown in flavour.modes.names, (action, situation)
 
 
 def test_a_return_without_a_home() -> None:

@@ -232,7 +232,7 @@ class Listener:
         self.seen = len(self.rig.events)
         texts, kinds = [], []
         for event in events:
-            notices = self.rig.flavour.notices(event)
+            notices = self.rig.flavour.texts.notices(event)
             texts += [notice.text for notice in notices]
             kinds += [each.kind.message for each in px4_events.occurrences(event, notices)]
         return texts, [kind for kind in kinds if kind not in texts]

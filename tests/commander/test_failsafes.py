@@ -311,7 +311,7 @@ def test_px4_without_position_descends_and_goes_back_when_it_returns() -> None:
     rig.judgement.position_valid = False
     rig.run(0.1)
     assert rig.commander.mode is FlightMode.DESCEND
-    assert rig.flavour.custom_modes[rig.commander.mode] == 0x06040000
+    assert rig.flavour.modes.custom[rig.commander.mode] == 0x06040000
     assert not rig.commander.set_mode(FlightMode.MISSION).accepted
     rig.judgement.position_valid = True
     rig.run(0.1)

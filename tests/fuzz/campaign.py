@@ -116,7 +116,7 @@ class Campaign:
             self._seed * 1000 + self._round,
             flying.autopilot.parameters.definitions,
             orders=orders,
-            bytewise=flying.autopilot.flavour.bytewise_parameters,
+            bytewise=flying.autopilot.flavour.services.parameters.bytewise,
         )
         link = flying.sitl.connect(0)
         figures, sitl = self.figures, flying.sitl

@@ -61,7 +61,7 @@ class PlaneRig(ServiceRig):
             self.context,
             policy=self.flavour.policy,
             parameters=self.flavour.commander_parameters(self.store),
-            vehicle=self.flavour.vehicle_tasks(self.context, self.missions, self.flavour.policy),
+            vehicle=self.flavour.flight.vehicle_tasks(self.context, self.missions, self.flavour.policy),
             health=HealthMonitor(self.readings, self.judgement),
             land_detector=StillLandDetector(),
             thrust=lambda: 0.3,

@@ -35,7 +35,7 @@ class Rig(ServiceRig):
         super().__init__("px4")
         self.link = Link()
         self.channels = [self.link]  # type: ignore[list-item]
-        self.service = EventService(self.commander, self, self.flavour.notices)
+        self.service = EventService(self.commander, self, self.flavour.texts.notices)
 
     def sent(self) -> list[Any]:
         found, self.link.sent = self.link.sent, []

@@ -48,13 +48,13 @@ def display(mode: FlightMode, **changes: bool) -> ModeDisplay:
 @pytest.mark.parametrize(("mode", "custom", "base"), PX4_MODES)
 def test_px4_heartbeat_fields(mode: FlightMode, custom: int, base: int) -> None:
     flavour = get_flavour("px4")
-    assert flavour.custom_modes[mode] == custom
-    assert flavour.base_mode(display(mode)) == base
-    assert flavour.base_mode(display(mode, armed=True)) == base | 0x80
+    assert flavour.modes.custom[mode] == custom
+    assert flavour.modes.base_mode(display(mode)) == base
+    assert flavour.modes.base_mode(display(mode, armed=True)) == base | 0x80
 
 
 def test_px4_offboard_shows_what_is_streamed() -> None:
-    base = get_flavour("px4").base_mode
+    base = get_flavour("px4").modes.base_mode
     assert base(display(M.OFFBOARD, armed=True, attitude_setpoints=True)) == 0x91
     assert base(display(M.OFFBOARD, armed=True)) == 0x81
     assert base(display(M.OFFBOARD, attitude_setpoints=True)) == 0x11
@@ -90,13 +90,13 @@ ARDUPILOT_MODES = [
 @pytest.mark.parametrize(("number", "mode", "base"), ARDUPILOT_MODES)
 def test_ardupilot_heartbeat_fields(number: int, mode: FlightMode, base: int) -> None:
     flavour = get_flavour("ardupilot")
-    assert flavour.custom_modes[mode] == number
+    assert flavour.modes.custom[mode] == number
     assert ardupilot_modes.commanded_mode(number) is mode
-    assert flavour.base_mode(display(mode)) == base
+    assert flavour.modes.base_mode(display(mode)) == base
 
 
 def test_ardupilot_base_mode_in_flight() -> None:
-    base = get_flavour("ardupilot").base_mode
+    base = get_flavour("ardupilot").modes.base_mode
     assert base(display(M.STABILIZED, armed=True)) == 209
     assert base(display(M.GUIDED, armed=True)) == 217
     assert base(display(M.GUIDED, armed=True, thrust_setpoints=True)) == 209
@@ -116,8 +116,8 @@ def test_every_mode_the_commander_can_end_in_is_shown(name: str, kind: AirframeK
     policy = flavour.policy
     ends = {FlightMode.TERMINATION, policy.boot_mode, policy.fallback_land, policy.reposition_mode}
     for mode in policy.ground_modes | policy.flown_modes | ends - {None}:
-        assert mode in flavour.custom_modes
-        assert mode in flavour.mode_names
+        assert mode in flavour.modes.custom
+        assert mode in flavour.modes.names
 
 
 @pytest.mark.parametrize("name", FLAVOUR_NAMES)
@@ -128,7 +128,7 @@ def test_a_flavour_is_complete(name: str) -> None:
     assert policy.armable_modes <= policy.ground_modes
     assert policy.reposition_mode in policy.flown_modes
     for mode in policy.ground_modes | policy.flown_modes | {policy.fallback_land}:
-        assert mode in flavour.custom_modes and mode in flavour.mode_names
+        assert mode in flavour.modes.custom and mode in flavour.modes.names
     assert flavour.command_address(7).system_id == 7
 
 

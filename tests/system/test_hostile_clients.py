@@ -127,7 +127,7 @@ def test_the_same_request_again_and_again_is_answered_once_a_tick() -> None:
         for _ in range(100):
             client.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AVAILABLE_MODES, 0)
         there.on(0.5, client)
-        modes = len(there.flying.autopilot.flavour.listed_modes)
+        modes = len(there.flying.autopilot.flavour.modes.listed)
         assert client.count("COMMAND_ACK") == 100
         assert modes <= client.count("AVAILABLE_MODES") <= 12 * modes
 

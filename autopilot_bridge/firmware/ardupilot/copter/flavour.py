@@ -4,10 +4,8 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
-from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.control.multicopter import MulticopterController
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
@@ -16,10 +14,10 @@ from autopilot_bridge.firmware.ardupilot.services import SERVICES, address_rule
 from autopilot_bridge.firmware.ardupilot.texts import copter_notices
 from autopilot_bridge.firmware.data import load_data, modes
 from autopilot_bridge.firmware.external_mapping import ardupilot_gps_source
-from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
+from autopilot_bridge.firmware.flavour import Flavour, Identity, Modes, SensorBits, Texts
 from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.texts import Notice, Severity
-from autopilot_bridge.flight.multicopter.land_detector import LandDetector
+from autopilot_bridge.firmware.vehicle_classes import MULTICOPTER
 from autopilot_bridge.flight.plan_reading import ARDUCOPTER_PLANS
 from autopilot_bridge.mavlink.simulation_marks import FLIGHTSTACK_UID2
 from flightsim.airframe import AirframeKind
@@ -78,6 +76,15 @@ POLICY: Final = CommanderPolicy(
 )
 
 IDENTITY: Final = Identity(
+    autopilot=3,  # MAV_AUTOPILOT_ARDUPILOTMEGA
+    vehicle_type=2,  # MAV_TYPE_QUADROTOR
+    sensor_bits=SensorBits(
+        present=0x5371FC2F,
+        enabled=0x52619C2F,
+        enabled_armed=0x5361FC2F,
+        health=0x57719C2F,
+        health_armed=0x5771FC2F,
+    ),
     product="ArduCopter V4.6.3 (3fc7011a)",
     capabilities=0xFBEF,
     flight_sw_version=0x040603FF,
@@ -93,45 +100,36 @@ IDENTITY: Final = Identity(
 
 
 ARDUPILOT: Final = Flavour(
+    identity=IDENTITY,
+    modes=Modes(
+        custom=ardupilot_modes.CUSTOM_MODES,
+        names=ardupilot_modes.MODE_NAMES,
+        base_mode=ardupilot_modes.base_mode,
+    ),
+    texts=Texts(
+        notices=copter_notices,
+        banner=(
+            Notice(Severity.INFO, IDENTITY.product),
+            Notice(Severity.INFO, "flightstack SITL"),
+            Notice(Severity.INFO, "Frame: QUAD/X"),
+        ),
+        need_heartbeat=True,
+        repeated_by_events=False,
+    ),
+    flight=MULTICOPTER,
     name="ardupilot",
     kind=AirframeKind.MULTICOPTER,
-    autopilot=3,  # MAV_AUTOPILOT_ARDUPILOTMEGA
-    vehicle_type=2,  # MAV_TYPE_QUADROTOR
-    custom_modes=ardupilot_modes.CUSTOM_MODES,
-    mode_names=ardupilot_modes.MODE_NAMES,
-    base_mode=ardupilot_modes.base_mode,
     policy=POLICY,
-    notices=copter_notices,
-    banner=(
-        Notice(Severity.INFO, IDENTITY.product),
-        Notice(Severity.INFO, "flightstack SITL"),
-        Notice(Severity.INFO, "Frame: QUAD/X"),
-    ),
-    identity=IDENTITY,
     command_address=address_rule,
     parameter_definitions=lambda: ARDUPILOT_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, ARDUPILOT_PARAMETERS),
     airframe_of=None,
     launch_parameters=MappingProxyType({}),
-    sensor_bits=SensorBits(
-        present=0x5371FC2F,
-        enabled=0x52619C2F,
-        enabled_armed=0x5361FC2F,
-        health=0x57719C2F,
-        health_armed=0x5771FC2F,
-    ),
-    has_airspeed=False,
-    controller=MulticopterController,
-    vehicle_tasks=MulticopterTasks,
-    land_detector=LandDetector,
     commander_parameters=ardupilot_mapping.commander_parameters,
     flight_parameters=ardupilot_mapping.flight_parameters,
     controller_parameters=ardupilot_mapping.controller_parameters,
     navigation_parameters=ardupilot_mapping.navigation_parameters,
-    text_needs_heartbeat=True,
     heartbeat_on_mode_change=True,
-    sends_events=False,
-    bytewise_parameters=False,
     reboot_starts_again=True,
     gps_source=ardupilot_gps_source,
     services=SERVICES,

@@ -6,10 +6,8 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.events import SystemStatus
-from autopilot_bridge.commander.fixed_wing_tasks import FixedWingTasks
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
-from autopilot_bridge.control.fixed_wing import FixedWingController
 from autopilot_bridge.firmware.ardupilot.copter.flavour import ARDUPILOT
 from autopilot_bridge.firmware.ardupilot.copter.flavour import POLICY as MULTICOPTER_POLICY
 from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane_mapping
@@ -18,9 +16,9 @@ from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE
 from autopilot_bridge.firmware.ardupilot.services import PLANE_SERVICES
 from autopilot_bridge.firmware.ardupilot.texts import plane_notices
 from autopilot_bridge.firmware.data import load_data, modes
-from autopilot_bridge.firmware.flavour import SensorBits
+from autopilot_bridge.firmware.flavour import Modes, SensorBits
 from autopilot_bridge.firmware.texts import Notice, Severity
-from autopilot_bridge.flight.fixed_wing import LandDetector
+from autopilot_bridge.firmware.vehicle_classes import FIXED_WING
 from autopilot_bridge.flight.plan_reading import ARDUPLANE_PLANS
 from flightsim.airframe import AirframeKind, LaunchKind
 
@@ -69,6 +67,14 @@ POLICY: Final[CommanderPolicy] = replace(
 
 IDENTITY: Final = replace(
     ARDUPILOT.identity,
+    vehicle_type=1,  # MAV_TYPE_FIXED_WING
+    sensor_bits=SensorBits(
+        present=0x1361FC3F,
+        enabled=0x1261803F,
+        enabled_armed=0x1361FC3F,
+        health=0x1331803F,
+        health_armed=0x1331FC3F,
+    ),
     product="ArduPlane V4.6.3 (3fc7011a)",
     capabilities=0xF36F,
     flight_sw_version=0x040603FF,
@@ -84,34 +90,28 @@ LAUNCH_PARAMETERS: Final[Mapping[LaunchKind, Mapping[str, float]]] = MappingProx
 
 ARDUPILOT_PLANE: Final = replace(
     ARDUPILOT,
-    kind=AirframeKind.FIXED_WING,
-    vehicle_type=1,  # MAV_TYPE_FIXED_WING
-    custom_modes=ardupilot_plane_modes.CUSTOM_MODES,
-    mode_names=ardupilot_plane_modes.MODE_NAMES,
-    base_mode=ardupilot_plane_modes.base_mode,
-    policy=POLICY,
-    notices=plane_notices,
-    banner=(Notice(Severity.INFO, IDENTITY.product), Notice(Severity.INFO, "flightstack SITL")),
     identity=IDENTITY,
+    modes=Modes(
+        custom=ardupilot_plane_modes.CUSTOM_MODES,
+        names=ardupilot_plane_modes.MODE_NAMES,
+        base_mode=ardupilot_plane_modes.base_mode,
+    ),
+    texts=replace(
+        ARDUPILOT.texts,
+        notices=plane_notices,
+        need_heartbeat=False,
+        banner=(Notice(Severity.INFO, IDENTITY.product), Notice(Severity.INFO, "flightstack SITL")),
+    ),
+    flight=FIXED_WING,
+    kind=AirframeKind.FIXED_WING,
+    policy=POLICY,
     parameter_definitions=lambda: ARDUPILOT_PLANE_PARAMETERS,
     airframe=MappingProxyType({}),
     airframe_of=ardupilot_plane_mapping.airframe_overrides,
     launch_parameters=LAUNCH_PARAMETERS,
-    sensor_bits=SensorBits(
-        present=0x1361FC3F,
-        enabled=0x1261803F,
-        enabled_armed=0x1361FC3F,
-        health=0x1331803F,
-        health_armed=0x1331FC3F,
-    ),
-    has_airspeed=True,
-    controller=FixedWingController,
-    vehicle_tasks=FixedWingTasks,
-    land_detector=LandDetector,
     commander_parameters=ardupilot_plane_mapping.commander_parameters,
     flight_parameters=ardupilot_plane_mapping.flight_parameters,
     controller_parameters=ardupilot_plane_mapping.controller_parameters,
     navigation_parameters=ardupilot_plane_mapping.navigation_parameters,
-    text_needs_heartbeat=False,
     services=PLANE_SERVICES,
 )

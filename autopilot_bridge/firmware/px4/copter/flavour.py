@@ -4,20 +4,18 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
 from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.control.multicopter import MulticopterController
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.firmware.data import load_data, modes
-from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
+from autopilot_bridge.firmware.flavour import Flavour, Identity, Modes, SensorBits, Texts
 from autopilot_bridge.firmware.mapping import airframe_overrides
 from autopilot_bridge.firmware.px4.copter import mapping as px4_mapping
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.firmware.px4.services import SERVICES
 from autopilot_bridge.firmware.px4.texts import copter_notices
-from autopilot_bridge.flight.multicopter.land_detector import LandDetector
+from autopilot_bridge.firmware.vehicle_classes import MULTICOPTER
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.simulation_marks import PX4_SITL_UID
 from autopilot_bridge.services.channel import AddressRule
@@ -70,6 +68,15 @@ POLICY: Final = CommanderPolicy(
 )
 
 IDENTITY: Final = Identity(
+    autopilot=12,  # MAV_AUTOPILOT_PX4
+    vehicle_type=2,  # MAV_TYPE_QUADROTOR
+    sensor_bits=SensorBits(
+        present=0x0300402F,
+        enabled=0x0301402F,
+        enabled_armed=0x0301402F,
+        health=0x1320C83F,
+        health_armed=0x1320C83F,
+    ),
     product="PX4 Autopilot v1.16.1",
     capabilities=0xE8FF,
     flight_sw_version=0x011001FF,
@@ -89,41 +96,27 @@ def _command_address(system_id: int) -> AddressRule:
 
 
 PX4: Final = Flavour(
+    identity=IDENTITY,
+    modes=Modes(
+        custom=px4_modes.CUSTOM_MODES,
+        names=px4_modes.MODE_NAMES,
+        base_mode=px4_modes.base_mode,
+        listed=px4_modes.LISTED_MODES,
+    ),
+    texts=Texts(notices=copter_notices, banner=(), need_heartbeat=False, repeated_by_events=True),
+    flight=MULTICOPTER,
     name="px4",
     kind=AirframeKind.MULTICOPTER,
-    autopilot=12,  # MAV_AUTOPILOT_PX4
-    vehicle_type=2,  # MAV_TYPE_QUADROTOR
-    custom_modes=px4_modes.CUSTOM_MODES,
-    mode_names=px4_modes.MODE_NAMES,
-    base_mode=px4_modes.base_mode,
-    listed_modes=px4_modes.LISTED_MODES,
     policy=POLICY,
-    notices=copter_notices,
-    banner=(),
-    identity=IDENTITY,
     command_address=_command_address,
     parameter_definitions=lambda: PX4_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, PX4_PARAMETERS),
     airframe_of=None,
     launch_parameters=MappingProxyType({}),
-    sensor_bits=SensorBits(
-        present=0x0300402F,
-        enabled=0x0301402F,
-        enabled_armed=0x0301402F,
-        health=0x1320C83F,
-        health_armed=0x1320C83F,
-    ),
-    has_airspeed=False,
-    controller=MulticopterController,
-    vehicle_tasks=MulticopterTasks,
-    land_detector=LandDetector,
     commander_parameters=px4_mapping.commander_parameters,
     flight_parameters=px4_mapping.flight_parameters,
     controller_parameters=px4_mapping.controller_parameters,
     navigation_parameters=px4_mapping.navigation_parameters,
-    text_needs_heartbeat=False,
     heartbeat_on_mode_change=False,
-    sends_events=True,
-    bytewise_parameters=True,
     services=SERVICES,
 )

@@ -5,10 +5,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.commander.fixed_wing_tasks import FixedWingTasks
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.control.fixed_wing import FixedWingController
-from autopilot_bridge.firmware.flavour import SensorBits
+from autopilot_bridge.firmware.flavour import Modes, SensorBits
 from autopilot_bridge.firmware.px4.copter.flavour import POLICY as MULTICOPTER_POLICY
 from autopilot_bridge.firmware.px4.copter.flavour import PX4
 from autopilot_bridge.firmware.px4.plane import mapping as px4_plane_mapping
@@ -16,7 +14,7 @@ from autopilot_bridge.firmware.px4.plane import modes as px4_plane_modes
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
 from autopilot_bridge.firmware.px4.services import PLANE_SERVICES
 from autopilot_bridge.firmware.px4.texts import plane_notices
-from autopilot_bridge.flight.fixed_wing import LandDetector
+from autopilot_bridge.firmware.vehicle_classes import FIXED_WING
 from flightsim.airframe import AirframeKind, LaunchKind
 
 _SELECTABLE: Final = MULTICOPTER_POLICY.ground_modes - px4_plane_modes.MULTICOPTER_ONLY
@@ -40,20 +38,9 @@ LAUNCH_PARAMETERS: Final[Mapping[LaunchKind, Mapping[str, float]]] = MappingProx
     }
 )
 
-PX4_PLANE: Final = replace(
-    PX4,
-    kind=AirframeKind.FIXED_WING,
+IDENTITY: Final = replace(
+    PX4.identity,
     vehicle_type=1,  # MAV_TYPE_FIXED_WING
-    custom_modes=px4_plane_modes.CUSTOM_MODES,
-    mode_names=px4_plane_modes.MODE_NAMES,
-    base_mode=px4_plane_modes.base_mode,
-    listed_modes=px4_plane_modes.LISTED_MODES,
-    policy=POLICY,
-    notices=plane_notices,
-    parameter_definitions=lambda: PX4_PLANE_PARAMETERS,
-    airframe=MappingProxyType({}),
-    airframe_of=px4_plane_mapping.airframe_overrides,
-    launch_parameters=LAUNCH_PARAMETERS,
     sensor_bits=SensorBits(  # as the recorded flight of the aircraft shows them
         present=0x0300403F,
         enabled=0x0301403F,
@@ -61,10 +48,25 @@ PX4_PLANE: Final = replace(
         health=0x1320C83F,
         health_armed=0x1320C83F,
     ),
-    has_airspeed=True,
-    controller=FixedWingController,
-    vehicle_tasks=FixedWingTasks,
-    land_detector=LandDetector,
+)
+
+PX4_PLANE: Final = replace(
+    PX4,
+    identity=IDENTITY,
+    modes=Modes(
+        custom=px4_plane_modes.CUSTOM_MODES,
+        names=px4_plane_modes.MODE_NAMES,
+        base_mode=px4_plane_modes.base_mode,
+        listed=px4_plane_modes.LISTED_MODES,
+    ),
+    texts=replace(PX4.texts, notices=plane_notices),
+    flight=FIXED_WING,
+    kind=AirframeKind.FIXED_WING,
+    policy=POLICY,
+    parameter_definitions=lambda: PX4_PLANE_PARAMETERS,
+    airframe=MappingProxyType({}),
+    airframe_of=px4_plane_mapping.airframe_overrides,
+    launch_parameters=LAUNCH_PARAMETERS,
     commander_parameters=px4_plane_mapping.commander_parameters,
     flight_parameters=px4_plane_mapping.flight_parameters,
     controller_parameters=px4_plane_mapping.controller_parameters,
