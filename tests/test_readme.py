@@ -141,7 +141,9 @@ def unknown_names(text: str, known: dict[str, Path]) -> list[str]:
     for dotted in re.findall(rf"(?<![\w/.(])(?:{tops})(?:\.(?!md\b|py\b)[A-Za-z]\w*)+", text):
         parts = dotted.split(".")
         depth = max(k for k in range(1, len(parts) + 1) if ".".join(parts[:k]) in known)
-        source = known[".".join(parts[:depth])].read_text(encoding="utf-8")
+        module = known[".".join(parts[:depth])]
+        stub = module.with_suffix(".pyi")  # of a package whose names are imported when they are used
+        source = "".join(file.read_text(encoding="utf-8") for file in (module, stub) if file.exists())
         known_start = any(name.startswith(dotted) for name in known)  # `missions.studies.lissajous_*`
         if parts[depth:] and not known_start and not re.search(rf"\b{parts[depth]}\b", source):
             unknown.append(dotted)
