@@ -101,7 +101,7 @@ def request(name: str, seed: int, out: Path) -> RunRequest:
     return RunRequest(options=options, world=world, out=out, picture=False)
 
 
-def told(result: RunResult) -> Any:
+def reported(result: RunResult) -> Any:
     """What a result says of its flight."""
     changing = ("wall_time_s", "speedup", "options")  # options have the path of a map in the run folder
     summary = {key: value for key, value in result.summary.items() if key not in changing}
@@ -113,7 +113,7 @@ def told(result: RunResult) -> Any:
 )
 def test_a_flight_within_a_flight_changes_neither(name: str, tmp_path: Path) -> None:
     """The second flight begins and ends while the first one is under way."""
-    alone = [told(fly(name, request(name, seed, tmp_path / f"alone{seed}"))) for seed in (1, 2)]
+    alone = [reported(fly(name, request(name, seed, tmp_path / f"alone{seed}"))) for seed in (1, 2)]
     mission = find_mission(name)
     within: list[RunResult] = []
 
@@ -128,15 +128,15 @@ def test_a_flight_within_a_flight_changes_neither(name: str, tmp_path: Path) -> 
 
     first = fly(mission, request(name, 1, tmp_path / "first"), meanwhile)
     assert len(within) == 1
-    assert [told(first), told(within[0])] == alone
+    assert [reported(first), reported(within[0])] == alone
     assert alone[0][2]["mission"] == name and alone[0] != alone[1]
 
 
 def test_flights_in_threads_are_those_of_one_after_another(tmp_path: Path) -> None:
     requests = [replace(request("sector", seed, tmp_path / f"in_turn{seed}")) for seed in (1, 2)]
-    in_turn = [told(fly("sector", each)) for each in requests]
+    in_turn = [reported(fly("sector", each)) for each in requests]
     with ThreadPoolExecutor(2) as pool:
         at_once = pool.map(
-            lambda seed: told(fly("sector", request("sector", seed, tmp_path / f"at_once{seed}"))), (1, 2)
+            lambda seed: reported(fly("sector", request("sector", seed, tmp_path / f"at_once{seed}"))), (1, 2)
         )
     assert list(at_once) == in_turn
