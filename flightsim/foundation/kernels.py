@@ -12,7 +12,7 @@ import sys
 import types
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from enum import Enum
 from functools import cache, partial
 from importlib import import_module
@@ -89,12 +89,17 @@ def _keep(dispatcher: Any, file: "_CacheFile") -> None:
     dispatcher.compile = partial(_compile, dispatcher.compile, file)
 
 
-def when_compiling(listener: Callable[[], None]) -> None:
-    """Call a function once, when machine code is not in the cache and this process begins to compile it.
-
-    A later listener replaces one that was not called.
+@contextmanager
+def when_compiling(listener: Callable[[], None]) -> Iterator[None]:
+    """Context in which a function is called once, when machine code is not in the cache and this process
+    begins to compile it. A later listener replaces one that was not called.
     """
     _listeners[:] = [listener]
+    try:
+        yield
+    finally:
+        if listener in _listeners:
+            _listeners.remove(listener)
 
 
 _listeners: Final[list[Callable[[], None]]] = []

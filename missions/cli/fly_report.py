@@ -114,8 +114,7 @@ class ProgressLine:
         """Context of the flight: what a mission prints stands on lines of its own, above the progress line,
         and one line says that code is compiled, if it is.
         """
-        announce_compiling(self._note)
-        with self._line.shared():
+        with announce_compiling(self._note), self._line.shared():
             yield
 
     def _note(self, text: str) -> None:

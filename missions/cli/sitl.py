@@ -275,7 +275,7 @@ def sitl(
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
             click.echo("starting", err=True)
-            announce_compiling(partial(click.echo, err=True))
+            at_end.enter_context(announce_compiling(partial(click.echo, err=True)))
             simulated = Sitl(spec, signing=signing, cards=memory.cards)
             compile_flight_code(spec.vehicles)
             server = SitlServer(

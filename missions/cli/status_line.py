@@ -11,11 +11,13 @@ import click
 __all__ = ["StatusLine", "announce_compiling"]
 
 
-def announce_compiling(say: Callable[[str], None]) -> None:
-    """Say once that flight code is compiled, if the cache does not have all that this process needs."""
+@contextmanager
+def announce_compiling(say: Callable[[str], None]) -> Iterator[None]:
+    """Context in which it is said once that flight code is compiled, if the cache does not have all of it."""
     from flightsim.foundation.kernels import when_compiling
 
-    when_compiling(lambda: say("compiling the flight code: half a minute or so, the first time"))
+    with when_compiling(lambda: say("compiling the flight code: half a minute or so, the first time")):
+        yield
 
 
 class StatusLine:

@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 from types import ModuleType
@@ -168,12 +169,22 @@ def package(tmp_path: Path) -> Package:
 
 
 def test_a_listener_is_called_once_and_only_when_code_is_compiled(package: Package) -> None:
-    program = (
+    listening = (
         "from flightsim.foundation.kernels import when_compiling\n"
-        "when_compiling(lambda: print('compiling'))\n" + PROGRAM
+        "with when_compiling(lambda: print('compiling')):\n"
     )
+    program = listening + textwrap.indent(PROGRAM, "    ")
     assert package.say(program).splitlines() == ["compiling", "13.0 0"]
     assert package.say(program).splitlines() == ["13.0 1"]
+
+
+def test_a_listener_is_not_called_after_its_context(package: Package) -> None:
+    """A command that flew says nothing about what is compiled after it in the same process."""
+    ended = (
+        "from flightsim.foundation.kernels import when_compiling\n"
+        "with when_compiling(lambda: print('compiling')):\n    pass\n"
+    )
+    assert package.say(ended + PROGRAM).splitlines() == ["13.0 0"]
 
 
 @pytest.mark.slow
