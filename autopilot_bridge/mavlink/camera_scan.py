@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.vectors import Vector
@@ -72,7 +72,7 @@ def detection_message(
     angle_y_rad: float,
     distance_m: float,
     size_rad: float,
-) -> Any:
+) -> dialect.MAVLink_landing_target_message:
     """LANDING_TARGET of one detection.
 
     Args:
@@ -102,7 +102,7 @@ def detection_message(
     )
 
 
-def camera_scan_message(scan: CameraScan) -> Any:
+def camera_scan_message(scan: CameraScan) -> dialect.MAVLink_tunnel_message:
     """The TUNNEL message of a scan, to all systems and components."""
     mount_rad = (math.nan,) * 3 if scan.mount_rad is None else scan.mount_rad
     payload = _LAYOUT.pack(

@@ -166,7 +166,7 @@ def track_report_messages(
     identity: float,
     released: bool,
     tracks: Sequence[ReportedTrack],
-) -> list[Any]:
+) -> list[dialect.MAVLink_tunnel_message]:
     """The TUNNEL messages of a report, to all systems and components; one when there is no track.
 
     Args:
@@ -219,7 +219,7 @@ def read_track_report(payload_type: int, length: int, payload: Sequence[int]) ->
     )
 
 
-def decision_message(decision: HandoffDecision) -> Any:
+def decision_message(decision: HandoffDecision) -> dialect.MAVLink_tunnel_message:
     """The TUNNEL message of a decision, to all systems and components."""
     payload = _DECISION.pack(
         *(_VERSION, _DECIDED if decision.decided else 0, decision.system, 0, decision.target),
@@ -253,7 +253,7 @@ def read_decision(payload_type: int, length: int, payload: Sequence[int]) -> Han
     )
 
 
-def designation_message(designation: TrackDesignation) -> Any:
+def designation_message(designation: TrackDesignation) -> dialect.MAVLink_tunnel_message:
     """The TUNNEL message of a designation, to all systems and components."""
     payload = _DESIGNATION.pack(_VERSION, designation.system, designation.track)
     return _tunnel(TRACK_DESIGNATION_PAYLOAD, payload)
@@ -273,7 +273,7 @@ def read_designation(payload_type: int, length: int, payload: Sequence[int]) -> 
     return TrackDesignation(system=system, track=track)
 
 
-def _tunnel(payload_type: int, payload: bytes) -> Any:
+def _tunnel(payload_type: int, payload: bytes) -> dialect.MAVLink_tunnel_message:
     return dialect.MAVLink_tunnel_message(
         0, 0, payload_type, len(payload), list(payload.ljust(_PAYLOAD_SIZE, b"\0"))
     )

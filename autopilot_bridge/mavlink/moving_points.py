@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 
@@ -65,7 +65,9 @@ class MovingPoints:
         return self.first + len(self.points) == self.total
 
 
-def moving_points_messages(scan: int, time_us: int, points: Sequence[Point], sigma: float) -> list[Any]:
+def moving_points_messages(
+    scan: int, time_us: int, points: Sequence[Point], sigma: float
+) -> list[dialect.MAVLink_tunnel_message]:
     """The TUNNEL messages of a scan, to all systems and components; one when nothing moves.
 
     Args:

@@ -9,7 +9,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.vectors import Quaternion
@@ -73,7 +73,9 @@ class SearchLikelihood:
     detections: tuple[Pair, ...]
 
 
-def search_likelihood_message(likelihood: SearchLikelihood, *, target_system: int = 0) -> Any:
+def search_likelihood_message(
+    likelihood: SearchLikelihood, *, target_system: int = 0
+) -> dialect.MAVLink_tunnel_message:
     """The TUNNEL message of a likelihood, to the components of one system, or of all (0). Of a quaternion x,
     y and z are sent, with w not negative.
     """

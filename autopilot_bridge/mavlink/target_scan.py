@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 
@@ -72,7 +72,9 @@ class ScanEnd:
     detections: int
 
 
-def scan_messages(scan: int, time_us: int, detections: Sequence[tuple[float, float]]) -> list[Any]:
+def scan_messages(
+    scan: int, time_us: int, detections: Sequence[tuple[float, float]]
+) -> list[dialect.MAVLink_tunnel_message]:
     """The TUNNEL messages of a scan, to all systems and components.
 
     Args:

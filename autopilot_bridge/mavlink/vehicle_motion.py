@@ -15,7 +15,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 
@@ -56,7 +56,7 @@ class VehicleMotion:
     height_m: float
 
 
-def motion_message(motion: VehicleMotion) -> Any:
+def motion_message(motion: VehicleMotion) -> dialect.MAVLink_tunnel_message:
     """The TUNNEL message of a motion, to all systems and components."""
     payload = _CONTENT.pack(
         *(_VERSION, motion.system, motion.number & 0xFFFF, motion.time_us),

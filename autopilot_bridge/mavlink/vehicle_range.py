@@ -12,7 +12,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 
@@ -45,7 +45,7 @@ class VehicleRange:
     sigma_m: float
 
 
-def range_message(measured: VehicleRange) -> Any:
+def range_message(measured: VehicleRange) -> dialect.MAVLink_tunnel_message:
     """The TUNNEL message of a range, to all systems and components."""
     payload = _CONTENT.pack(
         _VERSION,

@@ -7,8 +7,9 @@ autopilot has sent.
 """
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.camera_scan import CameraScan, camera_scan_message
 from autopilot_bridge.payload.camera_actions import CameraActions
@@ -93,7 +94,7 @@ class CameraComponent(CameraActions):
 
     # inside
 
-    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
+    def _on_message(self, message: MAVLinkMessage, sender: tuple[int, int]) -> None:
         new = self.vehicle.handle(message, sender, self._time_us)
         if (
             new
@@ -104,7 +105,7 @@ class CameraComponent(CameraActions):
         if not new:
             self.definition.handle(message, sender, self._time_us)
 
-    def _scan(self, frame: CameraFrame) -> Any:
+    def _scan(self, frame: CameraFrame) -> MAVLinkMessage:
         parameters = self.device.parameters
         model = parameters.model
         return camera_scan_message(

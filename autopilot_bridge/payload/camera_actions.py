@@ -1,7 +1,6 @@
 """What commands make the camera component do: photos, videos, and the reports of them."""
 
-from typing import Any
-
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_messages import capture_status, image_captured, photo_notes
 from autopilot_bridge.payload.camera_state import CameraState
@@ -60,7 +59,7 @@ class CameraActions(CameraState):
         """Send CAMERA_CAPTURE_STATUS."""
         self.send(capture_status(self, self._time_us))
 
-    def _settings(self, time_us: int) -> Any:
+    def _settings(self, time_us: int) -> MAVLinkMessage:
         lens = self.lens
         return mavlink.MAVLink_camera_settings_message(
             self.time_ms, self.mode, lens.zoom_percent, lens.focus_percent

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_definition import CameraDefinition
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, STORAGE_ID
 from autopilot_bridge.payload.camera_video import STREAM_ID, VideoStream
-from autopilot_bridge.payload.component import Answer, CommandHandler, parameters, whole
+from autopilot_bridge.payload.component import Answer, CommandHandler, CommandMessage, parameters, whole
 
 Sender = tuple[int, int]
 
@@ -75,7 +75,7 @@ class CameraCommands:
 
     # photos and videos
 
-    def _start_capture(self, message: Any, sender: Sender) -> int | None:
+    def _start_capture(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 camera, p2 interval s, p3 number of photos (0: unlimited), p4 sequence number of a single
         photo.
         """
@@ -102,12 +102,12 @@ class CameraCommands:
         last = self._newest_single
         return last is not None and last[:2] == single[:2] and single[2] - last[2] < _REPEATED_US
 
-    def _stop_capture(self, message: Any, sender: Sender) -> int | None:
+    def _stop_capture(self, message: CommandMessage, sender: Sender) -> int | None:
         self._camera.trigger.stop()
         self._camera.send_status()
         return _ACCEPTED
 
-    def _start_video(self, message: Any, sender: Sender) -> int | None:
+    def _start_video(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 stream (0: all), p2 rate of the status messages during the video, Hz."""
         stream, status_hz, *_ = parameters(message)
         if whole(stream, -1) not in (0, STREAM_ID) or not 0.0 <= status_hz <= _MAX_STATUS_HZ:
@@ -116,13 +116,13 @@ class CameraCommands:
             return _REJECTED
         return _ACCEPTED if self._camera.start_recording(status_hz) else _FAILED
 
-    def _stop_video(self, message: Any, sender: Sender) -> int | None:
+    def _stop_video(self, message: CommandMessage, sender: Sender) -> int | None:
         if whole(message.param1, -1) not in (0, STREAM_ID):
             return _DENIED
         self._camera.stop_recording()
         return _ACCEPTED
 
-    def _trigger_control(self, message: Any, sender: Sender) -> int | None:
+    def _trigger_control(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 enable (1, 0, -1: unchanged), p2 reset the sequence (1), p3 pause (1, 0, -1: unchanged)."""
         enable, reset, pause = (whole(value, -1) for value in parameters(message)[:3])
         if enable not in (-1, 0, 1) or reset not in (-1, 0, 1) or pause not in (-1, 0, 1):
@@ -136,7 +136,7 @@ class CameraCommands:
             self._newest_single = None
         return _ACCEPTED
 
-    def _trigger_distance(self, message: Any, sender: Sender) -> int | None:
+    def _trigger_distance(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 metres between photos (0: off, -1: unchanged), p3 one photo at once (1)."""
         distance_m, _, at_once, *_ = parameters(message)
         if distance_m != -1.0 and not self._camera.trigger.set_distance(distance_m):
@@ -145,14 +145,14 @@ class CameraCommands:
             self._camera.take_photo()
         return _ACCEPTED
 
-    def _trigger_interval(self, message: Any, sender: Sender) -> int | None:
+    def _trigger_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 milliseconds between photos (0: off, -1: unchanged)."""
         if message.param1 == -1.0:
             return _ACCEPTED
         accepted = self._camera.trigger.set_cycle(1e-3 * message.param1, self._camera.time_us)
         return _ACCEPTED if accepted else _DENIED
 
-    def _digicam(self, message: Any, sender: Sender) -> int | None:
+    def _digicam(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_DIGICAM_CONTROL: p3 zoom step, p4 focus lock, p5 shoot (1)."""
         values = parameters(message)
         step, shoot = values[2], whole(values[4], 0)
@@ -164,7 +164,7 @@ class CameraCommands:
 
     # settings
 
-    def _set_mode(self, message: Any, sender: Sender) -> int | None:
+    def _set_mode(self, message: CommandMessage, sender: Sender) -> int | None:
         mode = whole(message.param2, -1)
         if mode not in _MODES:
             return _DENIED
@@ -173,15 +173,15 @@ class CameraCommands:
         self._definition.report("CAM_MODE")
         return _ACCEPTED
 
-    def _zoom(self, message: Any, sender: Sender) -> int | None:
+    def _zoom(self, message: CommandMessage, sender: Sender) -> int | None:
         lens = self._camera.lens
         return self._drive_lens(message, lens.zoom if lens.has_zoom else None)
 
-    def _focus(self, message: Any, sender: Sender) -> int | None:
+    def _focus(self, message: CommandMessage, sender: Sender) -> int | None:
         lens = self._camera.lens
         return self._drive_lens(message, lens.focus if lens.has_focus else None)
 
-    def _drive_lens(self, message: Any, drive: Callable[[int, float], bool] | None) -> int:
+    def _drive_lens(self, message: CommandMessage, drive: Callable[[int, float], bool] | None) -> int:
         """p1 kind of the value, p2 value."""
         if drive is None:
             return _UNSUPPORTED
@@ -190,7 +190,7 @@ class CameraCommands:
         self._camera.move_lens()
         return _ACCEPTED
 
-    def _reset(self, message: Any, sender: Sender) -> int | None:
+    def _reset(self, message: CommandMessage, sender: Sender) -> int | None:
         if whole(message.param1, 0) != 1:
             return _DENIED
         self._camera.mode = int(mavlink.CAMERA_MODE_IMAGE)
@@ -199,7 +199,7 @@ class CameraCommands:
         self._camera.send_settings()
         return _ACCEPTED
 
-    def _format(self, message: Any, sender: Sender) -> int | None:
+    def _format(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 storage, p2 format (1), p3 count photos from 0 again (1)."""
         camera = self._camera
         storage, wanted, reset_log, *_ = (whole(value, -1) for value in parameters(message))
@@ -214,7 +214,7 @@ class CameraCommands:
 
     # the stream
 
-    def _set_streaming(self, message: Any, running: bool) -> int | None:
+    def _set_streaming(self, message: CommandMessage, running: bool) -> int | None:
         def switch(stream: VideoStream, fov_deg: float) -> None:
             stream.running = running
             self._camera.send(stream.status(fov_deg))
@@ -244,18 +244,18 @@ class CameraCommands:
 
     # tracking
 
-    def _track_point(self, message: Any, sender: Sender) -> int | None:
+    def _track_point(self, message: CommandMessage, sender: Sender) -> int | None:
         x, y, radius, *_ = parameters(message)
         return self._tracked(self._camera.tracker.follow_point(x, y, radius))
 
-    def _track_rectangle(self, message: Any, sender: Sender) -> int | None:
+    def _track_rectangle(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._tracked(self._camera.tracker.follow_rectangle(*parameters(message)[:4]))
 
     def _tracked(self, found: bool) -> int:
         self._camera.send(self._camera.tracker.message())
         return _ACCEPTED if found else _FAILED
 
-    def _stop_tracking(self, message: Any, sender: Sender) -> int | None:
+    def _stop_tracking(self, message: CommandMessage, sender: Sender) -> int | None:
         self._camera.tracker.stop()
         self._camera.send(self._camera.tracker.message())
         return _ACCEPTED
@@ -277,12 +277,12 @@ class CameraCommands:
         self._camera.send(self._camera.storage.message(self._camera.time_ms))
         return _ACCEPTED
 
-    def _old_request(self, message: Any, sender: Sender) -> int | None:
+    def _old_request(self, message: CommandMessage, sender: Sender) -> int | None:
         """Commands that are older than REQUEST_MESSAGE."""
         return self._camera.request(_OLD_REQUESTS[message.command])
 
-    def _old_stream_information(self, message: Any, sender: Sender) -> int | None:
+    def _old_stream_information(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_stream(message.param1)
 
-    def _old_stream_status(self, message: Any, sender: Sender) -> int | None:
+    def _old_stream_status(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_stream_status(message.param1)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 from xml.etree import ElementTree
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_messages import DEFINITION_FILE, DEFINITION_VERSION
@@ -57,25 +58,25 @@ class CameraDefinition:
         self._next_tick_us: int | None = None  # no file was requested yet
         self._list: list[int] = []
 
-    def send(self, message: Any) -> None:
+    def send(self, message: MAVLinkMessage) -> None:
         """Send a message of the file service (which uses this object as its channel)."""
         self._camera.send(message)
 
-    def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> None:
+    def handle(self, message: MAVLinkMessage, sender: tuple[int, int], time_us: int) -> None:
         """Handle FTP and PARAM_EXT messages."""
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
+        match message:
+            case mavlink.MAVLink_file_transfer_protocol_message():
                 self._files.on_transfer(message, Source(self, *sender), time_us)
                 self._next_tick_us = time_us
-            case mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST:
+            case mavlink.MAVLink_param_ext_request_list_message():
                 self._list = list(range(len(self.settings)))
-            case mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ:
+            case mavlink.MAVLink_param_ext_request_read_message():
                 index = message.param_index
                 if index == -1:
                     index = self._index(message.param_id)
                 if 0 <= index < len(self.settings):
                     self._send_setting(index)
-            case mavlink.MAVLINK_MSG_ID_PARAM_EXT_SET:
+            case mavlink.MAVLink_param_ext_set_message():
                 self._set(message)
 
     def step(self, time_us: int) -> None:
@@ -93,7 +94,7 @@ class CameraDefinition:
     def _index(self, name: str) -> int:
         return next((i for i, setting in enumerate(self.settings) if setting.name == name), -1)
 
-    def _set(self, message: Any) -> None:
+    def _set(self, message: mavlink.MAVLink_param_ext_set_message) -> None:
         index = self._index(message.param_id)
         value, result = -1, _UNKNOWN
         if index >= 0:

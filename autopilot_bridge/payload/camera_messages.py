@@ -1,8 +1,9 @@
 """The messages of the camera component: each function makes one message of its present state."""
 
 import math
-from typing import Any, Final
+from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.camera_scan import detection_message
 from autopilot_bridge.payload.camera_state import SENSOR_WIDTH_MM, CameraState
@@ -21,7 +22,7 @@ _UNKNOWN_DEGE7: Final = 2**31 - 1
 _FARTHEST_M: Final = 20_000.0  # at greater distances the ground is no plane
 
 
-def information(camera: CameraState) -> Any:
+def information(camera: CameraState) -> MAVLinkMessage:
     """CAMERA_INFORMATION."""
     model = camera.device.parameters.model
     flags = (
@@ -56,7 +57,7 @@ def information(camera: CameraState) -> Any:
     )
 
 
-def capture_status(camera: CameraState, time_us: int) -> Any:
+def capture_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     """CAMERA_CAPTURE_STATUS; between two photos of a series the camera is idle with an interval set."""
     since_us = camera.recording_since_us
     return mavlink.MAVLink_camera_capture_status_message(
@@ -70,7 +71,9 @@ def capture_status(camera: CameraState, time_us: int) -> Any:
     )
 
 
-def image_captured(camera: CameraState, time_us: int, index: int, name: str) -> Any:
+def image_captured(
+    camera: CameraState, time_us: int, index: int, name: str
+) -> mavlink.MAVLink_camera_image_captured_message:
     """CAMERA_IMAGE_CAPTURED: position from the autopilot, orientation as known to the camera."""
     here = camera.vehicle.located(time_us)
     q = camera.orientation
@@ -109,7 +112,7 @@ def photo_notes(camera: CameraState) -> dict[str, float]:
     return notes
 
 
-def fov_status(camera: CameraState, time_us: int) -> Any:
+def fov_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     """CAMERA_FOV_STATUS: the camera's position, and the ground point at the centre of its picture."""
     here, q = camera.vehicle.located(time_us), camera.orientation
     ground = None if here is None or q is None else ground_point(camera, here, rotate(q, _FORWARD))
@@ -124,7 +127,7 @@ def fov_status(camera: CameraState, time_us: int) -> Any:
     )
 
 
-def tracking_geo_status(camera: CameraState, time_us: int) -> Any:
+def tracking_geo_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     """CAMERA_TRACKING_GEO_STATUS: the ground position of the tracked target."""
     tracker, here, q = camera.tracker, camera.vehicle.located(time_us), camera.orientation
     place, distance_m, heading_rad = None, math.nan, math.nan
@@ -165,7 +168,7 @@ def ground_point(
     return GeodeticPosition(lat_deg=max(-90.0, min(90.0, lat_deg)), lon_deg=lon_deg, alt_m=alt_m)
 
 
-def landing_target(detection: Detection) -> Any:
+def landing_target(detection: Detection) -> MAVLinkMessage:
     """LANDING_TARGET of a detection."""
     return detection_message(
         detection.time_us,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.component import fixed_text
 
@@ -39,7 +40,7 @@ class CameraStorage:
         """There is no space for another photo."""
         return self.available_mib < IMAGE_MIB
 
-    def add_photo(self, message: Any) -> None:
+    def add_photo(self, message: mavlink.MAVLink_camera_image_captured_message) -> None:
         """Store a photo and its message."""
         self.used_mib += IMAGE_MIB
         self.log[message.image_index] = message
@@ -54,7 +55,7 @@ class CameraStorage:
             self.images = 0
             self.log.clear()
 
-    def message(self, time_ms: int) -> Any:
+    def message(self, time_ms: int) -> MAVLinkMessage:
         """STORAGE_INFORMATION."""
         return mavlink.MAVLink_storage_information_message(
             time_ms,

@@ -5,8 +5,9 @@ Positions in the picture are fractions of its width and height from the upper le
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from flightsim.payload import CameraFrame, Detection, PinholeModel
 
@@ -84,7 +85,7 @@ class CameraTracker:
         active = int(mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE)
         return active if fresh else active | int(mavlink.CAMERA_TRACKING_STATUS_FLAGS_COASTING)
 
-    def message(self) -> Any:
+    def message(self) -> MAVLinkMessage:
         """CAMERA_TRACKING_IMAGE_STATUS."""
         thing, nan = self.thing, math.nan
         point, rectangle = (nan, nan, nan), (nan, nan, nan, nan)

@@ -1,8 +1,8 @@
 """The camera's video stream in MAVLink messages."""
 
 from dataclasses import dataclass
-from typing import Any
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.component import fixed_text
 
@@ -27,7 +27,7 @@ class VideoStream:
     bitrate: int
     running: bool = True
 
-    def information(self, fov_deg: float) -> Any:
+    def information(self, fov_deg: float) -> MAVLinkMessage:
         """VIDEO_STREAM_INFORMATION."""
         return mavlink.MAVLink_video_stream_information_message(
             STREAM_ID,
@@ -39,7 +39,7 @@ class VideoStream:
             encoding=mavlink.VIDEO_STREAM_ENCODING_H264,
         )
 
-    def status(self, fov_deg: float) -> Any:
+    def status(self, fov_deg: float) -> MAVLinkMessage:
         """VIDEO_STREAM_STATUS."""
         return mavlink.MAVLink_video_stream_status_message(STREAM_ID, *self._picture(fov_deg))
 

@@ -7,9 +7,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Final
 
-from autopilot_bridge.mavlink import Frame, FrameEncoder, decode
+from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, decode
 from autopilot_bridge.mavlink import dialect as mavlink
 
+CommandMessage = mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message
 Builder = Callable[[int], Any]
 """Makes a message of the present state; takes vehicle time, microseconds."""
 
@@ -82,7 +83,7 @@ class Component:
                 self.send(self._builders[message_id](time_us))
         self.next_us = min(self._due_us.values(), default=_NEVER_US)
 
-    def send(self, message: Any) -> None:
+    def send(self, message: MAVLinkMessage) -> None:
         """Frame a message and send it."""
         self._send(self._encoder.encode(message))
 
@@ -111,16 +112,18 @@ class Component:
             return
         sender = (frame.system_id, frame.component_id)
         if frame.message_id in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
-            self._on_command(decode(frame), sender)
+            message = decode(frame)
+            if isinstance(message, CommandMessage):
+                self._on_command(message, sender)
         elif not self.commands_only:
             self._on_message(decode(frame), sender)
 
-    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
+    def _on_message(self, message: MAVLinkMessage, sender: tuple[int, int]) -> None:
         """Handle a message that is not a command and is addressed to this component or to all; not called
         if `commands_only`.
         """
 
-    def _on_command(self, message: Any, sender: tuple[int, int]) -> None:
+    def _on_command(self, message: CommandMessage, sender: tuple[int, int]) -> None:
         handler = self._handlers.get(message.command)
         addressed = message.target_component == self.component_id
         if handler is None:
@@ -137,10 +140,10 @@ class Component:
                 )
             )
 
-    def _on_request_message(self, message: Any, sender: tuple[int, int]) -> int | None:
+    def _on_request_message(self, message: CommandMessage, sender: tuple[int, int]) -> int | None:
         return self._request(whole(message.param1, -1), message, sender)
 
-    def _request(self, message_id: int, message: Any, sender: tuple[int, int]) -> int:
+    def _request(self, message_id: int, message: CommandMessage, sender: tuple[int, int]) -> int:
         answer = self._answers.get(message_id)
         return self.request(message_id) if answer is None else answer(message, sender)
 
@@ -152,7 +155,7 @@ class Component:
         self.send(builder(self._time_us))
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    def _on_set_interval(self, message: Any, sender: tuple[int, int]) -> int | None:
+    def _on_set_interval(self, message: CommandMessage, sender: tuple[int, int]) -> int | None:
         message_id = whole(message.param1, -1)
         interval_us = message.param2
         if message_id not in self._builders:
@@ -175,7 +178,7 @@ class Component:
         self.next_us = min(self._due_us.values(), default=_NEVER_US)
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    def _on_get_interval(self, message: Any, sender: tuple[int, int]) -> int | None:
+    def _on_get_interval(self, message: CommandMessage, sender: tuple[int, int]) -> int | None:
         message_id = whole(message.param1, -1)
         if message_id not in self._builders:
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
@@ -183,15 +186,15 @@ class Component:
         self.send(mavlink.MAVLink_message_interval_message(message_id, interval_us))
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    def _heartbeat(self, time_us: int) -> Any:
+    def _heartbeat(self, time_us: int) -> MAVLinkMessage:
         return mavlink.MAVLink_heartbeat_message(
             self._mav_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
         )
 
 
-def parameters(message: Any) -> tuple[float, ...]:
+def parameters(message: CommandMessage) -> tuple[float, ...]:
     """The seven parameters of a command, as in a COMMAND_LONG."""
-    if hasattr(message, "param5"):
+    if isinstance(message, mavlink.MAVLink_command_long_message):
         last = (message.param5, message.param6, message.param7)
     else:
         last = (float(message.x), float(message.y), message.z)

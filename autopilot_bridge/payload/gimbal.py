@@ -6,13 +6,14 @@ point it; while no component is in control, all components may.
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
-from autopilot_bridge.payload.component import Component, parameters, whole
+from autopilot_bridge.payload.component import CommandMessage, Component, parameters, whole
 from autopilot_bridge.payload.gimbal_aim import GimbalAim
 from autopilot_bridge.payload.gimbal_control import GimbalControl, Sender
 from autopilot_bridge.payload.gimbal_messages import (
@@ -104,25 +105,23 @@ class GimbalComponent(Component):
 
     # messages
 
-    def _on_message(self, message: Any, sender: Sender) -> None:
-        m = mavlink
-        kind = message.get_msgId()
-        match kind:
-            case m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT | m.MAVLINK_MSG_ID_FOLLOW_TARGET:
+    def _on_message(self, message: MAVLinkMessage, sender: Sender) -> None:
+        match message:
+            case mavlink.MAVLink_global_position_int_message() | mavlink.MAVLink_follow_target_message():
                 self._vehicle.handle(message, sender, self._time_us)
                 self.aim.handle(message, sender, self._time_us)
-            case m.MAVLINK_MSG_ID_GIMBAL_DEVICE_SET_ATTITUDE:
+            case mavlink.MAVLink_gimbal_device_set_attitude_message():
                 if self.control.may_point(sender):
                     self._set_attitude(message)
             case (
-                m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW
-                | m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL
-                | m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE
+                mavlink.MAVLink_gimbal_manager_set_pitchyaw_message()
+                | mavlink.MAVLink_gimbal_manager_set_manual_control_message()
+                | mavlink.MAVLink_gimbal_manager_set_attitude_message()
             ) if message.gimbal_device_id in (0, 1, GIMBAL_COMPONENT) and self.control.may_point(sender):
-                if kind == m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW:
+                if isinstance(message, mavlink.MAVLink_gimbal_manager_set_pitchyaw_message):
                     rates = (message.pitch_rate, message.yaw_rate)
                     self._point(message.flags, message.pitch, message.yaw, *rates)
-                elif kind == m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL:
+                elif isinstance(message, mavlink.MAVLink_gimbal_manager_set_manual_control_message):
                     self._steer(message)
                 else:
                     self._set_attitude(message)
@@ -147,7 +146,7 @@ class GimbalComponent(Component):
         self.aim.clear()
         return True
 
-    def _steer(self, message: Any) -> None:
+    def _steer(self, message: mavlink.MAVLink_gimbal_manager_set_manual_control_message) -> None:
         """GIMBAL_MANAGER_SET_MANUAL_CONTROL: -1..1 of a full angle or turn rate; NaN: not given."""
         rates = [_share(value) * _MANUAL_RATE_RAD_S for value in (message.pitch_rate, message.yaw_rate)]
         angles = [
@@ -155,7 +154,11 @@ class GimbalComponent(Component):
         ]
         self._point(message.flags, angles[0], angles[1], rates[0], rates[1])
 
-    def _set_attitude(self, message: Any) -> None:
+    def _set_attitude(
+        self,
+        message: mavlink.MAVLink_gimbal_device_set_attitude_message
+        | mavlink.MAVLink_gimbal_manager_set_attitude_message,
+    ) -> None:
         q = [float(value) for value in message.q]
         rates = (float(message.angular_velocity_y), float(message.angular_velocity_z))
         if any(math.isnan(value) for value in q):
@@ -173,7 +176,7 @@ class GimbalComponent(Component):
 
     # commands
 
-    def _on_pitchyaw(self, message: Any, sender: Sender) -> int | None:
+    def _on_pitchyaw(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_GIMBAL_MANAGER_PITCHYAW: p1..p4 in degrees and deg/s, p5 flags, p7 device."""
         pitch, yaw, pitch_rate, yaw_rate, flags, _, device = parameters(message)
         if whole(device, -1) not in (0, 1, GIMBAL_COMPONENT):
@@ -183,7 +186,7 @@ class GimbalComponent(Component):
         angles = (pitch * _DEG, yaw * _DEG, pitch_rate * _DEG, yaw_rate * _DEG)
         return _ACCEPTED if self._point(max(0, whole(flags, 0)), *angles) else _DENIED
 
-    def _on_configure(self, message: Any, sender: Sender) -> int | None:
+    def _on_configure(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_GIMBAL_MANAGER_CONFIGURE: the components in control, p7 device."""
         values = parameters(message)
         if whole(values[6], 0) not in (0, 1, GIMBAL_COMPONENT):
@@ -195,15 +198,15 @@ class GimbalComponent(Component):
             self.send(self._manager_status())
         return _ACCEPTED
 
-    def _on_roi_location(self, message: Any, sender: Sender) -> int | None:
+    def _on_roi_location(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_LOCATION: latitude, longitude, altitude."""
-        if hasattr(message, "x"):
+        if isinstance(message, mavlink.MAVLink_command_int_message):
             place = (1e-7 * message.x, 1e-7 * message.y, message.z, message.frame)
         else:
             place = (message.param5, message.param6, message.param7, mavlink.MAV_FRAME_GLOBAL)
         return self._look_at(*place, sender)
 
-    def _on_roi_system(self, message: Any, sender: Sender) -> int | None:
+    def _on_roi_system(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_SYSID: p1 the system."""
         system_id = whole(message.param1, 0)
         if not self.control.may_point(sender) or not 1 <= system_id <= 255 or system_id == self.system_id:
@@ -211,14 +214,14 @@ class GimbalComponent(Component):
         self.aim.follow(system_id)
         return _ACCEPTED
 
-    def _on_roi_none(self, message: Any, sender: Sender) -> int | None:
+    def _on_roi_none(self, message: CommandMessage, sender: Sender) -> int | None:
         if not self.control.may_point(sender):
             return _DENIED
         self.aim.clear()
         self._gimbal.command()
         return _ACCEPTED
 
-    def _on_old_roi(self, message: Any, sender: Sender) -> int | None:
+    def _on_old_roi(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI: p1 MAV_ROI; targets at waypoints are left to the autopilot, which has the mission."""
         match whole(message.param1, -1):
             case mavlink.MAV_ROI_NONE:
@@ -240,7 +243,7 @@ class GimbalComponent(Component):
         self._next_roi_us = self._time_us
         return _ACCEPTED if looks else _DENIED
 
-    def _on_mount_configure(self, message: Any, sender: Sender) -> int | None:
+    def _on_mount_configure(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_MOUNT_CONFIGURE: p1 MAV_MOUNT_MODE."""
         if not self.control.may_point(sender):
             return _DENIED
@@ -255,7 +258,7 @@ class GimbalComponent(Component):
                 return _UNSUPPORTED
         return _ACCEPTED
 
-    def _on_mount_control(self, message: Any, sender: Sender) -> int | None:
+    def _on_mount_control(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_MOUNT_CONTROL: p1 pitch, p2 roll, p3 yaw, degrees, or p4..p6 a position; p7 MAV_MOUNT_MODE."""
         pitch, roll, yaw, alt_m, lat_deg, lon_deg, mode = parameters(message)
         if not self.control.may_point(sender):
@@ -279,7 +282,7 @@ class GimbalComponent(Component):
                 return _UNSUPPORTED
         return _ACCEPTED
 
-    def _manager_status(self) -> Any:
+    def _manager_status(self) -> MAVLinkMessage:
         return mavlink.MAVLink_gimbal_manager_status_message(
             self.time_ms,
             status_flags(self._gimbal),

@@ -1,8 +1,9 @@
 """The target that a gimbal follows automatically: a position, or another system that reports its position."""
 
 import math
-from typing import Any, Final
+from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
 from autopilot_bridge.payload.reported_vehicle import STALE_US, ReportedVehicle
@@ -56,15 +57,15 @@ class GimbalAim:
             self._place = None
         self.system_id = system_id
 
-    def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> None:
+    def handle(self, message: MAVLinkMessage, sender: tuple[int, int], time_us: int) -> None:
         """Handle GLOBAL_POSITION_INT or FOLLOW_TARGET of the followed system."""
         if sender[0] != self.system_id or not self.system_id:
             return
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT:
+        match message:
+            case mavlink.MAVLink_global_position_int_message():
                 alt_m = 1e-3 * message.alt
                 velocity = (1e-2 * message.vx, 1e-2 * message.vy, 1e-2 * message.vz)
-            case mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET if message.est_capabilities & _HAS_POSITION:
+            case mavlink.MAVLink_follow_target_message() if message.est_capabilities & _HAS_POSITION:
                 alt_m = float(message.alt)
                 moves = message.est_capabilities & _HAS_VELOCITY
                 north, east, down = message.vel if moves else (0.0, 0.0, 0.0)

@@ -1,8 +1,9 @@
 """The messages of the gimbal component, as device and as manager of gimbal protocol v2."""
 
 import math
-from typing import Any, Final
+from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.payload.component import fixed_text
@@ -37,7 +38,7 @@ def status_flags(gimbal: Gimbal) -> int:
     return flags | int(frame) | int(mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
 
 
-def attitude_status(gimbal: Gimbal) -> Any:
+def attitude_status(gimbal: Gimbal) -> MAVLinkMessage:
     """GIMBAL_DEVICE_ATTITUDE_STATUS."""
     flags = status_flags(gimbal)
     in_earth = bool(flags & GimbalFlags.YAW_IN_EARTH_FRAME)
@@ -63,7 +64,7 @@ def attitude_status(gimbal: Gimbal) -> Any:
     )
 
 
-def mount_orientation(gimbal: Gimbal, time_ms: int) -> Any:
+def mount_orientation(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """MOUNT_ORIENTATION, of the protocol's first version: roll and pitch against the horizon, degrees."""
     roll, pitch, yaw = euler_of(gimbal.measured_q_heading_from_gimbal.tolist())
     return mavlink.MAVLink_mount_orientation_message(
@@ -75,7 +76,7 @@ def mount_orientation(gimbal: Gimbal, time_ms: int) -> Any:
     )
 
 
-def manager_information(gimbal: Gimbal, time_ms: int) -> Any:
+def manager_information(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """GIMBAL_MANAGER_INFORMATION."""
     capabilities = _device_capabilities(gimbal) | _POINTS_AT_PLACE
     return mavlink.MAVLink_gimbal_manager_information_message(
@@ -83,7 +84,7 @@ def manager_information(gimbal: Gimbal, time_ms: int) -> Any:
     )
 
 
-def device_information(gimbal: Gimbal, time_ms: int) -> Any:
+def device_information(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """GIMBAL_DEVICE_INFORMATION."""
     return mavlink.MAVLink_gimbal_device_information_message(
         time_ms,

@@ -3,8 +3,8 @@
 """
 
 from collections.abc import Callable
-from typing import Any
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import MOVING_POINT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import moving_points_messages
@@ -34,5 +34,5 @@ class MovingPointComponent(Component):
         for message in moving_points_messages(scan.number, scan.time_us, scan.points, self._sigma):
             self.send(message)
 
-    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
+    def _on_message(self, message: MAVLinkMessage, sender: tuple[int, int]) -> None:
         """Ignore the message: the camera uses commands only."""

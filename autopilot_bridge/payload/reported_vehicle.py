@@ -1,8 +1,9 @@
 """The payload's knowledge of its vehicle: only the messages that the autopilot has sent on their link."""
 
 import math
-from typing import Any, Final
+from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -36,22 +37,22 @@ class ReportedVehicle:
         self._position_us = -STALE_US
         self._unix_minus_boot_us: int | None = None
 
-    def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> bool:
+    def handle(self, message: MAVLinkMessage, sender: tuple[int, int], time_us: int) -> bool:
         """Handle a message; True when it brought new data. Contents never raise."""
         if sender != (self._system_id, AUTOPILOT_COMPONENT):
             return False
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT:
+        match message:
+            case mavlink.MAVLink_global_position_int_message():
                 return self._note_position(message, time_us)
-            case mavlink.MAVLINK_MSG_ID_ATTITUDE:
+            case mavlink.MAVLink_attitude_message():
                 if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
                     return False
                 self.q_ned_from_frd = from_euler(message.roll, message.pitch, message.yaw)
-            case mavlink.MAVLINK_MSG_ID_SYSTEM_TIME:
+            case mavlink.MAVLink_system_time_message():
                 if message.time_unix_usec == 0:
                     return False
                 self._unix_minus_boot_us = message.time_unix_usec - time_us
-            case mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            case mavlink.MAVLink_heartbeat_message():
                 self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
             case _:
                 return False
@@ -70,7 +71,7 @@ class ReportedVehicle:
         """Unix time, microseconds; 0: not known."""
         return 0 if self._unix_minus_boot_us is None else time_us + self._unix_minus_boot_us
 
-    def _note_position(self, message: Any, time_us: int) -> bool:
+    def _note_position(self, message: mavlink.MAVLink_global_position_int_message, time_us: int) -> bool:
         if abs(message.lat) > _LAT_MAX or abs(message.lon) > _LON_MAX or (message.lat == 0 == message.lon):
             return False
         self.position = GeodeticPosition(

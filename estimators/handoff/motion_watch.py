@@ -168,7 +168,7 @@ class MotionWatch:
         """
         number = self._number
         self._number += 1
-        return [] if points is None else moving_points_messages(number, exposed_us, points, self._sigma)
+        return [] if points is None else [*moving_points_messages(number, exposed_us, points, self._sigma)]
 
     def makes(self, message: Message) -> bool:
         """Whether a message is of a kind that it sends."""

@@ -210,13 +210,13 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
             handler = self._own_handlers.get(name)
         return outcome if handler is None else handler(time_us, message)
 
-    def _gimbal(self, _time_us: int, message: Message) -> Outcome:
+    def _gimbal(self, _time_us: int, message: wire.GIMBAL_DEVICE_ATTITUDE_STATUS) -> Outcome:
         found = gimbal_attitude(message)
         if found is None:
             return Outcome.IMPLAUSIBLE
         return Outcome.USED if self.tracker.gimbal(found) else Outcome.LATE
 
-    def _detection(self, time_us: int, message: Message) -> Outcome:
+    def _detection(self, time_us: int, message: wire.LANDING_TARGET) -> Outcome:
         found = detection(message)
         if found is None:
             return Outcome.IMPLAUSIBLE

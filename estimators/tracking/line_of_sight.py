@@ -9,9 +9,10 @@ is used, so that a turning aircraft doesn't turn the frame.
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from estimators import wire
 from flightsim.foundation.vectors import Quaternion, Vector, conjugate, from_euler, rotate, yaw_of
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
@@ -52,7 +53,7 @@ class GimbalAttitude:
     from_north: bool
 
 
-def detection(m: Any) -> Detection | None:
+def detection(m: wire.LANDING_TARGET | dialect.MAVLink_landing_target_message) -> Detection | None:
     """From LANDING_TARGET; None when its angles are not possible in an image."""
     if not (abs(m.angle_x) < 0.5 * math.pi and abs(m.angle_y) < 0.5 * math.pi):
         return None
@@ -64,7 +65,9 @@ def detection(m: Any) -> Detection | None:
     )
 
 
-def gimbal_attitude(m: Any) -> GimbalAttitude | None:
+def gimbal_attitude(
+    m: wire.GIMBAL_DEVICE_ATTITUDE_STATUS | dialect.MAVLink_gimbal_device_attitude_status_message,
+) -> GimbalAttitude | None:
     """The attitude from GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is invalid.
 
     Roll and pitch are relative to the horizon. Yaw is relative to north or to the vehicle's heading, as the

@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, Packet, dialect
 from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
@@ -34,7 +34,7 @@ class _Vehicle(Protocol):
     def notes(self) -> FlightNotes: ...
 
 
-def heartbeat() -> Any:
+def heartbeat() -> MAVLinkMessage:
     """The heartbeat of an onboard process."""
     return dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3

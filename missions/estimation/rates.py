@@ -2,9 +2,9 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import definition, dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, definition, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.interface import Need
 from estimators.needs import NOT_STREAMED, RATE_TOLERANCE, lacking, wanted_rate_hz
@@ -22,7 +22,7 @@ _ROUNDS: Final = 3
 
 def interval_request(
     system_id: int, name: str, rate_hz: float, component_id: int = AUTOPILOT_COMPONENT
-) -> Any:
+) -> MAVLinkMessage:
     """Message with MAV_CMD_SET_MESSAGE_INTERVAL for an autopilot, or for another component."""
     return dialect.MAVLink_command_long_message(
         system_id,

@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from missions.how_left import TakeOver
@@ -172,7 +172,7 @@ class CommandAuthority:
         mode = firmware.mode_commanded(ModeCommand(main=message.param2, sub=message.param3))
         return (mode, *firmware.modes_instead.get(mode, ()))
 
-    def on_ack(self, ack: Any) -> None:
+    def on_ack(self, ack: dialect.MAVLink_command_ack_message) -> None:
         """Process a COMMAND_ACK that is addressed to this program."""
         if ack.result in _UNANSWERED:
             return
@@ -197,7 +197,9 @@ class CommandAuthority:
         ):
             over.texts.append(text)
 
-    def on_heartbeat(self, heartbeat: Any, time_us: int, *, just_back: bool = False) -> None:
+    def on_heartbeat(
+        self, heartbeat: dialect.MAVLink_heartbeat_message, time_us: int, *, just_back: bool = False
+    ) -> None:
         """Process a heartbeat of the vehicle's autopilot.
 
         Args:

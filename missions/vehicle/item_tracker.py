@@ -17,9 +17,9 @@ The place in the mission never goes back: evidence of an earlier place is ignore
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -231,14 +231,13 @@ class ItemTracker:
         """The first step of an item, or of the item after it if it has no step (a jump)."""
         return next((k for k, step in enumerate(self._steps) if step.index >= index), len(self._steps) - 1)
 
-    def on_message(self, message: Any, time_us: int) -> None:
+    def on_message(self, message: MAVLinkMessage, time_us: int) -> None:
         """Process a MISSION_ITEM_REACHED, MISSION_CURRENT or GLOBAL_POSITION_INT."""
-        kind = message.get_type()
-        if kind == "MISSION_ITEM_REACHED":
+        if isinstance(message, dialect.MAVLink_mission_item_reached_message):
             self.on_reached(message.seq - self.first, time_us)
-        elif kind == "MISSION_CURRENT":
+        elif isinstance(message, dialect.MAVLink_mission_current_message):
             self.on_current(message.seq - self.first, time_us, message.mission_state)
-        elif kind == "GLOBAL_POSITION_INT":
+        elif isinstance(message, dialect.MAVLink_global_position_int_message):
             self.on_position(message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3, time_us)
 
     def on_reached(self, index: int, time_us: int) -> None:

@@ -144,7 +144,7 @@ class VehicleLink:
             raise VehicleTimeout("no heartbeat was received yet: call wait_heartbeat first")
         return value
 
-    def _on_heartbeat(self, frame: Any) -> None:
+    def _on_heartbeat(self, frame: Frame) -> None:
         if frame.component_id != AUTOPILOT_COMPONENT:
             return
         if self._system_id is not None and frame.system_id != self._system_id:
@@ -176,7 +176,7 @@ class VehicleLink:
             self.first_heartbeat_us = clock.time_us
         self._heartbeat_us = self.clock.time_us
         self._watch.on_heartbeat()
-        self._judge_mode(decode(frame))
+        self._judge_mode(decode_as(frame, dialect.MAVLink_heartbeat_message))
 
     def _identify(self, firmware: Firmware, system_id: int) -> None:
         self._firmware, self._system_id = firmware, system_id
@@ -205,7 +205,7 @@ class VehicleLink:
         lat, lon, alt = _read_position(frame)
         self.tasks.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self.clock.stamp_us)
 
-    def _judge_mode(self, heartbeat: Any) -> None:
+    def _judge_mode(self, heartbeat: dialect.MAVLink_heartbeat_message) -> None:
         """Decide who commands the vehicle. After a take-over all waits end."""
         authority = self.authority
         was_ours = authority.take_over is None
@@ -314,16 +314,16 @@ class VehicleLink:
         )
         self.on_regained()
 
-    def _on_status_text(self, frame: Any) -> None:
+    def _on_status_text(self, frame: Frame) -> None:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
-            text = self._assembler.add(decode(frame))
+            text = self._assembler.add(decode_as(frame, dialect.MAVLink_statustext_message))
             if text is not None:
                 self._add_text(text)
                 if self._authority is not None:  # not events: most are checks for modes that changed with it
                     self.tasks.on_text(text.text)
                     self._authority.on_text(text.severity, text.text, self.clock.time_us)
 
-    def _on_event(self, frame: Any) -> None:
+    def _on_event(self, frame: Frame) -> None:
         """Add the reason that PX4 names by an event without a text."""
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
             event = decode_as(frame, dialect.MAVLink_event_message)
@@ -335,9 +335,9 @@ class VehicleLink:
     def _add_text(self, text: StatusText) -> None:
         self.status_texts.append(replace(text, received_us=self.clock.time_us))
 
-    def _on_ack(self, frame: Any) -> None:
+    def _on_ack(self, frame: Frame) -> None:
         if frame.system_id == self._system_id:
-            self._last_ack = ack = decode(frame)
+            self._last_ack = ack = decode_as(frame, dialect.MAVLink_command_ack_message)
             if self._authority is not None and self.addressed_here(ack):
                 self._authority.on_ack(ack)
 
@@ -724,6 +724,6 @@ class VehicleLink:
         )
 
 
-def describe_ack(ack: Any) -> str:
+def describe_ack(ack: dialect.MAVLink_command_ack_message) -> str:
     """A COMMAND_ACK as text: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
     return f"{command_name(ack.command)}: {enum_name('MAV_RESULT', ack.result) or f'result {ack.result}'}"

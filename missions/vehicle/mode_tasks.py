@@ -7,7 +7,7 @@ the landing, and "Landing sequence start" (ArduPilot 4.6.3, AP_Mission.cpp: jump
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from missions.kind import VehicleKind
@@ -113,15 +113,15 @@ class ModeTasks:
         """Process a text of the autopilot."""
         self._landing_reported = self._landing_reported or text.startswith(_LANDING_TEXTS)
 
-    def on_mission_message(self, message: Any, time_us: int) -> None:
+    def on_mission_message(self, message: MAVLinkMessage, time_us: int) -> None:
         """Process a MISSION_CURRENT or MISSION_ITEM_REACHED."""
         if self._tracker is not None:
             self._tracker.on_message(message, time_us)
-        if message.get_type() == "MISSION_ITEM_REACHED":
-            self._reached = max(self._reached, int(message.seq))
-            return
-        self._current, self._total = int(message.seq), int(message.total)
-        self._complete = self._in_mission and message.mission_state == dialect.MISSION_STATE_COMPLETE
+        if isinstance(message, dialect.MAVLink_mission_item_reached_message):
+            self._reached = max(self._reached, message.seq)
+        elif isinstance(message, dialect.MAVLink_mission_current_message):
+            self._current, self._total = message.seq, message.total
+            self._complete = self._in_mission and message.mission_state == dialect.MISSION_STATE_COMPLETE
 
     def on_position(self, lat_deg: float, lon_deg: float, alt_m: float, time_us: int) -> None:
         """Process a position."""

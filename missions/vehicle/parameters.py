@@ -3,7 +3,7 @@
 import math
 import struct
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
@@ -38,7 +38,7 @@ def value_to_wire(value: float, kind: int, bytewise: bool) -> float:
     return value
 
 
-def _name(message: Any) -> str:
+def _name(message: dialect.MAVLink_param_value_message) -> str:
     return plain_text(str(message.param_id).rstrip("\0"))
 
 

@@ -6,15 +6,18 @@ messages are used as they arrive; only requested messages are sent.
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final, TypeVar
 
-from autopilot_bridge.mavlink import decode, dialect
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode_as, dialect
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
 from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.vehicle.link import VehicleLink
 
 # within this time the gimbal manager reports which component has the control
+MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
+ValueT = TypeVar("ValueT")
+
 _CONTROL_REPORTED_US: Final = 3_000_000
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
@@ -35,36 +38,44 @@ class Payload:
 
     def on_detection(self, listener: Callable[[Detection], None]) -> Callable[[], None]:
         """Call `listener` with each detection; returns a function that ends this."""
-        return self._listen("LANDING_TARGET", CAMERA_COMPONENT, detection, listener)
+        return self._listen(dialect.MAVLink_landing_target_message, CAMERA_COMPONENT, detection, listener)
 
     def on_gimbal_attitude(self, listener: Callable[[GimbalAttitude], None]) -> Callable[[], None]:
         """Call `listener` with each attitude of the gimbal; returns a function that ends this."""
-        return self._listen("GIMBAL_DEVICE_ATTITUDE_STATUS", GIMBAL_COMPONENT, gimbal_attitude, listener)
+        return self._listen(
+            dialect.MAVLink_gimbal_device_attitude_status_message, GIMBAL_COMPONENT, gimbal_attitude, listener
+        )
 
     def on_total_field(self, listener: Callable[[int, float], None]) -> Callable[[], None]:
         """Call `listener` with (vehicle time us, total magnetic field nT) of each sample of the survey
         magnetometer; returns a function that ends this.
         """
 
-        def sample(m: Any) -> tuple[int, float] | None:
+        def sample(m: dialect.MAVLink_named_value_float_message) -> tuple[int, float] | None:
             if str(m.name).rstrip("\0") != survey_magnetometer.TOTAL_FIELD_NAME or not math.isfinite(m.value):
                 return None
             return int(m.time_boot_ms) * 1000, float(m.value)
 
-        return self._listen("NAMED_VALUE_FLOAT", MAGNETOMETER_COMPONENT, sample, lambda s: listener(*s))
+        return self._listen(
+            dialect.MAVLink_named_value_float_message, MAGNETOMETER_COMPONENT, sample, lambda s: listener(*s)
+        )
 
     def _listen(
-        self, name: str, component_id: int, convert: Callable[[Any], Any], listener: Callable[[Any], None]
+        self,
+        kind: type[MessageT],
+        component_id: int,
+        convert: Callable[[MessageT], ValueT | None],
+        listener: Callable[[ValueT], None],
     ) -> Callable[[], None]:
         system_id = self._link.system_id
 
-        def look(frame: Any) -> None:
+        def look(frame: Frame) -> None:
             if frame.system_id == system_id and frame.component_id == component_id:
-                value = convert(decode(frame))
+                value = convert(decode_as(frame, kind))
                 if value is not None:
                     listener(value)
 
-        return self._link.connection.listen(name, look)
+        return self._link.connection.listen(kind.msgname, look)
 
     # gimbal
 

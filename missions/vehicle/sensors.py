@@ -14,7 +14,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from autopilot_bridge.mavlink import Frame, decode
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode, dialect
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, read_camera_scan
 from autopilot_bridge.mavlink.components import (
     AUTOPILOT_COMPONENT,
@@ -95,18 +95,18 @@ class Sensor:
         return f"{self.name} ({self.component})"
 
 
-def _heartbeat(_message: Any) -> Sign:
+def _heartbeat(_message: MAVLinkMessage) -> Sign:
     return Sign()
 
 
-def _searched_picture(m: Any) -> Sign | None:
+def _searched_picture(m: dialect.MAVLink_tunnel_message) -> Sign | None:
     if m.payload_type != CAMERA_SCAN_PAYLOAD:
         return None
     scan = read_camera_scan(m.payload_type, m.payload_length, m.payload)
     return Sign(plausible=False) if scan is None else Sign(stamp_us=scan.time_us)
 
 
-def _target_scan(m: Any) -> Sign | None:
+def _target_scan(m: dialect.MAVLink_tunnel_message) -> Sign | None:
     if m.payload_type != TARGET_SCAN_PAYLOAD:
         return None
     scan = read_scan_payload(m.payload_type, m.payload_length, m.payload)
@@ -115,19 +115,19 @@ def _target_scan(m: Any) -> Sign | None:
     return Sign(stamp_us=scan.time_us) if isinstance(scan, ScanEnd) else None
 
 
-def _moving_points(m: Any) -> Sign | None:
+def _moving_points(m: dialect.MAVLink_tunnel_message) -> Sign | None:
     if m.payload_type != MOVING_POINTS_PAYLOAD:
         return None
     points = read_moving_points(m.payload_type, m.payload_length, m.payload)
     return Sign(plausible=False) if points is None else Sign(stamp_us=points.time_us)
 
 
-def _gimbal_attitude(m: Any) -> Sign:
+def _gimbal_attitude(m: dialect.MAVLink_gimbal_device_attitude_status_message) -> Sign:
     attitude = gimbal_attitude(m)
     return Sign(plausible=False) if attitude is None else Sign(stamp_us=attitude.time_us)
 
 
-def _total_field(m: Any) -> Sign | None:
+def _total_field(m: dialect.MAVLink_named_value_float_message) -> Sign | None:
     if str(m.name).rstrip("\0") != survey_magnetometer.TOTAL_FIELD_NAME:
         return None
     plausible = math.isfinite(m.value) and 0.0 < m.value < survey_magnetometer.STRONGEST_NT

@@ -2,9 +2,9 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from flightsim.foundation.vectors import from_euler
 from missions.errors import PlanError
 
@@ -54,7 +54,7 @@ class Setpoint:
             | (_IGNORE_YAW_RATE if self.yaw_rate_rad_s is None else 0)
         )
 
-    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> Any:
+    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> MAVLinkMessage:
         """The MAVLink message, with the position moved by `offset_ned_m` (the place of home in the local
         frame).
         """
@@ -115,7 +115,7 @@ class AttitudeSetpoint:
             return _IGNORE_ATTITUDE | _IGNORE_PITCH_AND_YAW_RATE | thrust
         return _IGNORE_RATES | thrust
 
-    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> Any:
+    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> MAVLinkMessage:
         """The setpoint as a MAVLink message. An attitude has no position, so the offset of the local frame
         has no effect.
         """

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from autopilot_bridge.mavlink import DEFINITIONS
+from autopilot_bridge.mavlink import DEFINITIONS, Frame
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.link import VehicleLink
 
@@ -61,7 +61,7 @@ async def _count(link: VehicleLink, needed_hz: Mapping[str, float]) -> tuple[Cou
     changed: Counter[str] = Counter()
 
     def counting(name: str) -> Callable[[Any], None]:
-        def count(frame: Any) -> None:
+        def count(frame: Frame) -> None:
             if (frame.system_id, frame.component_id) == (link.system_id, 1):
                 received[name] += 1
 

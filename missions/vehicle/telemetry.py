@@ -7,7 +7,7 @@ from inspect import signature
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypeVar
 
-from autopilot_bridge.mavlink import Frame, definition, field_reader
+from autopilot_bridge.mavlink import Frame, definition, dialect, field_reader
 from autopilot_bridge.mavlink.plain_text import plain_text
 from flightsim.foundation.geodesy import GeodeticPosition
 
@@ -202,7 +202,7 @@ def gps(time_usec: int, eph: int, fix_type: int, satellites_visible: int) -> Gps
     )
 
 
-def home(m: Any) -> GeodeticPosition:
+def home(m: dialect.MAVLink_home_position_message) -> GeodeticPosition:
     """From HOME_POSITION."""
     return GeodeticPosition(lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3)
 
@@ -256,7 +256,7 @@ class StatusTextAssembler:
     def __init__(self) -> None:
         self._parts: dict[int, dict[int, str]] = {}
 
-    def add(self, m: Any) -> StatusText | None:
+    def add(self, m: dialect.MAVLink_statustext_message) -> StatusText | None:
         """Add one message; returns the text when it is complete."""
         text = str(m.text)
         if not m.id:
