@@ -14,10 +14,10 @@ from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.vehicle.link import VehicleLink
 
-# within this time the gimbal manager reports which component has the control
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 ValueT = TypeVar("ValueT")
 
+# within this time the gimbal manager reports which component has the control
 _CONTROL_REPORTED_US: Final = 3_000_000
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
