@@ -20,6 +20,7 @@ __all__ = [
     "paired_difference",
     "paired_rates",
     "rate_of",
+    "share_interval",
     "unpaired_difference",
     "unpaired_rates",
 ]
@@ -176,6 +177,41 @@ def rate_of(count: int, n: int) -> Rate:
         return Rate(n=0, count=0, rate=math.nan, ci95=(0.0, 1.0))
     interval = stats.binomtest(count, n).proportion_ci(LEVEL, method="wilson")
     return Rate(n=n, count=count, rate=count / n, ci95=(float(interval.low), float(interval.high)))
+
+
+def share_interval(
+    counted: NDArray[np.bool_], clusters: NDArray[np.generic] | None = None
+) -> tuple[float, Interval]:
+    """A share of trials with its 95 % interval.
+
+    Args:
+        counted: (n,) whether a trial counts.
+        clusters: (n,) what trials share, such as their terrain: trials of one cluster are not independent, so
+            the interval is that of a bootstrap over clusters (percentile), and of fewer than 10 clusters
+            Student's of the shares of the clusters. None, or clusters of one trial each: Wilson's.
+
+    Returns:
+        the share, NaN without trials, and the interval.
+    """
+    n = len(counted)
+    rate = rate_of(int(counted.sum()), n)
+    if clusters is None:
+        return rate.rate, rate.ci95
+    which = np.unique(clusters, return_inverse=True)[1].reshape(-1)
+    sizes = np.bincount(which).astype(np.float64)
+    if len(sizes) == n:
+        return rate.rate, rate.ci95
+    if rate.count in (0, n):  # equal values show no spread: at worst a cluster is one independent trial
+        return rate.rate, rate_of(len(sizes) if rate.count else 0, len(sizes)).ci95
+    counts = np.bincount(which, weights=counted)
+    if len(sizes) < FEW:
+        low, high = mean_interval(counts / sizes)
+    else:
+        generator = RandomStreams(0).generator("study", "clusters")
+        drawn = generator.integers(0, len(sizes), (RESAMPLES, len(sizes)))
+        shares = counts[drawn].sum(axis=1) / sizes[drawn].sum(axis=1)
+        low, high = np.quantile(shares, (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL)).tolist()
+    return rate.rate, (max(0.0, low), min(1.0, high))
 
 
 def paired_difference(values: Array, baseline: Array) -> Difference:
