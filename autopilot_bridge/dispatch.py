@@ -4,13 +4,18 @@
         @command(mavlink.MAV_CMD_DO_GRIPPER)
         def _grip(self, command: Command, source: Source) -> Result: ...
 
+        @receives(mavlink.MAVLink_heartbeat_message)
+        def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int): ...
+
 A subclass that overrides a method keeps its numbers; one that declares a number for another method replaces
 the method of that number.
 """
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, get_args
+
+from autopilot_bridge.mavlink import MAVLinkMessage
 
 MethodT = TypeVar("MethodT", bound=Callable[..., Any])
 
@@ -26,25 +31,45 @@ def command(*numbers: int) -> Callable[[MethodT], MethodT]:
     return _marked(COMMANDS, numbers)
 
 
-def receives(*message_ids: int) -> Callable[[MethodT], MethodT]:
-    """The method handles these messages."""
-    return _marked(RECEIVERS, message_ids)
+def receives(*kinds: type[MAVLinkMessage]) -> Callable[[MethodT], MethodT]:
+    """The method handles the messages of these classes, which its first parameter names too.
+
+    Raises (what is returned):
+        TypeError: the parameter's annotation names other classes.
+    """
+    mark = _marked(RECEIVERS, _ids(kinds))
+
+    def checked(method: MethodT) -> MethodT:
+        code, annotations = method.__code__, method.__annotations__
+        annotated = annotations.get(code.co_varnames[1])
+        if set(kinds) != set(get_args(annotated) or (annotated,)):
+            declared = " | ".join(kind.__name__ for kind in kinds)
+            raise TypeError(
+                f"{method.__qualname__} receives {declared}, but its message is annotated {annotated!r}"
+            )
+        return mark(method)
+
+    return checked
 
 
-def streams(*message_ids: int) -> Callable[[MethodT], MethodT]:
+def streams(*kinds: type[MAVLinkMessage]) -> Callable[[MethodT], MethodT]:
     """The method makes these messages, which can be streamed and requested."""
-    return _marked(BUILDERS, message_ids)
+    return _marked(BUILDERS, _ids(kinds))
 
 
-def on_request(*message_ids: int) -> Callable[[MethodT], MethodT]:
+def on_request(*kinds: type[MAVLinkMessage]) -> Callable[[MethodT], MethodT]:
     """The method sends these messages, which are sent on REQUEST_MESSAGE only."""
-    return _marked(ON_DEMAND, message_ids)
+    return _marked(ON_DEMAND, _ids(kinds))
 
 
 def table_of(owner: object, kind: str) -> dict[int, Any]:
     """The methods that `owner` declares for one kind of number: number -> bound method."""
     names = _names(type(owner), kind)  # type: ignore[arg-type]  # mypy does not see that a type is hashable
     return {number: getattr(owner, name) for number, name in names.items()}
+
+
+def _ids(kinds: tuple[type[MAVLinkMessage], ...]) -> tuple[int, ...]:
+    return tuple(kind.id for kind in kinds)
 
 
 def _marked(kind: str, numbers: tuple[int, ...]) -> Callable[[MethodT], MethodT]:

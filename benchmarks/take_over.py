@@ -23,6 +23,7 @@ from typing import Any, Final
 from pymavlink import mavutil
 
 from autopilot_bridge.mavlink import decode, definition, dialect
+from autopilot_bridge.mavlink.components import GROUND_STATION
 from autopilot_bridge.tlog import TlogReader
 from benchmarks.firmware import FIRMWARES, VEHICLES, Firmware, FirmwareMissing
 from missions.base.mission import Mission
@@ -31,7 +32,6 @@ from missions.base.request import RunRequest
 from missions.library import find_mission
 from missions.runs import session
 from missions.vehicle import Mode, Setpoint, Vehicle, VehicleKind
-from missions.vehicle.connection import GROUND_STATION
 from missions.vehicle.firmware_records import FIRMWARES as RECORDS
 
 PILOT: Final = (255, 50)

@@ -22,6 +22,9 @@ from estimators.runner import why_excluded
 if TYPE_CHECKING:
     from estimators.logs import Log
 
+Received = tuple[int, Message | Observation, bool]
+"""Vehicle time us, what was received, whether it is inside the replayed part."""
+
 _LEARNT_FROM = 20
 """Number of SYSTEM_TIMEs of each vehicle that are read before several logs are put in order."""
 
@@ -94,17 +97,16 @@ def replay(
     failure = ""
     if not (fleet.team and lacking) and served:
         try:
-            for time_us, message, inside in _messages(opened, fleet, system_id, Part(from_s, to_s, boot)):
-                if isinstance(message, fleet.observes):
+            for time_us, received, inside in _received(opened, fleet, system_id, Part(from_s, to_s, boot)):
+                if not isinstance(received, Message):
                     if inside:
-                        fleet.observe(message)
-                    continue
+                        fleet.observe(received)
                 # A parameter is logged once and is valid from then on, also when it was logged before the
                 # selected part.
-                if inside or message.name in NOT_STREAMED:
-                    fleet.take(time_us, message)
+                elif inside or received.name in NOT_STREAMED:
+                    fleet.take(time_us, received)
                 else:
-                    fleet.pass_over(time_us, message)
+                    fleet.pass_over(time_us, received)
         except EstimatorFailure as error:
             failure = str(error)
     return Replay(logs=opened, fleet=fleet, supplies=served, lacking=lacking, failure=failure)
@@ -162,11 +164,9 @@ def _own_vehicles(logs: Sequence["Log"], needs: Sequence[Need], system_id: int |
     return found
 
 
-def _messages(
-    logs: Sequence["Log"], fleet: Fleet, system_id: int | None, part: Part
-) -> Iterator[tuple[int, Message, bool]]:
-    """Needed messages in the order of the file, and whether they are in the selected part; of several logs,
-    in the order of the team's common time.
+def _received(logs: Sequence["Log"], fleet: Fleet, system_id: int | None, part: Part) -> Iterator[Received]:
+    """Needed messages and observations in the order of the file; of several logs, in the order of the team's
+    common time.
     """
     names = sorted(fleet.read_names)
     streams = [_all_of(log, _present(log, names), system_id, part, fleet) for log in logs]
@@ -180,7 +180,7 @@ def _messages(
 
 def _all_of(
     log: "Log", names: Sequence[str], system_id: int | None, part: Part, fleet: Fleet
-) -> Iterator[tuple[int, Any, bool]]:
+) -> Iterator[Received]:
     """Messages and, in the order in which they were received, the observations of the run."""
     messages = _messages_of(log, names, system_id, part)
     path = observations_beside(log.path) if fleet.observes else None
@@ -192,8 +192,8 @@ def _all_of(
 
 
 def _interleaved(
-    messages: Iterable[tuple[int, tuple[int, Any, bool]]], observations: Iterator[tuple[int, Observation]]
-) -> Iterator[tuple[int, Any, bool]]:
+    messages: Iterable[tuple[int, Received]], observations: Iterator[tuple[int, Observation]]
+) -> Iterator[Received]:
     following = next(observations, None)
     inside = True
     for position, item in messages:

@@ -30,6 +30,7 @@ class Message(tuple[Any, ...]):
     name: ClassVar[str]
     message_id: ClassVar[int]
     _fields: ClassVar[tuple[str, ...]]
+    _make: "ClassVar[Callable[[Iterable[object]], Message]]"
     src_system: int
     src_component: int
 
@@ -48,7 +49,7 @@ def field_name(name: str) -> str:
     return f"{name}_" if keyword.iskeyword(name) or name in _CLASS_ATTRIBUTES else name
 
 
-def message_class(found: MessageDefinition) -> Any:
+def message_class(found: MessageDefinition) -> type[Message]:
     """The named tuple of one message definition; always the same class for a definition of the dialect."""
     return _dialect_class(found.message_id) if DEFINITIONS.get(found.message_id) is found else _make(found)
 
@@ -85,7 +86,9 @@ def read_as(frame: Frame, kind: type[MessageT]) -> MessageT:
     return message
 
 
-def rows(made: Any, system_id: int, component_id: int, columns: Iterable[Iterable[Any]]) -> Iterator[Message]:
+def rows(
+    made: type[Message], system_id: int, component_id: int, columns: Iterable[Iterable[Any]]
+) -> Iterator[Message]:
     """Make messages from columns, one column per field in the order of the definition's `wire_fields`.
 
     Args:
@@ -102,7 +105,7 @@ def text(raw: bytes) -> str:
     return raw.split(b"\0", 1)[0].decode("ascii", "replace")
 
 
-def _make(found: MessageDefinition) -> Any:
+def _make(found: MessageDefinition) -> type[Message]:
     names = [*SOURCE_FIELDS, *(field_name(field.name) for field in found.wire_fields)]
     fields = namedtuple(found.name, names)  # type: ignore[misc]  # names are known only at run time
     own = {"__slots__": (), "name": found.name, "message_id": found.message_id}
@@ -110,7 +113,7 @@ def _make(found: MessageDefinition) -> Any:
 
 
 @cache
-def _dialect_class(message_id: int) -> Any:
+def _dialect_class(message_id: int) -> type[Message]:
     return _make(DEFINITIONS[message_id])
 
 
@@ -124,7 +127,7 @@ def _reader(message_id: int) -> Callable[[Frame], Message]:
 
     def read(frame: Frame) -> Message:
         values = iter(unpack(frame.payload))
-        parts: list[Any] = [frame.system_id, frame.component_id]
+        parts: list[object] = [frame.system_id, frame.component_id]
         for field in found.wire_fields:
             if field.code == "s":
                 parts.append(text(next(values)))

@@ -8,7 +8,7 @@ import math
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from estimators.messages import Message, is_a, read_message
 from estimators.needs import message_names
 from estimators.observations import Observation
 from estimators.vehicle_time import TeamTime, VehicleTime
+
+ReceivedT = TypeVar("ReceivedT")
 
 TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})
 ESTIMATOR_COMPONENTS: Final = frozenset(range(191, 195))
@@ -355,7 +357,7 @@ class Runner:
             raise EstimatorFailure(f"{self.estimator.NAME}.reset() failed: {described(error)}") from error
 
     def _processed(
-        self, time_us: int, name: str, process: Callable[[int, Any], Outcome], received: Any
+        self, time_us: int, name: str, process: Callable[[int, ReceivedT], Outcome], received: ReceivedT
     ) -> Outcome:
         estimator = self.estimator
         try:

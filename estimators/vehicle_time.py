@@ -22,8 +22,9 @@ In full, for each system:
 * Before the first stamp the time is 0.
 """
 
+from collections.abc import Container
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +89,7 @@ class TeamTime:
         return time_us + boot_us - self._reference_us
 
 
-def stamp_field(name: str, fields: Any) -> tuple[str, int] | None:
+def stamp_field(name: str, fields: Container[str]) -> tuple[str, int] | None:
     """The field that holds a message's own stamp, and its unit in microseconds; None: it has none.
 
     Args:
@@ -113,7 +114,7 @@ class VehicleTime:
     """Determines the vehicle time of messages, one after the other, in the order of their arrival."""
 
     def __init__(self) -> None:
-        self._fields: dict[Any, tuple[str, int] | None] = {}
+        self._fields: dict[type[Message], tuple[str, int] | None] = {}
         self._systems: dict[int, _SystemTime] = {}
 
     def stamp(self, message: Message) -> int:

@@ -4,13 +4,11 @@ The classes are made when they are first used. `wire.pyi` beside this module has
 `python -m estimators.wire_stub` writes it.
 """
 
-from typing import Any
-
 from autopilot_bridge.mavlink import definition
-from estimators.messages import message_class
+from estimators.messages import Message, message_class
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> type[Message]:
     if not name.isupper():
         raise AttributeError(name)
     made = globals()[name] = message_class(definition(name))

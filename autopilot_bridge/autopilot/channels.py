@@ -131,7 +131,7 @@ class ChannelStreams(Microservice):
             self._throttles[channel.name] = throttle
         return throttle
 
-    @receives(mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO)
+    @receives(mavlink.MAVLink_radio_status_message, mavlink.MAVLink_radio_message)
     def _on_radio_status(
         self,
         message: mavlink.MAVLink_radio_status_message | mavlink.MAVLink_radio_message,

@@ -28,8 +28,8 @@ class StatusTextService(Microservice):
         self._greeted: set[str] = set()
         self._next_id = 1
 
-    @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-    def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    @receives(mavlink.MAVLink_heartbeat_message)
+    def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
         self._greeted.add(source.channel.name)
 
     def forget(self, channel: Channel) -> None:

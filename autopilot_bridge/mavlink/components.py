@@ -18,5 +18,7 @@ MAGNETOMETER_COMPONENT: Final = dialect.MAV_COMP_ID_PERIPHERAL
 """The magnetometer of a survey."""
 GROUND_STATION_COMPONENT: Final = dialect.MAV_COMP_ID_MISSIONPLANNER
 """A program on the ground, as ground stations have it."""
+GROUND_STATION: Final = (255, GROUND_STATION_COMPONENT)
+"""System and component id of a program on the ground."""
 ONBOARD_COMPUTER_COMPONENT: Final = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
 """An estimator."""

@@ -71,10 +71,12 @@ def field_reader(name: str, *fields: str) -> Callable[[Frame], tuple[Any, ...]]:
 
 
 @cache
-def _constructor(message_id: int) -> Callable[[bytes], Any]:
+def _constructor(message_id: int) -> Callable[[bytes], MAVLinkMessage]:
     """A function that makes the message object from its full-size payload."""
     found = definition(message_id)
-    make = found.message_class
+    message_class = found.message_class
+    assert message_class is not None, f"{found.name} is of another dialect"
+    make: Callable[..., MAVLinkMessage] = message_class
     unpack = found.wire.unpack
     positions: dict[str, slice | int] = {}
     strings = set()
@@ -90,8 +92,8 @@ def _constructor(message_id: int) -> Callable[[bytes], Any]:
         template = vars(make(*[0] * len(plan)))
         names = [field.name for field in found.wire_fields]
 
-        def construct_scalars(payload: bytes) -> Any:
-            message = make.__new__(make)
+        def construct_scalars(payload: bytes) -> MAVLinkMessage:
+            message = message_class.__new__(message_class)
             attributes = vars(message)  # without the constructor, which takes three times as long
             attributes.update(template)
             attributes.update(zip(names, unpack(payload), strict=True))
@@ -99,7 +101,7 @@ def _constructor(message_id: int) -> Callable[[bytes], Any]:
 
         return construct_scalars
 
-    def construct(payload: bytes) -> Any:
+    def construct(payload: bytes) -> MAVLinkMessage:
         values = unpack(payload)
         arguments: list[Any] = []
         for position, is_string in plan:

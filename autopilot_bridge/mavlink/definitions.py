@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.errors import MessageError
 from autopilot_bridge.mavlink import dialect
@@ -75,7 +75,7 @@ class MessageDefinition:
     message_id: int
     name: str
     crc_extra: int
-    message_class: Any
+    message_class: type[MAVLinkMessage] | None
     field_names: tuple[str, ...]
     wire_fields: tuple[WireField, ...]
     wire: struct.Struct
@@ -91,7 +91,7 @@ def define(
     crc_extra: int,
     field_names: tuple[str, ...],
     wire_fields: Iterable[tuple[str, str, int]],
-    message_class: Any = None,
+    message_class: type[MAVLinkMessage] | None = None,
 ) -> MessageDefinition:
     """The definition of a message, of this dialect or another one.
 
@@ -121,7 +121,7 @@ def define(
     )
 
 
-def define_class(message_class: Any) -> MessageDefinition:
+def define_class(message_class: type[MAVLinkMessage]) -> MessageDefinition:
     """The definition of one of pymavlink's classes, of any dialect."""
     names = tuple(message_class.fieldnames)
     types = dict(zip(names, message_class.fieldtypes, strict=True))

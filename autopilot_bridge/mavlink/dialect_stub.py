@@ -9,10 +9,11 @@ import inspect
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from pymavlink.dialects.v20 import all as pymavlink_dialect
 
+from autopilot_bridge.mavlink.definitions import MAVLinkMessage
 from autopilot_bridge.mavlink.event_messages import MESSAGES
 
 STUB: Final = Path(__file__).with_name("dialect.pyi")
@@ -123,12 +124,12 @@ def stub() -> str:
     )
 
 
-def _classes() -> Iterator[Any]:
+def _classes() -> Iterator[type[MAVLinkMessage]]:
     classes = {**pymavlink_dialect.mavlink_map, **MESSAGES}
     return (classes[key] for key in sorted(classes))
 
 
-def _message(made: Any) -> str:
+def _message(made: type[MAVLinkMessage]) -> str:
     """Two classes: the fields, which a row of a log has too, and pymavlink's message with its constructor."""
     lengths = dict(zip(made.ordered_fieldnames, made.array_lengths, strict=True))
     fields = [

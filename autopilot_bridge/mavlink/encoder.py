@@ -32,7 +32,7 @@ class FrameEncoder:
         self.system_id = system_id
         self.component_id = component_id
         self.sequence = 0
-        self._messages: dict[int, tuple[bytes, bytes, Callable[[Any], bytes]]] = {}
+        self._messages: dict[int, tuple[bytes, bytes, Callable[[MAVLinkMessage], bytes]]] = {}
 
     def encode(self, message: MAVLinkMessage) -> bytes:
         """The frame of a message, with its payload truncated as in MAVLink 2. The message is not changed.
@@ -76,14 +76,14 @@ class FrameEncoder:
         self.sequence = sequence
         return frames
 
-    def _prepare(self, message_id: int) -> tuple[bytes, bytes, Callable[[Any], bytes]]:
+    def _prepare(self, message_id: int) -> tuple[bytes, bytes, Callable[[MAVLinkMessage], bytes]]:
         found = definition(message_id)
         sender = bytes((self.system_id, self.component_id)) + message_id.to_bytes(3, "little")
         known = (sender, bytes([found.crc_extra]), payload_packer(message_id))
         self._messages[message_id] = known
         return known
 
-    def _frame(self, known: tuple[bytes, bytes, Callable[[Any], bytes]], payload: bytes) -> bytes:
+    def _frame(self, known: tuple[bytes, bytes, Callable[[MAVLinkMessage], bytes]], payload: bytes) -> bytes:
         payload = payload.rstrip(b"\0") or b"\0"
         sequence = self.sequence
         self.sequence = (sequence + 1) & 0xFF

@@ -8,7 +8,7 @@ MAVLink guide ("Serialization", CRC_EXTRA).
 """
 
 import struct
-from typing import Any, Final
+from typing import Final
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
@@ -35,26 +35,26 @@ def _code(kind: str, length: int) -> str:
     return f"{length}{_CODES[kind]}" if length else _CODES[kind]
 
 
-def _message_class(message_id: int, name: str, fields: list[Field]) -> Any:
+def _message_class(message_id: int, name: str, fields: list[Field]) -> type[dialect.MAVLink_message]:
     """A class like pymavlink's, whose constructor takes the fields in order."""
     ordered = sorted(fields, key=lambda field: -_SIZES[field[0]])  # stable: the order on the wire
     names = [field for _, field, _ in fields]
     wire = struct.Struct("<" + "".join(_code(kind, length) for kind, _, length in ordered))
     strings = {field for kind, field, _ in fields if kind == "char"}
 
-    def construct(self: Any, *values: Any) -> None:
+    def construct(self: dialect.MAVLink_message, *values: object) -> None:
         if len(values) != len(names):
             raise TypeError(f"{name} takes {len(names)} fields: {', '.join(names)}")
         dialect.MAVLink_message.__init__(self, message_id, name)
         self._fieldnames = names
         for field, value in zip(names, values, strict=True):
-            if field in strings:
+            if field in strings and isinstance(value, bytes):
                 setattr(self, f"_{field}_raw", value)
                 value = value.split(b"\0", 1)[0].decode("ascii", errors="replace")
             setattr(self, field, value)
 
-    def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> bytes:
-        values: list[Any] = []
+    def pack(self: dialect.MAVLink_message, mav: dialect.MAVLink, force_mavlink1: bool = False) -> bytes:
+        values: list[object] = []
         for kind, field, length in ordered:
             value = getattr(self, f"_{field}_raw" if kind == "char" else field)
             values += value if length and kind != "char" else (value,)
@@ -124,12 +124,6 @@ ResponseEventError: Final = _message_class(
         ("uint8_t", "reason", 0),
     ],
 )
-
-COMPONENT_METADATA: Final = 397
-EVENT: Final = 410
-CURRENT_EVENT_SEQUENCE: Final = 411
-REQUEST_EVENT: Final = 412
-RESPONSE_EVENT_ERROR: Final = 413
 
 MESSAGES: Final = {
     each.id: each

@@ -7,7 +7,7 @@ Source: MAVLink camera definition files (mavlink.io/en/services/camera_def.html)
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 from xml.etree import ElementTree
 
 from autopilot_bridge.mavlink import MAVLinkMessage
@@ -181,7 +181,7 @@ def _settings(camera: CameraActions) -> tuple[CameraSetting, ...]:
     )
 
 
-def _number(value: Any) -> int:
+def _number(value: str | bytes) -> int:
     """The first byte of a value, which decoders return as text."""
     if isinstance(value, str):
         value = value.encode("latin-1", "replace")
@@ -192,5 +192,5 @@ def _bytes(value: int) -> bytes:
     return bytes((value,)).ljust(128, b"\0")
 
 
-def _text(name: Any) -> bytes:
+def _text(name: str | bytes) -> bytes:
     return (name if isinstance(name, bytes) else str(name).encode("ascii", "replace"))[:16]

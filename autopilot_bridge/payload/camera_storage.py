@@ -1,7 +1,7 @@
 """The camera's memory: photo count, log of the photos, and the memory card."""
 
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
@@ -28,7 +28,7 @@ class CameraStorage:
 
     used_mib: float = 0.0
     images: int = 0
-    log: dict[int, Any] = field(default_factory=dict)
+    log: dict[int, mavlink.MAVLink_camera_image_captured_message] = field(default_factory=dict)
 
     @property
     def available_mib(self) -> float:

@@ -5,19 +5,19 @@ Source: MAVLink heartbeat protocol, command protocol, and "requesting messages" 
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, decode
 from autopilot_bridge.mavlink import dialect as mavlink
 
 CommandMessage = mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message
-Builder = Callable[[int], Any]
+Builder = Callable[[int], MAVLinkMessage]
 """Makes a message of the present state; takes vehicle time, microseconds."""
 
-CommandHandler = Callable[[Any, tuple[int, int]], int | None]
+CommandHandler = Callable[[CommandMessage, tuple[int, int]], int | None]
 """Executes a command: (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
 
-Answer = Callable[[Any, tuple[int, int]], int]
+Answer = Callable[[CommandMessage, tuple[int, int]], int]
 """Answers REQUEST_MESSAGE for a message that has parameters of its own -> MAV_RESULT."""
 
 MAX_RATE_HZ: Final = 50.0

@@ -7,7 +7,7 @@ whole or not.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple, Protocol, TypeVar, cast
+from typing import Final, NamedTuple, Protocol
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 
@@ -61,13 +61,6 @@ NO_CLIENT: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
 
 Receiver = Callable[[MavlinkMessage, Source, int], None]
 """Handles one received message: (message, source, time_us). Never raises because of its contents."""
-
-MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
-
-
-def receiver(kind: type[MessageT], handle: Callable[[MessageT, Source, int], None]) -> dict[int, Receiver]:
-    """The entry of a table of receivers: `handle` takes the messages of this class."""
-    return {kind.id: cast(Receiver, handle)}
 
 
 def send_to_all(broadcast: Broadcast, message: MavlinkMessage) -> None:

@@ -14,8 +14,15 @@ from typing import Any
 from autopilot_bridge.mavlink.definitions import definition
 
 
+class FieldValues(tuple[object, ...]):
+    """A named tuple of the fields of a message, made by `fields`."""
+
+    __slots__ = ()
+    _replace: Callable[..., "FieldValues"]
+
+
 @cache
-def fields(message: str) -> Callable[..., Any]:
+def fields(message: str) -> Callable[..., FieldValues]:
     """Makes the field values of a message, a named tuple, from the fields' names.
 
     Raises (what is returned):
@@ -24,7 +31,8 @@ def fields(message: str) -> Callable[..., Any]:
     described = definition(message)
     lengths = {field.name: (field.length, field.code) for field in described.wire_fields}
     zeros = [_zero(*lengths[name]) for name in described.field_names]
-    return namedtuple(message, described.field_names, defaults=zeros)
+    values = namedtuple(message, described.field_names, defaults=zeros)  # type: ignore[misc]
+    return type(message, (values, FieldValues), {"__slots__": ()})
 
 
 def _zero(length: int, code: str) -> Any:

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import pymavlink.dialects.v20
 
-from autopilot_bridge.mavlink import DEFINITIONS, MessageDefinition
+from autopilot_bridge.mavlink import DEFINITIONS, MAVLinkMessage, MessageDefinition
 from autopilot_bridge.mavlink.definitions import define, define_class
 from autopilot_bridge.mavlink.event_messages import MESSAGES
 from estimators.errors import LogError
 from estimators.logs.xml_definitions import FieldText, MessageText, read_definitions
-from estimators.messages import message_class
+from estimators.messages import Message, message_class
 
 DEFAULT_DIALECT: Final = "all"
 
@@ -36,7 +36,7 @@ class Description:
     definition: MessageDefinition
     units: Mapping[str, str]
     instance_field: str | None
-    made: Any
+    made: type[Message]
 
     @property
     def name(self) -> str:
@@ -154,7 +154,7 @@ def _layout(found: MessageDefinition) -> tuple[object, ...]:
     return found.name, found.crc_extra, found.field_names, found.wire_fields
 
 
-def _from_class(made: Any) -> tuple[MessageDefinition, Mapping[str, str], str | None]:
+def _from_class(made: type[MAVLinkMessage]) -> tuple[MessageDefinition, Mapping[str, str], str | None]:
     return define_class(made), made.fieldunits_by_name, made.instance_field
 
 

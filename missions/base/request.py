@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import SigningKey
+from autopilot_bridge.mavlink.components import GROUND_STATION
 from missions.base.options import FlightOptions, MissionOptions
 from missions.errors import PlanError
-from missions.vehicle.connection import GROUND_STATION
 from missions.vehicle.firmware import Mode
 from missions.vehicle.limits import FORECAST_WIND_M_S
 

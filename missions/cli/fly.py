@@ -223,8 +223,9 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
     left_out_parameters: tuple[str, ...] = ()
     if parameters and world is not None:
         parameters, left_out_parameters = known_to_all(parameters, world, strict=given["strict_params"])
+    from autopilot_bridge.mavlink.components import GROUND_STATION
     from missions.base.request import REGAIN_S, RunRequest
-    from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.vehicle.connection import ONBOARD_COMPUTER
     from missions.vehicle.firmware import Mode
 
     request = RunRequest(

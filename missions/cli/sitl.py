@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 _LOG_RATE_HZ = 4
 _FAILED = 1
-_LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
 
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
@@ -83,9 +82,10 @@ def _for_clients(
 def _request_streams() -> bytes:
     """Request for all of ArduPilot's streams from every vehicle, at the rate that MAVProxy requests."""
     from autopilot_bridge.mavlink import FrameEncoder, dialect
+    from autopilot_bridge.mavlink.components import GROUND_STATION
 
     request = dialect.MAVLink_request_data_stream_message(0, 0, dialect.MAV_DATA_STREAM_ALL, _LOG_RATE_HZ, 1)
-    return FrameEncoder(*_LOGGER).encode(request)
+    return FrameEncoder(*GROUND_STATION).encode(request)
 
 
 @contextlib.contextmanager

@@ -8,7 +8,7 @@ path by the same amount. The same errors with home as the vehicle reports it are
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -299,7 +299,9 @@ def _largest_angle_deg(
     return float(np.degrees(2.0 * np.arccos(dot)).max())
 
 
-def _attitude_error_deg(truth: Any, attitude: Any, track: Track | None) -> float | None:
+def _attitude_error_deg(
+    truth: NDArray[np.void], attitude: NDArray[np.void], track: Track | None
+) -> float | None:
     """Largest angle between the autopilot's attitude and the true one, in flight."""
     if len(truth) < 2 or len(attitude) < 2:
         return None
@@ -312,7 +314,9 @@ def _attitude_error_deg(truth: Any, attitude: Any, track: Track | None) -> float
     )
 
 
-def _tracking_error_deg(target: Any, attitude: Any, track: Track | None) -> float | None:
+def _tracking_error_deg(
+    target: NDArray[np.void], attitude: NDArray[np.void], track: Track | None
+) -> float | None:
     """Largest angle between the controller's attitude setpoint and the autopilot's attitude, in flight."""
     if len(target) < 2 or len(attitude) < 2:
         return None

@@ -1,9 +1,9 @@
 """Compares the readings of a vehicle's survey magnetometer with the map, and reports anomalies."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from autopilot_bridge.mavlink import field_reader
+from autopilot_bridge.mavlink import Frame, field_reader
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators.occupancy.detection import Anomaly, AnomalyDetector
 from estimators.occupancy.placed_readings import PlacedReading, ReadingCheck, ReadingPlacer
@@ -66,7 +66,7 @@ class FieldWatch:
         if self.check.accepts(total_nt):
             self.placer.add_reading(time_us, total_nt)
 
-    def _on_position(self, frame: Any) -> None:
+    def _on_position(self, frame: Frame) -> None:
         if frame.system_id != self._vehicle.system_id or frame.component_id != AUTOPILOT_COMPONENT:
             return
         time_ms, lat, lon, alt_mm = _read_position(frame)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
+from autopilot_bridge.mavlink import dialect
 from estimators.magnetic_identification.estimator import field_direction
 from estimators.magnetic_identification.identifier import Identifier
 from estimators.occupancy.detection import Anomaly, AnomalyDetector, MapError
@@ -162,7 +163,7 @@ class SearchTeam:
         watch = searcher.watch = self._watch(index)
         watch.start()
         try:
-            with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
+            with vehicle.link.messages(dialect.MAVLink_global_position_int_message) as stream:
                 while True:
                     await vehicle.link.next_frame(
                         stream, what="position during the search", timeout_s=_POSITION_S

@@ -1,8 +1,8 @@
 """Progress of a vehicle in an uploaded mission file, and detection of the mission's end."""
 
-from typing import Any, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from missions.errors import MissionError, VehicleTimeout
 from missions.plan_files.document import MissionDocument
 from missions.plan_files.route import Stop, has_curves, placed
@@ -14,7 +14,12 @@ from missions.vehicle.vehicle import Vehicle
 CURVED: Final = "mission"
 """Name of the phase of a mission whose path is not only straight lines. Such a phase is not scored."""
 
-_NAMES: Final = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT", "GLOBAL_POSITION_INT")
+_MESSAGES: Final = (
+    dialect.MAVLink_mission_item_reached_message,
+    dialect.MAVLink_mission_current_message,
+    dialect.MAVLink_heartbeat_message,
+    dialect.MAVLink_global_position_int_message,
+)
 
 
 class MissionWatch:
@@ -60,7 +65,7 @@ class MissionWatch:
             VehicleTimeout: the mission took too long.
         """
         vehicle = self._vehicle
-        with vehicle.link.messages(*_NAMES) as stream:
+        with vehicle.link.messages(*_MESSAGES) as stream:
             try:
                 async with vehicle.link.deadline(limit_s, self._awaited):
                     while not self._take(await anext(stream)):
@@ -82,9 +87,9 @@ class MissionWatch:
             return False
         return self._tracker.coming_down if self.lands else self._tracker.over
 
-    def _take(self, message: Any) -> bool:
+    def _take(self, message: MAVLinkMessage) -> bool:
         """Process one message; returns True at the end of the mission."""
-        if message.get_type() == "HEARTBEAT":
+        if isinstance(message, dialect.MAVLink_heartbeat_message):
             return self._heartbeat(message)
         self._tracker.on_message(message, self._vehicle.clock.stamp_us)
         self._note()
@@ -101,7 +106,7 @@ class MissionWatch:
         if self._flown and notes.current == self._phase:
             notes.begin("return", self._vehicle.clock.stamp_us)
 
-    def _heartbeat(self, message: Any) -> bool:
+    def _heartbeat(self, message: dialect.MAVLink_heartbeat_message) -> bool:
         vehicle, tracker = self._vehicle, self._tracker
         modes = vehicle.firmware.modes
         if not vehicle.armed and not vehicle.commands.may_be_armed:

@@ -32,7 +32,13 @@ FARTHEST_M: Final = 10_000.0
 _FAR_M: Final = 1000.0
 _PLAN_HOME_M: Final = 200.0
 _REQUESTED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
-_SHOWN: Final = (*_REQUESTED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
+_SHOWN: Final = (
+    *_REQUESTED,
+    *(kind.msgname for kind in FILTER_STATUS.values()),
+    "HEARTBEAT",
+    "HOME_POSITION",
+    "GLOBAL_POSITION_INT",
+)
 _LISTEN_S: Final = 1.5
 _PARAMETERS_AT_ONCE: Final = 4
 
@@ -141,11 +147,12 @@ async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
 
 
 async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
-    for name in (*_REQUESTED, FILTER_STATUS[vehicle.autopilot]):
+    filter_status = FILTER_STATUS[vehicle.autopilot]
+    for name in (*_REQUESTED, filter_status.msgname):
         if vehicle.link.message(name) is None:
             await vehicle.commands.set_message_rate(name, 2.0)
     reports: list[Mapping[str, Any]] = []  # reports of the navigation filter
-    with vehicle.link.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
+    with vehicle.link.messages(filter_status) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)
         try:
@@ -160,7 +167,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
         if message is not None:
             messages[name] = message.to_dict()
     if reports:
-        messages[FILTER_STATUS[vehicle.autopilot]] = usual(reports)
+        messages[filter_status.msgname] = usual(reports)
     return Snapshot(
         flavour=vehicle.autopilot,
         kind=vehicle.kind,

@@ -6,13 +6,14 @@ from statistics import median_high
 from types import MappingProxyType
 from typing import Any, Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from missions.kind import VehicleKind
 
 Fields = Mapping[str, Any]
 """A message's fields by name, in wire units. Values that are not numbers are None or NaN."""
 
-FILTER_STATUS: Final[Mapping[str, str]] = MappingProxyType(
-    {"px4": "ESTIMATOR_STATUS", "ardupilot": "EKF_STATUS_REPORT"}
+FILTER_STATUS: Final[Mapping[str, type[MAVLinkMessage]]] = MappingProxyType(
+    {"px4": dialect.MAVLink_estimator_status_message, "ardupilot": dialect.MAVLink_ekf_status_report_message}
 )
 """By flavour: the message in which the navigation filter reports its state; see `usual`."""
 

@@ -328,7 +328,7 @@ class SearchTeam(Generic[Options]):
         ) as flight:
             self._begin(index)
             commanded: float | None = None
-            with vehicle.link.messages("GLOBAL_POSITION_INT") as stream:
+            with vehicle.link.messages(dialect.MAVLink_global_position_int_message) as stream:
                 while True:
                     await vehicle.link.next_frame(
                         stream, what="position during the search", timeout_s=_POSITION_S

@@ -9,6 +9,7 @@ import math
 from contextlib import suppress
 from typing import Final
 
+from autopilot_bridge.mavlink import dialect
 from estimators.pressure_height import PressureHeight
 from flightsim.foundation.atmosphere import air_density_ratio
 from missions.errors import MissionError, VehicleTimeout
@@ -70,7 +71,7 @@ class AttitudePilot:
         if link.armed and position.height_m > 5.0:
             raise MissionError("the pressure on the ground must be taken before takeoff")
         total, count = 0.0, 0
-        with link.messages("SCALED_PRESSURE") as stream, suppress(TimeoutError):
+        with link.messages(dialect.MAVLink_scaled_pressure_message) as stream, suppress(TimeoutError):
             async with link.deadline(_GROUND_S, "static pressure"):
                 while count < _GROUND_SAMPLES:
                     message = await anext(stream)

@@ -1,11 +1,12 @@
 """Commands and modes: the MAVLink command protocol with its confirmations."""
 
 from collections.abc import Awaitable, Callable
-from typing import Any, Final, TypeVar, cast
+from typing import Final, TypeVar
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from missions.errors import CommandRejected, MissionError, ModeNotEntered, VehicleTimeout
+from missions.vehicle.connection import MessageStream
 from missions.vehicle.firmware import Mode, ModeCommand
 from missions.vehicle.heights import HeightRule
 from missions.vehicle.link import VehicleLink, describe_ack
@@ -38,11 +39,11 @@ class _ModeAnswers:
     """
 
     def __init__(self) -> None:
-        self.refused: Any = None
+        self.refused: dialect.MAVLink_command_ack_message | None = None
         self.accepted = False
         self.await_heartbeat = False
 
-    def add(self, ack: Any) -> None:
+    def add(self, ack: dialect.MAVLink_command_ack_message) -> None:
         """Note an answer."""
         if ack.result == _ACCEPTED:
             self.accepted = self.await_heartbeat = True
@@ -87,11 +88,11 @@ class VehicleCommands:
     async def request(self, kind: type[MessageT], timeout_s: float = 2.0) -> MessageT:
         """Request one message (REQUEST_MESSAGE) of this class and wait for it."""
         name = kind.msgname
-        with self.link.messages(name) as stream:
+        with self.link.messages(kind) as stream:
             self.request_once(name)
             try:
                 async with self.link.deadline(timeout_s, name):
-                    return cast(MessageT, await anext(stream))
+                    return await anext(stream)
             except TimeoutError:
                 raise VehicleTimeout(
                     f"no {name} within {timeout_s:g} s of the request; {self.link.last_received()}"
@@ -168,7 +169,7 @@ class VehicleCommands:
     ) -> int:
         clock, begun_us, progress = self.link.clock, None, ""
         limit_us = round(max(_IN_PROGRESS_LIMIT_S, timeout_s) * 1e6)
-        with self.link.messages("COMMAND_ACK") as acks:
+        with self.link.messages(dialect.MAVLink_command_ack_message) as acks:
             for attempt in range(_SENDINGS):
                 self.link.send(message(attempt))
                 wait_s = timeout_s
@@ -193,7 +194,9 @@ class VehicleCommands:
             f"{self.link.last_received()}"
         )
 
-    async def _next_ack(self, acks: Any, command: int, timeout_s: float) -> Any:
+    async def _next_ack(
+        self, acks: MessageStream[dialect.MAVLink_command_ack_message], command: int, timeout_s: float
+    ) -> dialect.MAVLink_command_ack_message:
         async with self.link.deadline(timeout_s, f"the answer to {command_name(command)}"):
             while True:
                 ack = await anext(acks)
@@ -233,7 +236,9 @@ class VehicleCommands:
         targets = (target, *firmware.modes_instead.get(target, ()))
         command = firmware.mode_command(mode)
         answers = _ModeAnswers()
-        with self.link.messages("COMMAND_ACK", "HEARTBEAT") as replies:
+        with self.link.messages(
+            dialect.MAVLink_command_ack_message, dialect.MAVLink_heartbeat_message
+        ) as replies:
             try:
                 async with self.link.deadline(timeout_s, f"mode {mode}"):
                     while True:
@@ -254,7 +259,9 @@ class VehicleCommands:
             acknowledged=answers.accepted,
         )
 
-    async def _entered(self, targets: tuple[int, ...], replies: Any, answers: "_ModeAnswers") -> bool:
+    async def _entered(
+        self, targets: tuple[int, ...], replies: MessageStream[MAVLinkMessage], answers: "_ModeAnswers"
+    ) -> bool:
         """Wait for a heartbeat with one of the modes; returns False when the command is to be sent again."""
         clock = self.link.clock
         end_us = clock.time_us + round(_MODE_AGAIN_S * 1e6)
@@ -265,14 +272,19 @@ class VehicleCommands:
                     return False
                 answers.await_heartbeat = False
                 end_us += round(_MODE_AGAIN_S * 1e6)
-            elif reply.get_type() == "HEARTBEAT":
+            elif isinstance(reply, dialect.MAVLink_heartbeat_message):
                 if reply.custom_mode in targets:
                     return True
                 answers.await_heartbeat = False
-            elif reply.command == dialect.MAV_CMD_DO_SET_MODE:
+            elif (
+                isinstance(reply, dialect.MAVLink_command_ack_message)
+                and reply.command == dialect.MAV_CMD_DO_SET_MODE
+            ):
                 answers.add(reply)
 
-    async def _next_within(self, replies: Any, seconds: float) -> Any:
+    async def _next_within(
+        self, replies: MessageStream[MAVLinkMessage], seconds: float
+    ) -> MAVLinkMessage | None:
         if seconds <= 0.0:
             return None
         try:

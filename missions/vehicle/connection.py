@@ -10,7 +10,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Protocol, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Final, Generic, Protocol, Self, TypeVar, cast, overload
 
 from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.mavlink import (
@@ -26,7 +26,7 @@ from autopilot_bridge.mavlink import (
 )
 from autopilot_bridge.mavlink.components import (
     AUTOPILOT_COMPONENT,
-    GROUND_STATION_COMPONENT,
+    GROUND_STATION,
     ONBOARD_COMPUTER_COMPONENT,
 )
 from autopilot_bridge.mavlink.signing import SETUP_SIGNING
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
-GROUND_STATION: Final = (255, GROUND_STATION_COMPONENT)
-"""System and component id of a mission on the ground."""
 ONBOARD_COMPUTER: Final = (1, ONBOARD_COMPUTER_COMPONENT)
 """System and component id of a mission on board of system 1."""
 
@@ -374,16 +372,17 @@ class Connection:
         return stop
 
     def messages(
-        self, *names: str, system_id: int | None = None, component_id: int | None = None
-    ) -> "MessageStream":
-        """Stream of the messages with these names: `async for message in connection.messages("ATTITUDE")`.
+        self, *kinds: type[MessageT], system_id: int | None = None, component_id: int | None = None
+    ) -> "MessageStream[MessageT]":
+        """Stream of the messages of these classes, decoded:
+        `async for message in connection.messages(dialect.MAVLink_attitude_message)`.
 
         The stream begins with the first message that arrives after this call.
         """
-        return MessageStream(self, names, system_id, component_id)
+        return MessageStream(self, kinds, system_id, component_id)
 
 
-class MessageStream:
+class MessageStream(Generic[MessageT]):
     """Decoded messages as they arrive, in order. Close it, or use it as a context manager.
 
     Attributes:
@@ -391,13 +390,17 @@ class MessageStream:
     """
 
     def __init__(
-        self, connection: Connection, names: Iterable[str], system_id: int | None, component_id: int | None
+        self,
+        connection: Connection,
+        kinds: Iterable[type[MessageT]],
+        system_id: int | None,
+        component_id: int | None,
     ) -> None:
         self._queue: deque[Frame] = deque()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waiting: asyncio.Future[None] | None = None
         self._system_id, self._component_id = system_id, component_id
-        self._stops = [connection.listen(name, self._on_frame, in_order=False) for name in names]
+        self._stops = [connection.listen(kind.msgname, self._on_frame, in_order=False) for kind in kinds]
         self._at_once = 0
         self.dropped = 0
 
@@ -413,11 +416,11 @@ class MessageStream:
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_result(None)
 
-    def __aiter__(self) -> "MessageStream":
+    def __aiter__(self) -> Self:
         return self
 
-    async def __anext__(self) -> Any:
-        return decode(await self.frame())
+    async def __anext__(self) -> MessageT:
+        return cast(MessageT, decode(await self.frame()))
 
     async def frame(self) -> Frame:
         """The next frame, when it has arrived; it is not decoded."""
@@ -436,9 +439,9 @@ class MessageStream:
                 self._waiting = None
         return self._queue.popleft()
 
-    def take(self) -> MAVLinkMessage | None:
+    def take(self) -> MessageT | None:
         """The next message if one has arrived, else None; does not wait."""
-        return decode(self._queue.popleft()) if self._queue else None
+        return cast(MessageT, decode(self._queue.popleft())) if self._queue else None
 
     def close(self) -> None:
         """Stop receiving messages."""

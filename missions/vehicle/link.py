@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
-from typing import Any, Final, TypeVar, overload
+from typing import Final, TypeVar, cast, overload
 
 from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.mavlink import (
@@ -36,7 +36,7 @@ from missions.vehicle.link_watch import LOST_AFTER_S, QUIET_AFTER_S, LinkWatch
 from missions.vehicle.mode_tasks import ModeTasks
 from missions.vehicle.notes import FlightNotes, LinkLoss
 from missions.vehicle.system_id_check import SystemIdCheck
-from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
+from missions.vehicle.telemetry import Position, StatusText, StatusTextAssembler, home, source_of
 
 T = TypeVar("T")
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
@@ -89,11 +89,11 @@ class VehicleLink:
         self._firmware: Firmware | None = None
         self._authority: CommandAuthority | None = None
         self._tasks: ModeTasks | None = None
-        self._last_ack: Any = None
+        self._last_ack: dialect.MAVLink_command_ack_message | None = None
         self._heartbeat_us: int | None = None
         self.on_regained: Callable[[], None] = lambda: None
         # newest usable telemetry: its frame, the value, and the time at which it was examined
-        self._usable: dict[type, tuple[Frame, Any, int]] = {}
+        self._usable: dict[type, tuple[Frame, object, int]] = {}
         self.first_heartbeat_us = 0
         self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
@@ -374,18 +374,19 @@ class VehicleLink:
         `MissionProgress`. A message with NaN or infinite values is ignored: for one second the message before
         it is returned, then None.
         """
-        source = SOURCES[kind]
-        frame = self.connection.newest_frame(source.message_id, self.system_id)
+        source = source_of(kind)
+        frame = self.connection.newest_frame(source.kind.id, self.system_id)
         if frame is None:
             return None
         before = self._usable.get(kind)
         known = before is not None and before[0] is frame  # converted once
-        value: T | None = before[1] if before is not None and known else source.read(frame)
+        usable = cast(T, before[1]) if before is not None else None
+        value = usable if known else source.read(frame)
         now_us = self.clock.time_us
         if value is not None:
             self._usable[kind] = (frame, value, now_us)
             return value
-        return before[1] if before is not None and now_us - before[2] <= _USABLE_FOR_US else None
+        return usable if before is not None and now_us - before[2] <= _USABLE_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
         """Home as reported by the vehicle, or None."""
@@ -408,8 +409,8 @@ class VehicleLink:
 
     async def telemetry(self, kind: type[T]) -> AsyncIterator[T]:
         """Stream of telemetry: `async for position in vehicle.telemetry(Position)`."""
-        source = SOURCES[kind]
-        with self.messages(source.message) as stream:
+        source = source_of(kind)
+        with self.messages(source.kind) as stream:
             while True:
                 value = source.read(await stream.frame())
                 if value is not None:
@@ -419,7 +420,7 @@ class VehicleLink:
         """Call `listener` with each usable telemetry of a kind, in the order of all messages, also of those
         that arrive together; returns a function that ends this. The listener must send nothing.
         """
-        source, system_id = SOURCES[kind], self.system_id
+        source, system_id = source_of(kind), self.system_id
 
         def on_frame(frame: Frame) -> None:
             if frame.system_id == system_id and frame.component_id == AUTOPILOT_COMPONENT:
@@ -427,11 +428,11 @@ class VehicleLink:
                 if value is not None:
                     listener(value)
 
-        return self.connection.listen(source.message, on_frame, in_order=False)
+        return self.connection.listen(source.kind.msgname, on_frame, in_order=False)
 
-    def messages(self, *names: str) -> MessageStream:
-        """Stream of the autopilot's messages by name."""
-        return self.connection.messages(*names, system_id=self.system_id, component_id=AUTOPILOT_COMPONENT)
+    def messages(self, *kinds: type[MessageT]) -> MessageStream[MessageT]:
+        """Stream of the autopilot's messages of these classes."""
+        return self.connection.messages(*kinds, system_id=self.system_id, component_id=AUTOPILOT_COMPONENT)
 
     @property
     def armed(self) -> bool:
@@ -695,7 +696,7 @@ class VehicleLink:
             for stop in stops:
                 stop()
 
-    async def next_frame(self, stream: MessageStream, *, what: str, timeout_s: float) -> Frame:
+    async def next_frame(self, stream: MessageStream[MessageT], *, what: str, timeout_s: float) -> Frame:
         """The next frame of a stream.
 
         Raises:

@@ -1,10 +1,10 @@
 """The MAVLink mission protocol of a ground station: missions, geofences and rally points."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final, TypeVar
 
-from autopilot_bridge.mavlink import command_name, dialect, enum_name
+from autopilot_bridge.mavlink import MAVLinkMessage, command_name, dialect, enum_name
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_from_message, item_message
@@ -22,6 +22,15 @@ _REPEATED: Final = 40  # replies without progress; PX4 repeats a request 20 time
 _ERRORS_BORNE: Final = 10  # an item that ArduPilot requested eight times may arrive there eight times
 _GIVEN_UP: Final = (dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_OPERATION_CANCELLED)
 _DO_JUMP: Final = 177
+_Reply = (
+    dialect.MAVLink_mission_request_int_message
+    | dialect.MAVLink_mission_request_message
+    | dialect.MAVLink_mission_ack_message
+)
+"""What a vehicle sends while a plan is uploaded."""
+_AnswerT = TypeVar(
+    "_AnswerT", dialect.MAVLink_mission_count_message, dialect.MAVLink_mission_item_int_message
+)
 _NAMES: Final = {
     MissionType.MISSION: "mission",
     MissionType.FENCE: "geofence",
@@ -29,7 +38,9 @@ _NAMES: Final = {
 }
 
 
-def _item_message(item: MissionItem, sequence: int, system_id: int, mission_type: MissionType) -> Any:
+def _item_message(
+    item: MissionItem, sequence: int, system_id: int, mission_type: MissionType
+) -> MAVLinkMessage:
     """MISSION_ITEM_INT for an autopilot; x and y that are not set are 0, as ground stations send them."""
     first = sequence == 0 and mission_type is MissionType.MISSION
     target = (system_id, AUTOPILOT_COMPONENT)
@@ -55,9 +66,9 @@ def _result_name(result: int) -> str:
     return enum_name("MAV_MISSION_RESULT", result, prefix="MAV_MISSION_") or f"result {result}"
 
 
-def _reply_name(reply: Any) -> str:
+def _reply_name(reply: _Reply) -> str:
     """A reply of a transfer as text."""
-    if reply.get_type() == "MISSION_ACK":
+    if isinstance(reply, dialect.MAVLink_mission_ack_message):
         return f"the answer {_result_name(reply.type)}"
     return f"a request for item {reply.seq}"
 
@@ -95,9 +106,13 @@ async def _send_plan(
     link: VehicleLink, items: Sequence[MissionItem], mission_type: MissionType, before: int
 ) -> None:
     what = _NAMES[mission_type]
-    names = ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK")
     requested = -1
-    with link.messages(*names) as replies:
+    replies: MessageStream[_Reply] = link.messages(
+        dialect.MAVLink_mission_request_int_message,
+        dialect.MAVLink_mission_request_message,
+        dialect.MAVLink_mission_ack_message,
+    )
+    with replies:
         count = dialect.MAVLink_mission_count_message(link.system_id, 1, len(items), int(mission_type))
         link.send(count)
         attempts = 0
@@ -128,7 +143,7 @@ async def _send_plan(
                     f"{requested + 1} of {len(items)} items, the last one {_reply_name(reply)}; "
                     f"{link.last_received()}"
                 )
-            if reply.get_type() == "MISSION_ACK":
+            if isinstance(reply, dialect.MAVLink_mission_ack_message):
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
                     if all_sent:
                         return
@@ -166,8 +181,8 @@ async def _send_plan(
 
 
 async def _next_reply(
-    link: VehicleLink, replies: MessageStream, mission_type: MissionType, seconds: float
-) -> Any:
+    link: VehicleLink, replies: MessageStream[_Reply], mission_type: MissionType, seconds: float
+) -> _Reply:
     """The next message of this transfer; those of other clients' transfers do not extend the wait."""
     async with link.deadline(seconds, f"a request for an item of the {_NAMES[mission_type]}"):
         while True:
@@ -177,20 +192,21 @@ async def _next_reply(
 
 
 async def _ask(
-    link: VehicleLink, message: Any, name: str, mission_type: MissionType, sequence: int | None = None
-) -> Any:
+    link: VehicleLink,
+    message: MAVLinkMessage,
+    answer: type[_AnswerT],
+    mission_type: MissionType,
+    fits: Callable[[_AnswerT], bool] = lambda _: True,
+) -> _AnswerT:
     """Send a request repeatedly until its answer is received."""
-    with link.messages(name) as replies:
+    name = answer.msgname
+    with link.messages(answer) as replies:
         for _ in range(_RETRIES):
             link.send(message)
             try:
                 async with link.deadline(_RETRY_S, name):
                     async for reply in replies:
-                        if (
-                            link.addressed_here(reply)
-                            and reply.mission_type == mission_type
-                            and (sequence is None or reply.seq == sequence)
-                        ):
+                        if link.addressed_here(reply) and reply.mission_type == mission_type and fits(reply):
                             return reply
             except TimeoutError:
                 continue
@@ -201,7 +217,13 @@ async def _ask(
 
 async def _ask_count(link: VehicleLink, mission_type: MissionType) -> int:
     message = dialect.MAVLink_mission_request_list_message(link.system_id, 1, int(mission_type))
-    return int((await _ask(link, message, "MISSION_COUNT", mission_type)).count)
+    return int((await _ask(link, message, dialect.MAVLink_mission_count_message, mission_type)).count)
+
+
+async def _ask_item(link: VehicleLink, mission_type: MissionType, sequence: int) -> MissionItem:
+    request = dialect.MAVLink_mission_request_int_message(link.system_id, 1, sequence, int(mission_type))
+    kind = dialect.MAVLink_mission_item_int_message
+    return item_from_message(await _ask(link, request, kind, mission_type, lambda item: item.seq == sequence))
 
 
 def _end_download(link: VehicleLink, mission_type: MissionType) -> None:
@@ -216,8 +238,7 @@ async def download(link: VehicleLink, mission_type: MissionType = MissionType.MI
     """Download the whole plan from the vehicle, in the vehicle's numbering."""
     items = []
     for k in range(await _ask_count(link, mission_type)):
-        request = dialect.MAVLink_mission_request_int_message(link.system_id, 1, k, int(mission_type))
-        items.append(item_from_message(await _ask(link, request, "MISSION_ITEM_INT", mission_type, k)))
+        items.append(await _ask_item(link, mission_type, k))
     _end_download(link, mission_type)
     return items
 
@@ -229,7 +250,7 @@ async def clear(link: VehicleLink, mission_type: MissionType = MissionType.MISSI
     """
     what = _NAMES[mission_type]
     errors = 0
-    with link.messages("MISSION_ACK") as replies:
+    with link.messages(dialect.MAVLink_mission_ack_message) as replies:
         for _ in range(_RETRIES):
             link.send(dialect.MAVLink_mission_clear_all_message(link.system_id, 1, int(mission_type)))
             try:

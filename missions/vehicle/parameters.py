@@ -88,7 +88,7 @@ class VehicleParameters:
         message = dialect.MAVLink_param_request_read_message(
             self._link.system_id, 1, name.encode("ascii", "replace")[:16], -1
         )
-        with self._link.messages("PARAM_VALUE") as replies:
+        with self._link.messages(dialect.MAVLink_param_value_message) as replies:
             for _ in range(tries):
                 self._link.send(message)
                 try:
@@ -117,7 +117,7 @@ class VehicleParameters:
             self._link.system_id, 1, name.encode("ascii"), value_to_wire(value, kind, bytewise), kind
         )
         kept = math.nan
-        with self._link.messages("PARAM_VALUE") as replies:
+        with self._link.messages(dialect.MAVLink_param_value_message) as replies:
             for _ in range(_TRIES):
                 self._link.send(message)
                 try:
@@ -162,7 +162,7 @@ class VehicleParameters:
     async def _names(self) -> frozenset[str]:
         """Names in the vehicle's list of parameters, as far as they were received."""
         names: set[str] = set()
-        with self._link.messages("PARAM_VALUE") as replies:
+        with self._link.messages(dialect.MAVLink_param_value_message) as replies:
             self._link.send(
                 dialect.MAVLink_param_request_list_message(self._link.system_id, AUTOPILOT_COMPONENT)
             )

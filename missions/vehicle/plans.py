@@ -116,7 +116,7 @@ class VehiclePlans:
         If the vehicle does not confirm it (MISSION_CURRENT), the notes get a warning.
         """
         first = 1 if self._link.firmware.first_mission_item_is_home else 0
-        with self._link.messages("MISSION_CURRENT") as stream:
+        with self._link.messages(dialect.MAVLink_mission_current_message) as stream:
             for _ in range(_REWINDS):
                 self._link.send(
                     dialect.MAVLink_mission_set_current_message(self._link.system_id, AUTOPILOT_COMPONENT, 0)

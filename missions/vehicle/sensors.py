@@ -12,9 +12,9 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final, NamedTuple, TypeVar
 
-from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode, dialect
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode_as, dialect
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, read_camera_scan
 from autopilot_bridge.mavlink.components import (
     AUTOPILOT_COMPONENT,
@@ -45,6 +45,8 @@ __all__ = [
     "Sign",
 ]
 
+MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
+
 _RECEIVED_S: Final = 5.0  # for the first message of a component
 _PROOFS: Final = 2  # readings that prove a sensor, at its lowest rate
 _LATE_S: Final = 2.0
@@ -65,6 +67,23 @@ class Sign:
     plausible: bool = True
 
 
+class Source(NamedTuple):
+    """The messages of a sensor.
+
+    Attributes:
+        message: their name.
+        read: what a frame of that message says; None: it is no reading of this sensor.
+    """
+
+    message: str
+    read: Callable[[Frame], Sign | None]
+
+    @classmethod
+    def of(cls, kind: type[MessageT], read: Callable[[MessageT], Sign | None]) -> "Source":
+        """By a function of the decoded message."""
+        return cls(kind.msgname, lambda frame: read(decode_as(frame, kind)))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
     """A sensor, and how it shows in messages that it works.
@@ -72,20 +91,18 @@ class Sensor:
     Attributes:
         name: for texts.
         component: id of the MAVLink component that sends the messages.
-        message: name of the message.
         what: the readings, for texts: "pictures that were searched".
         least_hz: lowest rate of readings at which it is of use.
         silent_s: vehicle time without a usable reading after which it has stopped.
-        read: what a message says; None: it is no reading of this sensor.
+        source: its messages.
     """
 
     name: str
     component: int
-    message: str
+    source: Source
     what: str
     least_hz: float
     silent_s: float = 5.0
-    read: Callable[[Any], Sign | None]
 
     def silent_after(self, seconds: float) -> "Sensor":
         """The same sensor with another `silent_s`."""
@@ -137,61 +154,54 @@ def _total_field(m: dialect.MAVLink_named_value_float_message) -> Sign | None:
 TAG_CAMERA: Final = Sensor(
     name="camera",
     component=CAMERA_COMPONENT,
-    message="TUNNEL",
+    source=Source.of(dialect.MAVLink_tunnel_message, _searched_picture),
     what="searched pictures (docs/mavlink/camera_scan.md)",
     least_hz=0.5,
-    read=_searched_picture,
 )
 """A camera that searches its pictures for tags, and reports each of them."""
 CAMERA: Final = Sensor(
     name="camera",
     component=CAMERA_COMPONENT,
-    message="HEARTBEAT",
+    source=Source.of(dialect.MAVLink_heartbeat_message, _heartbeat),
     what="heartbeats",
     least_hz=0.5,
-    read=_heartbeat,
 )
 """A camera that reports what it detects, and nothing of empty pictures."""
 GIMBAL: Final = Sensor(
     name="gimbal",
     component=GIMBAL_COMPONENT,
-    message="GIMBAL_DEVICE_ATTITUDE_STATUS",
+    source=Source.of(dialect.MAVLink_gimbal_device_attitude_status_message, _gimbal_attitude),
     what="attitudes (GIMBAL_DEVICE_ATTITUDE_STATUS)",
     least_hz=1.0,
-    read=_gimbal_attitude,
 )
 SURVEY_MAGNETOMETER: Final = Sensor(
     name="survey magnetometer",
     component=MAGNETOMETER_COMPONENT,
-    message="NAMED_VALUE_FLOAT",
+    source=Source.of(dialect.MAVLink_named_value_float_message, _total_field),
     what=f"readings of a field (NAMED_VALUE_FLOAT {survey_magnetometer.TOTAL_FIELD_NAME})",
     least_hz=1.0,
-    read=_total_field,
 )
 TARGET_SENSOR: Final = Sensor(
     name="target sensor",
     component=TARGET_SENSOR_COMPONENT,
-    message="TUNNEL",
+    source=Source.of(dialect.MAVLink_tunnel_message, _target_scan),
     what="complete scans (docs/mavlink/target_scan.md)",
     least_hz=0.1,
     silent_s=30.0,
-    read=_target_scan,
 )
 MOVING_POINTS: Final = Sensor(
     name="moving-point camera",
     component=MOVING_POINT_COMPONENT,
-    message="TUNNEL",
+    source=Source.of(dialect.MAVLink_tunnel_message, _moving_points),
     what="scans (docs/mavlink/moving_points.md)",
     least_hz=1.0,
-    read=_moving_points,
 )
 RANGE_RADIO: Final = Sensor(
     name="range radio",
     component=RANGE_RADIO_COMPONENT,
-    message="HEARTBEAT",
+    source=Source.of(dialect.MAVLink_heartbeat_message, _heartbeat),
     what="heartbeats",
     least_hz=0.5,
-    read=_heartbeat,
 )
 """It measures ranges only while another vehicle is in reach."""
 
@@ -212,7 +222,7 @@ class _Track:
         self._stamp_us: int | None = None
 
     def take(self, frame: Frame, now_us: int) -> None:
-        sign = self.sensor.read(decode(frame))
+        sign = self.sensor.source.read(frame)
         if sign is None:
             return
         if not sign.plausible:
@@ -260,7 +270,7 @@ class SensorWatch:
                 if (frame.system_id, frame.component_id) == (link.system_id, track.sensor.component):
                     track.take(frame, link.clock.time_us)
 
-            self._stops.append(connection.listen(sensor.message, take, in_order=False))
+            self._stops.append(connection.listen(sensor.source.message, take, in_order=False))
 
     async def prove(self) -> None:
         """Wait until all sensors have sent usable readings at their lowest rates or faster, and keep watching
@@ -316,7 +326,7 @@ class SensorWatch:
             await link.wait_until(
                 lambda: not missing(),
                 what="sensors of the mission",
-                on=("HEARTBEAT", *(t.sensor.message for t in self._tracks)),
+                on=("HEARTBEAT", *(t.sensor.source.message for t in self._tracks)),
                 timeout_s=_RECEIVED_S,
             )
         except VehicleTimeout:
@@ -333,7 +343,7 @@ class SensorWatch:
             await link.wait_until(
                 lambda: track.proven(link.clock.time_us),
                 what=sensor.what,
-                on=(sensor.message,),
+                on=(sensor.source.message,),
                 timeout_s=limit_s,
             )
         except VehicleTimeout:

@@ -6,7 +6,7 @@ also comes at a fifth of its rate. Instead, messages that are not needed are slo
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import DEFINITIONS, Frame
 from missions.vehicle.commands import VehicleCommands
@@ -60,7 +60,7 @@ async def _count(link: VehicleLink, needed_hz: Mapping[str, float]) -> tuple[Cou
     received: Counter[str] = Counter()
     changed: Counter[str] = Counter()
 
-    def counting(name: str) -> Callable[[Any], None]:
+    def counting(name: str) -> Callable[[Frame], None]:
         def count(frame: Frame) -> None:
             if (frame.system_id, frame.component_id) == (link.system_id, 1):
                 received[name] += 1

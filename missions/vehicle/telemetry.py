@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from inspect import signature
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Final, Generic, NamedTuple, TypeVar, cast
 
-from autopilot_bridge.mavlink import Frame, definition, dialect, field_reader
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage, dialect, field_reader
 from autopilot_bridge.mavlink.plain_text import plain_text
 from flightsim.foundation.geodesy import GeodeticPosition
 
@@ -212,39 +212,41 @@ def progress(seq: int) -> MissionProgress:
     return MissionProgress(sequence=seq)
 
 
-class Source(NamedTuple):
+class Source(NamedTuple, Generic[T]):
     """Where a kind of telemetry comes from.
 
     Attributes:
-        message: name of the message.
-        message_id: its number.
+        kind: class of the message.
         read: the value in a frame of that message; None: not usable.
     """
 
-    message: str
-    message_id: int
-    read: Callable[[Frame], Any]
+    kind: type[MAVLinkMessage]
+    read: Callable[[Frame], T | None]
 
     @classmethod
-    def of(cls, message: str, convert: Callable[..., Any]) -> "Source":
+    def of(cls, kind: type[MAVLinkMessage], convert: Callable[..., T | None]) -> "Source[T]":
         """By a function of some fields, whose arguments are those fields in the order on the wire."""
-        fields = field_reader(message, *signature(convert).parameters)
-        return cls(message, definition(message).message_id, lambda frame: convert(*fields(frame)))
+        fields = field_reader(kind.msgname, *signature(convert).parameters)
+        return cls(kind, lambda frame: convert(*fields(frame)))
 
 
-SOURCES: Final[Mapping[type, Source]] = MappingProxyType(
+_SOURCES: Final[Mapping[type, Source[object]]] = MappingProxyType(
     {
-        Position: Source.of("GLOBAL_POSITION_INT", position),
-        LocalPosition: Source.of("LOCAL_POSITION_NED", local_position),
-        Attitude: Source.of("ATTITUDE", attitude),
-        AirData: Source.of("VFR_HUD", air_data),
-        Pressure: Source.of("SCALED_PRESSURE", pressure),
-        Battery: Source.of("SYS_STATUS", battery),
-        Gps: Source.of("GPS_RAW_INT", gps),
-        MissionProgress: Source.of("MISSION_CURRENT", progress),
+        Position: Source.of(dialect.MAVLink_global_position_int_message, position),
+        LocalPosition: Source.of(dialect.MAVLink_local_position_ned_message, local_position),
+        Attitude: Source.of(dialect.MAVLink_attitude_message, attitude),
+        AirData: Source.of(dialect.MAVLink_vfr_hud_message, air_data),
+        Pressure: Source.of(dialect.MAVLink_scaled_pressure_message, pressure),
+        Battery: Source.of(dialect.MAVLink_sys_status_message, battery),
+        Gps: Source.of(dialect.MAVLink_gps_raw_int_message, gps),
+        MissionProgress: Source.of(dialect.MAVLink_mission_current_message, progress),
     }
 )
-"""The source of each kind of telemetry."""
+
+
+def source_of(kind: type[T]) -> Source[T]:
+    """The source of a kind of telemetry."""
+    return cast(Source[T], _SOURCES[kind])
 
 
 class StatusTextAssembler:

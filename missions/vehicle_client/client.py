@@ -125,7 +125,8 @@ class VehicleClient:
             with suppress(ValueError):  # NaN in a field is not valid JSON
                 fields = json.loads(message.fields_json)
                 self.messages[message.message_name] = fields
-                if message.message_name == FILTER_STATUS.get(self.flavour):
+                status = FILTER_STATUS.get(self.flavour)
+                if status is not None and message.message_name == status.msgname:
                     self._filter.append(fields)
                 if message.message_name == "PARAM_VALUE":
                     self.parameter_types[str(fields.get("param_id", ""))] = int(fields.get("param_type", 0))
@@ -160,7 +161,7 @@ class VehicleClient:
         """The data received so far; of the filter's measurements, the median of the newest ones."""
         messages = dict(self.messages)
         if self._filter:
-            messages[FILTER_STATUS[self.flavour]] = usual(self._filter)
+            messages[FILTER_STATUS[self.flavour].msgname] = usual(self._filter)
         return Snapshot(
             flavour=self.flavour,
             kind=self.kind,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from autopilot_bridge.links import Address, open_link
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, dialect
-from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, GROUND_STATION
 
 _LOOK_S = 0.02
 _GCS_HEARTBEAT_S = 1.0
@@ -80,7 +80,7 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
     """
     loop = asyncio.get_running_loop()
     link = open_link(address)
-    parser, encoder = FrameParser(), FrameEncoder(255, 190)
+    parser, encoder = FrameParser(), FrameEncoder(*GROUND_STATION)
     counts: dict[tuple[int, int], Counter[int]] = {}
     last: dict[tuple[int, int], int] = {}
     lost: Counter[tuple[int, int]] = Counter()

@@ -3,7 +3,7 @@
 import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -118,7 +118,7 @@ class CameraWatch:
                     (frame,) = self._parsers[index].feed(self._encoders[index].encode(message))
                     self._send_to(other, frame)
 
-    def _send_to(self, other: int, frame: Any) -> None:
+    def _send_to(self, other: int, frame: Frame) -> None:
         quality, now_us = self._quality, self._vehicles[0].clock.time_us
         for k in range(quality.repeats):
             self.counts["sent"] += 1

@@ -53,7 +53,7 @@ def attitude(k):
 
 def test_stream_gives_every_message_in_order():
     async def script(connection, send):
-        with connection.messages("ATTITUDE") as stream:
+        with connection.messages(dialect.MAVLink_attitude_message) as stream:
             for k in range(100):
                 send(attitude(k))
                 send(dialect.MAVLink_system_time_message(0, k))
@@ -67,7 +67,7 @@ def test_stream_gives_every_message_in_order():
 
 def test_a_slow_reader_loses_the_oldest_and_counts_them():
     async def script(connection, send):
-        with connection.messages("ATTITUDE") as stream:
+        with connection.messages(dialect.MAVLink_attitude_message) as stream:
             for k in range(5000):
                 send(attitude(k))
             assert stream.dropped == 5000 - 4096

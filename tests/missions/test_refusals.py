@@ -3,13 +3,15 @@
 import pytest
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mavlink.event_messages import EventMessage, event_sub_id
+from autopilot_bridge.mavlink.event_messages import event_sub_id
 from missions.errors import CommandRejected
 from missions.vehicle.px4_events import reason
 
 
-def event(name: str, level: int) -> EventMessage:
-    return EventMessage(0, 0, 1 << 24 | event_sub_id(name), 0, 1, level << 4 | level, [0] * 40)
+def event(name: str, level: int) -> dialect.MAVLink_event_message:
+    return dialect.MAVLink_event_message(
+        0, 0, 1 << 24 | event_sub_id(name), 0, 1, level << 4 | level, [0] * 40
+    )
 
 
 def test_events_are_reasons_by_their_number() -> None:

@@ -155,7 +155,7 @@ def test_a_loop_that_never_waits_lets_time_go_on(flown) -> None:
 def test_a_full_queue_gives_other_tasks_a_turn(flown) -> None:
     async def script(vehicle, autopilot):
         over = asyncio.Event()
-        with vehicle.link.messages("COMMAND_ACK") as stream:
+        with vehicle.link.messages(mavlink.MAVLink_command_ack_message) as stream:
             autopilot.ack(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
             asyncio.get_running_loop().call_later(0.01, over.set)
             while not over.is_set():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.mavlink import Frame, FrameEncoder, dialect
 from autopilot_bridge.mavlink.target_scan import scan_messages
 from flightsim.payload import CameraParameters, Device, DeviceOutage, PayloadParameters
 from flightsim.world_spec import VehicleSpec, WorldSpec
@@ -203,13 +203,16 @@ def test_an_interrupted_link_is_no_stopped_sensor(measured):
 
 
 def test_what_the_signs_of_life_are():
+    def read(sensor, message):
+        return sensor.source.read(Frame.of(FrameEncoder(1, sensor.component).encode(message)))
+
     (end,) = scan_messages(3, 5_000_000, [])
-    assert TARGET_SENSOR.read(end).stamp_us == 5_000_000
-    assert TAG_CAMERA.read(end) is None  # a scan of another sensor
+    assert read(TARGET_SENSOR, end).stamp_us == 5_000_000
+    assert read(TAG_CAMERA, end) is None  # a scan of another sensor
     attitude = dialect.MAVLink_gimbal_device_attitude_status_message(
         0, 0, 1234, 32, [1.0, 0, 0, 0], 0, 0, 0, 0
     )
-    assert GIMBAL.read(attitude).stamp_us == 1_234_000
+    assert read(GIMBAL, attitude).stamp_us == 1_234_000
     attitude.q = [float("nan")] * 4
-    assert not GIMBAL.read(attitude).plausible
-    assert CAMERA.read(None).plausible
+    assert not read(GIMBAL, attitude).plausible
+    assert read(CAMERA, dialect.MAVLink_heartbeat_message(0, 0, 0, 0, 0, 3)).plausible

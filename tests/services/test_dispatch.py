@@ -7,9 +7,10 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot import Autopilot
-from autopilot_bridge.dispatch import command, streams
+from autopilot_bridge.dispatch import command, receives, streams
 from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
 from autopilot_bridge.mavlink import FrameParser
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
@@ -56,7 +57,7 @@ class Base(Microservice):
     def first(self) -> str:
         return "base"
 
-    @streams(1)
+    @streams(mavlink.MAVLink_heartbeat_message)
     def third(self) -> str:
         return "stream"
 
@@ -75,7 +76,20 @@ def test_an_overridden_method_keeps_its_numbers_and_a_later_declaration_replaces
     assert {number: take() for number, take in commands.items()} == {1: "child", 2: "second", 3: "second"}
     commands = Base().commands
     assert {number: take() for number, take in commands.items()} == {1: "base", 2: "base"}
-    assert list(Child().builders) == [1] and not Child().receivers and not Child().on_demand
+    assert list(Child().builders) == [HEARTBEAT] and not Child().receivers and not Child().on_demand
+
+
+def test_a_handler_is_annotated_with_the_classes_that_it_receives() -> None:
+    heartbeat, ping = mavlink.MAVLink_heartbeat_message, mavlink.MAVLink_ping_message
+
+    def both(self: Microservice, message: heartbeat | ping, source: Source, time_us: int) -> None: ...  # type: ignore[valid-type]
+
+    def untyped(self: Microservice, message, source: Source, time_us: int) -> None: ...  # type: ignore[no-untyped-def]
+
+    assert receives(ping, heartbeat)(both) is both
+    for kinds, handler in [((heartbeat,), both), ((ping,), untyped)]:
+        with pytest.raises(TypeError, match=rf"{handler.__name__} receives {kinds[0].__name__}, but"):
+            receives(*kinds)(handler)
 
 
 def test_a_message_that_no_service_handles_is_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:

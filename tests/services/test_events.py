@@ -17,7 +17,6 @@ from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.firmware.px4.component_metadata import GENERAL, ComponentMetadataService
 from autopilot_bridge.firmware.px4.event_service import KEPT, EventService
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE, EVENT, RequestEvent
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.files.ftp_protocol import crc32
@@ -42,7 +41,12 @@ class Rig(ServiceRig):
         return found
 
     def request(self, first: int, last: int) -> list[Any]:
-        assert deliver(RequestEvent(1, 1, first, last), Source(self.link, 255, 190), 0, self.service)
+        assert deliver(
+            mavlink.MAVLink_request_event_message(1, 1, first, last),
+            Source(self.link, 255, 190),
+            0,
+            self.service,
+        )
         return self.sent()
 
 
@@ -67,7 +71,7 @@ def test_sequence_wraps_and_lost_events_can_be_requested() -> None:
     sent = rig.sent()
     numbers = [message.sequence for message in sent]
     assert 65535 in numbers and numbers[numbers.index(65535) + 1] == 0
-    assert rig.service.builders[CURRENT_EVENT_SEQUENCE]() == (numbers[-1], 0)
+    assert rig.service.builders[mavlink.MAVLink_current_event_sequence_message.id]() == (numbers[-1], 0)
     again = rig.request(numbers[-3], numbers[-1])
     assert again == sent[-3:]
     (error,) = rig.request(numbers[0], numbers[0])
@@ -91,7 +95,7 @@ def test_refused_arming_brings_the_reasons() -> None:
     rig = Rig()
     rig.commander.situation.ready = False
     rig.service.follow(events.ArmingDenied(time_us=0, mode=FlightMode.HOLD, reasons=(Reason.BOOTING,)))
-    ids = [message.id for message in rig.sent() if message.get_msgId() == EVENT]
+    ids = [message.id for message in rig.sent() if isinstance(message, mavlink.MAVLink_event_message)]
     assert ids[0] == px4_events.KINDS[1].event_id  # the text's
     assert ids[1] == px4_events.ARMING_SUMMARY.event_id
     assert px4_events.CHECKS[Reason.BOOTING].event_id in ids[2:-1]

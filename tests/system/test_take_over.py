@@ -14,6 +14,7 @@ import pytest
 
 from autopilot_bridge.clock import LoopClock
 from autopilot_bridge.mavlink import decode, definition, dialect
+from autopilot_bridge.mavlink.components import GROUND_STATION
 from autopilot_bridge.tlog import TlogReader
 from missions.base.mission import Mission
 from missions.base.options import FlightOptions, Via
@@ -23,7 +24,7 @@ from missions.library import find_mission
 from missions.runs import session
 from missions.runs.vehicle_opening import VehicleOpener, embedded_stage
 from missions.vehicle import Mode, Setpoint, Vehicle
-from missions.vehicle.connection import GROUND_STATION, Connection
+from missions.vehicle.connection import Connection
 from missions.vehicle.telemetry import Position
 
 PILOT: Final = (255, 50)

@@ -55,7 +55,7 @@ class ArdupilotCalibration(Microservice):
         self._requested_us = 0
         self._begun_us = 0
 
-    @receives(mavlink.MAVLINK_MSG_ID_COMMAND_ACK)
+    @receives(mavlink.MAVLink_command_ack_message)
     def _on_acknowledgement(
         self, message: mavlink.MAVLink_command_ack_message, source: Source, time_us: int
     ) -> None:

@@ -34,7 +34,7 @@ class ArduPilotCommands(CommandHandlers):
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_MODE)
+    @receives(mavlink.MAVLink_set_mode_message)
     def set_mode_message(
         self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int
     ) -> None:

@@ -8,13 +8,13 @@ Source: ArduPilot 4.6 (AC_PolyFence_loader, GCS_Rally), the last release that ac
 
 import math
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.messages import plan_checksum
 
@@ -23,12 +23,12 @@ RALLY_TOTAL: Final = "RALLY_TOTAL"
 _LEAST_FENCE: Final = 5  # return point, three vertices, and the first vertex again
 _WARNING: Final = mavlink.MAV_SEVERITY_WARNING
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
-_NAMES: Final = {
-    mavlink.MAVLINK_MSG_ID_FENCE_POINT: "FENCE_POINT",
-    mavlink.MAVLINK_MSG_ID_FENCE_FETCH_POINT: "FENCE_FETCH_POINT",
-    mavlink.MAVLINK_MSG_ID_RALLY_POINT: "RALLY_POINT",
-    mavlink.MAVLINK_MSG_ID_RALLY_FETCH_POINT: "RALLY_FETCH_POINT",
-}
+_OldMessage = (
+    mavlink.MAVLink_fence_point_message
+    | mavlink.MAVLink_fence_fetch_point_message
+    | mavlink.MAVLink_rally_point_message
+    | mavlink.MAVLink_rally_fetch_point_message
+)
 _RETURN_POINT: Final = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 _VERTEX: Final = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 
@@ -66,16 +66,16 @@ class OldPoints(Microservice):
         self._announce = announce
         self._fence_points: dict[int, Point] = {}
         self._rally_points: dict[int, MissionItem] = {}
-        self._warned: set[int] = set()
+        self._warned: set[str] = set()
         self._versions = [0, 0]
         parameters.subscribe(self._on_parameter)
 
-    @receives(*_NAMES)
-    def _on_point(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
-        number = message.get_msgId()
-        if number not in self._warned:
-            self._warned.add(number)
-            self._announce(_INFO, f"Received message ({_NAMES[number]}) is deprecated")
+    @receives(*get_args(_OldMessage))
+    def _on_point(self, message: _OldMessage, source: Source, time_us: int) -> None:
+        name = message.get_type()
+        if name not in self._warned:
+            self._warned.add(name)
+            self._announce(_INFO, f"Received message ({name}) is deprecated")
         match message:
             case mavlink.MAVLink_fence_point_message():
                 self._take_fence_point(message)

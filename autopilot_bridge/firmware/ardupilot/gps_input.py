@@ -8,7 +8,7 @@ Source: MAVLink common.xml (GPS_INPUT 232, HIL_GPS 113); ArduPilot 4.6 AP_GPS_MA
 """
 
 import math
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
@@ -52,13 +52,13 @@ class GpsInputService(Microservice):
         self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
         self.taken = self.refused = 0
 
-    @receives(mavlink.MAVLINK_MSG_ID_GPS_INPUT)
+    @receives(mavlink.MAVLink_gps_input_message)
     def _on_gps_input(self, message: mavlink.MAVLink_gps_input_message, source: Source, time_us: int) -> None:
         """Only the first receiver (`gps_id`) exists."""
         if self._listens and message.gps_id == 0:
             self._take(message, _gps_input(message), time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_HIL_GPS)
+    @receives(mavlink.MAVLink_hil_gps_message)
     def _on_hil_gps(self, message: mavlink.MAVLink_hil_gps_message, source: Source, time_us: int) -> None:
         if self._listens:
             self._take(message, _hil_gps(message), time_us)
@@ -136,7 +136,7 @@ def _hil_gps(message: mavlink.MAVLink_hil_gps_message) -> list[float] | None:
 
 
 def _fix(
-    message: Any,
+    message: mavlink.MAVLink_gps_input_message | mavlink.MAVLink_hil_gps_message,
     *,
     alt_m: float,
     velocity: tuple[float, ...],

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_ids
@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.messages.common import NAN, CommonMessages
+from autopilot_bridge.telemetry.fields import FieldValues
 from autopilot_bridge.telemetry.streams import Values
 from flightsim.foundation.vectors import euler_of
 
@@ -51,7 +52,7 @@ _SECONDS_PER_HOUR: Final = 3600.0
 class ArdupilotMessages(CommonMessages):
     """Builders of what ArduCopter sends."""
 
-    @streams(_M.MAVLINK_MSG_ID_TIMESYNC)
+    @streams(_M.MAVLink_timesync_message)
     def timesync(self) -> Values:
         """TIMESYNC (111) request."""
         return (0, self.view.time_us * 1000, 0, 0)
@@ -60,28 +61,28 @@ class ArdupilotMessages(CommonMessages):
         """Without an airspeed sensor ArduCopter shows its ground speed."""
         return self.view.refreshed().ground_speed_m_s
 
-    @streams(_M.MAVLINK_MSG_ID_RAW_IMU)
+    @streams(_M.MAVLink_raw_imu_message)
     def raw_imu(self) -> Values | None:
         """RAW_IMU (27), scaled like SCALED_IMU."""
         values = self.raw_scaled_imu()
         return None if values is None else (self.view.time_us, *values, 0, self.temperature_cdeg())
 
-    @streams(_M.MAVLINK_MSG_ID_SCALED_IMU2)
+    @streams(_M.MAVLink_scaled_imu2_message)
     def scaled_imu2(self) -> Values | None:
         """SCALED_IMU2 (116): the values of the first IMU."""
         return self.scaled_imu()
 
-    @streams(_M.MAVLINK_MSG_ID_POWER_STATUS)
+    @streams(_M.MAVLink_power_status_message)
     def power_status(self) -> Values:
         """POWER_STATUS (125)."""
         return (5000, 0, 0)
 
-    @streams(_M.MAVLINK_MSG_ID_MEMINFO)
+    @streams(_M.MAVLink_meminfo_message)
     def meminfo(self) -> Values:
         """MEMINFO (152): free memory of the emulated board."""
         return (0, 65535, 131072)
 
-    @streams(_M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT)
+    @streams(_M.MAVLink_nav_controller_output_message)
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62)."""
         roll, pitch, _ = euler_of(self.parts.controller.attitude_setpoint.tolist())
@@ -105,18 +106,18 @@ class ArdupilotMessages(CommonMessages):
             0.0,
         )
 
-    @streams(_M.MAVLINK_MSG_ID_RC_CHANNELS)
+    @streams(_M.MAVLink_rc_channels_message)
     def rc_channels(self) -> Values:
         """RC_CHANNELS (65): the simulated transmitter at rest."""
         return (self.view.time_ms, 8, *_RC_NEUTRAL_US, *(0,) * 10, 255)
 
-    @streams(_M.MAVLINK_MSG_ID_AHRS)
+    @streams(_M.MAVLink_ahrs_message)
     def ahrs(self) -> Values:
         """AHRS (163): gyro bias estimate."""
         bias = self.parts.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
         return (*bias, 0.0, 0.0, 0.0, 0.0)
 
-    @streams(_M.MAVLINK_MSG_ID_AHRS2)
+    @streams(_M.MAVLink_ahrs2_message)
     def ahrs2(self) -> Values | None:
         """AHRS2 (178)."""
         v = self.view.refreshed()
@@ -124,7 +125,7 @@ class ArdupilotMessages(CommonMessages):
             return None
         return (v.roll, v.pitch, v.yaw, v.alt_amsl_m, v.lat_e7, v.lon_e7)
 
-    @streams(_M.MAVLINK_MSG_ID_EKF_STATUS_REPORT)
+    @streams(_M.MAVLink_ekf_status_report_message)
     def ekf_status_report(self) -> Values:
         """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
         health = self.parts.navigation.health
@@ -142,7 +143,7 @@ class ArdupilotMessages(CommonMessages):
         """EKF_STATUS_FLAGS."""
         return ekf_flags(self.parts.navigation.health, position_ready=self.parts.commander.situation.position)
 
-    @streams(_M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4)
+    @streams(_M.MAVLink_esc_telemetry_1_to_4_message)
     def esc_telemetry(self) -> Values | None:
         """ESC_TELEMETRY_1_TO_4 (11030): voltage of the battery; the ESCs report no speed."""
         battery = self.view.battery
@@ -161,7 +162,7 @@ class ArdupilotMessages(CommonMessages):
             (count,) * 4,
         )
 
-    @streams(_M.MAVLINK_MSG_ID_TERRAIN_REPORT)
+    @streams(_M.MAVLink_terrain_report_message)
     def terrain_report(self) -> Values | None:
         """TERRAIN_REPORT (136): no terrain data is loaded."""
         v = self.view.refreshed()
@@ -169,7 +170,7 @@ class ArdupilotMessages(CommonMessages):
             return None
         return (v.lat_e7, v.lon_e7, 0, 0.0, 0.0, 0, 0)
 
-    @streams(_M.MAVLINK_MSG_ID_WIND)
+    @streams(_M.MAVLink_wind_message)
     def wind(self) -> Values:
         """WIND (168); a copter without a drag model reports calm."""
         return (-180.0, 0.0, 0.0)
@@ -182,7 +183,7 @@ class ArdupilotMessages(CommonMessages):
         """EXTENDED_SYS_STATE (245): a copter reports VTOL in multicopter state."""
         return (mavlink.MAV_VTOL_STATE_MC, int(self.context.landed_state))
 
-    def battery_status(self) -> Any:
+    def battery_status(self) -> FieldValues | None:
         """BATTERY_STATUS (147): kind of battery unknown, energy in hectojoules from charge and voltage."""
         values = super().battery_status()
         battery = self.view.battery

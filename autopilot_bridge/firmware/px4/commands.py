@@ -27,7 +27,7 @@ _PROTOCOL_VERSION = 300
 class Px4Commands(CommandHandlers):
     """PX4's commands. Everything not in the table is UNSUPPORTED, as in the firmware."""
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_MODE)
+    @receives(mavlink.MAVLink_set_mode_message)
     def set_mode_message(
         self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int
     ) -> None:

@@ -21,12 +21,6 @@ from autopilot_bridge.firmware.event_kinds import Occurrence
 from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.texts import Notice
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.mavlink.event_messages import (
-    CURRENT_EVENT_SEQUENCE,
-    REQUEST_EVENT,
-    EventMessage,
-    ResponseEventError,
-)
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.microservice import Microservice
@@ -62,11 +56,11 @@ class EventService(Microservice):
         self._reported: tuple[Occurrence, ...] = ()
         self._station_connected = False
 
-    @streams(CURRENT_EVENT_SEQUENCE)
+    @streams(mavlink.MAVLink_current_event_sequence_message)
     def _current(self) -> Values:
         return (self._sequence, 0)
 
-    @receives(REQUEST_EVENT)
+    @receives(mavlink.MAVLink_request_event_message)
     def _on_request(
         self, message: mavlink.MAVLink_request_event_message, source: Source, time_us: int
     ) -> None:
@@ -76,12 +70,12 @@ class EventService(Microservice):
         oldest = self._kept[0].sequence if self._kept else self._sequence
         for step in range(min(count, KEPT)):
             sequence = (message.first_sequence + step) % _MODULO
-            event = kept.get(sequence)
-            if event is None:
-                event = ResponseEventError(
+            source.channel.send(
+                kept.get(sequence)
+                or mavlink.MAVLink_response_event_error_message(
                     source.system_id, source.component_id, sequence, oldest, _UNAVAILABLE
                 )
-            source.channel.send(event)
+            )
 
     def tick(self, time_us: int) -> None:
         """Report the checks when they have changed, and when a ground station connects."""
@@ -121,7 +115,7 @@ class EventService(Microservice):
         kind, values, level = occurrence
         level = kind.level if level is None else level
         self._sequence = (self._sequence + 1) % _MODULO
-        message = EventMessage(
+        message = mavlink.MAVLink_event_message(
             0,  # to all systems
             0,
             kind.event_id,

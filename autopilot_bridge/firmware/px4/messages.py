@@ -3,17 +3,16 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_rates
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.messages.common import NAN, CommonMessages
 from autopilot_bridge.services.parts import AutopilotParts
-from autopilot_bridge.telemetry.fields import fields
+from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 
@@ -24,7 +23,7 @@ _ACTUATOR_OUTPUTS: Final = 32  # fields of ACTUATOR_OUTPUT_STATUS
 
 _DATA: Final = load_data("px4", "messages.toml")
 ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
-    {**message_rates(_DATA["onboard_rates_hz"]), CURRENT_EVENT_SEQUENCE: 1 / 3}
+    {**message_rates(_DATA["onboard_rates_hz"]), _M.MAVLink_current_event_sequence_message.id: 1 / 3}
 )
 """PX4's ONBOARD mode (UDP 14540; docs/firmware/px4.md, section 6)."""
 
@@ -53,24 +52,24 @@ class Px4Messages(CommonMessages):
         super().__init__(parts)
         self._ping_sequence = -1
 
-    @streams(_M.MAVLINK_MSG_ID_PING)
+    @streams(_M.MAVLink_ping_message)
     def ping(self) -> Values:
         """PING (4), to all systems."""
         self._ping_sequence += 1
         return (self.view.time_us, self._ping_sequence, 0, 0)
 
-    @streams(_M.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS)
+    @streams(_M.MAVLink_actuator_output_status_message)
     def actuator_output_status(self) -> Values:
         """ACTUATOR_OUTPUT_STATUS (375): the pulses of SERVO_OUTPUT_RAW."""
         _, _, *pulses = self.servo_output_raw()
         return (self.view.time_us, len(pulses), (*pulses, *(0.0,) * (_ACTUATOR_OUTPUTS - len(pulses))))
 
-    @streams(_M.MAVLINK_MSG_ID_TIMESYNC)
+    @streams(_M.MAVLink_timesync_message)
     def timesync(self) -> Values:
         """TIMESYNC (111) request, nanoseconds since boot."""
         return (0, self.view.time_us * 1000, 0, 0)
 
-    @streams(_M.MAVLINK_MSG_ID_ALTITUDE)
+    @streams(_M.MAVLink_altitude_message)
     def altitude(self) -> Values | None:
         """ALTITUDE (141): monotonic is the barometer's, terrain is relative to the local origin."""
         v = self.view.refreshed()
@@ -116,8 +115,8 @@ class Px4Messages(CommonMessages):
         mask = sum(bit for bit, value in zip(_TARGET_BITS, target, strict=True) if math.isnan(value))
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
-    @streams(_M.MAVLINK_MSG_ID_ESTIMATOR_STATUS)
-    def estimator_status(self) -> Any:
+    @streams(_M.MAVLink_estimator_status_message)
+    def estimator_status(self) -> FieldValues:
         """ESTIMATOR_STATUS (230). PX4's ratios are squared: (innovation / gate)^2."""
         health = self.parts.navigation.health
         return _ESTIMATOR_STATUS(
@@ -133,8 +132,8 @@ class Px4Messages(CommonMessages):
             pos_vert_accuracy=health.position_vertical_accuracy_m,
         )
 
-    @streams(_M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS)
-    def orbit_execution_status(self) -> Any:
+    @streams(_M.MAVLink_orbit_execution_status_message)
+    def orbit_execution_status(self) -> FieldValues | None:
         """ORBIT_EXECUTION_STATUS (360), while circling."""
         orbit = self.parts.commander.tasks.orbit
         frame = self.context.frame
@@ -151,12 +150,12 @@ class Px4Messages(CommonMessages):
             z=alt_m,
         )
 
-    @streams(_M.MAVLINK_MSG_ID_CURRENT_MODE)
+    @streams(_M.MAVLink_current_mode_message)
     def current_mode(self) -> Values:
         """CURRENT_MODE (436)."""
         return self.parts.status.current_mode()
 
-    @streams(_M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION)
+    @streams(_M.MAVLink_open_drone_id_location_message)
     def open_drone_id_location(self) -> Values | None:
         """OPEN_DRONE_ID_LOCATION (12901), ASTM F3411."""
         v = self.view.refreshed()
@@ -187,7 +186,7 @@ class Px4Messages(CommonMessages):
             0,
         )
 
-    @streams(_M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM)
+    @streams(_M.MAVLink_open_drone_id_system_message)
     def open_drone_id_system(self) -> Values | None:
         """OPEN_DRONE_ID_SYSTEM (12904): the operator is assumed at home."""
         home = self.home_place()

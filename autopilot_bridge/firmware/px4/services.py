@@ -23,6 +23,7 @@ from autopilot_bridge.firmware.px4.texts import copter_notices, plane_notices
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices
 from autopilot_bridge.firmware.texts import Notice
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, GROUND_STATION_COMPONENT
 from autopilot_bridge.navigation.external import ExternalFrame
 from autopilot_bridge.parameter_files import QGC_SUFFIX
 from autopilot_bridge.parameters import ParameterStore
@@ -159,7 +160,11 @@ CARD: Final = CardLayout(
 
 def address_rule(system_id: int) -> AddressRule:
     """Own system id only; component 1, 190 (formerly the mission planner's) or 0."""
-    return AddressRule(system_id=system_id, component_ids=frozenset((1, 190)), any_system=False)
+    return AddressRule(
+        system_id=system_id,
+        component_ids=frozenset((AUTOPILOT_COMPONENT, GROUND_STATION_COMPONENT)),
+        any_system=False,
+    )
 
 
 def _copter_services(parts: AutopilotParts) -> tuple[Microservice, ...]:

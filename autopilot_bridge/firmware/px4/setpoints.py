@@ -24,7 +24,7 @@ class Px4Setpoints(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self.commander = parts.commander
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
+    @receives(mavlink.MAVLink_set_position_target_local_ned_message)
     def on_local(
         self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
     ) -> None:
@@ -47,7 +47,7 @@ class Px4Setpoints(Microservice):
             return
         self._take(message, position, velocity, acceleration, time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT)
+    @receives(mavlink.MAVLink_set_position_target_global_int_message)
     def on_global(
         self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
@@ -107,7 +107,7 @@ class Px4Setpoints(Microservice):
             )
         )
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET)
+    @receives(mavlink.MAVLink_set_attitude_target_message)
     def on_attitude(
         self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
     ) -> None:

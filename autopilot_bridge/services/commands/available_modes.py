@@ -35,7 +35,7 @@ class AvailableModes(Microservice):
     def __init__(self, modes: Sequence[ListedMode]) -> None:
         self._modes = modes
 
-    @on_request(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES)
+    @on_request(mavlink.MAVLink_available_modes_message)
     def _send(self, channel: Channel, index: float) -> None:
         """Send the mode with this index (from 1), or all modes for 0."""
         for number, mode in enumerate(self._modes, start=1):

@@ -77,7 +77,7 @@ class MessageIntervalService(Microservice):
         self._pending: dict[tuple[Channel, int, float], None] = {}  # two equal requests get one answer
         self._time_us = 0
 
-    @receives(mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM)
+    @receives(mavlink.MAVLink_request_data_stream_message)
     def _on_data_stream(
         self, message: mavlink.MAVLink_request_data_stream_message, source: Source, time_us: int
     ) -> None:

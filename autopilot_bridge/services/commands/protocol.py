@@ -32,7 +32,7 @@ class CommandService(Microservice):
         handler = self._table.get(command.id)
         return Result.UNSUPPORTED if handler is None else handler(command, sender)
 
-    @receives(mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT)
+    @receives(mavlink.MAVLink_command_long_message, mavlink.MAVLink_command_int_message)
     def _on_command(
         self,
         message: mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message,

@@ -88,12 +88,12 @@ class PayloadCommands(Microservice):
             GIMBAL_COMPONENT,
         )
 
-    @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-    def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    @receives(mavlink.MAVLink_heartbeat_message)
+    def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
         if self._is_own(source):
             self._received_us[source.component_id] = time_us
 
-    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
+    @receives(mavlink.MAVLink_gimbal_manager_status_message)
     def _on_manager_status(
         self, message: mavlink.MAVLink_gimbal_manager_status_message, source: Source, time_us: int
     ) -> None:

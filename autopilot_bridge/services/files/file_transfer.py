@@ -107,7 +107,7 @@ class FileTransferService(Microservice):
             Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
-    @receives(mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL)
+    @receives(mavlink.MAVLink_file_transfer_protocol_message)
     def on_transfer(
         self, message: mavlink.MAVLink_file_transfer_protocol_message, source: Source, time_us: int
     ) -> None:

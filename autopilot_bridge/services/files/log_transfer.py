@@ -10,7 +10,7 @@ Source: MAVLink log download (mavlink.io/en/messages/common.html, LOG_ENTRY, LOG
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
@@ -25,13 +25,11 @@ REPLIES_PER_TICK: Final = 40
 _MAX_RANGES: Final = 64
 _MAX_CLIENTS: Final = 16
 _IDLE_US: Final = 60_000_000
-_REQUESTS: Final = frozenset(
-    (
-        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST,
-        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
-        mavlink.MAVLINK_MSG_ID_LOG_ERASE,
-        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_END,
-    )
+_Request = (
+    mavlink.MAVLink_log_request_list_message
+    | mavlink.MAVLink_log_request_data_message
+    | mavlink.MAVLink_log_erase_message
+    | mavlink.MAVLink_log_request_end_message
 )
 
 
@@ -90,8 +88,8 @@ class LogTransferService(Microservice):
         self._logs: list[LogFile] = []  # as listed, so that the numbers stay valid
         self._downloads: dict[tuple[str, int, int], _Download] = {}
 
-    @receives(*_REQUESTS)
-    def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    @receives(*get_args(_Request))
+    def _on_request(self, message: _Request, source: Source, time_us: int) -> None:
         if self._waits:
             self._refuse(source)
             return

@@ -118,7 +118,7 @@ class ExternalOdometryService(Microservice):
         elif self._simulation is None or self._simulation.apply_failure(_VIO, sample.values):
             self._navigation.take_external(sample)
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN)
+    @receives(mavlink.MAVLink_set_gps_global_origin_message)
     def _set_origin(
         self, message: mavlink.MAVLink_set_gps_global_origin_message, source: Source, time_us: int
     ) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.services.channel import Receiver, Source, receiver
+from autopilot_bridge.services.channel import Receiver, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
@@ -44,19 +44,18 @@ class FollowService(Microservice):
     @property
     def receivers(self) -> Mapping[int, Receiver]:
         """FOLLOW_TARGET, and GLOBAL_POSITION_INT where the firmware follows it."""
+        taken = dict(super().receivers)
         if not self._by_position:
-            return super().receivers
-        return {
-            **super().receivers,
-            **receiver(mavlink.MAVLink_global_position_int_message, self._on_position),
-        }
+            del taken[mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT]
+        return taken
 
-    @receives(mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET)
+    @receives(mavlink.MAVLink_follow_target_message)
     def _on_follow_target(
         self, message: mavlink.MAVLink_follow_target_message, source: Source, time_us: int
     ) -> None:
         self._take(message, source, time_us, *_of_follow(message))
 
+    @receives(mavlink.MAVLink_global_position_int_message)
     def _on_position(
         self, message: mavlink.MAVLink_global_position_int_message, source: Source, time_us: int
     ) -> None:

@@ -59,7 +59,7 @@ class LandingTargetService(Microservice):
             return {}
         return super().receivers
 
-    @receives(mavlink.MAVLINK_MSG_ID_LANDING_TARGET)
+    @receives(mavlink.MAVLink_landing_target_message)
     def _on_target(
         self, message: mavlink.MAVLink_landing_target_message, source: Source, time_us: int
     ) -> None:
@@ -69,7 +69,7 @@ class LandingTargetService(Microservice):
         if place is None or not track.take(place[0], place[1], sigma_m=place[2]):
             self.refused += 1
 
-    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
+    @receives(mavlink.MAVLink_gimbal_device_attitude_status_message)
     def _on_gimbal(
         self, message: mavlink.MAVLink_gimbal_device_attitude_status_message, source: Source, time_us: int
     ) -> None:

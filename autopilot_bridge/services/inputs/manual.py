@@ -93,7 +93,7 @@ class ManualService(Microservice):
             self._switch.tick(time_us)
         self._gesture.tick(time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+    @receives(mavlink.MAVLink_heartbeat_message)
     def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
         gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
         if gcs:
@@ -103,7 +103,7 @@ class ManualService(Microservice):
         only = self._rules.gcs_only
         return not only or source.system_id == round(self._parameters.get(only))
 
-    @receives(mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL)
+    @receives(mavlink.MAVLink_manual_control_message)
     def _on_manual(
         self, message: mavlink.MAVLink_manual_control_message, source: Source, time_us: int
     ) -> None:
@@ -132,7 +132,7 @@ class ManualService(Microservice):
                 time_us=time_us,
             )
 
-    @receives(mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
+    @receives(mavlink.MAVLink_rc_channels_override_message)
     def _on_override(
         self, message: mavlink.MAVLink_rc_channels_override_message, source: Source, time_us: int
     ) -> None:
@@ -178,7 +178,7 @@ class ManualService(Microservice):
             self._steering = False
             self._commander.pilot.release()
 
-    @streams(mavlink.MAVLINK_MSG_ID_RC_CHANNELS)
+    @streams(mavlink.MAVLink_rc_channels_message)
     def _rc_channels(self) -> Values | None:
         """RC_CHANNELS (65); None without a radio."""
         pulses_us = self._radio.pulses_us

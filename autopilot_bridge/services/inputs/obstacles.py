@@ -45,7 +45,7 @@ class ObstacleService(Microservice):
         self._enabled = enabled
         self.refused = 0
 
-    @receives(mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
+    @receives(mavlink.MAVLink_obstacle_distance_message, mavlink.MAVLink_distance_sensor_message)
     def _on_obstacles(
         self,
         message: mavlink.MAVLink_obstacle_distance_message | mavlink.MAVLink_distance_sensor_message,

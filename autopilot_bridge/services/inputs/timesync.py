@@ -40,13 +40,13 @@ class TimeSyncService(Microservice):
     def __init__(self, *, answers_ping: bool) -> None:
         self._answers_ping = answers_ping
 
-    @receives(mavlink.MAVLINK_MSG_ID_TIMESYNC)
+    @receives(mavlink.MAVLink_timesync_message)
     def _on_timesync(self, message: mavlink.MAVLink_timesync_message, source: Source, time_us: int) -> None:
         if message.tc1 == 0:
             now_ns = min(time_us * _NS_PER_US, _INT64_MAX)
             source.channel.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
 
-    @receives(mavlink.MAVLINK_MSG_ID_PING)
+    @receives(mavlink.MAVLink_ping_message)
     def _on_ping(self, message: mavlink.MAVLink_ping_message, source: Source, time_us: int) -> None:
         if self._answers_ping and message.target_system == 0 and message.target_component == 0:
             source.channel.send(

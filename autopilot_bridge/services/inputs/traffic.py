@@ -17,7 +17,6 @@ from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_ADSB_VEHICLE: Final = mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE
 _MOST: Final = 50  # maximum number of aircraft stored
 _LIFETIME_US: Final = 30_000_000
 _LEAST_INTERVAL_US: Final = 90_000  # between two reports of one aircraft
@@ -68,11 +67,11 @@ class TrafficService(Microservice):
         """ICAO addresses of the aircraft received recently."""
         return tuple(self._aircraft)
 
-    @streams(_ADSB_VEHICLE)
+    @streams(mavlink.MAVLink_adsb_vehicle_message)
     def _no_report(self) -> None:
         """ADSB_VEHICLE can be requested, and is not sent."""
 
-    @receives(_ADSB_VEHICLE)
+    @receives(mavlink.MAVLink_adsb_vehicle_message)
     def _on_report(self, message: mavlink.MAVLink_adsb_vehicle_message, source: Source, time_us: int) -> None:
         """A report forwarded by another autopilot is not forwarded again."""
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0

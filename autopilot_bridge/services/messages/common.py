@@ -1,14 +1,14 @@
 """Messages that are the same in both firmwares (MAVLink common message set)."""
 
 import math
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
-from autopilot_bridge.telemetry.fields import fields
+from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN
 from flightsim import interface
@@ -36,17 +36,17 @@ class CommonMessages(Microservice):
         self.view = parts.view
         self.context = parts.commander.context
 
-    @streams(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+    @streams(mavlink.MAVLink_heartbeat_message)
     def heartbeat(self) -> Values:
         """HEARTBEAT (0)."""
         return self.parts.status.heartbeat()
 
-    @streams(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    @streams(mavlink.MAVLink_autopilot_version_message)
     def autopilot_version(self) -> Values:
         """AUTOPILOT_VERSION (148)."""
         return self.parts.status.autopilot_version()
 
-    @streams(mavlink.MAVLINK_MSG_ID_SYS_STATUS)
+    @streams(mavlink.MAVLink_sys_status_message)
     def sys_status(self) -> Values:
         """SYS_STATUS (1)."""
         present, enabled, health = self.parts.status.sys_status()
@@ -65,12 +65,12 @@ class CommonMessages(Microservice):
             battery_remaining=remaining,
         )
 
-    @streams(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
+    @streams(mavlink.MAVLink_system_time_message)
     def system_time(self) -> Values:
         """SYSTEM_TIME (2)."""
         return (self.parts.memory.unix_epoch_us + self.view.time_us, self.view.time_ms)
 
-    @streams(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT)
+    @streams(mavlink.MAVLink_gps_raw_int_message)
     def gps_raw_int(self) -> Values | None:
         """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send.
 
@@ -119,7 +119,7 @@ class CommonMessages(Microservice):
             vel_acc=round(v[interface.GPS_SPEED_ACCURACY_M_S] * 1000.0),
         )
 
-    @streams(mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE)
+    @streams(mavlink.MAVLink_scaled_pressure_message)
     def scaled_pressure(self) -> Values | None:
         """SCALED_PRESSURE (29), hPa."""
         pressure_pa, temperature_c = self.view.pressure()
@@ -137,7 +137,7 @@ class CommonMessages(Microservice):
         """Pressure of the pitot tube; 0 without one."""
         return 0.0
 
-    @streams(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW)
+    @streams(mavlink.MAVLink_servo_output_raw_message)
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""
         motors = self.parts.controller.actuators.tolist()[:4]
@@ -147,7 +147,7 @@ class CommonMessages(Microservice):
             pulses = [self.servo_disarmed_us] * 4
         return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
 
-    @streams(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+    @streams(mavlink.MAVLink_gps_global_origin_message)
     def gps_global_origin(self) -> Values | None:
         """GPS_GLOBAL_ORIGIN (49): the filter's local origin."""
         frame = self.context.frame
@@ -161,7 +161,7 @@ class CommonMessages(Microservice):
             self.view.time_us,
         )
 
-    @streams(mavlink.MAVLINK_MSG_ID_VFR_HUD)
+    @streams(mavlink.MAVLink_vfr_hud_message)
     def vfr_hud(self) -> Values:
         """VFR_HUD (74)."""
         v = self.view.refreshed()
@@ -182,7 +182,7 @@ class CommonMessages(Microservice):
         """Collective being commanded, 0..1."""
         return self.parts.controller.thrust if self.context.armed else 0.0
 
-    @streams(mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET)
+    @streams(mavlink.MAVLink_attitude_target_message)
     def attitude_target(self) -> Values | None:
         """ATTITUDE_TARGET (83): the setpoint of the attitude loop."""
         context = self.context
@@ -206,7 +206,7 @@ class CommonMessages(Microservice):
         values = context.setpoint.tolist()
         return [*values[sp.MOTION], values[sp.YAW_RAD], values[sp.YAW_RATE_RAD_S]]
 
-    @streams(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED)
+    @streams(mavlink.MAVLink_position_target_local_ned_message)
     def position_target_local_ned(self) -> Values | None:
         """POSITION_TARGET_LOCAL_NED (85)."""
         target = self.trajectory_setpoint()
@@ -214,7 +214,7 @@ class CommonMessages(Microservice):
             return None
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, 0, *target)
 
-    @streams(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT)
+    @streams(mavlink.MAVLink_position_target_global_int_message)
     def position_target_global_int(self) -> Values | None:
         """POSITION_TARGET_GLOBAL_INT (87)."""
         target = self.trajectory_setpoint()
@@ -246,14 +246,14 @@ class CommonMessages(Microservice):
         """IMU temperature, centidegrees."""
         return round(self.view.imu()[interface.IMU_TEMPERATURE_C] * 100.0)
 
-    @streams(mavlink.MAVLINK_MSG_ID_SCALED_IMU)
+    @streams(mavlink.MAVLink_scaled_imu_message)
     def scaled_imu(self) -> Values | None:
         """SCALED_IMU (26)."""
         values = self.raw_scaled_imu()
         return None if values is None else (self.view.time_ms, *values, self.temperature_cdeg())
 
-    @streams(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS)
-    def battery_status(self) -> Any:
+    @streams(mavlink.MAVLink_battery_status_message)
+    def battery_status(self) -> FieldValues | None:
         """BATTERY_STATUS (147)."""
         battery = self.view.battery
         if battery is None:
@@ -271,12 +271,12 @@ class CommonMessages(Microservice):
             charge_state=int(self.parts.commander.battery_level),
         )
 
-    @streams(mavlink.MAVLINK_MSG_ID_VIBRATION)
+    @streams(mavlink.MAVLink_vibration_message)
     def vibration(self) -> Values:
         """VIBRATION (241)."""
         return (self.view.time_us, *self.view.vibration.rms_m_s2, 0, 0, 0)
 
-    @streams(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+    @streams(mavlink.MAVLink_home_position_message)
     def home_position(self) -> Values | None:
         """HOME_POSITION (242)."""
         place = self.home_place()
@@ -306,12 +306,12 @@ class CommonMessages(Microservice):
         half_yaw = 0.5 * self.context.home_yaw_rad
         return (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
 
-    @streams(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
+    @streams(mavlink.MAVLink_extended_sys_state_message)
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245)."""
         return (mavlink.MAV_VTOL_STATE_UNDEFINED, int(self.context.landed_state))
 
-    @streams(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
+    @streams(mavlink.MAVLink_distance_sensor_message)
     def distance_sensor(self) -> Values | None:
         """DISTANCE_SENSOR (132), facing down."""
         reading = self.parts.readings.rangefinder

@@ -136,11 +136,13 @@ class ParameterService(Microservice):
             self._continue_list(listing)
         self._listings = [listing for listing in self._listings if listing.next_index < self._store.count]
 
-    @receives(mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST)
-    def _on_list_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    @receives(mavlink.MAVLink_param_request_list_message)
+    def _on_list_request(
+        self, message: mavlink.MAVLink_param_request_list_message, source: Source, time_us: int
+    ) -> None:
         self.list_on(source.channel)
 
-    @receives(mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ)
+    @receives(mavlink.MAVLink_param_request_read_message)
     def _on_read(
         self, message: mavlink.MAVLink_param_request_read_message, source: Source, time_us: int
     ) -> None:
@@ -179,7 +181,7 @@ class ParameterService(Microservice):
                 listing.channel.send(self._value_message(definition, index=listing.next_index))
             listing.next_index += 1
 
-    @receives(mavlink.MAVLINK_MSG_ID_PARAM_SET)
+    @receives(mavlink.MAVLink_param_set_message)
     def _on_set(self, message: mavlink.MAVLink_param_set_message, source: Source, time_us: int) -> None:
         channel = source.channel
         name = _name_of(message)

@@ -5,7 +5,6 @@ the message nor the command.
 """
 
 import math
-from typing import Final
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event, FenceBreached
@@ -21,7 +20,6 @@ from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.rules import PLACED_COMMANDS
 
-_STATUS: Final = mavlink.MAVLINK_MSG_ID_FENCE_STATUS
 _OFF, _ON, _FLOOR_OFF = 0, 1, 2  # of DO_FENCE_ENABLE
 
 
@@ -46,7 +44,7 @@ class ArdupilotGeofence(Microservice):
             if values is not None:
                 send_to_all(self._broadcast, mavlink.MAVLink_fence_status_message(*values))
 
-    @streams(_STATUS)
+    @streams(mavlink.MAVLink_fence_status_message)
     def _status(self) -> tuple[int, int, int, int, int] | None:
         """FENCE_STATUS (162), while the fence is on."""
         watch = self._commander.fence

@@ -8,8 +8,10 @@ not part of CRC_EXTRA, so every MAVLink 2 receiver understands both.
 
 import struct
 import zlib
-from typing import Any, ClassVar, Final
+from collections.abc import Callable
+from typing import ClassVar, Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_message
@@ -18,21 +20,21 @@ from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
 _CRC_HEAD: Final = struct.Struct("<BHB4f")
 
 
-def _with_extensions(base: Any, names: tuple[str, ...]) -> Any:
+def _with_extensions(base: type[MAVLinkMessage], names: tuple[str, ...]) -> Callable[..., MAVLinkMessage]:
     """`base` with uint32 extension fields appended, or `base` itself when it has them."""
     if all(name in base.fieldnames for name in names):
         return base
     packer = struct.Struct(base.unpacker.format + "I" * len(names))
     count = len(base.ordered_fieldnames)
 
-    class Extended(base):  # type: ignore[misc]
-        fieldnames: ClassVar[Any] = [*base.fieldnames, *names]
-        ordered_fieldnames: ClassVar[Any] = [*base.ordered_fieldnames, *names]
-        fieldtypes: ClassVar[Any] = [*base.fieldtypes, *["uint32_t"] * len(names)]
-        native_format: ClassVar[Any] = bytearray(packer.format.encode())
-        orders: ClassVar[Any] = [*base.orders, *range(count, count + len(names))]
-        lengths: ClassVar[Any] = [*base.lengths, *[1] * len(names)]
-        array_lengths: ClassVar[Any] = [*base.array_lengths, *[0] * len(names)]
+    class Extended(base):  # type: ignore[misc,valid-type]
+        fieldnames: ClassVar[list[str]] = [*base.fieldnames, *names]
+        ordered_fieldnames: ClassVar[list[str]] = [*base.ordered_fieldnames, *names]
+        fieldtypes: ClassVar[list[str]] = [*base.fieldtypes, *["uint32_t"] * len(names)]
+        native_format = bytearray(packer.format.encode())
+        orders: ClassVar[list[int]] = [*base.orders, *range(count, count + len(names))]
+        lengths: ClassVar[list[int]] = [*base.lengths, *[1] * len(names)]
+        array_lengths: ClassVar[list[int]] = [*base.array_lengths, *[0] * len(names)]
         unpacker = packer
 
         def __init__(self, **fields: int) -> None:
@@ -44,10 +46,9 @@ def _with_extensions(base: Any, names: tuple[str, ...]) -> Any:
         def wire_payload(self) -> bytes:
             return packer.pack(*[getattr(self, name) for name in self.ordered_fieldnames])
 
-        def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        def pack(self, mav: mavlink.MAVLink, force_mavlink1: bool = False) -> bytes:
             payload = self.wire_payload()
-            packed: bytes = self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
-            return packed
+            return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
     Extended.__name__ = base.__name__
     return Extended

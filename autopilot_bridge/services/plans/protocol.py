@@ -120,7 +120,7 @@ class MissionService(Microservice):
     def stores(self) -> Mapping[MissionType, MissionStore]:
         return self._stores
 
-    @streams(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
+    @streams(mavlink.MAVLink_mission_current_message)
     def _current(self) -> bytes | None:
         return extended_payload(self.current_message())
 
@@ -183,12 +183,12 @@ class MissionService(Microservice):
         self._downloads.tick(time_us)
         self._report.tick(time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_COUNT)
+    @receives(mavlink.MAVLink_mission_count_message)
     def _on_count(self, message: mavlink.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
         self._report.forget_reached()
         self._uploads.on_count(message, source, time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_ITEM, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT)
+    @receives(mavlink.MAVLink_mission_item_message, mavlink.MAVLink_mission_item_int_message)
     def _on_item(
         self,
         message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
@@ -198,24 +198,24 @@ class MissionService(Microservice):
         if not self._take_guided_item(message, source):
             self._uploads.on_item(message, source, time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST)
+    @receives(mavlink.MAVLink_mission_write_partial_list_message)
     def _on_partial(
         self, message: mavlink.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
     ) -> None:
         self._uploads.on_partial(message, source, time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_ACK)
+    @receives(mavlink.MAVLink_mission_ack_message)
     def _on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
         self._downloads.on_ack(message, source)
         self._uploads.on_ack(message, source, time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST)
+    @receives(mavlink.MAVLink_mission_request_list_message)
     def _on_list(
         self, message: mavlink.MAVLink_mission_request_list_message, source: Source, time_us: int
     ) -> None:
         self._downloads.on_list(message, source, time_us, uploader=self._uploads.partner)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_REQUEST, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT)
+    @receives(mavlink.MAVLink_mission_request_message, mavlink.MAVLink_mission_request_int_message)
     def _on_request(
         self,
         message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
@@ -224,7 +224,7 @@ class MissionService(Microservice):
     ) -> None:
         self._downloads.on_request(message, source, time_us, uploader=self._uploads.partner)
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL)
+    @receives(mavlink.MAVLink_mission_clear_all_message)
     def _on_clear(
         self, message: mavlink.MAVLink_mission_clear_all_message, source: Source, time_us: int
     ) -> None:
@@ -253,7 +253,7 @@ class MissionService(Microservice):
             self._replace(kind, (), 0)
         source.channel.send(ack_message(source, result, message.mission_type))
 
-    @receives(mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT)
+    @receives(mavlink.MAVLink_mission_set_current_message)
     def _on_set_current(
         self, message: mavlink.MAVLink_mission_set_current_message, source: Source, time_us: int
     ) -> None:

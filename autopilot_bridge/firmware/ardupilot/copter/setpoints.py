@@ -34,7 +34,7 @@ class ArduCopterSetpoints(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self.commander = parts.commander
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
+    @receives(mavlink.MAVLink_set_position_target_local_ned_message)
     def on_local(
         self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
     ) -> None:
@@ -63,7 +63,7 @@ class ArduCopterSetpoints(Microservice):
             position = (position[0] + north_m, position[1] + east_m, position[2] + down_m)
         self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT)
+    @receives(mavlink.MAVLink_set_position_target_global_int_message)
     def on_global(
         self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
@@ -140,7 +140,7 @@ class ArduCopterSetpoints(Microservice):
         else:
             guided.set_hold(context)
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET)
+    @receives(mavlink.MAVLink_set_attitude_target_message)
     def on_attitude(
         self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
     ) -> None:

@@ -63,7 +63,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             ]
         return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
 
-    @streams(_M.MAVLINK_MSG_ID_AIRSPEED)
+    @streams(_M.MAVLink_airspeed_message)
     def airspeed(self) -> Values | None:
         """AIRSPEED (295); the raw pressure is in Pa, as the firmware sends it."""
         pressure_pa = self._aircraft.pitot_pressure_pa
@@ -80,7 +80,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             _SENSOR_UNHEALTHY if rejected else _SENSOR_USED,
         )
 
-    @streams(_M.MAVLINK_MSG_ID_AOA_SSA)
+    @streams(_M.MAVLink_aoa_ssa_message)
     def flow_angles(self) -> Values:
         """AOA_SSA (11020): angle of attack and sideslip by velocity and wind, degrees; 0 on the ground."""
         forward, right, down = self._aircraft.air_velocity_frd_m_s

@@ -37,7 +37,7 @@ class ArduPlaneSetpoints(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self.commander = parts.commander
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
+    @receives(mavlink.MAVLink_set_position_target_local_ned_message)
     def on_local(
         self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
     ) -> None:
@@ -58,7 +58,7 @@ class ArduPlaneSetpoints(Microservice):
         height_m = self._home_down_m() - down_m
         self.commander.emit(AltitudeChanged(time_us=self.commander.time_us, height_m=height_m))
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT)
+    @receives(mavlink.MAVLink_set_position_target_global_int_message)
     def on_global(
         self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
@@ -84,7 +84,7 @@ class ArduPlaneSetpoints(Microservice):
         if guided is not None:
             self._fly_at(guided, reference_down_m - message.alt)
 
-    @receives(mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET)
+    @receives(mavlink.MAVLink_set_attitude_target_message)
     def on_attitude(
         self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
     ) -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.px4 import messages as px4
@@ -13,6 +13,7 @@ from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.services.messages.common import NAN
 from autopilot_bridge.services.parts import AutopilotParts
+from autopilot_bridge.telemetry.fields import FieldValues
 from autopilot_bridge.telemetry.streams import Values
 
 _M = mavlink
@@ -61,7 +62,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         unused = (self.servo_unused_us,) * 12
         return (self.view.time_us & 0xFFFFFFFF, 0, aileron, elevator, rudder, motor, *unused)
 
-    @streams(_M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT)
+    @streams(_M.MAVLink_nav_controller_output_message)
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62): nav_roll and nav_pitch stay 0, bearings are signed, as in PX4.
 
@@ -95,7 +96,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         error_m_s = self._aircraft.controller.airspeed_error_m_s if self._aircraft.powered else 0.0
         return -error_m_s if math.isfinite(error_m_s) else 0.0
 
-    @streams(_M.MAVLINK_MSG_ID_WIND_COV)
+    @streams(_M.MAVLink_wind_cov_message)
     def wind_cov(self) -> Values | None:
         """WIND_COV (231), from the first flight on; horizontal."""
         if self.context.landed_state is LandedState.IN_AIR:
@@ -140,7 +141,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
             place = (north_m, east_m, frame.origin.alt_m)
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, _PLACE_MASK, *place, *_NOTHING)
 
-    def estimator_status(self) -> Any:
+    def estimator_status(self) -> FieldValues:
         """ESTIMATOR_STATUS (230): with the airspeed's ratio while it is fused."""
         values = super().estimator_status()
         health = self.parts.navigation.health
@@ -148,7 +149,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
             return values
         return values._replace(tas_ratio=health.airspeed_test_ratio**2)
 
-    def orbit_execution_status(self) -> Any:
+    def orbit_execution_status(self) -> FieldValues | None:
         """ORBIT_EXECUTION_STATUS (360) in frame 0, as recorded."""
         values = super().orbit_execution_status()
         return None if values is None else values._replace(frame=mavlink.MAV_FRAME_GLOBAL)
