@@ -43,7 +43,7 @@ from flightsim.foundation.magnetics import magnetic_field_ned_gauss
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.foundation.vectors import between
 from flightsim.home import Home
-from flightsim.payload import GroundTargets, Payload, magnetic_field_of
+from flightsim.payload import Carrier, GroundTargets, Payload, magnetic_field_of
 from flightsim.payload.magnetic_spec import MagneticSpec
 from flightsim.world_spec import WorldSpec
 from missions.cli.fly import flight_of, fly
@@ -202,12 +202,14 @@ class CarriedPayload:
         streams = RandomStreams(world.seed)
         payload = Payload(
             world.vehicles[0].payload,
-            truth=self._truth,
-            home=home,
-            physics_rate_hz=RATE_HZ,
-            seeds=lambda name: streams.child("vehicle", 0, "sensor", name),
-            targets=GroundTargets(world.targets, seeds=lambda index: streams.child("target", index)),
-            magnetic_field=field,
+            Carrier(
+                truth=self._truth,
+                home=home,
+                physics_rate_hz=RATE_HZ,
+                seeds=lambda name: streams.child("vehicle", 0, "sensor", name),
+                targets=GroundTargets(world.targets, seeds=lambda index: streams.child("target", index)),
+                magnetic_field=field,
+            ),
         )
         self.station = PayloadStation(payload, system_id=world.vehicles[0].system_id, send=send)
         self._before: State | None = None

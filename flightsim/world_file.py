@@ -12,10 +12,12 @@ from flightsim.environment import Environment
 from flightsim.foundation import documents
 from flightsim.foundation.conversion import Conversion, NotMade, Refused
 from flightsim.foundation.file_content import FileError
+from flightsim.foundation.plug_ins import PlugInError, plug_in_class, plug_ins
 from flightsim.home import Home
 from flightsim.payload import (
     Circle,
     ConstantVelocity,
+    DeviceParameters,
     DipoleSignature,
     GaussianSignature,
     InducedDipole,
@@ -31,6 +33,7 @@ from flightsim.payload import (
     TerrainSpec,
 )
 from flightsim.payload.detection import DetectionModel
+from flightsim.payload.payload import DEVICES_GROUP
 from flightsim.wind_profile import WindProfile
 
 T = TypeVar("T")
@@ -88,13 +91,23 @@ def made_from(kind: type[T], table: Any, path: Path) -> T:
     Raises:
         WorldFileError: a value is not accepted.
     """
-    conversion = Conversion(folder=path.parent, makers=_MAKERS, kinds=_KINDS, short={WindProfile: "law"})
     try:
-        found: T = conversion.called(kind, table)
+        devices = {
+            name: plug_in_class(DEVICES_GROUP, name, DeviceParameters) for name in plug_ins(DEVICES_GROUP)
+        }
+        conversion = Conversion(
+            folder=path.parent,
+            makers=_MAKERS,
+            kinds={**_KINDS, DeviceParameters: devices},
+            short={WindProfile: "law"},
+        )
+        made: T = conversion.called(kind, table)
+    except PlugInError as error:
+        raise WorldFileError(f"{path}: {error}") from error
     except NotMade as error:
         raise WorldFileError(f"{path}: {error.where}{error}".replace(": : ", ": ")) from error
     except Refused as error:
         raise WorldFileError(
             f"{path}: {error.where} is {error.value!r}; accepted: {error.accepted}"
         ) from error
-    return found
+    return made

@@ -9,6 +9,7 @@ autopilot has sent.
 from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.camera_scan import CameraScan, camera_scan_message
@@ -22,52 +23,26 @@ from autopilot_bridge.payload.camera_messages import (
     landing_target,
     tracking_geo_status,
 )
-from flightsim.payload import Camera, CameraFrame, Gimbal
+from autopilot_bridge.payload.component import Sender
+from autopilot_bridge.payload.reported_vehicle import REPORTS
+from flightsim.payload import Camera, CameraFrame
 
 _LENS_INTERVAL_US: Final = 100_000
 
 
 class CameraComponent(CameraActions):
-    """Takes photos and videos, zooms, focuses, tracks detections, and reports the detected targets.
-
-    Args:
-        camera: the device.
-        system_id: of the vehicle.
-        send: sends packed frames.
-        gimbal: the gimbal that carries it; None: fixed to the body.
-        gimbal_device_id: id of that gimbal; 0: none.
+    """Takes photos and videos, zooms, focuses, tracks detections, and reports the detected targets; arguments
+    as `Component`.
 
     Attributes:
         definition: the camera definition file and the camera's settings.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        *,
-        system_id: int,
-        send: Callable[[bytes], None],
-        gimbal: Gimbal | None = None,
-        gimbal_device_id: int = 0,
-    ) -> None:
-        super().__init__(
-            camera, system_id=system_id, send=send, gimbal=gimbal, gimbal_device_id=gimbal_device_id
-        )
-        self._builders.update(
-            {
-                mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION: lambda _: information(self),
-                mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS: self._settings,
-                mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: lambda t: capture_status(self, t),
-                mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION: lambda _: self.storage.message(self.time_ms),
-                mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS: lambda t: fov_status(self, t),
-                mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_IMAGE_STATUS: lambda _: self.tracker.message(),
-                mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS: lambda t: tracking_geo_status(self, t),
-            }
-        )
+    def __init__(self, device: Camera, *, system_id: int, send: Callable[[bytes], None]) -> None:
+        super().__init__(device, system_id=system_id, send=send)
         self.definition = CameraDefinition(self)
-        self._commands = CameraCommands(self, self.definition)
-        self._handlers.update(self._commands.handlers)
-        self._answers.update(self._commands.answers)
+        self._add_part(self.definition)
+        self._add_part(CameraCommands(self, self.definition))
 
     def step(self, time_us: int) -> None:
         """Send streams, take the photos of a series, move the lens, and send the status while something
@@ -84,26 +59,48 @@ class CameraComponent(CameraActions):
         if self.recording_since_us is not None:
             self._record(time_us)
 
-    def update(self, frame: CameraFrame) -> None:
+    def update(self, reading: CameraFrame) -> None:
         """Send the detections of a frame that was delivered on this step."""
-        self.tracker.update(frame)
-        for detection in frame.detections:
+        self.tracker.update(reading)
+        for detection in reading.detections:
             self.send(landing_target(detection))
-        if self.device.parameters.reader is not None and frame.searched:
-            self.send(self._scan(frame))
+        if self.device.parameters.reader is not None and reading.searched:
+            self.send(self._scan(reading))
 
     # inside
 
-    def _on_message(self, message: MAVLinkMessage, sender: tuple[int, int]) -> None:
-        new = self.vehicle.handle(message, sender, self._time_us)
+    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION)
+    def _information(self, time_us: int) -> MAVLinkMessage:
+        return information(self)
+
+    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)
+    def _capture_status(self, time_us: int) -> MAVLinkMessage:
+        return capture_status(self, time_us)
+
+    @streams(mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION)
+    def _storage_information(self, time_us: int) -> MAVLinkMessage:
+        return self.storage.message(self.time_ms)
+
+    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS)
+    def _fov_status(self, time_us: int) -> MAVLinkMessage:
+        return fov_status(self, time_us)
+
+    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_IMAGE_STATUS)
+    def _tracking_image_status(self, time_us: int) -> MAVLinkMessage:
+        return self.tracker.message()
+
+    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS)
+    def _tracking_geo_status(self, time_us: int) -> MAVLinkMessage:
+        return tracking_geo_status(self, time_us)
+
+    @receives(*REPORTS)
+    def _follow_vehicle(self, message: MAVLinkMessage, sender: Sender, time_us: int) -> None:
         if (
-            new
-            and message.get_msgId() == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
-            and self.trigger.travelled(self.vehicle.velocity_ned_m_s, self._time_us)
+            self.vehicle.handle(message, sender, time_us)
+            and isinstance(message, mavlink.MAVLink_global_position_int_message)
+            and self.trigger.travelled(self.vehicle.velocity_ned_m_s, time_us)
         ):
             self.take_photo()
-        if not new:
-            self.definition.handle(message, sender, self._time_us)
 
     def _scan(self, frame: CameraFrame) -> MAVLinkMessage:
         parameters = self.device.parameters
@@ -118,7 +115,7 @@ class CameraComponent(CameraActions):
                 focal_px=model.focal_px * self.device.zoom,
                 distortion=parameters.imager.distortion.coefficients,
                 mount_rad=None
-                if self._gimbal is not None
+                if self.device.gimbal is not None
                 else (parameters.mount_roll_rad, parameters.mount_pitch_rad, parameters.mount_yaw_rad),
                 position_frd_m=parameters.position_frd_m,
             )

@@ -1,5 +1,6 @@
 """What commands make the camera component do: photos, videos, and the reports of them."""
 
+from autopilot_bridge.dispatch import streams
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_messages import capture_status, image_captured, photo_notes
@@ -59,8 +60,11 @@ class CameraActions(CameraState):
         """Send CAMERA_CAPTURE_STATUS."""
         self.send(capture_status(self, self._time_us))
 
+    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS)
     def _settings(self, time_us: int) -> MAVLinkMessage:
-        lens = self.lens
         return mavlink.MAVLink_camera_settings_message(
-            self.time_ms, self.mode, lens.zoom_percent, lens.focus_percent
+            time_boot_ms=self.time_ms,
+            mode_id=self.mode,
+            zoomLevel=self.lens.zoom_percent,
+            focusLevel=self.lens.focus_percent,
         )

@@ -4,14 +4,13 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from autopilot_bridge.dispatch import command, on_request
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_definition import CameraDefinition
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, STORAGE_ID
 from autopilot_bridge.payload.camera_video import STREAM_ID, VideoStream
-from autopilot_bridge.payload.component import Answer, CommandHandler, CommandMessage, parameters, whole
-
-Sender = tuple[int, int]
+from autopilot_bridge.payload.component import CommandMessage, Sender, parameters, whole
 
 _ACCEPTED: Final = int(mavlink.MAV_RESULT_ACCEPTED)
 _DENIED: Final = int(mavlink.MAV_RESULT_DENIED)
@@ -30,51 +29,16 @@ _OLD_REQUESTS: Final[Mapping[int, int]] = {
 
 
 class CameraCommands:
-    """Executes the commands for a camera component.
-
-    Attributes:
-        handlers: by MAV_CMD.
-        answers: messages whose request has parameters of its own, by message id.
-    """
+    """Executes the commands for a camera component, and the requests that have parameters of their own."""
 
     def __init__(self, camera: CameraActions, definition: CameraDefinition) -> None:
         self._camera = camera
         self._definition = definition
         self._newest_single: tuple[Sender, int, int] | None = None  # sender, sequence number, time
-        m = mavlink
-        self.handlers: dict[int, CommandHandler] = {
-            m.MAV_CMD_IMAGE_START_CAPTURE: self._start_capture,
-            m.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_capture,
-            m.MAV_CMD_VIDEO_START_CAPTURE: self._start_video,
-            m.MAV_CMD_VIDEO_STOP_CAPTURE: self._stop_video,
-            m.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
-            m.MAV_CMD_SET_CAMERA_ZOOM: self._zoom,
-            m.MAV_CMD_SET_CAMERA_FOCUS: self._focus,
-            m.MAV_CMD_RESET_CAMERA_SETTINGS: self._reset,
-            m.MAV_CMD_STORAGE_FORMAT: self._format,
-            m.MAV_CMD_VIDEO_START_STREAMING: lambda message, _: self._set_streaming(message, True),
-            m.MAV_CMD_VIDEO_STOP_STREAMING: lambda message, _: self._set_streaming(message, False),
-            m.MAV_CMD_CAMERA_TRACK_POINT: self._track_point,
-            m.MAV_CMD_CAMERA_TRACK_RECTANGLE: self._track_rectangle,
-            m.MAV_CMD_CAMERA_STOP_TRACKING: self._stop_tracking,
-            m.MAV_CMD_DO_TRIGGER_CONTROL: self._trigger_control,
-            m.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
-            m.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
-            m.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
-            m.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: self._old_stream_information,
-            m.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: self._old_stream_status,
-            m.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: lambda message, _: self._send_photo(message.param1),
-            **dict.fromkeys(_OLD_REQUESTS, self._old_request),
-        }
-        self.answers: dict[int, Answer] = {
-            m.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: lambda message, _: self._send_photo(message.param2),
-            m.MAVLINK_MSG_ID_STORAGE_INFORMATION: lambda message, _: self._send_storage(message.param2),
-            m.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION: lambda message, _: self._send_stream(message.param2),
-            m.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS: lambda message, _: self._send_stream_status(message.param2),
-        }
 
     # photos and videos
 
+    @command(mavlink.MAV_CMD_IMAGE_START_CAPTURE)
     def _start_capture(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 camera, p2 interval s, p3 number of photos (0: unlimited), p4 sequence number of a single
         photo.
@@ -102,11 +66,13 @@ class CameraCommands:
         last = self._newest_single
         return last is not None and last[:2] == single[:2] and single[2] - last[2] < _REPEATED_US
 
+    @command(mavlink.MAV_CMD_IMAGE_STOP_CAPTURE)
     def _stop_capture(self, message: CommandMessage, sender: Sender) -> int | None:
         self._camera.trigger.stop()
         self._camera.send_status()
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_VIDEO_START_CAPTURE)
     def _start_video(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 stream (0: all), p2 rate of the status messages during the video, Hz."""
         stream, status_hz, *_ = parameters(message)
@@ -116,12 +82,14 @@ class CameraCommands:
             return _REJECTED
         return _ACCEPTED if self._camera.start_recording(status_hz) else _FAILED
 
+    @command(mavlink.MAV_CMD_VIDEO_STOP_CAPTURE)
     def _stop_video(self, message: CommandMessage, sender: Sender) -> int | None:
         if whole(message.param1, -1) not in (0, STREAM_ID):
             return _DENIED
         self._camera.stop_recording()
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_TRIGGER_CONTROL)
     def _trigger_control(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 enable (1, 0, -1: unchanged), p2 reset the sequence (1), p3 pause (1, 0, -1: unchanged)."""
         enable, reset, pause = (whole(value, -1) for value in parameters(message)[:3])
@@ -136,6 +104,7 @@ class CameraCommands:
             self._newest_single = None
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST)
     def _trigger_distance(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 metres between photos (0: off, -1: unchanged), p3 one photo at once (1)."""
         distance_m, _, at_once, *_ = parameters(message)
@@ -145,6 +114,7 @@ class CameraCommands:
             self._camera.take_photo()
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL)
     def _trigger_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 milliseconds between photos (0: off, -1: unchanged)."""
         if message.param1 == -1.0:
@@ -152,6 +122,7 @@ class CameraCommands:
         accepted = self._camera.trigger.set_cycle(1e-3 * message.param1, self._camera.time_us)
         return _ACCEPTED if accepted else _DENIED
 
+    @command(mavlink.MAV_CMD_DO_DIGICAM_CONTROL)
     def _digicam(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_DIGICAM_CONTROL: p3 zoom step, p4 focus lock, p5 shoot (1)."""
         values = parameters(message)
@@ -164,6 +135,7 @@ class CameraCommands:
 
     # settings
 
+    @command(mavlink.MAV_CMD_SET_CAMERA_MODE)
     def _set_mode(self, message: CommandMessage, sender: Sender) -> int | None:
         mode = whole(message.param2, -1)
         if mode not in _MODES:
@@ -173,10 +145,12 @@ class CameraCommands:
         self._definition.report("CAM_MODE")
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_SET_CAMERA_ZOOM)
     def _zoom(self, message: CommandMessage, sender: Sender) -> int | None:
         lens = self._camera.lens
         return self._drive_lens(message, lens.zoom if lens.has_zoom else None)
 
+    @command(mavlink.MAV_CMD_SET_CAMERA_FOCUS)
     def _focus(self, message: CommandMessage, sender: Sender) -> int | None:
         lens = self._camera.lens
         return self._drive_lens(message, lens.focus if lens.has_focus else None)
@@ -190,6 +164,7 @@ class CameraCommands:
         self._camera.move_lens()
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_RESET_CAMERA_SETTINGS)
     def _reset(self, message: CommandMessage, sender: Sender) -> int | None:
         if whole(message.param1, 0) != 1:
             return _DENIED
@@ -199,11 +174,12 @@ class CameraCommands:
         self._camera.send_settings()
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_STORAGE_FORMAT)
     def _format(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 storage, p2 format (1), p3 count photos from 0 again (1)."""
         camera = self._camera
-        storage, wanted, reset_log, *_ = (whole(value, -1) for value in parameters(message))
-        if storage not in (0, STORAGE_ID) or wanted != 1:
+        storage, format_it, reset_log, *_ = (whole(value, -1) for value in parameters(message))
+        if storage not in (0, STORAGE_ID) or format_it != 1:
             return _DENIED
         if camera.recording_since_us is not None or camera.trigger.series:
             return _REJECTED
@@ -214,16 +190,26 @@ class CameraCommands:
 
     # the stream
 
-    def _set_streaming(self, message: CommandMessage, running: bool) -> int | None:
+    @command(mavlink.MAV_CMD_VIDEO_START_STREAMING)
+    def _start_streaming(self, message: CommandMessage, sender: Sender) -> int | None:
+        return self._set_streaming(message.param1, True)
+
+    @command(mavlink.MAV_CMD_VIDEO_STOP_STREAMING)
+    def _stop_streaming(self, message: CommandMessage, sender: Sender) -> int | None:
+        return self._set_streaming(message.param1, False)
+
+    def _set_streaming(self, number: float, running: bool) -> int:
         def switch(stream: VideoStream, fov_deg: float) -> None:
             stream.running = running
             self._camera.send(stream.status(fov_deg))
 
-        return self._with_stream(message.param1, switch)
+        return self._with_stream(number, switch)
 
+    @on_request(mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION)
     def _send_stream(self, number: float) -> int:
         return self._with_stream(number, lambda stream, fov: self._camera.send(stream.information(fov)))
 
+    @on_request(mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS)
     def _send_stream_status(self, number: float) -> int:
         def report(stream: VideoStream, fov_deg: float) -> None:
             # MAVSDK 4.1 requests only the status, but reads the address only from the information
@@ -244,17 +230,20 @@ class CameraCommands:
 
     # tracking
 
+    @command(mavlink.MAV_CMD_CAMERA_TRACK_POINT)
     def _track_point(self, message: CommandMessage, sender: Sender) -> int | None:
         x, y, radius, *_ = parameters(message)
         return self._tracked(self._camera.tracker.follow_point(x, y, radius))
 
+    @command(mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE)
     def _track_rectangle(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._tracked(self._camera.tracker.follow_rectangle(*parameters(message)[:4]))
 
-    def _tracked(self, found: bool) -> int:
+    def _tracked(self, tracks: bool) -> int:
         self._camera.send(self._camera.tracker.message())
-        return _ACCEPTED if found else _FAILED
+        return _ACCEPTED if tracks else _FAILED
 
+    @command(mavlink.MAV_CMD_CAMERA_STOP_TRACKING)
     def _stop_tracking(self, message: CommandMessage, sender: Sender) -> int | None:
         self._camera.tracker.stop()
         self._camera.send(self._camera.tracker.message())
@@ -262,6 +251,11 @@ class CameraCommands:
 
     # data requested again
 
+    @command(mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE)
+    def _old_photo(self, message: CommandMessage, sender: Sender) -> int | None:
+        return self._send_photo(message.param1)
+
+    @on_request(mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
     def _send_photo(self, index: float) -> int:
         """CAMERA_IMAGE_CAPTURED of a photo by its index; -1: the newest."""
         storage, number = self._camera.storage, whole(index, -2)
@@ -271,18 +265,22 @@ class CameraCommands:
         self._camera.send(message)
         return _ACCEPTED
 
+    @on_request(mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION)
     def _send_storage(self, number: float) -> int:
         if whole(number, -1) not in (0, STORAGE_ID):
             return _DENIED
         self._camera.send(self._camera.storage.message(self._camera.time_ms))
         return _ACCEPTED
 
+    @command(*_OLD_REQUESTS)
     def _old_request(self, message: CommandMessage, sender: Sender) -> int | None:
         """Commands that are older than REQUEST_MESSAGE."""
         return self._camera.request(_OLD_REQUESTS[message.command])
 
+    @command(mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION)
     def _old_stream_information(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_stream(message.param1)
 
+    @command(mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS)
     def _old_stream_status(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_stream_status(message.param1)

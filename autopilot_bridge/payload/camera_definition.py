@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree import ElementTree
 
-from autopilot_bridge.mavlink import MAVLinkMessage
+from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_messages import DEFINITION_FILE, DEFINITION_VERSION
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY
+from autopilot_bridge.payload.component import Sender
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.storage.generated import GeneratedStore
@@ -62,22 +63,28 @@ class CameraDefinition:
         """Send a message of the file service (which uses this object as its channel)."""
         self._camera.send(message)
 
-    def handle(self, message: MAVLinkMessage, sender: tuple[int, int], time_us: int) -> None:
-        """Handle FTP and PARAM_EXT messages."""
-        match message:
-            case mavlink.MAVLink_file_transfer_protocol_message():
-                self._files.on_transfer(message, Source(self, *sender), time_us)
-                self._next_tick_us = time_us
-            case mavlink.MAVLink_param_ext_request_list_message():
-                self._list = list(range(len(self.settings)))
-            case mavlink.MAVLink_param_ext_request_read_message():
-                index = message.param_index
-                if index == -1:
-                    index = self._index(message.param_id)
-                if 0 <= index < len(self.settings):
-                    self._send_setting(index)
-            case mavlink.MAVLink_param_ext_set_message():
-                self._set(message)
+    @receives(mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL)
+    def _on_transfer(
+        self, message: mavlink.MAVLink_file_transfer_protocol_message, sender: Sender, time_us: int
+    ) -> None:
+        self._files.on_transfer(message, Source(self, *sender), time_us)
+        self._next_tick_us = time_us
+
+    @receives(mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST)
+    def _on_list(
+        self, message: mavlink.MAVLink_param_ext_request_list_message, sender: Sender, time_us: int
+    ) -> None:
+        self._list = list(range(len(self.settings)))
+
+    @receives(mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ)
+    def _on_read(
+        self, message: mavlink.MAVLink_param_ext_request_read_message, sender: Sender, time_us: int
+    ) -> None:
+        index = message.param_index
+        if index == -1:
+            index = self._index(message.param_id)
+        if 0 <= index < len(self.settings):
+            self._send_setting(index)
 
     def step(self, time_us: int) -> None:
         """Continue files and lists."""
@@ -94,19 +101,23 @@ class CameraDefinition:
     def _index(self, name: str) -> int:
         return next((i for i, setting in enumerate(self.settings) if setting.name == name), -1)
 
-    def _set(self, message: mavlink.MAVLink_param_ext_set_message) -> None:
+    @receives(mavlink.MAVLINK_MSG_ID_PARAM_EXT_SET)
+    def _on_set(self, message: mavlink.MAVLink_param_ext_set_message, sender: Sender, time_us: int) -> None:
         index = self._index(message.param_id)
         value, result = -1, _UNKNOWN
         if index >= 0:
             setting = self.settings[index]
-            wanted = _number(message.param_value)
-            if message.param_type == _UINT8 and any(wanted == value for _, value in setting.options):
-                setting.set(wanted)
+            new = _number(message.param_value)
+            if message.param_type == _UINT8 and any(new == value for _, value in setting.options):
+                setting.set(new)
                 result = _ACCEPTED
             value = setting.get()
         self._camera.send(
             mavlink.MAVLink_param_ext_ack_message(
-                _text(message.param_id), _bytes(max(0, value)), _UINT8, result
+                param_id=_text(message.param_id),
+                param_value=_bytes(max(0, value)),
+                param_type=_UINT8,
+                param_result=result,
             )
         )
 
@@ -114,7 +125,11 @@ class CameraDefinition:
         setting = self.settings[index]
         self._camera.send(
             mavlink.MAVLink_param_ext_value_message(
-                setting.name.encode(), _bytes(setting.get()), _UINT8, len(self.settings), index
+                param_id=setting.name.encode(),
+                param_value=_bytes(setting.get()),
+                param_type=_UINT8,
+                param_count=len(self.settings),
+                param_index=index,
             )
         )
 

@@ -6,6 +6,7 @@ from typing import Final
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.camera_scan import detection_message
+from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.payload.camera_state import SENSOR_WIDTH_MM, CameraState
 from autopilot_bridge.payload.component import fixed_text
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -40,20 +41,20 @@ def information(camera: CameraState) -> MAVLinkMessage:
     flags |= mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS if camera.lens.has_focus else 0
     flags |= mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if camera.stream is not None else 0
     return mavlink.MAVLink_camera_information_message(
-        camera.time_ms,
-        fixed_text("flightstack", 32),
-        fixed_text("simulated camera", 32),
-        0x01000000,
-        camera.lens.focal_mm,
-        SENSOR_WIDTH_MM,
-        SENSOR_WIDTH_MM * model.height_px / model.width_px,
-        model.width_px,
-        model.height_px,
-        0,
-        flags,
-        DEFINITION_VERSION,
-        fixed_text(_DEFINITION_URI, 140),
-        gimbal_device_id=camera.gimbal_device_id,
+        time_boot_ms=camera.time_ms,
+        vendor_name=fixed_text("flightstack", 32),
+        model_name=fixed_text("simulated camera", 32),
+        firmware_version=0x01000000,
+        focal_length=camera.lens.focal_mm,
+        sensor_size_h=SENSOR_WIDTH_MM,
+        sensor_size_v=SENSOR_WIDTH_MM * model.height_px / model.width_px,
+        resolution_h=model.width_px,
+        resolution_v=model.height_px,
+        lens_id=0,
+        flags=flags,
+        cam_definition_version=DEFINITION_VERSION,
+        cam_definition_uri=fixed_text(_DEFINITION_URI, 140),
+        gimbal_device_id=0 if camera.device.gimbal is None else GIMBAL_COMPONENT,
     )
 
 
@@ -61,13 +62,13 @@ def capture_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     """CAMERA_CAPTURE_STATUS; between two photos of a series the camera is idle with an interval set."""
     since_us = camera.recording_since_us
     return mavlink.MAVLink_camera_capture_status_message(
-        camera.time_ms,
-        2 if camera.trigger.series else 0,
-        1 if since_us is not None else 0,
-        1e-6 * camera.trigger.interval_us if camera.trigger.series else 0.0,
-        0 if since_us is None else (time_us - since_us) // 1000 & 0xFFFFFFFF,
-        max(0.0, camera.storage.available_mib - camera.recorded_mib),
-        camera.storage.images,
+        time_boot_ms=camera.time_ms,
+        image_status=2 if camera.trigger.series else 0,
+        video_status=1 if since_us is not None else 0,
+        image_interval=1e-6 * camera.trigger.interval_us if camera.trigger.series else 0.0,
+        recording_time_ms=0 if since_us is None else (time_us - since_us) // 1000 & 0xFFFFFFFF,
+        available_capacity=max(0.0, camera.storage.available_mib - camera.recorded_mib),
+        image_count=camera.storage.images,
     )
 
 
@@ -79,17 +80,17 @@ def image_captured(
     q = camera.orientation
     relative_alt_m = camera.vehicle.relative_alt_m
     return mavlink.MAVLink_camera_image_captured_message(
-        camera.time_ms,
-        camera.vehicle.unix_us(time_us),
-        0,
-        0 if here is None else round(here.lat_deg * 1e7),
-        0 if here is None else round(here.lon_deg * 1e7),
-        0 if here is None else round(here.alt_m * 1e3),
-        0 if here is None or math.isnan(relative_alt_m) else round(relative_alt_m * 1e3),
-        [math.nan] * 4 if q is None else list(q),
-        index,
-        1,
-        fixed_text(name, 205),
+        time_boot_ms=camera.time_ms,
+        time_utc=camera.vehicle.unix_us(time_us),
+        camera_id=0,
+        lat=0 if here is None else round(here.lat_deg * 1e7),
+        lon=0 if here is None else round(here.lon_deg * 1e7),
+        alt=0 if here is None else round(here.alt_m * 1e3),
+        relative_alt=0 if here is None or math.isnan(relative_alt_m) else round(relative_alt_m * 1e3),
+        q=[math.nan] * 4 if q is None else list(q),
+        image_index=index,
+        capture_result=1,
+        file_url=fixed_text(name, 205),
     )
 
 
@@ -117,13 +118,19 @@ def fov_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     here, q = camera.vehicle.located(time_us), camera.orientation
     ground = None if here is None or q is None else ground_point(camera, here, rotate(q, _FORWARD))
     width_rad, height_rad = camera.lens.fov_rad
+    lat_camera, lon_camera, alt_camera = _dege7(here)
+    lat_image, lon_image, alt_image = _dege7(ground)
     return mavlink.MAVLink_camera_fov_status_message(
-        camera.time_ms,
-        *_dege7(here),
-        *_dege7(ground),
-        [math.nan] * 4 if q is None else list(q),
-        math.degrees(width_rad),
-        math.degrees(height_rad),
+        time_boot_ms=camera.time_ms,
+        lat_camera=lat_camera,
+        lon_camera=lon_camera,
+        alt_camera=alt_camera,
+        lat_image=lat_image,
+        lon_image=lon_image,
+        alt_image=alt_image,
+        q=[math.nan] * 4 if q is None else list(q),
+        hfov=math.degrees(width_rad),
+        vfov=math.degrees(height_rad),
     )
 
 
@@ -143,14 +150,19 @@ def tracking_geo_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     lat, lon, _ = _dege7(place)
     nan = math.nan
     return mavlink.MAVLink_camera_tracking_geo_status_message(
-        tracker.status(),
-        0 if place is None else lat,
-        0 if place is None else lon,
-        nan if place is None else place.alt_m,
-        *(nan,) * 6,
-        distance_m,
-        heading_rad,
-        nan,
+        tracking_status=tracker.status(),
+        lat=0 if place is None else lat,
+        lon=0 if place is None else lon,
+        alt=nan if place is None else place.alt_m,
+        h_acc=nan,
+        v_acc=nan,
+        vel_n=nan,
+        vel_e=nan,
+        vel_d=nan,
+        vel_acc=nan,
+        dist=distance_m,
+        hdg=heading_rad,
+        hdg_acc=nan,
     )
 
 

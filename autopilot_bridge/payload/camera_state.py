@@ -13,7 +13,7 @@ from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.reported_vehicle import ReportedVehicle
 from flightsim.foundation.vectors import Quaternion, from_euler, product
-from flightsim.payload import Camera, Gimbal
+from flightsim.payload import Camera
 
 SENSOR_WIDTH_MM: Final = 6.0  # a 1/2.3-inch sensor; with the field of view it gives the focal length
 
@@ -31,15 +31,8 @@ class PictureKeeper(Protocol):
         """End the video."""
 
 
-class CameraState(Component):
-    """The camera device and the parts of its component.
-
-    Args:
-        camera: the device.
-        system_id: of the vehicle.
-        send: sends packed frames.
-        gimbal: the gimbal that carries it; None: fixed to the body.
-        gimbal_device_id: id of that gimbal; 0: none.
+class CameraState(Component[Camera]):
+    """The camera device and the parts of its component; arguments as `Component`.
 
     Attributes:
         stream: a video stream with a running server; None: there is none.
@@ -50,36 +43,22 @@ class CameraState(Component):
         recording_since_us: start of the running video; None: no video is being recorded.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        *,
-        system_id: int,
-        send: Callable[[bytes], None],
-        gimbal: Gimbal | None = None,
-        gimbal_device_id: int = 0,
-    ) -> None:
-        super().__init__(
-            system_id=system_id,
-            component_id=CAMERA_COMPONENT,
-            mav_type=mavlink.MAV_TYPE_CAMERA,
-            send=send,
-            rates_hz={},
-        )
-        self.device = camera
-        self.gimbal_device_id = gimbal_device_id
+    component_id = CAMERA_COMPONENT
+    mav_type = mavlink.MAV_TYPE_CAMERA
+
+    def __init__(self, device: Camera, *, system_id: int, send: Callable[[bytes], None]) -> None:
+        super().__init__(device, system_id=system_id, send=send)
         self.stream: VideoStream | None = None
         self.keeper: PictureKeeper | None = None
         self.mode = int(mavlink.CAMERA_MODE_IMAGE)
-        self.lens = CameraLens(camera, sensor_width_mm=SENSOR_WIDTH_MM)
+        self.lens = CameraLens(device, sensor_width_mm=SENSOR_WIDTH_MM)
         self.storage = CameraStorage()
-        self.tracker = CameraTracker(camera.parameters.model)
+        self.tracker = CameraTracker(device.parameters.model)
         self.trigger = PhotoTrigger()
         self.vehicle = ReportedVehicle(system_id)
         self.recording_since_us: int | None = None
         self.status_interval_us = 0
-        self._gimbal = gimbal
-        p = camera.parameters
+        p = device.parameters
         self._q_frd_from_mount = from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad)
         self._next_status_us = 0
         self._lens_us = 0
@@ -101,8 +80,8 @@ class CameraState(Component):
         """q_ned_from_mount: from the gimbal's own reference, or from the received attitude; None: not
         known.
         """
-        if self._gimbal is not None:
-            w, x, y, z = self._gimbal.measured_q_ned_from_gimbal.tolist()
+        if self.device.gimbal is not None:
+            w, x, y, z = self.device.gimbal.measured_q_ned_from_gimbal.tolist()
             return w, x, y, z
         q_ned_from_frd = self.vehicle.q_ned_from_frd
         return None if q_ned_from_frd is None else product(q_ned_from_frd, self._q_frd_from_mount)

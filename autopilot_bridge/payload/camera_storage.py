@@ -58,18 +58,18 @@ class CameraStorage:
     def message(self, time_ms: int) -> MAVLinkMessage:
         """STORAGE_INFORMATION."""
         return mavlink.MAVLink_storage_information_message(
-            time_ms,
-            STORAGE_ID,
-            1,
-            mavlink.STORAGE_STATUS_READY,
-            CAPACITY_MIB,
-            CAPACITY_MIB - self.available_mib,
-            self.available_mib,
-            90.0,
-            60.0,
-            mavlink.STORAGE_TYPE_MICROSD,
-            fixed_text("simulated card", 32),
-            mavlink.STORAGE_USAGE_FLAG_SET
+            time_boot_ms=time_ms,
+            storage_id=STORAGE_ID,
+            storage_count=1,
+            status=mavlink.STORAGE_STATUS_READY,
+            total_capacity=CAPACITY_MIB,
+            used_capacity=CAPACITY_MIB - self.available_mib,
+            available_capacity=self.available_mib,
+            read_speed=90.0,
+            write_speed=60.0,
+            type=mavlink.STORAGE_TYPE_MICROSD,
+            name=fixed_text("simulated card", 32),
+            storage_usage=mavlink.STORAGE_USAGE_FLAG_SET
             | mavlink.STORAGE_USAGE_FLAG_PHOTO
             | mavlink.STORAGE_USAGE_FLAG_VIDEO,
         )

@@ -87,20 +87,30 @@ class CameraTracker:
 
     def message(self) -> MAVLinkMessage:
         """CAMERA_TRACKING_IMAGE_STATUS."""
-        thing, nan = self.thing, math.nan
-        point, rectangle = (nan, nan, nan), (nan, nan, nan, nan)
-        if thing is not None:
-            half = max(0.5 * thing.size, 0.5 * _LEAST_SIDE)
-            aspect = self._model.width_px / self._model.height_px
-            point = (thing.x, thing.y, half)
-            rectangle = (thing.x - half, thing.y - half * aspect, thing.x + half, thing.y + half * aspect)
-        return mavlink.MAVLink_camera_tracking_image_status_message(
-            self.status(),
-            self.mode,
-            mavlink.CAMERA_TRACKING_TARGET_DATA_IN_STATUS if thing is not None else 0,
-            *(point if self.mode == mavlink.CAMERA_TRACKING_MODE_POINT else (nan, nan, nan)),
-            *(rectangle if self.mode == mavlink.CAMERA_TRACKING_MODE_RECTANGLE else (nan,) * 4),
+        message = mavlink.MAVLink_camera_tracking_image_status_message(
+            tracking_status=self.status(),
+            tracking_mode=self.mode,
+            target_data=0,
+            point_x=math.nan,
+            point_y=math.nan,
+            radius=math.nan,
+            rec_top_x=math.nan,
+            rec_top_y=math.nan,
+            rec_bottom_x=math.nan,
+            rec_bottom_y=math.nan,
         )
+        thing = self.thing
+        if thing is None:
+            return message
+        message.target_data = mavlink.CAMERA_TRACKING_TARGET_DATA_IN_STATUS
+        half = max(0.5 * thing.size, 0.5 * _LEAST_SIDE)
+        if self.mode == mavlink.CAMERA_TRACKING_MODE_POINT:
+            message.point_x, message.point_y, message.radius = thing.x, thing.y, half
+        elif self.mode == mavlink.CAMERA_TRACKING_MODE_RECTANGLE:
+            half_height = half * self._model.width_px / self._model.height_px
+            message.rec_top_x, message.rec_top_y = thing.x - half, thing.y - half_height
+            message.rec_bottom_x, message.rec_bottom_y = thing.x + half, thing.y + half_height
+        return message
 
     def _begin(self, mode: int, x: float, y: float, reach: float) -> bool:
         if self._frame is None or not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):

@@ -30,22 +30,27 @@ class VideoStream:
     def information(self, fov_deg: float) -> MAVLinkMessage:
         """VIDEO_STREAM_INFORMATION."""
         return mavlink.MAVLink_video_stream_information_message(
-            STREAM_ID,
-            1,
-            mavlink.VIDEO_STREAM_TYPE_RTSP,
-            *self._picture(fov_deg),
-            fixed_text("camera", 32),
-            fixed_text(self.uri, 160),
+            stream_id=STREAM_ID,
+            count=1,
+            type=mavlink.VIDEO_STREAM_TYPE_RTSP,
+            **self._picture(fov_deg),
+            name=fixed_text("camera", 32),
+            uri=fixed_text(self.uri, 160),
             encoding=mavlink.VIDEO_STREAM_ENCODING_H264,
         )
 
     def status(self, fov_deg: float) -> MAVLinkMessage:
         """VIDEO_STREAM_STATUS."""
-        return mavlink.MAVLink_video_stream_status_message(STREAM_ID, *self._picture(fov_deg))
+        return mavlink.MAVLink_video_stream_status_message(stream_id=STREAM_ID, **self._picture(fov_deg))
 
-    def _picture(self, fov_deg: float) -> tuple[int, float, int, int, int, int, int]:
-        """The common fields of both messages, from the flags to the field of view."""
-        flags = int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0
-        rotation_deg = 0
-        size = (self.width_px, self.height_px)
-        return (flags, self.rate_hz, *size, self.bitrate, rotation_deg, round(fov_deg))
+    def _picture(self, fov_deg: float) -> dict[str, Any]:
+        """The common fields of both messages."""
+        return {
+            "flags": int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0,
+            "framerate": self.rate_hz,
+            "resolution_h": self.width_px,
+            "resolution_v": self.height_px,
+            "bitrate": self.bitrate,
+            "rotation": 0,
+            "hfov": round(fov_deg),
+        }

@@ -5,70 +5,87 @@ Source: MAVLink heartbeat protocol, command protocol, and "requesting messages" 
 
 import math
 from collections.abc import Callable, Mapping
-from typing import ClassVar, Final
+from types import MappingProxyType
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
+from autopilot_bridge.dispatch import BUILDERS, COMMANDS, ON_DEMAND, RECEIVERS, command, streams, table_of
 from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, decode
 from autopilot_bridge.mavlink import dialect as mavlink
+from flightsim.payload import Device
+
+DeviceT = TypeVar("DeviceT", bound=Device[Any])
+
+Sender = tuple[int, int]
+"""System and component."""
 
 CommandMessage = mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message
+
 Builder = Callable[[int], MAVLinkMessage]
-"""Makes a message of the present state; takes vehicle time, microseconds."""
+"""Makes a message of the present state (`@streams`); takes vehicle time, microseconds."""
 
-CommandHandler = Callable[[CommandMessage, tuple[int, int]], int | None]
-"""Executes a command: (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
+CommandHandler = Callable[[CommandMessage, Sender], int | None]
+"""Executes a command (`@command`): (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
 
-Answer = Callable[[CommandMessage, tuple[int, int]], int]
-"""Answers REQUEST_MESSAGE for a message that has parameters of its own -> MAV_RESULT."""
+Answer = Callable[[float], int]
+"""Answers REQUEST_MESSAGE for a message with a parameter of its own (`@on_request`): param2 -> MAV_RESULT."""
+
+Receiver = Callable[[Any, Sender, int], object]
+"""Handles a message that is no command (`@receives`); takes message, sender, vehicle time."""
 
 MAX_RATE_HZ: Final = 50.0
 _NEVER_US: Final = 1 << 62
 _SECOND_US: Final = 1_000_000
 
 
-class Component:
-    """One component of a vehicle's MAVLink system.
+class Component(Generic[DeviceT]):
+    """One component of a vehicle's MAVLink system, which represents one device.
+
+    What it executes, handles and sends is declared at its methods, by the decorators of
+    `autopilot_bridge.dispatch`.
 
     Args:
-        system_id, component_id: of the component.
-        mav_type: MAV_TYPE, for the heartbeat.
+        device: the device.
+        system_id: of the vehicle.
         send: sends packed frames.
-        rates_hz: messages that are streamed from the start, by message id.
 
     Attributes:
-        commands_only: messages that are no commands are not decoded.
+        component_id: of the component.
+        mav_type: MAV_TYPE, for the heartbeat.
+        rates_hz: messages that are streamed from the start, by message id.
         next_us: time of the next stream that is due.
     """
 
-    commands_only: ClassVar[bool] = False
+    component_id: ClassVar[int]
+    mav_type: ClassVar[int] = mavlink.MAV_TYPE_ONBOARD_CONTROLLER
+    rates_hz: ClassVar[Mapping[int, float]] = MappingProxyType({})
 
-    def __init__(
-        self,
-        *,
-        system_id: int,
-        component_id: int,
-        mav_type: int,
-        send: Callable[[bytes], None],
-        rates_hz: Mapping[int, float],
-    ) -> None:
+    def __init__(self, device: DeviceT, *, system_id: int, send: Callable[[bytes], None]) -> None:
+        self.device = device
         self.system_id = system_id
-        self.component_id = component_id
-        self._mav_type = mav_type
         self._send = send
-        self._encoder = FrameEncoder(system_id, component_id)
-        self._builders: dict[int, Builder] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat}
+        self._encoder = FrameEncoder(system_id, self.component_id)
+        self._builders: dict[int, Builder] = {}
         self._answers: dict[int, Answer] = {}
-        self._handlers: dict[int, CommandHandler] = {
-            mavlink.MAV_CMD_REQUEST_MESSAGE: self._on_request_message,
-            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._on_set_interval,
-            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._on_get_interval,
-        }
-        self._default_rates_hz = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz}
+        self._commands: dict[int, CommandHandler] = {}
+        self._receivers: dict[int, Receiver] = {}
+        self._add_part(self)
+        self._default_rates_hz = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **self.rates_hz}
         self._intervals_us = {m: round(1e6 / rate_hz) for m, rate_hz in self._default_rates_hz.items()}
         self._due_us = dict.fromkeys(self._intervals_us, _SECOND_US)
         self.next_us = _SECOND_US
         self._time_us = 0
 
+    def _add_part(self, part: object) -> None:
+        """Execute, handle and send also what the methods of another object declare."""
+        self._commands |= table_of(part, COMMANDS)
+        self._receivers |= table_of(part, RECEIVERS)
+        self._builders |= table_of(part, BUILDERS)
+        self._answers |= table_of(part, ON_DEMAND)
+
     # sending
+
+    def update(self, reading: Any) -> None:
+        """Send what the device delivered on this step."""
 
     def step(self, time_us: int) -> None:
         """Send the streams that are due."""
@@ -115,16 +132,11 @@ class Component:
             message = decode(frame)
             if isinstance(message, CommandMessage):
                 self._on_command(message, sender)
-        elif not self.commands_only:
-            self._on_message(decode(frame), sender)
+        elif (receiver := self._receivers.get(frame.message_id)) is not None:
+            receiver(decode(frame), sender, time_us)
 
-    def _on_message(self, message: MAVLinkMessage, sender: tuple[int, int]) -> None:
-        """Handle a message that is not a command and is addressed to this component or to all; not called
-        if `commands_only`.
-        """
-
-    def _on_command(self, message: CommandMessage, sender: tuple[int, int]) -> None:
-        handler = self._handlers.get(message.command)
+    def _on_command(self, message: CommandMessage, sender: Sender) -> None:
+        handler = self._commands.get(message.command)
         addressed = message.target_component == self.component_id
         if handler is None:
             # an unknown command to all components is not answered
@@ -136,16 +148,20 @@ class Component:
         if result is not None:
             self.send(
                 mavlink.MAVLink_command_ack_message(
-                    message.command, result, 0, 0, target_system=sender[0], target_component=sender[1]
+                    command=message.command,
+                    result=result,
+                    progress=0,
+                    result_param2=0,
+                    target_system=sender[0],
+                    target_component=sender[1],
                 )
             )
 
-    def _on_request_message(self, message: CommandMessage, sender: tuple[int, int]) -> int | None:
-        return self._request(whole(message.param1, -1), message, sender)
-
-    def _request(self, message_id: int, message: CommandMessage, sender: tuple[int, int]) -> int:
+    @command(mavlink.MAV_CMD_REQUEST_MESSAGE)
+    def _on_request_message(self, message: CommandMessage, sender: Sender) -> int | None:
+        message_id = whole(message.param1, -1)
         answer = self._answers.get(message_id)
-        return self.request(message_id) if answer is None else answer(message, sender)
+        return self.request(message_id) if answer is None else answer(message.param2)
 
     def request(self, message_id: int) -> int:
         """Send a message now; returns the MAV_RESULT for the request."""
@@ -155,7 +171,8 @@ class Component:
         self.send(builder(self._time_us))
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    def _on_set_interval(self, message: CommandMessage, sender: tuple[int, int]) -> int | None:
+    @command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+    def _on_set_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         message_id = whole(message.param1, -1)
         interval_us = message.param2
         if message_id not in self._builders:
@@ -178,17 +195,24 @@ class Component:
         self.next_us = min(self._due_us.values(), default=_NEVER_US)
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    def _on_get_interval(self, message: CommandMessage, sender: tuple[int, int]) -> int | None:
+    @command(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL)
+    def _on_get_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         message_id = whole(message.param1, -1)
         if message_id not in self._builders:
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
         interval_us = min(self._intervals_us.get(message_id, -1), 0x7FFFFFFF)
-        self.send(mavlink.MAVLink_message_interval_message(message_id, interval_us))
+        self.send(mavlink.MAVLink_message_interval_message(message_id=message_id, interval_us=interval_us))
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
+    @streams(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     def _heartbeat(self, time_us: int) -> MAVLinkMessage:
         return mavlink.MAVLink_heartbeat_message(
-            self._mav_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+            type=self.mav_type,
+            autopilot=mavlink.MAV_AUTOPILOT_INVALID,
+            base_mode=0,
+            custom_mode=0,
+            system_status=mavlink.MAV_STATE_ACTIVE,
+            mavlink_version=3,
         )
 
 

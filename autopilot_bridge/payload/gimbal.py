@@ -6,16 +6,18 @@ point it; while no component is in control, all components may.
 
 import math
 from collections.abc import Callable
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
+from autopilot_bridge.dispatch import command, receives, streams
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
-from autopilot_bridge.payload.component import CommandMessage, Component, parameters, whole
+from autopilot_bridge.payload.component import CommandMessage, Component, Sender, parameters, whole
 from autopilot_bridge.payload.gimbal_aim import GimbalAim
-from autopilot_bridge.payload.gimbal_control import GimbalControl, Sender
+from autopilot_bridge.payload.gimbal_control import GimbalControl
 from autopilot_bridge.payload.gimbal_messages import (
     attitude_status,
     device_information,
@@ -43,7 +45,7 @@ _MANUAL_RATE_RAD_S: Final = 60.0 * _DEG
 _NAN: Final = math.nan
 
 
-class GimbalComponent(Component):
+class GimbalComponent(Component[Gimbal]):
     """Points a gimbal as commanded, and reports its direction.
 
     Attributes:
@@ -51,48 +53,21 @@ class GimbalComponent(Component):
         aim: the target that it follows automatically.
     """
 
-    def __init__(self, gimbal: Gimbal, *, system_id: int, send: Callable[[bytes], None]) -> None:
-        m = mavlink
-        super().__init__(
-            system_id=system_id,
-            component_id=GIMBAL_COMPONENT,
-            mav_type=m.MAV_TYPE_GIMBAL,
-            send=send,
-            rates_hz={
-                m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: 10.0,
-                m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: 1.0,
-            },
-        )
+    component_id = GIMBAL_COMPONENT
+    mav_type = mavlink.MAV_TYPE_GIMBAL
+    rates_hz = MappingProxyType(
+        {
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: 10.0,
+            mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: 1.0,
+        }
+    )
+
+    def __init__(self, device: Gimbal, *, system_id: int, send: Callable[[bytes], None]) -> None:
+        super().__init__(device, system_id=system_id, send=send)
         self.control = GimbalControl(system_id)
         self._vehicle = ReportedVehicle(system_id)
         self.aim = GimbalAim(self._vehicle)
-        self._gimbal = gimbal
         self._next_roi_us = 0
-        self._builders.update(
-            {
-                m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: lambda _: attitude_status(gimbal),
-                m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: lambda _: self._manager_status(),
-                m.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION: lambda _: manager_information(
-                    gimbal, self.time_ms
-                ),
-                m.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION: lambda _: device_information(
-                    gimbal, self.time_ms
-                ),
-                m.MAVLINK_MSG_ID_MOUNT_ORIENTATION: lambda _: mount_orientation(gimbal, self.time_ms),
-            }
-        )
-        self._handlers.update(
-            {
-                m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._on_pitchyaw,
-                m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._on_configure,
-                m.MAV_CMD_DO_SET_ROI_LOCATION: self._on_roi_location,
-                m.MAV_CMD_DO_SET_ROI_SYSID: self._on_roi_system,
-                m.MAV_CMD_DO_SET_ROI_NONE: self._on_roi_none,
-                m.MAV_CMD_DO_SET_ROI: self._on_old_roi,
-                m.MAV_CMD_DO_MOUNT_CONFIGURE: self._on_mount_configure,
-                m.MAV_CMD_DO_MOUNT_CONTROL: self._on_mount_control,
-            }
-        )
 
     def step(self, time_us: int) -> None:
         """Follow a region of interest, and send the messages that are due."""
@@ -100,31 +75,76 @@ class GimbalComponent(Component):
             self._next_roi_us = time_us + _ROI_INTERVAL_US
             direction = self.aim.direction(time_us)
             if direction is not None:
-                self._gimbal.command(_ROI_FLAGS, pitch_rad=direction[0], yaw_rad=direction[1])
+                self.device.command(_ROI_FLAGS, pitch_rad=direction[0], yaw_rad=direction[1])
         super().step(time_us)
 
     # messages
 
-    def _on_message(self, message: MAVLinkMessage, sender: Sender) -> None:
-        match message:
-            case mavlink.MAVLink_global_position_int_message() | mavlink.MAVLink_follow_target_message():
-                self._vehicle.handle(message, sender, self._time_us)
-                self.aim.handle(message, sender, self._time_us)
-            case mavlink.MAVLink_gimbal_device_set_attitude_message():
-                if self.control.may_point(sender):
-                    self._set_attitude(message)
-            case (
-                mavlink.MAVLink_gimbal_manager_set_pitchyaw_message()
-                | mavlink.MAVLink_gimbal_manager_set_manual_control_message()
-                | mavlink.MAVLink_gimbal_manager_set_attitude_message()
-            ) if message.gimbal_device_id in (0, 1, GIMBAL_COMPONENT) and self.control.may_point(sender):
-                if isinstance(message, mavlink.MAVLink_gimbal_manager_set_pitchyaw_message):
-                    rates = (message.pitch_rate, message.yaw_rate)
-                    self._point(message.flags, message.pitch, message.yaw, *rates)
-                elif isinstance(message, mavlink.MAVLink_gimbal_manager_set_manual_control_message):
-                    self._steer(message)
-                else:
-                    self._set_attitude(message)
+    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
+    def _attitude_status(self, time_us: int) -> MAVLinkMessage:
+        return attitude_status(self.device)
+
+    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
+    def _manager_information(self, time_us: int) -> MAVLinkMessage:
+        return manager_information(self.device, self.time_ms)
+
+    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION)
+    def _device_information(self, time_us: int) -> MAVLinkMessage:
+        return device_information(self.device, self.time_ms)
+
+    @streams(mavlink.MAVLINK_MSG_ID_MOUNT_ORIENTATION)
+    def _mount_orientation(self, time_us: int) -> MAVLinkMessage:
+        return mount_orientation(self.device, self.time_ms)
+
+    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
+    def _manager_status(self, time_us: int) -> MAVLinkMessage:
+        control = self.control
+        return mavlink.MAVLink_gimbal_manager_status_message(
+            time_boot_ms=self.time_ms,
+            flags=status_flags(self.device),
+            gimbal_device_id=GIMBAL_COMPONENT,
+            primary_control_sysid=control.primary[0],
+            primary_control_compid=control.primary[1],
+            secondary_control_sysid=control.secondary[0],
+            secondary_control_compid=control.secondary[1],
+        )
+
+    @receives(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET)
+    def _follow_positions(self, message: MAVLinkMessage, sender: Sender, time_us: int) -> None:
+        self._vehicle.handle(message, sender, time_us)
+        self.aim.handle(message, sender, time_us)
+
+    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_SET_ATTITUDE)
+    def _on_device_attitude(
+        self, message: mavlink.MAVLink_gimbal_device_set_attitude_message, sender: Sender, time_us: int
+    ) -> None:
+        if self.control.may_point(sender):
+            self._set_attitude(message)
+
+    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE)
+    def _on_manager_attitude(
+        self, message: mavlink.MAVLink_gimbal_manager_set_attitude_message, sender: Sender, time_us: int
+    ) -> None:
+        if self._may_point(message.gimbal_device_id, sender):
+            self._set_attitude(message)
+
+    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW)
+    def _on_manager_pitchyaw(
+        self, message: mavlink.MAVLink_gimbal_manager_set_pitchyaw_message, sender: Sender, time_us: int
+    ) -> None:
+        if self._may_point(message.gimbal_device_id, sender):
+            self._point(message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
+
+    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL)
+    def _on_manual_control(
+        self, message: mavlink.MAVLink_gimbal_manager_set_manual_control_message, sender: Sender, time_us: int
+    ) -> None:
+        if self._may_point(message.gimbal_device_id, sender):
+            self._steer(message)
+
+    def _may_point(self, device_id: int, sender: Sender) -> bool:
+        """Whether a message to the manager is for this gimbal, by a component that may point it."""
+        return device_id in (0, 1, GIMBAL_COMPONENT) and self.control.may_point(sender)
 
     def _point(
         self, flags: int, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float, roll: float = 0.0
@@ -133,7 +153,7 @@ class GimbalComponent(Component):
         if any(math.isinf(value) or abs(value) > 1e4 for value in (pitch, yaw, pitch_rate, yaw_rate)):
             return False
         try:
-            self._gimbal.command(
+            self.device.command(
                 flags & _KNOWN_FLAGS,
                 roll_rad=roll,
                 pitch_rad=pitch,
@@ -170,12 +190,11 @@ class GimbalComponent(Component):
         euler = np.empty(3)
         euler_from_quaternion(np.array(q) / norm, euler)
         roll, pitch, yaw = euler.tolist()
-        self._point(
-            message.flags, pitch, yaw, *rates, roll=roll if self._gimbal.parameters.axes == 3 else 0.0
-        )
+        self._point(message.flags, pitch, yaw, *rates, roll=roll if self.device.parameters.axes == 3 else 0.0)
 
     # commands
 
+    @command(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)
     def _on_pitchyaw(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_GIMBAL_MANAGER_PITCHYAW: p1..p4 in degrees and deg/s, p5 flags, p7 device."""
         pitch, yaw, pitch_rate, yaw_rate, flags, _, device = parameters(message)
@@ -186,6 +205,7 @@ class GimbalComponent(Component):
         angles = (pitch * _DEG, yaw * _DEG, pitch_rate * _DEG, yaw_rate * _DEG)
         return _ACCEPTED if self._point(max(0, whole(flags, 0)), *angles) else _DENIED
 
+    @command(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
     def _on_configure(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_GIMBAL_MANAGER_CONFIGURE: the components in control, p7 device."""
         values = parameters(message)
@@ -195,9 +215,10 @@ class GimbalComponent(Component):
         if not self.control.configure(values, sender):
             return _DENIED
         if before != (self.control.primary, self.control.secondary):
-            self.send(self._manager_status())
+            self.send(self._manager_status(self._time_us))
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_SET_ROI_LOCATION)
     def _on_roi_location(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_LOCATION: latitude, longitude, altitude."""
         if isinstance(message, mavlink.MAVLink_command_int_message):
@@ -206,6 +227,7 @@ class GimbalComponent(Component):
             place = (message.param5, message.param6, message.param7, mavlink.MAV_FRAME_GLOBAL)
         return self._look_at(*place, sender)
 
+    @command(mavlink.MAV_CMD_DO_SET_ROI_SYSID)
     def _on_roi_system(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_SYSID: p1 the system."""
         system_id = whole(message.param1, 0)
@@ -214,13 +236,15 @@ class GimbalComponent(Component):
         self.aim.follow(system_id)
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_SET_ROI_NONE)
     def _on_roi_none(self, message: CommandMessage, sender: Sender) -> int | None:
         if not self.control.may_point(sender):
             return _DENIED
         self.aim.clear()
-        self._gimbal.command()
+        self.device.command()
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_SET_ROI)
     def _on_old_roi(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI: p1 MAV_ROI; targets at waypoints are left to the autopilot, which has the mission."""
         match whole(message.param1, -1):
@@ -243,6 +267,7 @@ class GimbalComponent(Component):
         self._next_roi_us = self._time_us
         return _ACCEPTED if looks else _DENIED
 
+    @command(mavlink.MAV_CMD_DO_MOUNT_CONFIGURE)
     def _on_mount_configure(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_MOUNT_CONFIGURE: p1 MAV_MOUNT_MODE."""
         if not self.control.may_point(sender):
@@ -258,6 +283,7 @@ class GimbalComponent(Component):
                 return _UNSUPPORTED
         return _ACCEPTED
 
+    @command(mavlink.MAV_CMD_DO_MOUNT_CONTROL)
     def _on_mount_control(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_MOUNT_CONTROL: p1 pitch, p2 roll, p3 yaw, degrees, or p4..p6 a position; p7 MAV_MOUNT_MODE."""
         pitch, roll, yaw, alt_m, lat_deg, lon_deg, mode = parameters(message)
@@ -281,15 +307,6 @@ class GimbalComponent(Component):
             case _:
                 return _UNSUPPORTED
         return _ACCEPTED
-
-    def _manager_status(self) -> MAVLinkMessage:
-        return mavlink.MAVLink_gimbal_manager_status_message(
-            self.time_ms,
-            status_flags(self._gimbal),
-            GIMBAL_COMPONENT,
-            *self.control.primary,
-            *self.control.secondary,
-        )
 
 
 def _share(value: float) -> float:

@@ -5,9 +5,7 @@ DO_GIMBAL_MANAGER_CONFIGURE).
 from typing import Final
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.payload.component import whole
-
-Sender = tuple[int, int]
+from autopilot_bridge.payload.component import Sender, whole
 
 NO_CONTROLLER: Final = (0, 0)
 _LEAVE, _TAKE, _GIVE_UP = -1, -2, -3
@@ -39,15 +37,15 @@ class GimbalControl:
         0: none; -1: unchanged; -2: the sender takes control; -3: the sender releases it. False: invalid
         numbers, and nothing has changed.
         """
-        primary = _wanted(parameters[0], parameters[1], self.primary, sender)
-        secondary = _wanted(parameters[2], parameters[3], self.secondary, sender)
+        primary = _controller(parameters[0], parameters[1], self.primary, sender)
+        secondary = _controller(parameters[2], parameters[3], self.secondary, sender)
         if primary is None or secondary is None:
             return False
         self.primary, self.secondary = primary, secondary
         return True
 
 
-def _wanted(system: float, component: float, now: Sender, sender: Sender) -> Sender | None:
+def _controller(system: float, component: float, now: Sender, sender: Sender) -> Sender | None:
     ids = (whole(system, _NONSENSE), whole(component, _NONSENSE))
     if _LEAVE in ids:
         return now

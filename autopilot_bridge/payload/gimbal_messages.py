@@ -49,15 +49,15 @@ def attitude_status(gimbal: Gimbal) -> MAVLinkMessage:
     failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT if gimbal.limits_reached[2] else 0
     failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT if gimbal.limits_reached[0] else 0
     return mavlink.MAVLink_gimbal_device_attitude_status_message(
-        0,
-        0,
-        (max(0, gimbal.time_us) // 1000) & 0xFFFFFFFF,
-        flags,
-        (earth if in_earth else vehicle).tolist(),
-        rates[0],
-        rates[1],
-        rates[2],
-        failure,
+        target_system=0,
+        target_component=0,
+        time_boot_ms=(max(0, gimbal.time_us) // 1000) & 0xFFFFFFFF,
+        flags=flags,
+        q=(earth if in_earth else vehicle).tolist(),
+        angular_velocity_x=rates[0],
+        angular_velocity_y=rates[1],
+        angular_velocity_z=rates[2],
+        failure_flags=failure,
         delta_yaw=delta_yaw,
         delta_yaw_velocity=math.nan,
         gimbal_device_id=0,
@@ -68,11 +68,11 @@ def mount_orientation(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """MOUNT_ORIENTATION, of the protocol's first version: roll and pitch against the horizon, degrees."""
     roll, pitch, yaw = euler_of(gimbal.measured_q_heading_from_gimbal.tolist())
     return mavlink.MAVLink_mount_orientation_message(
-        time_ms,
-        math.degrees(roll),
-        math.degrees(pitch),
-        math.degrees(yaw),
-        math.degrees(yaw_of(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
+        time_boot_ms=time_ms,
+        roll=math.degrees(roll),
+        pitch=math.degrees(pitch),
+        yaw=math.degrees(yaw),
+        yaw_absolute=math.degrees(yaw_of(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
     )
 
 
@@ -80,30 +80,38 @@ def manager_information(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """GIMBAL_MANAGER_INFORMATION."""
     capabilities = _device_capabilities(gimbal) | _POINTS_AT_PLACE
     return mavlink.MAVLink_gimbal_manager_information_message(
-        time_ms, capabilities, GIMBAL_COMPONENT, *_limits(gimbal)
+        time_boot_ms=time_ms, cap_flags=capabilities, gimbal_device_id=GIMBAL_COMPONENT, **_limits(gimbal)
     )
 
 
 def device_information(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """GIMBAL_DEVICE_INFORMATION."""
     return mavlink.MAVLink_gimbal_device_information_message(
-        time_ms,
-        fixed_text("flightstack", 32),
-        fixed_text("simulated gimbal", 32),
-        fixed_text("", 32),
-        0x01000000,
-        0x01000000,
-        0,
-        _device_capabilities(gimbal) & 0xFFFF,
-        0,
-        *_limits(gimbal),
+        time_boot_ms=time_ms,
+        vendor_name=fixed_text("flightstack", 32),
+        model_name=fixed_text("simulated gimbal", 32),
+        custom_name=fixed_text("", 32),
+        firmware_version=0x01000000,
+        hardware_version=0x01000000,
+        uid=0,
+        cap_flags=_device_capabilities(gimbal) & 0xFFFF,
+        custom_cap_flags=0,
+        **_limits(gimbal),
     )
 
 
-def _limits(gimbal: Gimbal) -> tuple[float, float, float, float, float, float]:
+def _limits(gimbal: Gimbal) -> dict[str, Any]:
+    """Fields of both INFORMATION messages."""
     p = gimbal.parameters
-    roll = p.roll_limit_rad if p.axes == 3 else 0.0
-    return -roll, roll, p.pitch_min_rad, p.pitch_max_rad, -p.yaw_limit_rad, p.yaw_limit_rad
+    roll_rad = p.roll_limit_rad if p.axes == 3 else 0.0
+    return {
+        "roll_min": -roll_rad,
+        "roll_max": roll_rad,
+        "pitch_min": p.pitch_min_rad,
+        "pitch_max": p.pitch_max_rad,
+        "yaw_min": -p.yaw_limit_rad,
+        "yaw_max": p.yaw_limit_rad,
+    }
 
 
 def _device_capabilities(gimbal: Gimbal) -> int:

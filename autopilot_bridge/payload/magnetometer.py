@@ -4,14 +4,13 @@ MAVLink has no message for the magnitude of the field; a named value is the stan
 In single precision a field of 50,000 nT is reported to 0.004 nT.
 """
 
-from collections.abc import Callable
 from struct import Struct
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import MAGNETOMETER_COMPONENT
 from autopilot_bridge.payload.component import Component, fixed_text
-from flightsim.payload import MagneticReading
+from flightsim.payload import MagneticReading, SurveyMagnetometer
 
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 _NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
@@ -19,19 +18,10 @@ _MESSAGE_ID: Final = int(mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT)
 _pack: Final = Struct("<If10s").pack
 
 
-class MagnetometerComponent(Component):
+class MagnetometerComponent(Component[SurveyMagnetometer]):
     """Sends every reading when it comes."""
 
-    commands_only = True
-
-    def __init__(self, *, system_id: int, send: Callable[[bytes], None]) -> None:
-        super().__init__(
-            system_id=system_id,
-            component_id=MAGNETOMETER_COMPONENT,
-            mav_type=mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-            send=send,
-            rates_hz={},
-        )
+    component_id = MAGNETOMETER_COMPONENT
 
     def update(self, reading: MagneticReading) -> None:
         """Send a reading that was delivered on this step."""

@@ -2,37 +2,21 @@
 (`autopilot_bridge.mavlink.moving_points`, docs/mavlink/moving_points.md).
 """
 
-from collections.abc import Callable
-
-from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import MOVING_POINT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import moving_points_messages
 from autopilot_bridge.payload.component import Component
-from flightsim.payload import MovingPointScan
+from flightsim.payload import MovingPointCamera, MovingPointScan
 
 
-class MovingPointComponent(Component):
-    """Sends every scan when it is delivered.
+class MovingPointComponent(Component[MovingPointCamera]):
+    """Sends every scan when it is delivered, with the standard deviation that the camera states."""
 
-    Args:
-        sigma: standard deviation of the points, which the camera reports with them.
-    """
+    component_id = MOVING_POINT_COMPONENT
+    mav_type = mavlink.MAV_TYPE_CAMERA
 
-    def __init__(self, *, system_id: int, send: Callable[[bytes], None], sigma: float) -> None:
-        super().__init__(
-            system_id=system_id,
-            component_id=MOVING_POINT_COMPONENT,
-            mav_type=mavlink.MAV_TYPE_CAMERA,
-            send=send,
-            rates_hz={},
-        )
-        self._sigma = sigma
-
-    def update(self, scan: MovingPointScan) -> None:
+    def update(self, reading: MovingPointScan) -> None:
         """Send a scan that was delivered on this step."""
-        for message in moving_points_messages(scan.number, scan.time_us, scan.points, self._sigma):
+        sigma = self.device.parameters.pixel_rad
+        for message in moving_points_messages(reading.number, reading.time_us, reading.points, sigma):
             self.send(message)
-
-    def _on_message(self, message: MAVLinkMessage, sender: tuple[int, int]) -> None:
-        """Ignore the message: the camera uses commands only."""

@@ -2,37 +2,22 @@
 (`autopilot_bridge.mavlink.vehicle_range`, docs/mavlink/vehicle_range.md).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import RANGE_RADIO_COMPONENT
 from autopilot_bridge.mavlink.vehicle_range import VehicleRange, range_message
 from autopilot_bridge.payload.component import Component
-from flightsim.payload import MeasuredRange
+from flightsim.payload import MeasuredRange, RangeRadio
 
 
-class RangeRadioComponent(Component):
-    """Sends every range when it is measured.
+class RangeRadioComponent(Component[RangeRadio]):
+    """Sends every range when it is measured."""
 
-    Args:
-        sigma_m: standard deviation of the ranges, which the radio reports with them.
-    """
+    component_id = RANGE_RADIO_COMPONENT
 
-    commands_only = True
-
-    def __init__(self, *, system_id: int, send: Callable[[bytes], None], sigma_m: float) -> None:
-        super().__init__(
-            system_id=system_id,
-            component_id=RANGE_RADIO_COMPONENT,
-            mav_type=mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-            send=send,
-            rates_hz={},
-        )
-        self._sigma_m = sigma_m
-
-    def update(self, ranges: Sequence[MeasuredRange]) -> None:
+    def update(self, reading: Sequence[MeasuredRange]) -> None:
         """Send the ranges that were measured on this step."""
-        for measured in ranges:
+        for measured in reading:
             self.send(
                 range_message(
                     VehicleRange(
@@ -40,7 +25,7 @@ class RangeRadioComponent(Component):
                         number=measured.number,
                         time_us=measured.time_us,
                         range_m=measured.range_m,
-                        sigma_m=self._sigma_m,
+                        sigma_m=self.device.parameters.sigma_m,
                     )
                 )
             )

@@ -9,6 +9,13 @@ from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, from_euler
 
+REPORTS: Final = (
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+)
+"""The messages that are used."""
 STALE_US: Final = 3_000_000
 _LAT_MAX: Final = 900_000_000
 _LON_MAX: Final = 1_800_000_000

@@ -2,30 +2,18 @@
 (`autopilot_bridge.mavlink.target_scan`, docs/mavlink/target_scan.md).
 """
 
-from collections.abc import Callable
-
-from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import TARGET_SENSOR_COMPONENT
 from autopilot_bridge.mavlink.target_scan import scan_messages
 from autopilot_bridge.payload.component import Component
-from flightsim.payload import TargetScan
+from flightsim.payload import TargetScan, TargetSensor
 
 
-class TargetSensorComponent(Component):
+class TargetSensorComponent(Component[TargetSensor]):
     """Sends every scan when it is taken."""
 
-    commands_only = True
+    component_id = TARGET_SENSOR_COMPONENT
 
-    def __init__(self, *, system_id: int, send: Callable[[bytes], None]) -> None:
-        super().__init__(
-            system_id=system_id,
-            component_id=TARGET_SENSOR_COMPONENT,
-            mav_type=mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-            send=send,
-            rates_hz={},
-        )
-
-    def update(self, scan: TargetScan) -> None:
+    def update(self, reading: TargetScan) -> None:
         """Send a scan that was taken on this step."""
-        for message in scan_messages(scan.number, scan.time_us, scan.detections):
+        for message in scan_messages(reading.number, reading.time_us, reading.detections):
             self.send(message)

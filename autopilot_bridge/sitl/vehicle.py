@@ -30,7 +30,7 @@ from autopilot_bridge.storage.memory import MemoryCard
 from flightsim.airframe import AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.payload import GroundTargets, MagneticField, Payload, PayloadParameters, Terrain
+from flightsim.payload import Carrier, GroundTargets, MagneticField, Payload, Terrain
 from flightsim.sensors import GpsParameters, SensorSuite, SensorSuiteParameters
 from flightsim.world import World
 from flightsim.world_spec import VehicleSpec, WorldSpec
@@ -127,24 +127,22 @@ class SitlVehicle:
         self._probation = Probation()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
         self.payload: PayloadStation | None = None
-        if specification.payload != PayloadParameters():
-            self._fit(
-                Payload(
-                    specification.payload,
-                    truth=self.vehicle.truth,
-                    home=world_spec.place,
-                    physics_rate_hz=world_spec.physics_rate_hz,
-                    seeds=lambda name: streams.child("vehicle", index, "sensor", name),
-                    targets=targets,
-                    magnetic_field=magnetic_field,
-                    terrain=terrain,
-                    others=lambda: [
-                        (other.system_id, vehicle.truth)
-                        for other, vehicle in zip(world_spec.vehicles, world.vehicles, strict=True)
-                        if vehicle is not self.vehicle and other.payload.range_radio is not None
-                    ],
-                )
+        if specification.payload.devices:
+            carrier = Carrier(
+                truth=self.vehicle.truth,
+                home=world_spec.place,
+                physics_rate_hz=world_spec.physics_rate_hz,
+                seeds=lambda name: streams.child("vehicle", index, "sensor", name),
+                targets=targets,
+                magnetic_field=magnetic_field,
+                terrain=terrain,
+                others=lambda: [
+                    (other.system_id, vehicle.truth)
+                    for other, vehicle in zip(world_spec.vehicles, world.vehicles, strict=True)
+                    if vehicle is not self.vehicle and other.payload.range_radio is not None
+                ],
             )
+            self._fit(Payload(specification.payload, carrier))
 
     def _fit(self, payload: Payload) -> None:
         """Connect the payload's components on a separate link."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.payload import CameraComponent
 from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.video.service import CameraOnShow, VideoParameters, VideoService
@@ -52,9 +53,9 @@ def show_cameras(
         VideoError: the port is busy, or the folder is not empty.
     """
     components = [
-        (vehicle.specification.system_id, vehicle.payload.camera)
+        (vehicle.specification.system_id, camera)
         for vehicle in sitl.vehicles
-        if vehicle.payload is not None and vehicle.payload.camera is not None
+        if vehicle.payload is not None and (camera := vehicle.payload.get(CameraComponent)) is not None
     ]
     if not components:
         return None

@@ -166,6 +166,11 @@ class Conversion:
         if not isinstance(value, dict):
             raise Refused(value, "a table")
         of = get_args(kind)[1]
+        if of in self._kinds:  # the key is the kind
+            value = {
+                key: {"kind": key} | entry if isinstance(entry, dict) else entry
+                for key, entry in value.items()
+            }
         return {key: _inside(key, partial(self.value, of), entry) for key, entry in value.items()}
 
     def _row(self, value: Any, kind: Any) -> tuple[Any, ...]:

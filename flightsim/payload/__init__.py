@@ -20,6 +20,7 @@ from flightsim.payload.detection import (
     ResolutionDetection,
     SeenTargets,
 )
+from flightsim.payload.device import Carrier, Device, DeviceParameters
 from flightsim.payload.gimbal import LEVEL, Gimbal, GimbalFlags, GimbalParameters
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.imager import BrownDistortion, ImagerParameters
@@ -33,8 +34,8 @@ from flightsim.payload.moving_points import (
     PointReader,
     PointReaderParameters,
 )
-from flightsim.payload.payload import Device, DeviceOutage, Payload, PayloadParameters
-from flightsim.payload.range_radio import MeasuredRange, RadioOutage, RangeRadio, RangeRadioParameters
+from flightsim.payload.payload import DeviceOutage, Payload, PayloadParameters
+from flightsim.payload.range_radio import MeasuredRange, RangeRadio, RangeRadioParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
 from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.survey_magnetometer import (
@@ -65,6 +66,7 @@ __all__ = [
     "CameraFrame",
     "CameraParameters",
     "CameraView",
+    "Carrier",
     "Circle",
     "ConstantVelocity",
     "DailyVariation",
@@ -73,6 +75,7 @@ __all__ = [
     "DetectionModel",
     "Device",
     "DeviceOutage",
+    "DeviceParameters",
     "DipoleSignature",
     "FrameReader",
     "FrameReaderParameters",
@@ -102,7 +105,6 @@ __all__ = [
     "PinholeModel",
     "PointReader",
     "PointReaderParameters",
-    "RadioOutage",
     "RandomWalk",
     "RangeRadio",
     "RangeRadioParameters",

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
-from flightsim.foundation.options import Options
 from flightsim.foundation.rotations import multiply, quaternion_from_euler, rotate
 from flightsim.foundation.vectors import Quaternion, conjugate, product
 from flightsim.foundation.vectors import rotate as rotate_vector
@@ -28,6 +27,7 @@ from flightsim.payload.detection import (
     PictureDetection,
     SeenTargets,
 )
+from flightsim.payload.device import Carrier, Device, DeviceParameters, first_of
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.imager import ImagerParameters
@@ -40,7 +40,7 @@ _BLOCK: Final = 64  # frames served by one call of each generator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraParameters(Options):
+class CameraParameters(DeviceParameters):
     """A small machine-vision camera with a detector on board.
 
     Attributes:
@@ -112,12 +112,24 @@ class CameraParameters(Options):
         if not 0.0 <= least <= most:
             raise ValueError(f"false_size_px = {self.false_size_px!r} is not accepted: 0 <= least <= most is")
 
+    def build(self, carrier: Carrier) -> "Camera":
+        return Camera(
+            self,
+            truth=carrier.truth,
+            home=carrier.home,
+            targets=carrier.targets,
+            gimbal=first_of(Gimbal, carrier.fitted),
+            physics_rate_hz=carrier.physics_rate_hz,
+            seeds=carrier.seeds,
+        )
 
-class Camera:
+
+class Camera(Device[CameraFrame]):
     """One camera of one vehicle.
 
     Attributes:
         parameters: as given.
+        gimbal: the gimbal that carries it; None: fixed to the body.
         frame: newest delivered frame; None before the first.
         focus_distance_m: distance in focus; None: that of the centre of the picture (autofocus).
         reader: detects targets in its pictures; None: detections come from the models.
@@ -157,7 +169,7 @@ class Camera:
         self._truth = truth
         self._home_frame = HomeFrame(home)
         self._targets = targets
-        self._gimbal = gimbal
+        self.gimbal = gimbal
         self._q_frd_from_mount: Array = np.zeros(4)
         q_frd_from_mount, q_mount_from_camera = np.zeros(4), np.zeros(4)
         quaternion_from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad, q_frd_from_mount)
@@ -224,7 +236,7 @@ class Camera:
 
     def _pose(self) -> tuple[Vector, tuple[float, float, float, float]]:
         """The camera's place, local NED of home, and q_ned_from_mount."""
-        truth, gimbal = self._truth, self._gimbal
+        truth, gimbal = self._truth, self.gimbal
         q_ned_from_frd, arm, q = truth[t.Q_NED_FROM_FRD], np.zeros(3), np.zeros(4)
         q_frd_from_mount = self._q_frd_from_mount if gimbal is None else gimbal.q_frd_from_gimbal
         multiply(q_ned_from_frd, q_frd_from_mount, q)
@@ -248,7 +260,7 @@ class Camera:
             q_ned_from_mount=q,
             zoom=self._zoom,
             focus_distance_m=focus_m,
-            covered=self._gimbal is not None and self._gimbal.retracted,
+            covered=self.gimbal is not None and self.gimbal.retracted,
             targets=tuple(
                 TargetView(
                     position_ned_m=(float(north_m), float(east_m), float(down_m)),
@@ -323,7 +335,7 @@ class Camera:
             read = self.reader.read(self.view(time_us))
             searched = read is not None
             found = [] if read is None else list(read)
-        elif self._gimbal is None or not self._gimbal.retracted:
+        elif self.gimbal is None or not self.gimbal.retracted:
             found = self._detections(time_us, uniforms, normals) + self._false_detections(time_us)
             found.sort(key=lambda detection: (detection.u_px, detection.v_px))
         frame = CameraFrame(time_us, self._number, tuple(found), searched)
@@ -340,7 +352,7 @@ class Camera:
         vehicle[0], vehicle[1], vehicle[2] = self._home_frame.position_ned_m(truth)
         seen = k.look(
             truth[t.Q_NED_FROM_FRD],
-            self._q_frd_from_mount if self._gimbal is None else self._gimbal.q_frd_from_gimbal,
+            self._q_frd_from_mount if self.gimbal is None else self.gimbal.q_frd_from_gimbal,
             vehicle,
             targets.positions_ned_m,
             targets.sizes_m,
@@ -378,7 +390,7 @@ class Camera:
         """Keep the pose of the step before an exposure: the difference is the motion that blurs."""
         self._before_us = time_us
         self._q_before[0] = self._truth[t.Q_NED_FROM_FRD]
-        self._q_before[1] = self._q_frd_from_mount if self._gimbal is None else self._gimbal.q_frd_from_gimbal
+        self._q_before[1] = self._q_frd_from_mount if self.gimbal is None else self.gimbal.q_frd_from_gimbal
         self._vehicle_before_ned_m[:] = self._home_frame.position_ned_m(self._truth)
 
     def _blur_px(self, time_us: int) -> Array:

@@ -9,14 +9,14 @@ protocol v2 means by them.
 import math
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Any, Final
+from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import NotNegative, Positive, Rate, require_finite
-from flightsim.foundation.options import Options
 from flightsim.payload import gimbal_kernel as k
+from flightsim.payload.device import Carrier, Device, DeviceParameters
 from flightsim.sensors.sensor import gauss_markov
 from flightsim.sensors.suite import steps_per_sample
 
@@ -49,7 +49,7 @@ _KNOWN: Final = sum(GimbalFlags)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GimbalParameters(Options):
+class GimbalParameters(DeviceParameters):
     """A small brushless three-axis gimbal; `GimbalParameters.two_axis()` is a pan-tilt turret.
 
     Attributes:
@@ -68,6 +68,8 @@ class GimbalParameters(Options):
         error_time_constant_s: of that error.
         gyro_noise_rad_s: white, per sample.
     """
+
+    can_fail: ClassVar[bool] = False
 
     axes: int = 3
     rate_hz: Rate = 50
@@ -97,6 +99,11 @@ class GimbalParameters(Options):
                 f"are not accepted: rising, from {lowest:.4f} to pi/2, is"
             )
 
+    def build(self, carrier: Carrier) -> "Gimbal":
+        return Gimbal(
+            self, truth=carrier.truth, physics_rate_hz=carrier.physics_rate_hz, seed=carrier.seeds("gimbal")
+        )
+
     @classmethod
     def two_axis(cls, **overrides: Any) -> "GimbalParameters":
         """A belly turret: all round, from a little over the horizon to straight down."""
@@ -104,7 +111,7 @@ class GimbalParameters(Options):
         return cls(**(numbers | overrides))
 
 
-class Gimbal:
+class Gimbal(Device[Literal[True]]):
     """One gimbal on one vehicle.
 
     Attributes (arrays, written in place by every control step):
@@ -263,11 +270,11 @@ class Gimbal:
         state[k.PARKED] = float(bool(flags & (GimbalFlags.NEUTRAL | GimbalFlags.RETRACT)))
         self.flags = flags
 
-    def step(self, time_us: int) -> bool:
+    def step(self, time_us: int) -> Literal[True] | None:
         """One physics step; True when it was a control step and the arrays are new."""
         if self._countdown:
             self._countdown -= 1
-            return False
+            return None
         self._countdown = self._interval_steps - 1
         if self._row == _NOISE_ROWS:
             self._rng.standard_normal(out=self._block)

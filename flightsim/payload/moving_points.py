@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate, Share
-from flightsim.foundation.options import Options
 from flightsim.foundation.vectors import conjugate, from_euler, product, rotate
 from flightsim.home import Home
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_view import CameraView
+from flightsim.payload.device import Carrier, Device, DeviceParameters, first_of
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import GroundTargets
@@ -49,7 +49,7 @@ class PointReaderParameters(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MovingPointParameters(Options):
+class MovingPointParameters(DeviceParameters):
     """A camera with a front end for moving objects; on the gimbal, if the vehicle has one.
 
     Attributes:
@@ -84,6 +84,17 @@ class MovingPointParameters(Options):
         if not math.isfinite(self.mount_pitch_rad):
             raise ValueError(f"mount_pitch_rad = {self.mount_pitch_rad!r} is not accepted: a finite angle is")
 
+    def build(self, carrier: Carrier) -> "MovingPointCamera":
+        return MovingPointCamera(
+            self,
+            truth=carrier.truth,
+            home=carrier.home,
+            targets=carrier.targets,
+            gimbal=first_of(Gimbal, carrier.fitted),
+            physics_rate_hz=carrier.physics_rate_hz,
+            seeds=carrier.seeds,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class MovingPointScan:
@@ -101,7 +112,7 @@ class MovingPointScan:
     points: tuple[Point, ...]
 
 
-class MovingPointCamera:
+class MovingPointCamera(Device[MovingPointScan]):
     """One moving-point camera on one vehicle.
 
     Args:

@@ -11,28 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import NotNegative, Positive, Rate, Share
-from flightsim.foundation.options import Options
+from flightsim.foundation.checks import Positive, Rate, Share
 from flightsim.home import Home
+from flightsim.payload.device import Carrier, Device, DeviceParameters
 from flightsim.payload.home_frame import HomeFrame
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RadioOutage(Options):
-    """A time without ranges.
-
-    Attributes:
-        start_s, duration_s: time of the simulation.
-    """
-
-    start_s: NotNegative
-    duration_s: Positive
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RangeRadioParameters(Options):
+class RangeRadioParameters(DeviceParameters):
     """A radio that measures the range to every other vehicle with a radio.
 
     Attributes:
@@ -40,14 +28,22 @@ class RangeRadioParameters(Options):
         sigma_m: standard deviation of the noise (paper: 3 m).
         missing: probability that a measurement fails.
         reach_m: there are no ranges beyond it.
-        outages: times without ranges.
     """
 
     rate_hz: Rate = 10
     sigma_m: Positive = 3.0
     missing: Share = 0.02
     reach_m: Positive = 5000.0
-    outages: tuple[RadioOutage, ...] = ()
+
+    def build(self, carrier: Carrier) -> "RangeRadio":
+        return RangeRadio(
+            self,
+            truth=carrier.truth,
+            home=carrier.home,
+            others=carrier.others,
+            physics_rate_hz=carrier.physics_rate_hz,
+            seeds=carrier.seeds,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +63,7 @@ class MeasuredRange:
     range_m: float
 
 
-class RangeRadio:
+class RangeRadio(Device[tuple[MeasuredRange, ...]]):
     """The radio of one vehicle.
 
     A vehicle that is stepped later in the world is measured where it was one physics step before: 0.1 m at 25
@@ -111,26 +107,25 @@ class RangeRadio:
         self._seeds = seeds
         self._generators: dict[int, np.random.Generator] = {}
 
-    def step(self, time_us: int) -> tuple[MeasuredRange, ...]:
-        """One physics step; the ranges that are measured on it."""
+    def step(self, time_us: int) -> tuple[MeasuredRange, ...] | None:
+        """One physics step; the ranges that are measured on it, if it is time for a measurement."""
         if self._countdown:
             self._countdown -= 1
-            return ()
+            return None
         self._countdown = self._interval_steps - 1
         p = self.parameters
-        own = self._frame.position_ned_m(self._truth)
-        off = any(o.start_s <= time_us * 1e-6 < o.start_s + o.duration_s for o in p.outages)
-        found = []
+        here_ned_m = self._frame.position_ned_m(self._truth)
+        ranges = []
         for system_id, truth in self._others():
             rng = self._generators.get(system_id)
             if rng is None:
                 rng = np.random.Generator(np.random.PCG64(self._seeds(f"range_radio_{system_id}")))
                 self._generators[system_id] = rng
-            # drawn also when there is no range: an outage does not change later ones
+            # drawn also when there is no range: a failure does not change later ones
             noise_m, chance = p.sigma_m * float(rng.standard_normal()), float(rng.random())
-            distance_m = math.dist(own, self._frame.position_ned_m(truth))
-            if off or chance < p.missing or distance_m > p.reach_m:
+            distance_m = math.dist(here_ned_m, self._frame.position_ned_m(truth))
+            if chance < p.missing or distance_m > p.reach_m:
                 continue
-            found.append(MeasuredRange(time_us, system_id, self._number, max(0.0, distance_m + noise_m)))
+            ranges.append(MeasuredRange(time_us, system_id, self._number, max(0.0, distance_m + noise_m)))
         self._number += 1
-        return tuple(found)
+        return tuple(ranges)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.main_field import NANOTESLA_PER_GAUSS
-from flightsim.foundation.options import Options
 from flightsim.foundation.rotations import rotate_inverse
+from flightsim.payload.device import Carrier, Device, DeviceParameters
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.vehicle_field import VehicleField, VehicleFieldParameters
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SurveyMagnetometerParameters(Options):
+class SurveyMagnetometerParameters(DeviceParameters):
     """A caesium or potassium magnetometer on a small aircraft, compensated.
 
     Attributes:
@@ -48,6 +48,17 @@ class SurveyMagnetometerParameters(Options):
     quantum_nt: NotNegative = 0.001
     vehicle_field: VehicleFieldParameters | None = None
 
+    def build(self, carrier: Carrier) -> "SurveyMagnetometer":
+        if carrier.magnetic_field is None:
+            raise ValueError("a survey magnetometer needs a magnetic map; give the world one")
+        return SurveyMagnetometer(
+            self,
+            truth=carrier.truth,
+            field=carrier.magnetic_field,
+            physics_rate_hz=carrier.physics_rate_hz,
+            seed=carrier.seeds("survey_magnetometer"),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class MagneticReading:
@@ -62,7 +73,7 @@ class MagneticReading:
     total_field_nt: float
 
 
-class SurveyMagnetometer:
+class SurveyMagnetometer(Device[MagneticReading]):
     """One magnetometer on one vehicle.
 
     Attributes:

@@ -17,6 +17,7 @@ from flightsim.foundation.checks import NotNegative, Positive, Share
 from flightsim.foundation.options import Options
 from flightsim.foundation.vectors import wrap_pi, yaw_of
 from flightsim.home import Home
+from flightsim.payload.device import Carrier, Device, DeviceParameters
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import GroundTargets
 from flightsim.payload.terrain import Terrain
@@ -45,7 +46,7 @@ class ScanDisturbance(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TargetSensorParameters(Options):
+class TargetSensorParameters(DeviceParameters):
     """A sensor that looks in all directions and is stabilized to the horizon.
 
     A target at the offset (f, r), forward and right of the vehicle, is detected with the probability
@@ -71,6 +72,17 @@ class TargetSensorParameters(Options):
     bearing_sigma_rad: NotNegative = 0.03
     clutter_per_scan: NotNegative = 0.0
     disturbances: tuple[ScanDisturbance, ...] = ()
+
+    def build(self, carrier: Carrier) -> "TargetSensor":
+        return TargetSensor(
+            self,
+            truth=carrier.truth,
+            home=carrier.home,
+            targets=carrier.targets,
+            physics_rate_hz=carrier.physics_rate_hz,
+            seeds=carrier.seeds,
+            terrain=carrier.terrain,
+        )
 
     def probability(self, forward_m: float, right_m: float) -> float:
         """Probability to detect a target at an offset."""
@@ -115,7 +127,7 @@ class _Stream:
         return self._uniforms[row], self._normals[row][0], self._normals[row][1]
 
 
-class TargetSensor:
+class TargetSensor(Device[TargetScan]):
     """One target sensor on one vehicle.
 
     Attributes:

@@ -47,8 +47,7 @@ def start_video(
     Raises:
         ValueError: an option that can't be met, or one that needs a camera.
     """
-    cameras = any(vehicle.payload is not None and vehicle.payload.camera for vehicle in world.vehicles)
-    if not cameras:
+    if not any(vehicle.specification.payload.camera for vehicle in world.vehicles):
         if video is not None or pictures is not None:
             option = "--video" if video is not None else "--pictures"
             raise ValueError(f"{option} is for cameras; add --camera")

@@ -132,8 +132,8 @@ def _cameras_of(sitl: Sitl, films_to: Path | None) -> "RenderedCameras | None":
     """The rendered cameras of a world. None: no vehicle has a camera, and what makes pictures, which takes
     half a second to load, is not needed.
     """
-    devices = [vehicle.payload.devices for vehicle in sitl.vehicles if vehicle.payload is not None]
-    if all(each.camera is None and each.moving_points is None for each in devices):
+    payloads = [vehicle.specification.payload for vehicle in sitl.vehicles]
+    if all(each.camera is None and each.moving_points is None for each in payloads):
         return None
     from missions.embedded.rendered_cameras import RenderedCameras
 

@@ -20,17 +20,6 @@ def carrying(world: WorldSpec, payload: PayloadParameters) -> WorldSpec:
     return replace(
         world,
         vehicles=tuple(
-            replace(
-                vehicle,
-                payload=PayloadParameters(
-                    gimbal=vehicle.payload.gimbal or payload.gimbal,
-                    camera=vehicle.payload.camera or payload.camera,
-                    magnetometer=vehicle.payload.magnetometer or payload.magnetometer,
-                    target_sensor=vehicle.payload.target_sensor or payload.target_sensor,
-                    range_radio=vehicle.payload.range_radio or payload.range_radio,
-                    moving_points=vehicle.payload.moving_points or payload.moving_points,
-                ),
-            )
-            for vehicle in world.vehicles
+            replace(vehicle, payload=vehicle.payload.with_added(payload)) for vehicle in world.vehicles
         ),
     )

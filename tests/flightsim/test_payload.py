@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import fields, replace
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -9,25 +10,25 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flightsim import truth as t
+from flightsim.foundation.options import without_none
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     LEVEL,
     CameraParameters,
+    Carrier,
     GaussianSignature,
+    Gimbal,
     GimbalParameters,
     GroundTargetParameters,
     GroundTargets,
     MagneticField,
     MagneticMap,
-    MovingPointParameters,
     Payload,
     PayloadParameters,
     RandomWalk,
-    RangeRadioParameters,
     SurveyMagnetometer,
     SurveyMagnetometerParameters,
-    TargetSensorParameters,
 )
 
 Array = NDArray[np.float64]
@@ -71,33 +72,36 @@ def make(
     walk = RandomWalk(south_m=-40.0, west_m=-40.0, north_m=40.0, east_m=40.0, speed_m_s=1.0)
     payload = Payload(
         parameters,
-        truth=truth,
-        home=HOME,
-        physics_rate_hz=250,
-        seeds=lambda name: streams.child("vehicle", vehicle, "sensor", name),
-        targets=GroundTargets(
-            [GroundTargetParameters(motion=walk, tag_id=index) for index in range(targets)],
-            seeds=lambda index: streams.child("target", index),
+        Carrier(
+            truth=truth,
+            home=HOME,
+            physics_rate_hz=250,
+            seeds=lambda name: streams.child("vehicle", vehicle, "sensor", name),
+            targets=GroundTargets(
+                [GroundTargetParameters(motion=walk, tag_id=index) for index in range(targets)],
+                seeds=lambda index: streams.child("target", index),
+            ),
+            magnetic_field=MagneticField(FLAT, [GaussianSignature(north_m=0.0, east_m=0.0)]),
         ),
-        magnetic_field=MagneticField(FLAT, [GaussianSignature(north_m=0.0, east_m=0.0)]),
     )
     return payload, truth
 
 
-def fly(payload: Payload, truth: Array, steps: int = 2500) -> dict[str, list[object]]:
-    log: dict[str, list[object]] = {"gimbal": [], "camera": [], "magnetometer": []}
-    if payload.gimbal is not None:
-        payload.gimbal.command(LEVEL, pitch_rad=-0.5 * math.pi)
+def fly(payload: Payload, truth: Array, steps: int = 2500) -> dict[str, list[Any]]:
+    log: dict[str, list[Any]] = {"gimbal": [], "camera": [], "magnetometer": []}
+    gimbal = payload.get(Gimbal)
+    if gimbal is not None:
+        gimbal.command(LEVEL, pitch_rad=-0.5 * math.pi)
     for step in range(steps):
         write_truth(truth, step)
         payload.step(step * STEP_US)
-        if payload.frame is not None:
-            log["camera"].append(payload.frame)
-        if payload.reading is not None:
-            log["magnetometer"].append(payload.reading)
-        if payload.gimbal is not None and payload.gimbal.time_us == step * STEP_US:
-            log["gimbal"].append(payload.gimbal.measured_q_ned_from_gimbal.tobytes())
+        for name, reading in payload.readings.items():
+            log[name].append(reading if gimbal is None or name != "gimbal" else attitude_of(gimbal))
     return log
+
+
+def attitude_of(gimbal: Gimbal) -> bytes:
+    return gimbal.measured_q_ned_from_gimbal.tobytes()
 
 
 def test_rates() -> None:
@@ -105,7 +109,7 @@ def test_rates() -> None:
     assert len(log["gimbal"]) == 500
     assert len(log["magnetometer"]) == 100
     assert len(log["camera"]) == 99  # the last one is under way
-    assert sum(len(frame.detections) for frame in log["camera"]) > 100  # type: ignore[attr-defined]
+    assert sum(len(frame.detections) for frame in log["camera"]) > 100
 
 
 @pytest.mark.parametrize("removed", ["gimbal", "magnetometer", "camera"])
@@ -121,16 +125,9 @@ def test_removing_a_device_changes_no_other(removed: str) -> None:
 
 
 def test_only_a_magnetometer_alone_rests_between_its_readings() -> None:
-    devices = {
-        "gimbal": GimbalParameters(),
-        "camera": CameraParameters(),
-        "target_sensor": TargetSensorParameters(),
-        "range_radio": RangeRadioParameters(),
-        "moving_points": MovingPointParameters(),
-    }
-    others = {"magnetometer", "outages"}
-    assert {*devices, *others} == {field.name for field in fields(PayloadParameters)}
     alone = PayloadParameters(magnetometer=SurveyMagnetometerParameters())
+    names = {each.name for each in fields(PayloadParameters)} - {"magnetometer", "others", "outages"}
+    hints = get_type_hints(PayloadParameters)
 
     def next_us(parameters: PayloadParameters) -> int:
         payload, _ = make(parameters)
@@ -138,13 +135,14 @@ def test_only_a_magnetometer_alone_rests_between_its_readings() -> None:
         return payload.next_us
 
     assert next_us(alone) > STEP_US
-    for name, device in devices.items():
-        assert next_us(replace(alone, **{name: device})) == 0  # type: ignore[arg-type]
+    for name in names:
+        parameters, _ = without_none(hints[name])
+        assert next_us(replace(alone, **{name: parameters()})) == 0
 
 
 def test_one_target_more_changes_no_other() -> None:
     def of(log: dict[str, list[object]], tags: set[int]) -> list[object]:
-        return [d for frame in log["camera"] for d in frame.detections if d.target_id in tags]  # type: ignore[attr-defined]
+        return [d for frame in log["camera"] for d in frame.detections if d.target_id in tags]
 
     two, three = fly(*make(targets=2)), fly(*make(targets=3))
     assert of(two, {0, 1}) == of(three, {0, 1}) != []
@@ -167,20 +165,14 @@ def test_a_payload_of_nothing_and_one_without_a_field() -> None:
     with pytest.raises(ValueError, match="needs a magnetic map"):
         Payload(
             PayloadParameters(magnetometer=SurveyMagnetometerParameters()),
-            truth=truth,
-            home=HOME,
-            physics_rate_hz=250,
-            seeds=RandomStreams(1).child,  # type: ignore[arg-type]
+            Carrier(truth=truth, home=HOME, physics_rate_hz=250, seeds=RandomStreams(1).child),
         )
     blind = Payload(
         PayloadParameters(camera=CameraParameters(latency_s=0.0)),
-        truth=truth,
-        home=HOME,
-        physics_rate_hz=250,
-        seeds=RandomStreams(1).child,  # type: ignore[arg-type]
+        Carrier(truth=truth, home=HOME, physics_rate_hz=250, seeds=RandomStreams(1).child),
     )
     blind.step(0)
-    assert blind.frame is not None and blind.frame.detections == ()
+    assert blind.readings["camera"].detections == ()
 
 
 # --- survey magnetometer ---
@@ -216,11 +208,12 @@ def test_a_perfect_magnetometer_reads_the_field_where_it_is() -> None:
     for step in range(0, 1000):
         write_truth(truth, step)
         payload.step(step * STEP_US)
-        if payload.reading is not None:
-            assert payload.reading.time_us == step * STEP_US
+        if "magnetometer" in payload.readings:
+            reading = payload.readings["magnetometer"]
+            assert reading.time_us == step * STEP_US
             s = step / 250.0
             place = (20.0 * math.sin(0.2 * s), 20.0 * math.cos(0.2 * s), 100.0 + math.sin(s))
-            assert payload.reading.total_field_nt == pytest.approx(field.total_nt(*place), abs=1e-5)
+            assert reading.total_field_nt == pytest.approx(field.total_nt(*place), abs=1e-5)
 
 
 def test_noise_quantum_and_latency() -> None:
@@ -234,8 +227,8 @@ def test_noise_quantum_and_latency() -> None:
     for step in range(200):
         write_truth(truth, step)
         late.step(step * STEP_US)
-        if late.reading is not None:
-            assert step * STEP_US - late.reading.time_us == 248_000  # whole steps
+        if "magnetometer" in late.readings:
+            assert step * STEP_US - late.readings["magnetometer"].time_us == 248_000  # whole steps
 
 
 def test_heading_error_has_the_form_of_tolles_and_lawson() -> None:

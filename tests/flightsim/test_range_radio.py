@@ -9,7 +9,14 @@ from scipy import stats
 from flightsim import truth as t
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
-from flightsim.payload import RadioOutage, RangeRadio, RangeRadioParameters
+from flightsim.payload import (
+    Carrier,
+    DeviceOutage,
+    Payload,
+    PayloadParameters,
+    RangeRadio,
+    RangeRadioParameters,
+)
 
 HOME = Home()
 
@@ -34,7 +41,7 @@ def make(parameters, others, seed=1):
 
 
 def ranges(radio, seconds):
-    return [one for step in range(round(250 * seconds)) for one in radio.step(4000 * step)]
+    return [one for step in range(round(250 * seconds)) for one in radio.step(4000 * step) or ()]
 
 
 def test_ranges_are_distances_with_the_stated_noise():
@@ -57,10 +64,23 @@ def test_a_range_is_not_negative_and_ends_with_the_reach():
 def test_an_outage_and_another_vehicle_change_no_other_range():
     place = truth_at(200.0, 0.0, 100.0)
     usual = ranges(make(RangeRadioParameters(), [(2, place)]), 10.0)
-    broken = ranges(
-        make(RangeRadioParameters(outages=(RadioOutage(start_s=2.0, duration_s=3.0),)), [(2, place)]), 10.0
+    streams = RandomStreams(1)
+    outage = DeviceOutage(device="range_radio", start_s=2.0, duration_s=3.0)
+    broken = Payload(
+        PayloadParameters(range_radio=RangeRadioParameters(), outages=(outage,)),
+        Carrier(
+            truth=truth_at(0.0, 0.0, 100.0),
+            home=HOME,
+            others=lambda: [(2, place)],
+            physics_rate_hz=250,
+            seeds=lambda name: streams.child("vehicle", 0, "sensor", name),
+        ),
     )
-    assert broken == [one for one in usual if not 2.0 <= one.time_us * 1e-6 < 5.0]
+    received = []
+    for step in range(2500):
+        broken.step(4000 * step)
+        received += broken.readings.get("range_radio", ())
+    assert received == [one for one in usual if not 2.0 <= one.time_us * 1e-6 < 5.0]
     crowd = ranges(make(RangeRadioParameters(), [(4, truth_at(0.0, 90.0, 80.0)), (2, place)]), 10.0)
     assert [one for one in crowd if one.to_system == 2] == usual
 

@@ -88,7 +88,7 @@ class Flight:
                 (frame,) = Packet.of_one(data)
                 self.reader.watch.handle(read_message(frame))
 
-            component = MovingPointComponent(system_id=1, send=send, sigma=points.sigma)
+            component = MovingPointComponent(camera, system_id=1, send=send)
             for step in range(steps):
                 now_us = step * STEP_US
                 north_m, east_m = -30.0, -10.0 + 8.0 * now_us * 1e-6

@@ -6,7 +6,7 @@ import pytest
 
 from autopilot_bridge.mavlink import Frame, FrameEncoder, dialect
 from autopilot_bridge.mavlink.target_scan import scan_messages
-from flightsim.payload import CameraParameters, Device, DeviceOutage, PayloadParameters
+from flightsim.payload import CameraParameters, DeviceOutage, PayloadParameters
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.base.options import FlightOptions
 from missions.base.request import RunRequest
@@ -69,7 +69,7 @@ def test_a_camera_that_stops_in_flight_ends_the_search(tmp_path):
     options = FlightOptions(width_m=40.0, height_m=40.0, spacing_m=10.0, search=True)
     world = tag_search_world(WorldSpec(seed=1), options)
     (vehicle,) = world.vehicles
-    outage = DeviceOutage(device=Device.CAMERA, start_s=20.0)
+    outage = DeviceOutage(device="camera", start_s=20.0)
     world = replace(world, vehicles=(replace(vehicle, payload=replace(vehicle.payload, outages=(outage,))),))
     result = fly(
         "parallel-sweep", RunRequest(options=options, world=world, out=tmp_path / "run", picture=False)

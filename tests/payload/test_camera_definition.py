@@ -7,6 +7,7 @@ import pytest
 
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.payload import CAMERA_COMPONENT
+from flightsim.payload import Camera
 from tests.payload.test_components import SYSTEM, World
 
 HEADER = struct.Struct("<HBBBBBxI")
@@ -107,7 +108,7 @@ def test_settings_are_set_and_refused(world):
         assert set_to(world, name, value, kind).param_result == m.PARAM_ACK_VALUE_UNSUPPORTED
     assert settings(world)["CAM_PHOTOQUAL"] == 75
     assert set_to(world, b"CAM_AUTOFOCUS", 0).param_result == m.PARAM_ACK_ACCEPTED
-    assert world.payload.camera.focus_distance_m is not None
+    assert world.payload.get(Camera).focus_distance_m is not None
 
 
 def test_mode_is_one_thing_by_command_and_by_setting(world):

@@ -5,8 +5,9 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import dialect as m
-from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
+from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, CameraComponent
 from autopilot_bridge.payload.camera_video import VideoStream
+from flightsim.payload import Camera
 from tests.payload.test_components import HOME, SYSTEM, World
 from tests.rotations import pitch_rad, yaw_rad
 
@@ -180,7 +181,7 @@ def test_videos(world):
 
 
 def test_a_full_card_takes_no_more(world):
-    camera = world.station.camera
+    camera = world.station.get(CameraComponent)
     camera.storage.used_mib = 32_768.0 - 9.0
     assert say(world, START, 0, 0.2, 0) == ACCEPTED
     world.run(2.0)
@@ -233,7 +234,7 @@ def test_focus_and_reset(world):
     assert say(world, focus, m.FOCUS_TYPE_METERS, 5.0) == ACCEPTED
     assert settings(world).focusLevel == pytest.approx(90.0)
     assert say(world, focus, m.FOCUS_TYPE_RANGE, 0.0) == ACCEPTED
-    assert world.payload.camera.focus_distance_m == pytest.approx(0.5)
+    assert world.payload.get(Camera).focus_distance_m == pytest.approx(0.5)
     assert say(world, focus, m.FOCUS_TYPE_CONTINUOUS, 1.0) == ACCEPTED
     world.run(6.0)
     assert settings(world).focusLevel == pytest.approx(100.0)
@@ -241,7 +242,7 @@ def test_focus_and_reset(world):
     world.command(GIMBAL_COMPONENT, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -90.0)
     world.run(3.0)
     assert say(world, focus, m.FOCUS_TYPE_AUTO_SINGLE) == ACCEPTED
-    assert world.payload.camera.focus_distance_m == pytest.approx(100.0, rel=0.02)
+    assert world.payload.get(Camera).focus_distance_m == pytest.approx(100.0, rel=0.02)
     say(world, m.MAV_CMD_SET_CAMERA_MODE, 0, m.CAMERA_MODE_VIDEO)
     say(world, m.MAV_CMD_SET_CAMERA_ZOOM, m.ZOOM_TYPE_RANGE, 40.0)
     assert (settings(world).mode_id, settings(world).zoomLevel) == (m.CAMERA_MODE_VIDEO, pytest.approx(40.0))
@@ -256,7 +257,9 @@ def test_flags_tell_what_there_is(world):
     number = m.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
     assert say(world, m.MAV_CMD_REQUEST_MESSAGE, number) == m.MAV_RESULT_UNSUPPORTED
     assert say(world, m.MAV_CMD_VIDEO_START_STREAMING) == m.MAV_RESULT_UNSUPPORTED
-    world.station.camera.stream = VideoStream("rtsp://127.0.0.1:8554/camera1", 640, 360, 20.0, 2_000_000)
+    world.station.get(CameraComponent).stream = VideoStream(
+        "rtsp://127.0.0.1:8554/camera1", 640, 360, 20.0, 2_000_000
+    )
     flags = world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_INFORMATION).flags
     assert flags & m.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
     stream = world.request(CAMERA_COMPONENT, number)

@@ -21,6 +21,7 @@ from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.home import Home
 from flightsim.payload import (
     CameraParameters,
+    Carrier,
     GimbalParameters,
     GroundTargetParameters,
     GroundTargets,
@@ -62,12 +63,14 @@ class World:
                 camera=CameraParameters(false_detections_per_frame=0.0),
                 magnetometer=SurveyMagnetometerParameters(),
             ),
-            truth=truth,
-            home=HOME,
-            physics_rate_hz=250,
-            seeds=lambda name: np.random.SeedSequence([1, *name.encode()]),
-            targets=self.targets,
-            magnetic_field=MagneticField(survey),
+            Carrier(
+                truth=truth,
+                home=HOME,
+                physics_rate_hz=250,
+                seeds=lambda name: np.random.SeedSequence([1, *name.encode()]),
+                targets=self.targets,
+                magnetic_field=MagneticField(survey),
+            ),
         )
         self._parser = FrameParser()
         self.frames = []

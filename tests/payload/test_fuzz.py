@@ -6,8 +6,9 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameParser
 from autopilot_bridge.mavlink import dialect as m
-from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
+from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, CameraComponent, GimbalComponent
 from autopilot_bridge.payload.camera_video import VideoStream
+from flightsim.payload import Camera, Gimbal
 from tests.payload.test_components import SYSTEM, World
 from tests.system.hostile import commands, valid_frames
 
@@ -16,7 +17,7 @@ COMPONENTS = (0, 1, CAMERA_COMPONENT, GIMBAL_COMPONENT)
 
 def campaign(seed: int, count: int) -> World:
     world = World()
-    world.station.camera.stream = VideoStream("rtsp://127.0.0.1:1/camera1", 640, 360, 20.0, 1)
+    world.station.get(CameraComponent).stream = VideoStream("rtsp://127.0.0.1:1/camera1", 640, 360, 20.0, 1)
     hostile = [
         *valid_frames(seed, count, target=SYSTEM, components=COMPONENTS),
         *valid_frames(seed + 1, count // 4, target=SYSTEM, sender=SYSTEM, components=COMPONENTS),
@@ -34,9 +35,9 @@ def campaign(seed: int, count: int) -> World:
 
 def still_works(world: World) -> None:
     world.frames.clear()
-    camera, gimbal = world.station.camera, world.station.components[1]
+    camera, gimbal = world.station.get(CameraComponent), world.station.get(GimbalComponent)
     assert len(camera.storage.log) <= 20_000
-    assert math.isfinite(world.payload.camera.zoom) and 1.0 <= world.payload.camera.zoom <= 6.0
+    assert math.isfinite(world.payload.get(Camera).zoom) and 1.0 <= world.payload.get(Camera).zoom <= 6.0
     control = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
     assert world.command(GIMBAL_COMPONENT, control, 255, 190, 0, 0) == m.MAV_RESULT_ACCEPTED
     assert gimbal.control.primary == (255, 190)
@@ -48,7 +49,7 @@ def still_works(world: World) -> None:
         assert world.command(CAMERA_COMPONENT, number, 1, 1, 1) == m.MAV_RESULT_ACCEPTED
     assert world.command(CAMERA_COMPONENT, m.MAV_CMD_IMAGE_START_CAPTURE, 0, 0, 1) == m.MAV_RESULT_ACCEPTED
     world.run(3.0)
-    q = world.payload.gimbal.measured_q_heading_from_gimbal
+    q = world.payload.get(Gimbal).measured_q_heading_from_gimbal
     assert all(map(math.isfinite, q))
     w, x, y, z = q
     assert math.degrees(math.asin(2.0 * (w * y - z * x))) == pytest.approx(-30.0, abs=1.5)
@@ -69,7 +70,7 @@ def test_a_long_campaign():
 def test_what_they_say_can_be_read():
     world = World()
     said = bytearray()
-    world.station.camera._send = said.extend
+    world.station.get(CameraComponent)._send = said.extend
     for frame in commands(5, 3000, target=SYSTEM, without=(), components=(CAMERA_COMPONENT,)):
         world.station.receive(frame)
     world.run(0.5)

@@ -6,6 +6,7 @@ import pytest
 
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.payload import GIMBAL_COMPONENT
+from flightsim.payload import Gimbal
 from tests.payload.test_components import HOME, SYSTEM, World, pointing
 
 ACCEPTED, DENIED = m.MAV_RESULT_ACCEPTED, m.MAV_RESULT_DENIED
@@ -115,7 +116,7 @@ def test_the_mount_of_before(world):
     assert pointing(world).pitch == pytest.approx(0.0, abs=1.5)
     assert say(world, configure, float(m.MAV_MOUNT_MODE_RETRACT)) == ACCEPTED
     world.run(0.5)
-    assert world.payload.gimbal.retracted
+    assert world.payload.get(Gimbal).retracted
     assert say(world, control, 0, 0, 0, 0, 0, 0, float(m.MAV_MOUNT_MODE_RC_TARGETING)) == UNSUPPORTED
     assert say(world, control, math.inf, 0, 0, 0, 0, 0, targeting) == DENIED
 

@@ -6,6 +6,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.payload import CameraComponent
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.video import VideoParameters
 from autopilot_bridge.video.for_sitl import show_cameras
@@ -43,7 +44,7 @@ def flight(tmp_path: Path | None, *, look: bool) -> bytes:
         # the photos' names are reported; a stream would be, too
         service = show_cameras(sitl, VideoParameters(port=None, folder=tmp_path / "pictures"), lost.append)
         sitl.poll_every(4000)
-    camera = sitl.vehicles[0].payload.camera
+    camera = sitl.vehicles[0].payload.get(CameraComponent)
     client = FrameEncoder(255, 190)
 
     def order(command: int, *values: float) -> None:
