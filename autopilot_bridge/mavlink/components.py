@@ -14,7 +14,7 @@ MOVING_POINT_COMPONENT: Final = dialect.MAV_COMP_ID_USER4
 CAMERA_COMPONENT: Final = dialect.MAV_COMP_ID_CAMERA
 CAMERA_COMPONENTS: Final = range(dialect.MAV_COMP_ID_CAMERA, dialect.MAV_COMP_ID_CAMERA6 + 1)
 GIMBAL_COMPONENT: Final = dialect.MAV_COMP_ID_GIMBAL
-MAGNETOMETER_COMPONENT: Final = dialect.MAV_COMP_ID_PERIPHERAL
+SURVEY_MAGNETOMETER_COMPONENT: Final = dialect.MAV_COMP_ID_PERIPHERAL
 """The magnetometer of a survey."""
 GROUND_STATION_COMPONENT: Final = dialect.MAV_COMP_ID_MISSIONPLANNER
 """A program on the ground, as ground stations have it."""

@@ -8,33 +8,33 @@ outputs, and produce frames.
 from autopilot_bridge.mavlink.components import (
     CAMERA_COMPONENT,
     GIMBAL_COMPONENT,
-    MAGNETOMETER_COMPONENT,
     MOVING_POINT_COMPONENT,
     RANGE_RADIO_COMPONENT,
+    SURVEY_MAGNETOMETER_COMPONENT,
     TARGET_SENSOR_COMPONENT,
 )
 from autopilot_bridge.payload.camera import CameraComponent
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
-from autopilot_bridge.payload.magnetometer import MagnetometerComponent
 from autopilot_bridge.payload.moving_points import MovingPointComponent
 from autopilot_bridge.payload.range_radio import RangeRadioComponent
 from autopilot_bridge.payload.station import PayloadStation
+from autopilot_bridge.payload.survey_magnetometer import SurveyMagnetometerComponent
 from autopilot_bridge.payload.target_sensor import TargetSensorComponent
 
 __all__ = [
     "CAMERA_COMPONENT",
     "GIMBAL_COMPONENT",
-    "MAGNETOMETER_COMPONENT",
     "MOVING_POINT_COMPONENT",
     "RANGE_RADIO_COMPONENT",
+    "SURVEY_MAGNETOMETER_COMPONENT",
     "TARGET_SENSOR_COMPONENT",
     "CameraComponent",
     "Component",
     "GimbalComponent",
-    "MagnetometerComponent",
     "MovingPointComponent",
     "PayloadStation",
     "RangeRadioComponent",
+    "SurveyMagnetometerComponent",
     "TargetSensorComponent",
 ]

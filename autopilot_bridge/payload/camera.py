@@ -7,7 +7,7 @@ autopilot has sent.
 """
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.mavlink import MAVLinkMessage
@@ -24,7 +24,7 @@ from autopilot_bridge.payload.camera_messages import (
     tracking_geo_status,
 )
 from autopilot_bridge.payload.component import Sender
-from autopilot_bridge.payload.reported_vehicle import REPORTS
+from autopilot_bridge.payload.reported_vehicle import Report
 from flightsim.payload import Camera, CameraFrame
 
 _LENS_INTERVAL_US: Final = 100_000
@@ -69,32 +69,32 @@ class CameraComponent(CameraActions):
 
     # inside
 
-    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION)
+    @streams(mavlink.MAVLink_camera_information_message)
     def _information(self, time_us: int) -> MAVLinkMessage:
         return information(self)
 
-    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)
+    @streams(mavlink.MAVLink_camera_capture_status_message)
     def _capture_status(self, time_us: int) -> MAVLinkMessage:
         return capture_status(self, time_us)
 
-    @streams(mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION)
+    @streams(mavlink.MAVLink_storage_information_message)
     def _storage_information(self, time_us: int) -> MAVLinkMessage:
         return self.storage.message(self.time_ms)
 
-    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS)
+    @streams(mavlink.MAVLink_camera_fov_status_message)
     def _fov_status(self, time_us: int) -> MAVLinkMessage:
         return fov_status(self, time_us)
 
-    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_IMAGE_STATUS)
+    @streams(mavlink.MAVLink_camera_tracking_image_status_message)
     def _tracking_image_status(self, time_us: int) -> MAVLinkMessage:
         return self.tracker.message()
 
-    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS)
+    @streams(mavlink.MAVLink_camera_tracking_geo_status_message)
     def _tracking_geo_status(self, time_us: int) -> MAVLinkMessage:
         return tracking_geo_status(self, time_us)
 
-    @receives(*REPORTS)
-    def _follow_vehicle(self, message: MAVLinkMessage, sender: Sender, time_us: int) -> None:
+    @receives(*get_args(Report))
+    def _follow_vehicle(self, message: Report, sender: Sender, time_us: int) -> None:
         if (
             self.vehicle.handle(message, sender, time_us)
             and isinstance(message, mavlink.MAVLink_global_position_int_message)

@@ -60,7 +60,7 @@ class CameraActions(CameraState):
         """Send CAMERA_CAPTURE_STATUS."""
         self.send(capture_status(self, self._time_us))
 
-    @streams(mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS)
+    @streams(mavlink.MAVLink_camera_settings_message)
     def _settings(self, time_us: int) -> MAVLinkMessage:
         return mavlink.MAVLink_camera_settings_message(
             time_boot_ms=self.time_ms,

@@ -205,11 +205,11 @@ class CameraCommands:
 
         return self._with_stream(number, switch)
 
-    @on_request(mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION)
+    @on_request(mavlink.MAVLink_video_stream_information_message)
     def _send_stream(self, number: float) -> int:
         return self._with_stream(number, lambda stream, fov: self._camera.send(stream.information(fov)))
 
-    @on_request(mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS)
+    @on_request(mavlink.MAVLink_video_stream_status_message)
     def _send_stream_status(self, number: float) -> int:
         def report(stream: VideoStream, fov_deg: float) -> None:
             # MAVSDK 4.1 requests only the status, but reads the address only from the information
@@ -255,7 +255,7 @@ class CameraCommands:
     def _old_photo(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_photo(message.param1)
 
-    @on_request(mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+    @on_request(mavlink.MAVLink_camera_image_captured_message)
     def _send_photo(self, index: float) -> int:
         """CAMERA_IMAGE_CAPTURED of a photo by its index; -1: the newest."""
         storage, number = self._camera.storage, whole(index, -2)
@@ -265,7 +265,7 @@ class CameraCommands:
         self._camera.send(message)
         return _ACCEPTED
 
-    @on_request(mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION)
+    @on_request(mavlink.MAVLink_storage_information_message)
     def _send_storage(self, number: float) -> int:
         if whole(number, -1) not in (0, STORAGE_ID):
             return _DENIED

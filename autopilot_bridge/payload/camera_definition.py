@@ -11,6 +11,7 @@ from typing import Final
 from xml.etree import ElementTree
 
 from autopilot_bridge.dispatch import receives
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_messages import DEFINITION_FILE, DEFINITION_VERSION
@@ -63,20 +64,20 @@ class CameraDefinition:
         """Send a message of the file service (which uses this object as its channel)."""
         self._camera.send(message)
 
-    @receives(mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL)
+    @receives(mavlink.MAVLink_file_transfer_protocol_message)
     def _on_transfer(
         self, message: mavlink.MAVLink_file_transfer_protocol_message, sender: Sender, time_us: int
     ) -> None:
         self._files.on_transfer(message, Source(self, *sender), time_us)
         self._next_tick_us = time_us
 
-    @receives(mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST)
+    @receives(mavlink.MAVLink_param_ext_request_list_message)
     def _on_list(
         self, message: mavlink.MAVLink_param_ext_request_list_message, sender: Sender, time_us: int
     ) -> None:
         self._list = list(range(len(self.settings)))
 
-    @receives(mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ)
+    @receives(mavlink.MAVLink_param_ext_request_read_message)
     def _on_read(
         self, message: mavlink.MAVLink_param_ext_request_read_message, sender: Sender, time_us: int
     ) -> None:
@@ -101,7 +102,7 @@ class CameraDefinition:
     def _index(self, name: str) -> int:
         return next((i for i, setting in enumerate(self.settings) if setting.name == name), -1)
 
-    @receives(mavlink.MAVLINK_MSG_ID_PARAM_EXT_SET)
+    @receives(mavlink.MAVLink_param_ext_set_message)
     def _on_set(self, message: mavlink.MAVLink_param_ext_set_message, sender: Sender, time_us: int) -> None:
         index = self._index(message.param_id)
         value, result = -1, _UNKNOWN

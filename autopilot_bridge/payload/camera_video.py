@@ -1,6 +1,7 @@
 """The camera's video stream in MAVLink messages."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink

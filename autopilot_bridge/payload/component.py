@@ -204,7 +204,7 @@ class Component(Generic[DeviceT]):
         self.send(mavlink.MAVLink_message_interval_message(message_id=message_id, interval_us=interval_us))
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    @streams(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+    @streams(mavlink.MAVLink_heartbeat_message)
     def _heartbeat(self, time_us: int) -> MAVLinkMessage:
         return mavlink.MAVLink_heartbeat_message(
             type=self.mav_type,

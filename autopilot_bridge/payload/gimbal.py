@@ -80,23 +80,23 @@ class GimbalComponent(Component[Gimbal]):
 
     # messages
 
-    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
+    @streams(mavlink.MAVLink_gimbal_device_attitude_status_message)
     def _attitude_status(self, time_us: int) -> MAVLinkMessage:
         return attitude_status(self.device)
 
-    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
+    @streams(mavlink.MAVLink_gimbal_manager_information_message)
     def _manager_information(self, time_us: int) -> MAVLinkMessage:
         return manager_information(self.device, self.time_ms)
 
-    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION)
+    @streams(mavlink.MAVLink_gimbal_device_information_message)
     def _device_information(self, time_us: int) -> MAVLinkMessage:
         return device_information(self.device, self.time_ms)
 
-    @streams(mavlink.MAVLINK_MSG_ID_MOUNT_ORIENTATION)
+    @streams(mavlink.MAVLink_mount_orientation_message)
     def _mount_orientation(self, time_us: int) -> MAVLinkMessage:
         return mount_orientation(self.device, self.time_ms)
 
-    @streams(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
+    @streams(mavlink.MAVLink_gimbal_manager_status_message)
     def _manager_status(self, time_us: int) -> MAVLinkMessage:
         control = self.control
         return mavlink.MAVLink_gimbal_manager_status_message(
@@ -109,33 +109,38 @@ class GimbalComponent(Component[Gimbal]):
             secondary_control_compid=control.secondary[1],
         )
 
-    @receives(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET)
-    def _follow_positions(self, message: MAVLinkMessage, sender: Sender, time_us: int) -> None:
+    @receives(mavlink.MAVLink_global_position_int_message, mavlink.MAVLink_follow_target_message)
+    def _follow_positions(
+        self,
+        message: mavlink.MAVLink_global_position_int_message | mavlink.MAVLink_follow_target_message,
+        sender: Sender,
+        time_us: int,
+    ) -> None:
         self._vehicle.handle(message, sender, time_us)
         self.aim.handle(message, sender, time_us)
 
-    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_SET_ATTITUDE)
+    @receives(mavlink.MAVLink_gimbal_device_set_attitude_message)
     def _on_device_attitude(
         self, message: mavlink.MAVLink_gimbal_device_set_attitude_message, sender: Sender, time_us: int
     ) -> None:
         if self.control.may_point(sender):
             self._set_attitude(message)
 
-    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE)
+    @receives(mavlink.MAVLink_gimbal_manager_set_attitude_message)
     def _on_manager_attitude(
         self, message: mavlink.MAVLink_gimbal_manager_set_attitude_message, sender: Sender, time_us: int
     ) -> None:
         if self._may_point(message.gimbal_device_id, sender):
             self._set_attitude(message)
 
-    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW)
+    @receives(mavlink.MAVLink_gimbal_manager_set_pitchyaw_message)
     def _on_manager_pitchyaw(
         self, message: mavlink.MAVLink_gimbal_manager_set_pitchyaw_message, sender: Sender, time_us: int
     ) -> None:
         if self._may_point(message.gimbal_device_id, sender):
             self._point(message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
 
-    @receives(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL)
+    @receives(mavlink.MAVLink_gimbal_manager_set_manual_control_message)
     def _on_manual_control(
         self, message: mavlink.MAVLink_gimbal_manager_set_manual_control_message, sender: Sender, time_us: int
     ) -> None:

@@ -1,7 +1,7 @@
 """The messages of the gimbal component, as device and as manager of gimbal protocol v2."""
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink

@@ -9,11 +9,11 @@ from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, from_euler
 
-REPORTS: Final = (
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE,
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
-    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+Report = (
+    mavlink.MAVLink_global_position_int_message
+    | mavlink.MAVLink_attitude_message
+    | mavlink.MAVLink_system_time_message
+    | mavlink.MAVLink_heartbeat_message
 )
 """The messages that are used."""
 STALE_US: Final = 3_000_000

@@ -8,9 +8,9 @@ from autopilot_bridge.mavlink import FrameParser
 from autopilot_bridge.payload.camera import CameraComponent
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.gimbal import GimbalComponent
-from autopilot_bridge.payload.magnetometer import MagnetometerComponent
 from autopilot_bridge.payload.moving_points import MovingPointComponent
 from autopilot_bridge.payload.range_radio import RangeRadioComponent
+from autopilot_bridge.payload.survey_magnetometer import SurveyMagnetometerComponent
 from autopilot_bridge.payload.target_sensor import TargetSensorComponent
 from flightsim.foundation.plug_ins import plug_in_class
 from flightsim.payload import Payload
@@ -22,7 +22,7 @@ COMPONENTS: Final[Mapping[str, type[Component[Any]]]] = MappingProxyType(
     {
         "camera": CameraComponent,
         "gimbal": GimbalComponent,
-        "magnetometer": MagnetometerComponent,
+        "magnetometer": SurveyMagnetometerComponent,
         "target_sensor": TargetSensorComponent,
         "range_radio": RangeRadioComponent,
         "moving_points": MovingPointComponent,

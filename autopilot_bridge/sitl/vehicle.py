@@ -47,7 +47,7 @@ class SitlVehicle:
         sensors: its sensor suite; `sensors.faults` switches failures.
         failures: executes MAV_CMD_INJECT_FAILURE.
         backend: its autopilot.
-        payload: its payload, as MAVLink components on a separate link; None: no payload.
+        station: its payload, as MAVLink components on a separate link; None: no payload.
         links: its open links with their peers, and its signing key.
         crashed: the vehicle has crashed; clients were informed.
         stopped: a failure of its simulation was contained, and it stays stopped.
@@ -126,7 +126,7 @@ class SitlVehicle:
         self._report_failure: FailureReport | None = None
         self._probation = Probation()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
-        self.payload: PayloadStation | None = None
+        self.station: PayloadStation | None = None
         if specification.payload.devices:
             carrier = Carrier(
                 truth=self.vehicle.truth,
@@ -151,7 +151,7 @@ class SitlVehicle:
         channel = self.open(ours, role="payload")
         ours.on_receive = lambda data: self.take(channel, channel.parse(data))
         theirs.on_receive = station.receive
-        self.payload = station
+        self.station = station
 
     @property
     def autopilot(self) -> Autopilot:
@@ -207,8 +207,8 @@ class SitlVehicle:
             actuators = self.backend.step(time_us - boot_us)
             if self._boot_us == boot_us:  # it did not fail on a frame that it was sent within the step
                 self._actuators = actuators
-        if self.payload is not None:
-            self.payload.step(time_us)
+        if self.station is not None:
+            self.station.step(time_us)
         if self._crew is not None and self._crew.watch(time_us):
             self._crew = None
         if self.vehicle.crash is not None and not self.crashed:

@@ -55,7 +55,7 @@ def show_cameras(
     components = [
         (vehicle.specification.system_id, camera)
         for vehicle in sitl.vehicles
-        if vehicle.payload is not None and (camera := vehicle.payload.get(CameraComponent)) is not None
+        if vehicle.station is not None and (camera := vehicle.station.get(CameraComponent)) is not None
     ]
     if not components:
         return None

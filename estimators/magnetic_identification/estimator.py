@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
-from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
 from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -116,7 +116,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         if is_a(message, wire.NAMED_VALUE_FLOAT):
-            if message.src_component != MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
+            if message.src_component != SURVEY_MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message)
         if is_a(message, wire.GLOBAL_POSITION_INT) and message.src_component == AUTOPILOT_COMPONENT:

@@ -14,7 +14,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
 from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -125,7 +125,7 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
     def handle(self, time_us: int, message: Message) -> Outcome:
         name = message.name
         if is_a(message, wire.NAMED_VALUE_FLOAT):
-            if message.src_component != MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
+            if message.src_component != SURVEY_MAGNETOMETER_COMPONENT or message.name_ != TOTAL_FIELD_NAME:
                 return Outcome.IGNORED
             return self._on_reading(time_us, message.value)
         if message.src_component != AUTOPILOT_COMPONENT:

@@ -86,7 +86,7 @@ class RenderedCameras:
 def _tag_cameras(sitl: Sitl) -> Iterator[tuple[int, Camera, RenderedTagsReader]]:
     """System id, device and reader of each camera that reads tags."""
     for vehicle in sitl.vehicles:
-        device = None if vehicle.payload is None else vehicle.payload.payload.get(Camera)
+        device = None if vehicle.station is None else vehicle.station.payload.get(Camera)
         if device is not None and isinstance(device.reader, RenderedTagsReader):
             yield vehicle.specification.system_id, device, device.reader
 
@@ -94,6 +94,6 @@ def _tag_cameras(sitl: Sitl) -> Iterator[tuple[int, Camera, RenderedTagsReader]]
 def _point_cameras(sitl: Sitl) -> Iterator[tuple[int, MovingPointCamera, RenderedPointsReader]]:
     """The same of each moving-point camera."""
     for vehicle in sitl.vehicles:
-        device = None if vehicle.payload is None else vehicle.payload.payload.get(MovingPointCamera)
+        device = None if vehicle.station is None else vehicle.station.payload.get(MovingPointCamera)
         if device is not None and isinstance(device.reader, RenderedPointsReader):
             yield vehicle.specification.system_id, device, device.reader

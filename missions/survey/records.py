@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
 from estimators import survey_magnetometer
 from estimators.errors import EstimatorError
 from estimators.survey.compensation import (
@@ -43,7 +43,7 @@ def flight_readings(
         frame: the frame.
         attitude: give them the vehicle's attitude, for a compensation; readings without one are left out.
     """
-    sent = records.table("NAMED_VALUE_FLOAT", system_id, MAGNETOMETER_COMPONENT)
+    sent = records.table("NAMED_VALUE_FLOAT", system_id, SURVEY_MAGNETOMETER_COMPONENT)
     sent = sent[sent["name"] == survey_magnetometer.TOTAL_FIELD_NAME.encode()]
     positions = records.positions(system_id)
     attitudes = records.table("ATTITUDE", system_id, AUTOPILOT_COMPONENT)

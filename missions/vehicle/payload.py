@@ -9,7 +9,11 @@ from collections.abc import Callable
 from typing import Final, TypeVar
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode_as, dialect
-from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.components import (
+    CAMERA_COMPONENT,
+    GIMBAL_COMPONENT,
+    SURVEY_MAGNETOMETER_COMPONENT,
+)
 from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.vehicle.link import VehicleLink
@@ -38,11 +42,11 @@ class Payload:
 
     def on_detection(self, listener: Callable[[Detection], None]) -> Callable[[], None]:
         """Call `listener` with each detection; returns a function that ends this."""
-        return self._listen(dialect.MAVLink_landing_target_message, CAMERA_COMPONENT, detection, listener)
+        return self.listen(dialect.MAVLink_landing_target_message, CAMERA_COMPONENT, detection, listener)
 
     def on_gimbal_attitude(self, listener: Callable[[GimbalAttitude], None]) -> Callable[[], None]:
         """Call `listener` with each attitude of the gimbal; returns a function that ends this."""
-        return self._listen(
+        return self.listen(
             dialect.MAVLink_gimbal_device_attitude_status_message, GIMBAL_COMPONENT, gimbal_attitude, listener
         )
 
@@ -56,17 +60,28 @@ class Payload:
                 return None
             return int(m.time_boot_ms) * 1000, float(m.value)
 
-        return self._listen(
-            dialect.MAVLink_named_value_float_message, MAGNETOMETER_COMPONENT, sample, lambda s: listener(*s)
+        return self.listen(
+            dialect.MAVLink_named_value_float_message,
+            SURVEY_MAGNETOMETER_COMPONENT,
+            sample,
+            lambda s: listener(*s),
         )
 
-    def _listen(
+    def listen(
         self,
         kind: type[MessageT],
         component_id: int,
         convert: Callable[[MessageT], ValueT | None],
         listener: Callable[[ValueT], None],
     ) -> Callable[[], None]:
+        """Call `listener` with what a component of the vehicle sends; returns a function that ends this.
+
+        Args:
+            kind: class of the message.
+            component_id: of the component.
+            convert: what the message says, for `listener`; None: nothing.
+            listener: called with each of them.
+        """
         system_id = self._link.system_id
 
         def look(frame: Frame) -> None:
@@ -173,19 +188,19 @@ class Payload:
         link = self._link
         link.send(
             dialect.MAVLink_command_int_message(
-                link.system_id,
-                GIMBAL_COMPONENT,
-                dialect.MAV_FRAME_GLOBAL,
-                dialect.MAV_CMD_DO_SET_ROI_LOCATION,
-                0,
-                0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                round(lat_deg * 1e7),
-                round(lon_deg * 1e7),
-                alt_m,
+                target_system=link.system_id,
+                target_component=GIMBAL_COMPONENT,
+                frame=dialect.MAV_FRAME_GLOBAL,
+                command=dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+                current=0,
+                autocontinue=0,
+                param1=0.0,
+                param2=0.0,
+                param3=0.0,
+                param4=0.0,
+                x=round(lat_deg * 1e7),
+                y=round(lon_deg * 1e7),
+                z=alt_m,
             )
         )
 
@@ -194,7 +209,14 @@ class Payload:
         self._warn_when_taken()
         link.send(
             dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
-                link.system_id, GIMBAL_COMPONENT, _IN_VEHICLE_FRAME, 0, pitch, yaw, pitch_rate, yaw_rate
+                target_system=link.system_id,
+                target_component=GIMBAL_COMPONENT,
+                flags=_IN_VEHICLE_FRAME,
+                gimbal_device_id=0,
+                pitch=pitch,
+                yaw=yaw,
+                pitch_rate=pitch_rate,
+                yaw_rate=yaw_rate,
             )
         )
 

@@ -20,9 +20,9 @@ from autopilot_bridge.mavlink.components import (
     AUTOPILOT_COMPONENT,
     CAMERA_COMPONENT,
     GIMBAL_COMPONENT,
-    MAGNETOMETER_COMPONENT,
     MOVING_POINT_COMPONENT,
     RANGE_RADIO_COMPONENT,
+    SURVEY_MAGNETOMETER_COMPONENT,
     TARGET_SENSOR_COMPONENT,
 )
 from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, read_moving_points
@@ -176,7 +176,7 @@ GIMBAL: Final = Sensor(
 )
 SURVEY_MAGNETOMETER: Final = Sensor(
     name="survey magnetometer",
-    component=MAGNETOMETER_COMPONENT,
+    component=SURVEY_MAGNETOMETER_COMPONENT,
     source=Source.of(dialect.MAVLink_named_value_float_message, _total_field),
     what=f"readings of a field (NAMED_VALUE_FLOAT {survey_magnetometer.TOTAL_FIELD_NAME})",
     least_hz=1.0,

@@ -13,7 +13,7 @@ from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.payload import (
     CAMERA_COMPONENT,
     GIMBAL_COMPONENT,
-    MAGNETOMETER_COMPONENT,
+    SURVEY_MAGNETOMETER_COMPONENT,
     PayloadStation,
 )
 from flightsim import truth as t
@@ -134,11 +134,15 @@ def pointing(world: World) -> SimpleNamespace:
 def test_heartbeats_streams_and_ids(world):
     world.run(10.0)
     kinds = {(f.system_id, f.component_id) for f in world.frames}
-    assert kinds == {(SYSTEM, CAMERA_COMPONENT), (SYSTEM, GIMBAL_COMPONENT), (SYSTEM, MAGNETOMETER_COMPONENT)}
+    assert kinds == {
+        (SYSTEM, CAMERA_COMPONENT),
+        (SYSTEM, GIMBAL_COMPONENT),
+        (SYSTEM, SURVEY_MAGNETOMETER_COMPONENT),
+    }
     for component, mav_type in [
         (CAMERA_COMPONENT, m.MAV_TYPE_CAMERA),
         (GIMBAL_COMPONENT, m.MAV_TYPE_GIMBAL),
-        (MAGNETOMETER_COMPONENT, m.MAV_TYPE_ONBOARD_CONTROLLER),
+        (SURVEY_MAGNETOMETER_COMPONENT, m.MAV_TYPE_ONBOARD_CONTROLLER),
     ]:
         beats = world.messages(m.MAVLINK_MSG_ID_HEARTBEAT, component)
         assert len(beats) == 10
@@ -148,7 +152,7 @@ def test_heartbeats_streams_and_ids(world):
 
 def test_field_readings_are_named_values(world):
     world.run(5.0)
-    readings = world.messages(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, MAGNETOMETER_COMPONENT)
+    readings = world.messages(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, SURVEY_MAGNETOMETER_COMPONENT)
     assert len(readings) == 50
     assert {r.name for r in readings} == {"MAG_NT"}
     assert np.mean([r.value for r in readings]) == pytest.approx(48_000.0, abs=2.0)
@@ -358,7 +362,7 @@ SHARED = World()
 
 @settings(max_examples=300, deadline=None)
 @given(
-    component=st.sampled_from([0, CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT]),
+    component=st.sampled_from([0, CAMERA_COMPONENT, GIMBAL_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT]),
     command=st.sampled_from([511, 510, 512, 1000, 1001, 195, 197, 2000, 2001, 530, 526, 40_000]),
     values=st.lists(EXTREME, min_size=7, max_size=7),
     flags=st.integers(0, 2**16 - 1),

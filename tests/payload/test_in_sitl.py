@@ -5,7 +5,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mavlink import dialect as m
-from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
+from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from flightsim.payload import (
@@ -91,7 +91,9 @@ def test_magnetometer_measures_the_map():
     client = sitl.connect(0)
     (received,) = frames_after(sitl, 2.0, client)
     values = [
-        decode(f).value for f in received if f.component_id == MAGNETOMETER_COMPONENT and f.message_id == 251
+        decode(f).value
+        for f in received
+        if f.component_id == SURVEY_MAGNETOMETER_COMPONENT and f.message_id == 251
     ]
     assert len(values) == 20
     assert np.mean(values) == pytest.approx(48_123.0, abs=2.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, dialect
-from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
+from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import (
@@ -25,13 +25,13 @@ from tests.system.test_garbage import COMMAND_INT, COMMAND_LONG, TERMINATING, ch
 
 RANDOM_BYTES = 2_000_000
 DAMAGED_FRAMES = 100_000
-COMPONENTS = (0, 1, CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT)
+COMPONENTS = (0, 1, CAMERA_COMPONENT, GIMBAL_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT)
 UNTARGETED = [
     number
     for number, item in DEFINITIONS.items()
     if "target_component" not in {field.name for field in item.wire_fields}
 ]
-ALL_PAYLOAD = (CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT)
+ALL_PAYLOAD = (CAMERA_COMPONENT, GIMBAL_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT)
 LINES = np.linspace(-500.0, 500.0, 11)
 CARRIED = PayloadParameters(
     gimbal=GimbalParameters(), camera=CameraParameters(), magnetometer=SurveyMagnetometerParameters()

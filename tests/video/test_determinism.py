@@ -44,7 +44,7 @@ def flight(tmp_path: Path | None, *, look: bool) -> bytes:
         # the photos' names are reported; a stream would be, too
         service = show_cameras(sitl, VideoParameters(port=None, folder=tmp_path / "pictures"), lost.append)
         sitl.poll_every(4000)
-    camera = sitl.vehicles[0].payload.get(CameraComponent)
+    camera = sitl.vehicles[0].station.get(CameraComponent)
     client = FrameEncoder(255, 190)
 
     def order(command: int, *values: float) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import decode, definition
-from autopilot_bridge.mavlink.components import MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.components import SURVEY_MAGNETOMETER_COMPONENT
 from autopilot_bridge.tlog import TlogReader
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import LocalFrame
@@ -142,7 +142,7 @@ def flown_readings(folder, home, system_id):
         decode(frame)
         for _, frame in TlogReader(folder / "flight.tlog")
         if (frame.message_id, frame.system_id) == (definition("NAMED_VALUE_FLOAT").message_id, system_id)
-        and frame.component_id == MAGNETOMETER_COMPONENT
+        and frame.component_id == SURVEY_MAGNETOMETER_COMPONENT
     ]
     per_lat, per_lon = LocalFrame(home).metres_per_degree
     places = np.column_stack(

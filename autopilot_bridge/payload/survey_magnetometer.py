@@ -8,7 +8,7 @@ from struct import Struct
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.mavlink.components import MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.components import SURVEY_MAGNETOMETER_COMPONENT
 from autopilot_bridge.payload.component import Component, fixed_text
 from flightsim.payload import MagneticReading, SurveyMagnetometer
 
@@ -18,10 +18,10 @@ _MESSAGE_ID: Final = int(mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT)
 _pack: Final = Struct("<If10s").pack
 
 
-class MagnetometerComponent(Component[SurveyMagnetometer]):
+class SurveyMagnetometerComponent(Component[SurveyMagnetometer]):
     """Sends every reading when it comes."""
 
-    component_id = MAGNETOMETER_COMPONENT
+    component_id = SURVEY_MAGNETOMETER_COMPONENT
 
     def update(self, reading: MagneticReading) -> None:
         """Send a reading that was delivered on this step."""
