@@ -10,8 +10,13 @@ from autopilot_bridge.firmware.data import load_data, message_ids
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.messages.common import NAN, CommonMessages
-from autopilot_bridge.telemetry.fields import FieldValues
+from autopilot_bridge.services.messages.common import (
+    NAN,
+    POSITION_TARGET_LOCAL_NED,
+    TARGET_FIELDS,
+    CommonMessages,
+)
+from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 from flightsim.foundation.vectors import euler_of
 
@@ -42,11 +47,17 @@ STREAM_RATE_PARAMETERS: Final[Mapping[int, str]] = MappingProxyType(
 NOT_REQUESTABLE: Final = frozenset(message_ids(_DATA["not_requestable"]))
 """Messages that 4.6 refuses to send on request (docs/firmware/ardupilot.md, section 1)."""
 
+_RSSI_UNKNOWN: Final = 255
 _RC_NEUTRAL_US: Final = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 _POSITION_ONLY_MASK: Final = 0xFDF8
 _FORCE_AND_FRAME_BITS: Final = 0xF200
 _VELOCITY_MASK: Final = 0xC07
 _SECONDS_PER_HOUR: Final = 3600.0
+_AHRS: Final = fields("AHRS")
+_EKF_STATUS_REPORT: Final = fields("EKF_STATUS_REPORT")
+_RC_CHANNELS: Final = fields("RC_CHANNELS")
+_TERRAIN_REPORT: Final = fields("TERRAIN_REPORT")
+NAV_CONTROLLER_OUTPUT: Final = fields("NAV_CONTROLLER_OUTPUT")
 
 
 class ArdupilotMessages(CommonMessages):
@@ -95,27 +106,28 @@ class ArdupilotMessages(CommonMessages):
             bearing_deg = round(math.degrees(math.atan2(east, north))) % 360
             alt_error_m = -down
         heading_deg = round(math.degrees(v.yaw))
-        return (
-            math.degrees(roll) if math.isfinite(roll) else 0.0,
-            math.degrees(pitch) if math.isfinite(pitch) else 0.0,
-            heading_deg,
-            bearing_deg,
-            round(distance_m),
-            alt_error_m,
-            0.0,
-            0.0,
+        return NAV_CONTROLLER_OUTPUT(
+            nav_roll=math.degrees(roll) if math.isfinite(roll) else 0.0,
+            nav_pitch=math.degrees(pitch) if math.isfinite(pitch) else 0.0,
+            nav_bearing=heading_deg,
+            target_bearing=bearing_deg,
+            wp_dist=round(distance_m),
+            alt_error=alt_error_m,
         )
 
     @streams(_M.MAVLink_rc_channels_message)
     def rc_channels(self) -> Values:
         """RC_CHANNELS (65): the simulated transmitter at rest."""
-        return (self.view.time_ms, 8, *_RC_NEUTRAL_US, *(0,) * 10, 255)
+        pulses = {f"chan{number}_raw": pulse_us for number, pulse_us in enumerate(_RC_NEUTRAL_US, start=1)}
+        return _RC_CHANNELS(
+            time_boot_ms=self.view.time_ms, chancount=len(pulses), **pulses, rssi=_RSSI_UNKNOWN
+        )
 
     @streams(_M.MAVLink_ahrs_message)
     def ahrs(self) -> Values:
         """AHRS (163): gyro bias estimate."""
-        bias = self.parts.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
-        return (*bias, 0.0, 0.0, 0.0, 0.0)
+        x, y, z = self.parts.navigation.state[nav.GYRO_BIAS_RAD_S].tolist()
+        return _AHRS(omegaIx=x, omegaIy=y, omegaIz=z)
 
     @streams(_M.MAVLink_ahrs2_message)
     def ahrs2(self) -> Values | None:
@@ -129,14 +141,14 @@ class ArdupilotMessages(CommonMessages):
     def ekf_status_report(self) -> Values:
         """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
         health = self.parts.navigation.health
-        return (
-            self.ekf_status_flags(),
-            finite(health.velocity_test_ratio),
-            finite(health.position_horizontal_test_ratio),
-            finite(health.position_vertical_test_ratio),
-            finite(health.magnetometer_test_ratio),
-            finite(health.height_above_ground_test_ratio),
-            finite(health.airspeed_test_ratio),
+        return _EKF_STATUS_REPORT(
+            flags=self.ekf_status_flags(),
+            velocity_variance=finite(health.velocity_test_ratio),
+            pos_horiz_variance=finite(health.position_horizontal_test_ratio),
+            pos_vert_variance=finite(health.position_vertical_test_ratio),
+            compass_variance=finite(health.magnetometer_test_ratio),
+            terrain_alt_variance=finite(health.height_above_ground_test_ratio),
+            airspeed_variance=finite(health.airspeed_test_ratio),
         )
 
     def ekf_status_flags(self) -> int:
@@ -168,7 +180,7 @@ class ArdupilotMessages(CommonMessages):
         v = self.view.refreshed()
         if not v.has_global:
             return None
-        return (v.lat_e7, v.lon_e7, 0, 0.0, 0.0, 0, 0)
+        return _TERRAIN_REPORT(lat=v.lat_e7, lon=v.lon_e7)
 
     @streams(_M.MAVLink_wind_message)
     def wind(self) -> Values:
@@ -202,17 +214,26 @@ class ArdupilotMessages(CommonMessages):
         if target is None:
             return None
         if all(map(math.isfinite, target[:3])):
-            mask, target = _POSITION_ONLY_MASK & ~_FORCE_AND_FRAME_BITS, [*target[:3], *(0.0,) * 8]
+            mask, given = _POSITION_ONLY_MASK & ~_FORCE_AND_FRAME_BITS, slice(0, 3)
         else:
-            mask, target = _VELOCITY_MASK, [0.0, 0.0, 0.0, *map(finite, target[3:9]), 0.0, 0.0]
-        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
+            mask, given = _VELOCITY_MASK, slice(3, 9)
+        return POSITION_TARGET_LOCAL_NED(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            type_mask=mask,
+            **dict(zip(TARGET_FIELDS[given], map(finite, target[given]), strict=True)),
+        )
 
-    def position_target_global_int(self) -> Values | None:
+    def position_target_global_int(self) -> FieldValues | None:
         """POSITION_TARGET_GLOBAL_INT (87): frame 0, altitude above mean sea level."""
         values = super().position_target_global_int()
         if values is None:
             return None
-        return (values[0], mavlink.MAV_FRAME_GLOBAL, _POSITION_ONLY_MASK, *values[3:6], *(0.0,) * 8)
+        return values._replace(
+            coordinate_frame=mavlink.MAV_FRAME_GLOBAL,
+            type_mask=_POSITION_ONLY_MASK,
+            **dict.fromkeys(TARGET_FIELDS[3:], 0.0),
+        )
 
 
 def finite(value: float) -> float:

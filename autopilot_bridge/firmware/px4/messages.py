@@ -10,7 +10,13 @@ from autopilot_bridge.firmware.data import load_data, message_rates
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.messages.common import NAN, CommonMessages
+from autopilot_bridge.services.messages.common import (
+    ATTITUDE_TARGET,
+    NAN,
+    POSITION_TARGET_LOCAL_NED,
+    TARGET_FIELDS,
+    CommonMessages,
+)
 from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
@@ -19,6 +25,9 @@ from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 _M = mavlink
 _ESTIMATOR_STATUS: Final = fields("ESTIMATOR_STATUS")
 _ORBIT_EXECUTION_STATUS: Final = fields("ORBIT_EXECUTION_STATUS")
+_ALTITUDE: Final = fields("ALTITUDE")
+_OPEN_DRONE_ID_LOCATION: Final = fields("OPEN_DRONE_ID_LOCATION")
+_OPEN_DRONE_ID_SYSTEM: Final = fields("OPEN_DRONE_ID_SYSTEM")
 _ACTUATOR_OUTPUTS: Final = 32  # fields of ACTUATOR_OUTPUT_STATUS
 
 _DATA: Final = load_data("px4", "messages.toml")
@@ -78,14 +87,14 @@ class Px4Messages(CommonMessages):
         clearance_m = float(self.parts.navigation.state[nav.HEIGHT_ABOVE_GROUND_M])
         local_m = -v.pos[2]
         pressure_pa, _ = v.pressure()
-        return (
-            v.time_us,
-            pressure_altitude_m(pressure_pa) if math.isfinite(pressure_pa) else NAN,
-            v.alt_amsl_m,
-            local_m,
-            v.alt_relative_m,
-            local_m - clearance_m if math.isfinite(clearance_m) else NAN,
-            clearance_m,
+        return _ALTITUDE(
+            time_usec=v.time_us,
+            altitude_monotonic=pressure_altitude_m(pressure_pa) if math.isfinite(pressure_pa) else NAN,
+            altitude_amsl=v.alt_amsl_m,
+            altitude_local=local_m,
+            altitude_relative=v.alt_relative_m,
+            altitude_terrain=local_m - clearance_m if math.isfinite(clearance_m) else NAN,
+            bottom_clearance=clearance_m,
         )
 
     def attitude_target(self) -> Values | None:
@@ -95,7 +104,7 @@ class Px4Messages(CommonMessages):
             return target
         half_yaw = 0.5 * self.view.refreshed().yaw
         level = (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
-        return (self.view.time_ms, 0, level, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0))
+        return ATTITUDE_TARGET(time_boot_ms=self.view.time_ms, q=level)
 
     def position_target_local_ned(self) -> Values | None:
         """POSITION_TARGET_LOCAL_NED (85), at rest too; a quantity that is not commanded is NaN, and
@@ -113,7 +122,12 @@ class Px4Messages(CommonMessages):
                 for commanded, made in zip(target[3:6], computed, strict=True)
             ]
         mask = sum(bit for bit, value in zip(_TARGET_BITS, target, strict=True) if math.isnan(value))
-        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
+        return POSITION_TARGET_LOCAL_NED(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            type_mask=mask,
+            **dict(zip(TARGET_FIELDS, target, strict=True)),
+        )
 
     @streams(_M.MAVLink_estimator_status_message)
     def estimator_status(self) -> FieldValues:
@@ -164,26 +178,22 @@ class Px4Messages(CommonMessages):
         airborne = int(self.context.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND
         course_cdeg = round(math.degrees(math.atan2(v.vel[1], v.vel[0])) % 360.0 * 100.0) % 36000
         pressure_pa, _ = v.pressure()
-        return (
-            0,
-            0,
-            (0,) * 20,
-            mavlink.MAV_ODID_STATUS_AIRBORNE if airborne else mavlink.MAV_ODID_STATUS_GROUND,
-            course_cdeg,
-            round(v.ground_speed_m_s * 100.0),
-            round(-v.vel[2] * 100.0),
-            v.lat_e7,
-            v.lon_e7,
-            pressure_altitude_m_or_unknown(pressure_pa),
-            v.alt_amsl_m,
-            mavlink.MAV_ODID_HEIGHT_REF_OVER_TAKEOFF,
-            v.alt_relative_m,
-            mavlink.MAV_ODID_HOR_ACC_1_METER,
-            mavlink.MAV_ODID_VER_ACC_1_METER,
-            mavlink.MAV_ODID_VER_ACC_UNKNOWN,
-            mavlink.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
-            float(UINT16_UNKNOWN),
-            0,
+        return _OPEN_DRONE_ID_LOCATION(
+            status=mavlink.MAV_ODID_STATUS_AIRBORNE if airborne else mavlink.MAV_ODID_STATUS_GROUND,
+            direction=course_cdeg,
+            speed_horizontal=round(v.ground_speed_m_s * 100.0),
+            speed_vertical=round(-v.vel[2] * 100.0),
+            latitude=v.lat_e7,
+            longitude=v.lon_e7,
+            altitude_barometric=pressure_altitude_m_or_unknown(pressure_pa),
+            altitude_geodetic=v.alt_amsl_m,
+            height_reference=mavlink.MAV_ODID_HEIGHT_REF_OVER_TAKEOFF,
+            height=v.alt_relative_m,
+            horizontal_accuracy=mavlink.MAV_ODID_HOR_ACC_1_METER,
+            vertical_accuracy=mavlink.MAV_ODID_VER_ACC_1_METER,
+            barometer_accuracy=mavlink.MAV_ODID_VER_ACC_UNKNOWN,
+            speed_accuracy=mavlink.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
+            timestamp=float(UINT16_UNKNOWN),
         )
 
     @streams(_M.MAVLink_open_drone_id_system_message)
@@ -193,22 +203,18 @@ class Px4Messages(CommonMessages):
         if home is None:
             return None
         unix_s = (self.parts.memory.unix_epoch_us + self.view.time_us) // 1_000_000
-        return (
-            0,
-            0,
-            (0,) * 20,
-            mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_TAKEOFF,
-            mavlink.MAV_ODID_CLASSIFICATION_TYPE_UNDECLARED,
-            home[0],
-            home[1],
-            1,
-            0,
-            -1000.0,
-            -1000.0,
-            mavlink.MAV_ODID_CATEGORY_EU_UNDECLARED,
-            mavlink.MAV_ODID_CLASS_EU_UNDECLARED,
-            home[2] * 1e-3,
-            max(0, unix_s - ODID_EPOCH_UNIX_S),
+        return _OPEN_DRONE_ID_SYSTEM(
+            operator_location_type=mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_TAKEOFF,
+            classification_type=mavlink.MAV_ODID_CLASSIFICATION_TYPE_UNDECLARED,
+            operator_latitude=home[0],
+            operator_longitude=home[1],
+            area_count=1,
+            area_ceiling=-1000.0,
+            area_floor=-1000.0,
+            category_eu=mavlink.MAV_ODID_CATEGORY_EU_UNDECLARED,
+            class_eu=mavlink.MAV_ODID_CLASS_EU_UNDECLARED,
+            operator_altitude_geo=home[2] * 1e-3,
+            timestamp=max(0, unix_s - ODID_EPOCH_UNIX_S),
         )
 
 

@@ -21,6 +21,12 @@ _SYS_STATUS: Final = fields("SYS_STATUS")
 _GPS_RAW_INT: Final = fields("GPS_RAW_INT")
 _BATTERY_STATUS: Final = fields("BATTERY_STATUS")
 _DISTANCE_SENSOR: Final = fields("DISTANCE_SENSOR")
+_HOME_POSITION: Final = fields("HOME_POSITION")
+ATTITUDE_TARGET: Final = fields("ATTITUDE_TARGET")
+POSITION_TARGET_LOCAL_NED: Final = fields("POSITION_TARGET_LOCAL_NED")
+POSITION_TARGET_GLOBAL_INT: Final = fields("POSITION_TARGET_GLOBAL_INT")
+TARGET_FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate")
+"""The fields of POSITION_TARGET_LOCAL_NED that a trajectory setpoint has."""
 
 
 class CommonMessages(Microservice):
@@ -189,17 +195,18 @@ class CommonMessages(Microservice):
         if not context.armed or context.setpoint[sp.LEVEL] < sp.RATES:
             return None
         controller = self.parts.controller
-        return (
-            self.view.time_ms,
-            0,
-            controller.attitude_setpoint.tolist(),
-            *controller.rate_setpoint_frd_rad_s.tolist(),
-            controller.thrust,
-            (0.0, 0.0, 0.0),
+        roll_rate, pitch_rate, yaw_rate = controller.rate_setpoint_frd_rad_s.tolist()
+        return ATTITUDE_TARGET(
+            time_boot_ms=self.view.time_ms,
+            q=controller.attitude_setpoint.tolist(),
+            body_roll_rate=roll_rate,
+            body_pitch_rate=pitch_rate,
+            body_yaw_rate=yaw_rate,
+            thrust=controller.thrust,
         )
 
     def trajectory_setpoint(self) -> list[float] | None:
-        """Commanded position 3, velocity 3, acceleration 3, yaw, yaw rate; None in other kinds of flight."""
+        """Values of `TARGET_FIELDS` as commanded; None in other kinds of flight."""
         context = self.context
         if not context.armed or context.setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return None
@@ -212,24 +219,27 @@ class CommonMessages(Microservice):
         target = self.trajectory_setpoint()
         if target is None:
             return None
-        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, 0, *target)
+        return POSITION_TARGET_LOCAL_NED(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            **dict(zip(TARGET_FIELDS, target, strict=True)),
+        )
 
     @streams(mavlink.MAVLink_position_target_global_int_message)
-    def position_target_global_int(self) -> Values | None:
+    def position_target_global_int(self) -> FieldValues | None:
         """POSITION_TARGET_GLOBAL_INT (87)."""
         target = self.trajectory_setpoint()
         frame = self.context.frame
         if target is None or frame is None or not all(map(math.isfinite, target[:3])):
             return None
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(*target[:3])
-        return (
-            self.view.time_ms,
-            mavlink.MAV_FRAME_GLOBAL_INT,
-            0,
-            round(lat_deg * 1e7),
-            round(lon_deg * 1e7),
-            alt_m,
-            *target[3:],
+        return POSITION_TARGET_GLOBAL_INT(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT,
+            lat_int=round(lat_deg * 1e7),
+            lon_int=round(lon_deg * 1e7),
+            alt=alt_m,
+            **dict(zip(TARGET_FIELDS[3:], target[3:], strict=True)),
         )
 
     def raw_scaled_imu(self) -> tuple[int, ...] | None:
@@ -282,14 +292,17 @@ class CommonMessages(Microservice):
         place = self.home_place()
         if place is None:
             return None
-        return (
-            *place,
-            *self.context.home_ned_m.tolist(),
-            self.home_quaternion(),
-            0.0,
-            0.0,
-            0.0,
-            self.view.time_us,
+        lat, lon, alt = place
+        north_m, east_m, down_m = self.context.home_ned_m.tolist()
+        return _HOME_POSITION(
+            latitude=lat,
+            longitude=lon,
+            altitude=alt,
+            x=north_m,
+            y=east_m,
+            z=down_m,
+            q=self.home_quaternion(),
+            time_usec=self.view.time_us,
         )
 
     def home_place(self) -> tuple[int, int, int] | None:

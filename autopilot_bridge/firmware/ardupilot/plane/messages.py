@@ -11,7 +11,9 @@ from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
+from autopilot_bridge.services.messages.common import POSITION_TARGET_GLOBAL_INT, POSITION_TARGET_LOCAL_NED
 from autopilot_bridge.services.parts import AutopilotParts
+from autopilot_bridge.telemetry.fields import FieldValues
 from autopilot_bridge.telemetry.streams import Values
 from flightsim import interface
 
@@ -113,15 +115,15 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             distance_m = path.distance_m(north_m, east_m)
             height_error_m = down_m - path.down_m
             track_error_m = path.track_error_m(north_m, east_m)
-        return (
-            math.degrees(ardupilot.finite(controller.roll_setpoint_rad)),
-            math.degrees(ardupilot.finite(controller.pitch_setpoint_rad)),
-            bearing,
-            bearing,
-            round(distance_m),
-            height_error_m,
-            100.0 * ardupilot.finite(controller.airspeed_error_m_s),
-            track_error_m,
+        return ardupilot.NAV_CONTROLLER_OUTPUT(
+            nav_roll=math.degrees(ardupilot.finite(controller.roll_setpoint_rad)),
+            nav_pitch=math.degrees(ardupilot.finite(controller.pitch_setpoint_rad)),
+            nav_bearing=bearing,
+            target_bearing=bearing,
+            wp_dist=round(distance_m),
+            alt_error=height_error_m,
+            aspd_error=100.0 * ardupilot.finite(controller.airspeed_error_m_s),
+            xtrack_error=track_error_m,
         )
 
     def ekf_status_flags(self) -> int:
@@ -137,23 +139,28 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
         path = self._aircraft.path
         if path is None:
             return None
-        place = (path.north_m, path.east_m, path.down_m)
-        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, _TARGET_MASK & 0xDFF, *place, *(0.0,) * 8)
+        return POSITION_TARGET_LOCAL_NED(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            type_mask=_TARGET_MASK & 0xDFF,
+            x=path.north_m,
+            y=path.east_m,
+            z=path.down_m,
+        )
 
-    def position_target_global_int(self) -> Values | None:
+    def position_target_global_int(self) -> FieldValues | None:
         """POSITION_TARGET_GLOBAL_INT (87): frame 0, altitude above mean sea level."""
         path, frame = self._aircraft.path, self.context.frame
         if path is None or frame is None:
             return None
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(path.north_m, path.east_m, path.down_m)
-        return (
-            self.view.time_ms,
-            mavlink.MAV_FRAME_GLOBAL,
-            _TARGET_MASK,
-            round(lat_deg * 1e7),
-            round(lon_deg * 1e7),
-            alt_m,
-            *(0.0,) * 8,
+        return POSITION_TARGET_GLOBAL_INT(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_GLOBAL,
+            type_mask=_TARGET_MASK,
+            lat_int=round(lat_deg * 1e7),
+            lon_int=round(lon_deg * 1e7),
+            alt=alt_m,
         )
 
     def extended_sys_state(self) -> Values:

@@ -11,9 +11,14 @@ from autopilot_bridge.firmware.px4.messages import Px4Messages
 from autopilot_bridge.flight.context import LandedState
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
-from autopilot_bridge.services.messages.common import NAN
+from autopilot_bridge.services.messages.common import (
+    NAN,
+    POSITION_TARGET_GLOBAL_INT,
+    POSITION_TARGET_LOCAL_NED,
+    TARGET_FIELDS,
+)
 from autopilot_bridge.services.parts import AutopilotParts
-from autopilot_bridge.telemetry.fields import FieldValues
+from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 
 _M = mavlink
@@ -38,7 +43,9 @@ _NEUTRAL_US: Final = 1500
 _TRAVEL_US: Final = 500.0
 _STOPPED_US: Final = 900
 _PLACE_MASK: Final = 0xDF8  # velocity, acceleration, yaw and yaw rate are not given
-_NOTHING: Final = (NAN,) * 8
+_NOTHING: Final = dict.fromkeys(TARGET_FIELDS[3:], NAN)
+_NAV_CONTROLLER_OUTPUT: Final = fields("NAV_CONTROLLER_OUTPUT")
+_WIND_COV: Final = fields("WIND_COV")
 
 
 class Px4PlaneMessages(AircraftAir, Px4Messages):
@@ -77,19 +84,19 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
             flown = self._aircraft.powered
             down_m = controller.down_reference_m if flown else math.nan
             error_m = v.pos[2] - down_m if math.isfinite(down_m) else 0.0
-            return (0.0, 0.0, 0, 0, 0, error_m if flown else -v.alt_amsl_m, self._airspeed_error(), 0.0)
+            return _NAV_CONTROLLER_OUTPUT(
+                alt_error=error_m if flown else -v.alt_amsl_m, aspd_error=self._airspeed_error()
+            )
         north_m, east_m, down_m = v.pos
         course_rad = controller.course_setpoint_rad
         bearing_rad = path.direction_rad(north_m, east_m)
-        return (
-            0.0,
-            0.0,
-            round(math.degrees(course_rad if math.isfinite(course_rad) else bearing_rad)),
-            round(math.degrees(bearing_rad)),
-            round(path.distance_m(north_m, east_m)),
-            down_m - path.down_m,
-            self._airspeed_error(),
-            path.track_error_m(north_m, east_m),
+        return _NAV_CONTROLLER_OUTPUT(
+            nav_bearing=round(math.degrees(course_rad if math.isfinite(course_rad) else bearing_rad)),
+            target_bearing=round(math.degrees(bearing_rad)),
+            wp_dist=round(path.distance_m(north_m, east_m)),
+            alt_error=down_m - path.down_m,
+            aspd_error=self._airspeed_error(),
+            xtrack_error=path.track_error_m(north_m, east_m),
         )
 
     def _airspeed_error(self) -> float:
@@ -106,22 +113,23 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         if wind is None or not self._has_flown or not v.has_global:
             return None
         north, east = self.parts.navigation.health.wind_variance_m2_s2
-        return (v.time_us, wind[0], wind[1], 0.0, north + east, 0.0, v.alt_amsl_m, 0.0, 0.0)
+        return _WIND_COV(
+            time_usec=v.time_us, wind_x=wind[0], wind_y=wind[1], var_horiz=north + east, wind_alt=v.alt_amsl_m
+        )
 
-    def position_target_global_int(self) -> Values | None:
+    def position_target_global_int(self) -> FieldValues | None:
         """POSITION_TARGET_GLOBAL_INT (87): the target position, or the centre of the circle."""
         path, frame = self._aircraft.path, self.context.frame
         if path is None or frame is None:
             return None
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(path.north_m, path.east_m, path.down_m)
-        return (
-            self.view.time_ms,
-            mavlink.MAV_FRAME_GLOBAL_INT,
-            0,
-            round(lat_deg * 1e7),
-            round(lon_deg * 1e7),
-            alt_m,
-            *_NOTHING,
+        return POSITION_TARGET_GLOBAL_INT(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT,
+            lat_int=round(lat_deg * 1e7),
+            lon_int=round(lon_deg * 1e7),
+            alt=alt_m,
+            **_NOTHING,
         )
 
     def position_target_local_ned(self) -> Values | None:
@@ -139,7 +147,16 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
             return None
         else:
             place = (north_m, east_m, frame.origin.alt_m)
-        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, _PLACE_MASK, *place, *_NOTHING)
+        x, y, z = place
+        return POSITION_TARGET_LOCAL_NED(
+            time_boot_ms=self.view.time_ms,
+            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            type_mask=_PLACE_MASK,
+            x=x,
+            y=y,
+            z=z,
+            **_NOTHING,
+        )
 
     def estimator_status(self) -> FieldValues:
         """ESTIMATOR_STATUS (230): with the airspeed's ratio while it is fused."""
