@@ -38,14 +38,14 @@ from flightsim.payload import Device, DeviceParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HygrometerParameters(DeviceParameters):
+class PsychrometerParameters(DeviceParameters):
     rate_hz: Rate = 1
 
     def build(self, carrier):
-        return Hygrometer(self, carrier)
+        return Psychrometer(self, carrier)
 
 
-class Hygrometer(Device[float]):
+class Psychrometer(Device[float]):
     def __init__(self, parameters, carrier):
         self._interval = carrier.physics_rate_hz // parameters.rate_hz
         self._steps = 0
@@ -55,7 +55,7 @@ class Hygrometer(Device[float]):
         return 50.0 if self._steps % self._interval == 0 else None
 
 
-class HygrometerComponent(Component[Hygrometer]):
+class PsychrometerComponent(Component[Psychrometer]):
     component_id = dialect.MAV_COMP_ID_USER60
 
     def update(self, reading):
@@ -77,8 +77,8 @@ def package(tmp_path, monkeypatch):
     (tmp_path / "users_device.py").write_text(PACKAGE)
     monkeypatch.syspath_prepend(str(tmp_path))
     points = {
-        DEVICES_GROUP: {"hygrometer": "HygrometerParameters", "broken": "HygrometerParameters"},
-        GROUP: {"hygrometer": "HygrometerComponent", "broken": "Broken"},
+        DEVICES_GROUP: {"psychrometer": "PsychrometerParameters", "broken": "PsychrometerParameters"},
+        GROUP: {"psychrometer": "PsychrometerComponent", "broken": "Broken"},
     }
 
     def named(group: str) -> dict[str, EntryPoint]:
@@ -116,7 +116,7 @@ def test_every_device_has_a_component_of_its_own_id():
 
 @pytest.mark.usefixtures("package")
 def test_a_device_of_a_package_is_in_world_files_and_on_the_wire(tmp_path):
-    parameters = loaded(tmp_path, "[[vehicles]]\npayload.others.hygrometer = {rate_hz = 5}\n")
+    parameters = loaded(tmp_path, "[[vehicles]]\npayload.others.psychrometer = {rate_hz = 5}\n")
     frames, parser = [], FrameParser()
     station = PayloadStation(
         Payload(parameters, carrier()), system_id=3, send=lambda data: frames.extend(parser.feed(data))
@@ -132,7 +132,7 @@ def test_a_device_of_a_package_is_in_world_files_and_on_the_wire(tmp_path):
 @pytest.mark.usefixtures("package")
 def test_what_is_wrong_with_a_device_of_a_package_is_said(tmp_path):
     with pytest.raises(
-        WorldFileError, match=r"others.thermometer.kind is 'thermometer'; accepted: hygrometer"
+        WorldFileError, match=r"others.thermometer.kind is 'thermometer'; accepted: psychrometer"
     ):
         loaded(tmp_path, "[[vehicles]]\npayload.others.thermometer = {}\n")
     broken = loaded(tmp_path, "[[vehicles]]\npayload.others.broken = {}\n")
