@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import astuple, replace
+from dataclasses import replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.foundation.kernels import bound
-from flightsim.foundation.records import Record, Vector3, Vector4, record_array, the_record
+from flightsim.foundation.records import Record, Vector3, Vector4, pack, packed, record_array, the_record
 from flightsim.interface import MAX_ACTUATORS
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Array = NDArray[np.float64]
-StateArray = NDArray[np.void]
+RecordArray = NDArray[np.void]
 P = TypeVar("P", bound="DataclassInstance")
 
 
@@ -41,10 +41,10 @@ class Controller(ABC, Generic[P, S]):
     """Control laws on arrays, which one compiled step reads and writes.
 
     Args:
-        parameters: gains and limits; packed in the order of their fields.
+        parameters: gains and limits.
         physics_rate_hz: rate at which `step` is called.
         nav: navigation state, layout `navigation.layout`, shared with the filter.
-        kernel: the step: (nav, setpoint, parameters, state, `scratch` ..., actuators).
+        kernel: the step: (nav, setpoint, record of the parameters, of the state, `scratch` ..., actuators).
         state: the record of the state.
         setpoint: the module that names the places of the setpoint, and its levels.
         outer_rate_hz: least rate of the outer loops.
@@ -78,7 +78,7 @@ class Controller(ABC, Generic[P, S]):
             raise ValueError(
                 f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({NAV_SIZE},) is accepted"
             )
-        self._packed: Array = np.zeros(len(astuple(parameters)))
+        self._packed = packed(parameters)
         states = record_array(state)
         self._state: S = the_record(states, state)
         self.attitude_setpoint: Array = self._state.q_setpoint
@@ -107,7 +107,7 @@ class Controller(ABC, Generic[P, S]):
     def set_parameters(self, parameters: P) -> None:
         """Replace gains and limits, in flight too."""
         self.parameters = parameters
-        self._packed[:] = astuple(parameters)
+        pack(parameters, self._packed)
 
     def change(self, **values: Any) -> None:
         """Replace single parameters by their field names."""

@@ -1,17 +1,24 @@
 """Named records that Python code and compiled kernels share: a class declares the fields and their sizes.
 
+The parameters of a kernel are a dataclass of numbers, which is packed into a record with the same fields.
+
 A kernel takes a record by its fields' names, and another record or a plain array in its place fails when the
 kernel is compiled. All numbers are float64, one after the other.
 """
 
-from typing import Annotated, Any, TypeVar, get_args, get_type_hints
+from dataclasses import astuple, fields
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 Vector3 = Annotated[NDArray[np.float64], 3]
 Vector4 = Annotated[NDArray[np.float64], 4]
 
+T = TypeVar("T")
 RecordT = TypeVar("RecordT", bound="Record")
 
 
@@ -21,18 +28,30 @@ class Record:
 
 def record_array(kind: type[Record]) -> NDArray[np.void]:
     """An array (1,) with one record of zeros, for kernels that are bound to it."""
-    fields: list[Any] = []
+    places: list[Any] = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
-        fields.append((name, np.float64) if hint is float else (name, np.float64, (get_args(hint)[1],)))
-    return np.zeros(1, np.dtype(fields))
+        places.append((name, np.float64) if hint is float else (name, np.float64, (get_args(hint)[1],)))
+    return np.zeros(1, np.dtype(places))
 
 
-def the_record(array: NDArray[np.void], kind: type[RecordT]) -> RecordT:
-    """The record of `record_array`, by the names of its fields; it shares the array's memory."""
-    record: RecordT = array.view(np.recarray)[0]
+def the_record(array: NDArray[np.void], kind: type[T]) -> T:
+    """The record of `record_array` or `packed`, by the names of its fields; it shares the array's memory."""
+    record: T = array.view(np.recarray)[0]
     return record
 
 
 def new_record(kind: type[RecordT]) -> RecordT:
     """A record of zeros."""
     return the_record(record_array(kind), kind)
+
+
+def packed(parameters: "DataclassInstance") -> NDArray[np.void]:
+    """An array (1,) with one record of a dataclass of numbers, by the names of its fields; True is 1."""
+    array = np.zeros(1, np.dtype([(each.name, np.float64) for each in fields(parameters)]))
+    pack(parameters, array)
+    return array
+
+
+def pack(parameters: "DataclassInstance", array: NDArray[np.void]) -> None:
+    """Write the numbers of a dataclass to a record that `packed` has made of another one of its class."""
+    array[0] = astuple(parameters)

@@ -15,8 +15,9 @@ from autopilot_bridge.control.multicopter.attitude import (
     quaternion_from_thrust_axis,
     rate_control,
 )
+from flightsim.foundation import records
 from flightsim.foundation.random_streams import RandomStreams
-from flightsim.foundation.records import new_record
+from flightsim.foundation.records import new_record, the_record
 from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
@@ -24,9 +25,9 @@ DT_S = 0.004
 GAINS = {"roll_p_1_s": 5.0, "pitch_p_1_s": 7.0, "yaw_p_1_s": 3.0}
 
 
-def packed(**values: float) -> Array:
+def packed(**values: float) -> MulticopterParameters:
     parameters = MulticopterParameters(**values)  # type: ignore[arg-type]
-    return np.array([float(getattr(parameters, name)) for name in c.PARAMETER_NAMES])
+    return the_record(records.packed(parameters), MulticopterParameters)
 
 
 def rotation(q: Array) -> Rotation:

@@ -15,11 +15,12 @@ from autopilot_bridge.control.multicopter.attitude import (
     body_z_of,
     quaternion_from_thrust_axis,
 )
-from autopilot_bridge.control.multicopter.layout import PARAMETER_NAMES
 from autopilot_bridge.flight.multicopter import OffboardTask
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.environment import Environment, Turbulence
+from flightsim.foundation import records
+from flightsim.foundation.records import the_record
 from flightsim.foundation.rotations import euler_from_quaternion, quaternion_from_euler
 from tests.flight.rig import Rig, positions, tilts, velocities
 from tests.rotations import rotation_matrix
@@ -36,8 +37,8 @@ PX4_DEFAULTS = replace(
 )
 
 
-def packed(parameters: MulticopterParameters) -> np.ndarray:
-    return np.array([float(getattr(parameters, name)) for name in PARAMETER_NAMES])
+def packed(parameters: MulticopterParameters) -> MulticopterParameters:
+    return the_record(records.packed(parameters), MulticopterParameters)
 
 
 def hovering(**fields: object) -> tuple[Rig, OffboardTask]:

@@ -1,19 +1,27 @@
-"""The controllers' arrays: every quantity has places of its own, and the parameters their order."""
+"""The controllers' records and arrays: every quantity has a place of its own."""
 
+import math
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
+from numpy.typing import NDArray
 
 from autopilot_bridge.control.controller import ControllerState
 from autopilot_bridge.control.fixed_wing import layout as wing
 from autopilot_bridge.control.fixed_wing import setpoint as wing_setpoint
+from autopilot_bridge.control.fixed_wing.attitude import rate_control as wing_rate_control
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.control.multicopter import layout as copter
 from autopilot_bridge.control.multicopter import setpoint as copter_setpoint
+from autopilot_bridge.control.multicopter.attitude import limit_rates, rate_control
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.control.multicopter.position import update_airborne
+from autopilot_bridge.navigation import layout as n
 from autopilot_bridge.navigation.layout import NAV_SIZE
-from flightsim.foundation.records import new_record, record_array, the_record
+from flightsim.foundation.records import new_record, packed, record_array, the_record
 
 
 @pytest.mark.parametrize("kind", [copter.MulticopterState, wing.FixedWingState])
@@ -48,19 +56,47 @@ def test_the_setpoint_is_filled_without_gaps_or_overlaps(setpoint: ModuleType) -
     assert sorted(found) == list(range(setpoint.SETPOINT_SIZE))
 
 
-def test_parameters_of_the_axes_follow_each_other() -> None:
-    """Kernels address roll, pitch and yaw by the first one's place and the number of gains per axis."""
-    for layout, gains in (
-        (copter, ("p", "i", "d", "ff", "k", "integral_max")),
-        (wing, ("p", "i", "d", "ff", "integral_max")),
-    ):
-        assert len(gains) == layout.RATE_GAINS_PER_AXIS
-        for axis, name in enumerate(("roll", "pitch", "yaw")):
-            for k, gain in enumerate(gains):
-                place = layout.RATE_GAINS + axis * layout.RATE_GAINS_PER_AXIS + k
-                assert layout.PARAMETER_NAMES[place] == f"rate_{name}_{gain}"
-    for k, axis in enumerate(("roll", "pitch", "yaw")):
-        assert copter.PARAMETER_NAMES[copter.ATTITUDE_P + k] == f"{axis}_p_1_s"
-        assert copter.PARAMETER_NAMES[copter.RATE_MAX + k] == f"{axis}_rate_max_rad_s"
-    for k, surface in enumerate(("aileron", "elevator", "rudder")):
-        assert wing.PARAMETER_NAMES[wing.TRIM_SURFACES + k] == f"trim_{surface}"
+def test_another_record_in_the_place_of_the_parameters_does_not_compile() -> None:
+    rates = np.zeros(3)
+    limit_rates(rates, the_record(packed(MulticopterParameters()), MulticopterParameters))
+    with pytest.raises((TypingError, KeyError), match="roll_rate_max_rad_s"):
+        limit_rates(rates, new_record(copter.MulticopterState))  # type: ignore[arg-type]
+
+
+_AXES = ("roll", "pitch", "yaw")
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_the_gains_of_an_axis_are_its_own(axis: int) -> None:
+    """A gain moves the torque and the surface of its axis, and no other."""
+    names = [f"rate_{_AXES[axis]}_{gain}" for gain in ("p", "i", "d", "ff", "integral_max")]
+    for name in names:
+        copter_before, wing_before = _outputs(MulticopterParameters()), _outputs(FixedWingParameters())
+        copter_after = _outputs(replace(MulticopterParameters(), **{name: 0.07}))
+        wing_after = _outputs(replace(FixedWingParameters(), **{name: 0.07}))
+        for before, after in ((copter_before, copter_after), (wing_before, wing_after)):
+            assert [k for k in range(3) if (before[:, k] != after[:, k]).any()] == [axis], name
+
+
+def _outputs(parameters: MulticopterParameters | FixedWingParameters) -> NDArray[np.float64]:
+    """Torques or surfaces (n, 3) of rate errors that change their signs, until integrals are at a limit."""
+    outputs = []
+    nav = np.zeros(NAV_SIZE)
+    if isinstance(parameters, MulticopterParameters):
+        p, s = the_record(packed(parameters), MulticopterParameters), new_record(copter.MulticopterState)
+        s.dt = 0.1
+        for step in range(60):
+            rates = np.full(3, 0.1 * math.sin(step))
+            s.unallocated[:] = 0.0
+            rate_control(rates, np.full(3, 0.5), p, s, s.dt, True)
+            outputs.append(s.unallocated.copy())
+        return np.array(outputs)
+    wing_p, wing_s = the_record(packed(parameters), FixedWingParameters), new_record(wing.FixedWingState)
+    wing_s.dt, wing_s.eas = 0.1, 15.0
+    for step in range(60):
+        nav[n.RATES_FRD_RAD_S] = 0.1 * math.sin(step)
+        wing_s.rate_setpoint[:] = 0.5
+        surfaces = np.zeros(3)
+        wing_rate_control(nav, wing_p, wing_s, surfaces, False)
+        outputs.append(surfaces)
+    return np.array(outputs)

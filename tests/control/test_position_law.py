@@ -18,8 +18,9 @@ from autopilot_bridge.control.multicopter.position import (
     vertical_control,
 )
 from autopilot_bridge.navigation import layout as n
+from flightsim.foundation import records
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
-from flightsim.foundation.records import new_record
+from flightsim.foundation.records import new_record, the_record
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.rotations import rotation_matrix
 
@@ -30,9 +31,9 @@ BUMP_TIME_S = 0.3
 LOOSE = {"speed_xy_max_m_s": 20.0, "speed_up_max_m_s": 8.0, "speed_down_max_m_s": 8.0, "thrust_min": 0.05}
 
 
-def packed(**values: float | bool) -> Array:
+def packed(**values: float | bool) -> MulticopterParameters:
     parameters = MulticopterParameters(**(LOOSE | values))  # type: ignore[arg-type]
-    return np.array([float(getattr(parameters, name)) for name in c.PARAMETER_NAMES])
+    return the_record(records.packed(parameters), MulticopterParameters)
 
 
 def flying() -> tuple[Array, Array, Array]:
@@ -124,7 +125,7 @@ def test_what_is_not_given_of_an_axis_is_filled(
     setpoint[sp.ACC + axis] = acceleration
     s.vel_integral = 0.3
     trajectory_control(nav, setpoint, p, s, DT_S, False)
-    gain = p[c.POS_Z_P] if axis == 2 else p[c.POS_XY_P]
+    gain = p.pos_z_p_1_s if axis == 2 else p.pos_xy_p_1_s
     wanted = {
         "position": 0.5 * gain,
         "both": 0.5 * gain + 0.3,
@@ -201,7 +202,7 @@ def test_feed_forward_gives_way_at_the_speed_limit(
     limit = 6.0
     nav, setpoint, s = flying()
     p = packed(speed_xy_max_m_s=limit)
-    setpoint[sp.POS_NED_M] = nav[n.POS_NED_M] + np.array([*share, 0.0]) / p[c.POS_XY_P]
+    setpoint[sp.POS_NED_M] = nav[n.POS_NED_M] + np.array([*share, 0.0]) / p.pos_xy_p_1_s
     setpoint[sp.VEL_NED_M_S] = *forward, 0.0
     trajectory_control(nav, setpoint, p, s, DT_S, False)
     low, high = 0.0, 1.0
@@ -245,9 +246,9 @@ def test_tilt_limit_and_tracking_anti_windup(bearing: float) -> None:
     trajectory_control(nav, setpoint, p, s, DT_S, False)
     tangent = math.tan(math.radians(30.0))
     np.testing.assert_allclose(thrust_vector(s), tangent * unit - [0.0, 0.0, 1.0], atol=1e-9)
-    wanted = 12.0 + 0.5 * p[c.VEL_XY_P]
-    back = 2.0 / p[c.VEL_XY_P] * (wanted - G * tangent)
-    integral = p[c.VEL_XY_I] * (0.5 - back) * DT_S
+    wanted = 12.0 + 0.5 * p.vel_xy_p_1_s
+    back = 2.0 / p.vel_xy_p_1_s * (wanted - G * tangent)
+    integral = p.vel_xy_i_1_s2 * (0.5 - back) * DT_S
     np.testing.assert_allclose(s.vel_integral, integral * unit, atol=1e-9)
 
 
@@ -358,7 +359,7 @@ def test_vertical_integrator_waits_at_the_limits_of_the_thrust(
     setpoint[sp.ACC + 2] = acceleration
     p = packed()
     vertical_control(nav, setpoint, p, s, DT_S, False)
-    assert s.vel_integral[2] == pytest.approx(p[c.VEL_Z_I] * error * DT_S if integrates else 0.0)
+    assert s.vel_integral[2] == pytest.approx(p.vel_z_i_1_s2 * error * DT_S if integrates else 0.0)
 
 
 @pytest.mark.parametrize(("error", "integrates"), [(0.2, False), (-0.2, True)])

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
@@ -42,7 +42,7 @@ def acceleration_along_flow(nav: Array) -> float:
 
 
 @kernel
-def update_air(nav: Array, p: Array, s: FixedWingState, dt: float) -> None:
+def update_air(nav: Array, p: FixedWingParameters, s: FixedWingState, dt: float) -> None:
     """One step: writes EAS, EAS_RATE, EAS_TO_TAS and EAS_KNOWN."""
     measured = nav[n.AIRSPEED_M_S]
     known = math.isfinite(measured)
@@ -51,7 +51,7 @@ def update_air(nav: Array, p: Array, s: FixedWingState, dt: float) -> None:
     if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav[n.AIRSPEED_TRUE_M_S]):
         s.eas_to_tas = min(3.0, max(0.8, nav[n.AIRSPEED_TRUE_M_S] / measured))
     if not known:
-        s.eas = p[c.AIRSPEED_TRIM]
+        s.eas = p.airspeed_trim_m_s
         s.eas_rate = 0.0
         s.eas_known = 0.0
         return
@@ -65,9 +65,9 @@ def update_air(nav: Array, p: Array, s: FixedWingState, dt: float) -> None:
     if not math.isfinite(forward):
         forward = s.eas_rate
     # gains of the continuous filter, from its Riccati equation
-    speed_information = 1.0 / p[c.AIRSPEED_NOISE]
-    process = p[c.AIRSPEED_PROCESS]
-    rate_information = process / (p[c.AIRSPEED_RATE_NOISE] * p[c.AIRSPEED_RATE_NOISE])
+    speed_information = 1.0 / p.airspeed_noise_m_s
+    process = p.airspeed_rate_process_noise_m_s2
+    rate_information = process / (p.airspeed_rate_noise_m_s2 * p.airspeed_rate_noise_m_s2)
     total = speed_information + rate_information
     root = math.sqrt(process * (2.0 * speed_information + rate_information))
     speed = s.eas + dt * s.eas_rate

@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.lateral import ROLL_MAX_RAD, stall_speed
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -33,12 +33,12 @@ _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 
 
 @kernel
-def attitude_control(nav: Array, p: Array, s: FixedWingState) -> None:
+def attitude_control(nav: Array, p: FixedWingParameters, s: FixedWingState) -> None:
     """Write RATE_SETPOINT (FRD) for ROLL_SETPOINT and PITCH_SETPOINT."""
     roll, pitch = nav[n.ROLL], nav[n.PITCH]
-    roll_rate = wrap_pi(s.roll_setpoint - roll) / p[c.ROLL_TC]
-    pitch_rate = (s.pitch_setpoint - pitch) / p[c.PITCH_TC]
-    airspeed = max(0.7 * p[c.AIRSPEED_MIN], s.eas) * s.eas_to_tas
+    roll_rate = wrap_pi(s.roll_setpoint - roll) / p.roll_time_constant_s
+    pitch_rate = (s.pitch_setpoint - pitch) / p.pitch_time_constant_s
+    airspeed = max(0.7 * p.airspeed_min_m_s, s.eas) * s.eas_to_tas
     bank = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, roll))
     turn_rate = GRAVITY_M_S2 * math.tan(bank) * math.cos(pitch) / airspeed
     if s.ground_contact != 0.0:
@@ -50,43 +50,64 @@ def attitude_control(nav: Array, p: Array, s: FixedWingState) -> None:
     z = -sin_roll * pitch_rate + cos_pitch * cos_roll * turn_rate
     slip = nav[n.FORCE + 1]
     if s.ground_contact == 0.0 and math.isfinite(slip):
-        z -= p[c.SIDESLIP_GAIN] * min(_SLIP_MAX_M_S2, max(-_SLIP_MAX_M_S2, slip))
-    s.rate_setpoint[0] = min(p[c.ROLL_RATE_MAX], max(-p[c.ROLL_RATE_MAX], x))
-    s.rate_setpoint[1] = min(p[c.PITCH_RATE_UP], max(-p[c.PITCH_RATE_DOWN], y))
-    s.rate_setpoint[2] = min(p[c.YAW_RATE_MAX], max(-p[c.YAW_RATE_MAX], z))
+        z -= p.sideslip_gain_rad_s_per_m_s2 * min(_SLIP_MAX_M_S2, max(-_SLIP_MAX_M_S2, slip))
+    s.rate_setpoint[0] = min(p.roll_rate_max_rad_s, max(-p.roll_rate_max_rad_s, x))
+    s.rate_setpoint[1] = min(p.pitch_rate_max_up_rad_s, max(-p.pitch_rate_max_down_rad_s, y))
+    s.rate_setpoint[2] = min(p.yaw_rate_max_rad_s, max(-p.yaw_rate_max_rad_s, z))
 
 
 @kernel
-def rate_control(nav: Array, p: Array, s: FixedWingState, surfaces: Array, rolling: bool) -> None:
+def _rate_axis(
+    axis: int,
+    gains: tuple[float, float, float, float, float],
+    rate: float,
+    s: FixedWingState,
+    scale: float,
+    alpha: float,
+    rolling: bool,
+) -> float:
+    """The surface of one axis without its trim; gains are p, i, d, feed-forward and the limit of the
+    integral.
+    """
+    kp, ki, kd, ff, limit = gains
+    rate = min(_RATE_LIMIT_RAD_S, max(-_RATE_LIMIT_RAD_S, rate))
+    wanted = s.rate_setpoint[axis]
+    error = wanted - rate
+    raw = (rate - s.rate_previous[axis]) / s.dt
+    s.rate_previous[axis] = rate
+    s.rate_derivative[axis] += alpha * (raw - s.rate_derivative[axis])
+    moment = kp * error + s.rate_integral[axis] - kd * s.rate_derivative[axis]
+    missing = s.unallocated[axis]
+    surface = scale * (scale * moment + ff * wanted)
+    if s.ground_contact != 0.0:
+        s.rate_integral[axis] = 0.0  # the wheels hold the vehicle: it would only store a kick
+    elif not (rolling or (missing > 0.0 and error > 0.0) or (missing < 0.0 and error < 0.0)):
+        s.rate_integral[axis] = min(limit, max(-limit, s.rate_integral[axis] + ki * error * s.dt))
+    return surface
+
+
+@kernel
+def rate_control(
+    nav: Array, p: FixedWingParameters, s: FixedWingState, surfaces: Array, rolling: bool
+) -> None:
     """surfaces (3,) = aileron, elevator, rudder that fly RATE_SETPOINT; `rolling`: on the runway, integrators
     wait."""
     dt = s.dt
     scale = 1.0
-    if p[c.AIRSPEED_SCALING] != 0.0:
-        airspeed = min(1.5 * p[c.AIRSPEED_MAX], max(stall_speed(p), s.eas))
-        scale = p[c.SCALING_AIRSPEED] / airspeed
-    alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
-    for i in range(3):
-        g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
-        rate = min(_RATE_LIMIT_RAD_S, max(-_RATE_LIMIT_RAD_S, nav[n.RATES + i]))
-        wanted = s.rate_setpoint[i]
-        error = wanted - rate
-        raw = (rate - s.rate_previous[i]) / dt
-        s.rate_previous[i] = rate
-        s.rate_derivative[i] += alpha * (raw - s.rate_derivative[i])
-        moment = p[g] * error + s.rate_integral[i] - p[g + 2] * s.rate_derivative[i]
-        surface = scale * (scale * moment + p[g + 3] * wanted) + p[c.TRIM_SURFACES + i]
-        missing = s.unallocated[i]
-        if s.ground_contact != 0.0:
-            s.rate_integral[i] = 0.0  # the wheels hold the vehicle: it would only store a kick
-        elif not (rolling or (missing > 0.0 and error > 0.0) or (missing < 0.0 and error < 0.0)):
-            limit = p[g + 4]
-            s.rate_integral[i] = min(limit, max(-limit, s.rate_integral[i] + p[g + 1] * error * dt))
-        surfaces[i] = surface
+    if p.airspeed_scaling:
+        airspeed = min(1.5 * p.airspeed_max_m_s, max(stall_speed(p), s.eas))
+        scale = p.scaling_airspeed_m_s / airspeed
+    alpha = dt / (dt + 1.0 / (2.0 * math.pi * p.rate_derivative_cutoff_hz))
+    roll = (p.rate_roll_p, p.rate_roll_i, p.rate_roll_d, p.rate_roll_ff, p.rate_roll_integral_max)
+    pitch = (p.rate_pitch_p, p.rate_pitch_i, p.rate_pitch_d, p.rate_pitch_ff, p.rate_pitch_integral_max)
+    yaw = (p.rate_yaw_p, p.rate_yaw_i, p.rate_yaw_d, p.rate_yaw_ff, p.rate_yaw_integral_max)
+    surfaces[0] = _rate_axis(0, roll, nav[n.RATES], s, scale, alpha, rolling) + p.trim_aileron
+    surfaces[1] = _rate_axis(1, pitch, nav[n.RATES + 1], s, scale, alpha, rolling) + p.trim_elevator
+    surfaces[2] = _rate_axis(2, yaw, nav[n.RATES + 2], s, scale, alpha, rolling) + p.trim_rudder
 
 
 @kernel
-def ease_on_runway(p: Array, s: FixedWingState, surfaces: Array) -> None:
+def ease_on_runway(p: FixedWingParameters, s: FixedWingState, surfaces: Array) -> None:
     """Aileron and elevator fade in with the airspeed of the take-off roll.
 
     Without airspeed they have no effect; in a wind from behind the wrong one, and turn the vehicle over.
@@ -97,10 +118,10 @@ def ease_on_runway(p: Array, s: FixedWingState, surfaces: Array) -> None:
 
 
 @kernel
-def limit_surfaces(p: Array, s: FixedWingState, yaw_stick: float, surfaces: Array) -> None:
+def limit_surfaces(p: FixedWingParameters, s: FixedWingState, yaw_stick: float, surfaces: Array) -> None:
     """Add to the rudder what goes with the aileron and the stick; stop at the stops."""
     aileron = min(1.0, max(-1.0, surfaces[0]))
-    surfaces[2] += p[c.ROLL_TO_RUDDER] * aileron + yaw_stick
+    surfaces[2] += p.roll_to_rudder_ff * aileron + yaw_stick
     for i in range(3):
         limited = min(1.0, max(-1.0, surfaces[i]))
         s.unallocated[i] = surfaces[i] - limited
@@ -108,19 +129,19 @@ def limit_surfaces(p: Array, s: FixedWingState, yaw_stick: float, surfaces: Arra
 
 
 @kernel
-def wheel_control(nav: Array, sp: Array, p: Array, s: FixedWingState) -> float:
+def wheel_control(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState) -> float:
     """Steering -1..1 that holds the setpoint's heading on the ground; its yaw rate is the rudder's too."""
     error = wrap_pi(sp[to.STEERING_HEADING_RAD] - nav[n.YAW])
-    limit = p[c.WHEEL_RATE_MAX]
-    wanted = min(limit, max(-limit, error / p[c.WHEEL_TC]))
+    limit = p.wheel_rate_max_rad_s
+    wanted = min(limit, max(-limit, error / p.wheel_time_constant_s))
     s.rate_setpoint[2] = wanted
     speed = math.sqrt(nav[n.VEL] * nav[n.VEL] + nav[n.VEL + 1] * nav[n.VEL + 1])
-    slow = _WHEEL_SPEED_SHARE * p[c.AIRSPEED_MIN]
+    slow = _WHEEL_SPEED_SHARE * p.airspeed_min_m_s
     scale = slow / speed if speed > slow else 1.0  # false for NaN
     rate_error = wanted - nav[n.RATES + 2]
-    command = scale * (p[c.WHEEL_FF] * wanted + scale * (p[c.WHEEL_P] * rate_error + s.wheel_integral))
+    command = scale * (p.wheel_ff * wanted + scale * (p.wheel_p * rate_error + s.wheel_integral))
     if speed > 1.0 and abs(command) < 1.0:
-        limit = p[c.WHEEL_INTEGRAL_MAX]
-        integral = s.wheel_integral + p[c.WHEEL_I] * rate_error * s.dt
+        limit = p.wheel_integral_max
+        integral = s.wheel_integral + p.wheel_i * rate_error * s.dt
         s.wheel_integral = min(limit, max(-limit, integral))
     return min(1.0, max(-1.0, command))

@@ -15,11 +15,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.control.fixed_wing.vertical import follow_height, pitch_for_climb, reset_height
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
@@ -51,20 +51,22 @@ def _load_factor(s: FixedWingState) -> float:
 
 
 @kernel
-def _underspeed(p: Array, s: FixedWingState, load_factor: float) -> float:
+def _underspeed(p: FixedWingParameters, s: FixedWingState, load_factor: float) -> float:
     """How much too slow the vehicle is: 0 not at all, 1 near the stall."""
     if s.eas_known == 0.0:
         return 0.0
     raised = math.sqrt(load_factor)
     stall = stall_speed(p)
-    room = p[c.AIRSPEED_MIN] - stall
+    room = p.airspeed_min_m_s - stall
     full = raised * (stall + _UNDERSPEED_FULL * room)
     start = raised * (stall + _UNDERSPEED_START * room)
     return _clip((start - s.eas) / max(1e-3, start - full), 0.0, 1.0)
 
 
 @kernel
-def _update_powerless(p: Array, s: FixedWingState, dt: float, flown: bool, energy_rate: float) -> float:
+def _update_powerless(
+    p: FixedWingParameters, s: FixedWingState, dt: float, flown: bool, energy_rate: float
+) -> float:
     """How sure it is that full throttle doesn't keep the energy up: a failed motor, or air that sinks.
 
     Height can't be held then, and the airspeed must be (PX4's uncommanded descent, ArduPilot's bad descent).
@@ -72,7 +74,7 @@ def _update_powerless(p: Array, s: FixedWingState, dt: float, flown: bool, energ
     acceleration. A gust that takes airspeed isn't in it: that gives it back, and to give up height and
     airspeed for it would cost much more.
     """
-    full = s.throttle >= _FULL_THROTTLE * p[c.THROTTLE_MAX]
+    full = s.throttle >= _FULL_THROTTLE * p.throttle_max
     falling = energy_rate < 0.0 and s.energy_rate_setpoint > energy_rate
     step = dt / _POWERLESS_S if flown and full and falling else -dt / _POWERLESS_S
     s.powerless = _clip(s.powerless + step, 0.0, 1.0)
@@ -80,34 +82,36 @@ def _update_powerless(p: Array, s: FixedWingState, dt: float, flown: bool, energ
 
 
 @kernel
-def _trim_throttle(airspeed: float, p: Array) -> float:
+def _trim_throttle(airspeed: float, p: FixedWingParameters) -> float:
     """Throttle of level flight at an airspeed, between the three that are known."""
-    trim, at = p[c.TRIM_THROTTLE], p[c.AIRSPEED_TRIM]
+    trim, at = p.trim_throttle, p.airspeed_trim_m_s
     if airspeed < at:
-        end, end_at = p[c.TRIM_THROTTLE_MIN_SPEED], p[c.AIRSPEED_MIN]
+        end, end_at = p.trim_throttle_min_speed, p.airspeed_min_m_s
     else:
-        end, end_at = p[c.TRIM_THROTTLE_MAX_SPEED], p[c.AIRSPEED_MAX]
+        end, end_at = p.trim_throttle_max_speed, p.airspeed_max_m_s
     if end <= 0.0 or abs(end_at - at) < 1e-3:
         return trim
     return trim + (end - trim) * (airspeed - at) / (end_at - at)
 
 
 @kernel
-def _trim_pitch(airspeed: float, p: Array, s: FixedWingState) -> float:
+def _trim_pitch(airspeed: float, p: FixedWingParameters, s: FixedWingState) -> float:
     """Pitch of level flight at an airspeed and the commanded bank.
 
     The lift angle grows with the load factor and falls with the square of airspeed; in a level turn
     tan(pitch) = cos(bank) tan(angle of attack).
     """
-    lift = p[c.LIFT_ANGLE]
+    lift = p.lift_angle_rad
     if lift == 0.0:
-        return p[c.TRIM_PITCH]
-    ratio = p[c.AIRSPEED_TRIM] / max(_MIN_SPEED_M_S, airspeed)
-    return (p[c.TRIM_PITCH] - lift) / _load_factor(s) + lift * min(4.0, ratio * ratio)
+        return p.trim_pitch_rad
+    ratio = p.airspeed_trim_m_s / max(_MIN_SPEED_M_S, airspeed)
+    return (p.trim_pitch_rad - lift) / _load_factor(s) + lift * min(4.0, ratio * ratio)
 
 
 @kernel
-def _wanted_climb(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float, hold: bool) -> float:
+def _wanted_climb(
+    nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, hold: bool
+) -> float:
     """Climb rate to fly, m/s; NaN: no climb rate is commanded. `hold`: the present height by default."""
     height, climb = -nav[n.POS + 2], -nav[n.VEL + 2]
     wanted, rate = -sp[to.DOWN_M], sp[to.HEIGHT_RATE_M_S]
@@ -123,58 +127,62 @@ def _wanted_climb(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float,
             s.height_rate_reference -= slope
         follow_height(wanted, slope, height, p, s, dt)
         return _clip(
-            (s.height_reference - height) / p[c.HEIGHT_TC]
-            + p[c.HEIGHT_RATE_FF] * s.height_rate_reference
+            (s.height_reference - height) / p.height_time_constant_s
+            + p.height_rate_ff * s.height_rate_reference
             + slope,
-            -p[c.SINK_MAX],
-            p[c.CLIMB_MAX],
+            -p.sink_max_m_s,
+            p.climb_max_m_s,
         )
     reset_height(height, climb, s)
     return rate
 
 
 @kernel
-def _fly_pitch(sp: Array, p: Array, s: FixedWingState, dt: float, speed: float, under: float) -> None:
+def _fly_pitch(
+    sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, speed: float, under: float
+) -> None:
     """PITCH_SETPOINT that flies the rate of the energy balance; `speed` is the true airspeed."""
-    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p[c.PITCH_MIN]
-    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p[c.PITCH_MAX]
+    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p.pitch_min_rad
+    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p.pitch_max_rad
     # a climb-out's least pitch gives way before the wing stalls
-    lowest = (1.0 - under) * lowest + under * min(lowest, p[c.PITCH_MIN])
+    lowest = (1.0 - under) * lowest + under * min(lowest, p.pitch_min_rad)
     highest = max(highest, lowest)
     per_rad = speed * GRAVITY_M_S2
     wanted = s.balance_rate_setpoint / per_rad
     missing = wanted - s.balance_rate / per_rad
     previous = s.pitch_setpoint
-    step = p[c.PITCH_I] * missing * dt
+    step = p.pitch_integral_1_s * missing * dt
     winding = (previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)
     if s.ground_contact == 0.0 and not winding:
         s.pitch_integral = _clip(s.pitch_integral + step, lowest - highest, highest - lowest)
     pitch = (
         _trim_pitch(s.airspeed_setpoint, p, s)
-        + p[c.PITCH_DAMPING] * missing
-        + p[c.BALANCE_FF] * wanted
+        + p.pitch_damping * missing
+        + p.energy_balance_ff * wanted
         + s.pitch_integral
     )
-    change = dt * p[c.VERTICAL_ACCELERATION] / speed
+    change = dt * p.vertical_acceleration_max_m_s2 / speed
     s.pitch_setpoint = _clip(_clip(pitch, lowest, highest), previous - change, previous + change)
 
 
 @kernel
-def _fly_climb_by_pitch(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float, climb: float) -> None:
+def _fly_climb_by_pitch(
+    nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, climb: float
+) -> None:
     """PITCH_SETPOINT that flies a climb rate whatever becomes of the airspeed."""
-    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p[c.PITCH_MIN]
-    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p[c.PITCH_MAX]
+    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p.pitch_min_rad
+    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p.pitch_max_rad
     s.pitch_setpoint = pitch_for_climb(nav, p, s, dt, climb, lowest, max(lowest, highest))
 
 
 @kernel
-def _fly_throttle(sp: Array, p: Array, s: FixedWingState, dt: float, under: float) -> None:
+def _fly_throttle(sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, under: float) -> None:
     """THROTTLE that flies the rate of the total energy."""
-    lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
+    lowest, highest = p.throttle_min, p.throttle_max
     if math.isfinite(sp[to.THROTTLE_MAX]):
         highest = _clip(sp[to.THROTTLE_MAX], 0.0, highest)
         lowest = min(lowest, highest)
-    rate_max, rate_min = GRAVITY_M_S2 * p[c.CLIMB_MAX], -GRAVITY_M_S2 * p[c.SINK_MIN]
+    rate_max, rate_min = GRAVITY_M_S2 * p.climb_max_m_s, -GRAVITY_M_S2 * p.sink_min_m_s
     wanted = s.energy_rate_setpoint
     trim = _clip(_trim_throttle(s.airspeed_setpoint, p), lowest, highest)
     if wanted >= 0.0:
@@ -185,36 +193,38 @@ def _fly_throttle(sp: Array, p: Array, s: FixedWingState, dt: float, under: floa
     previous = s.throttle
     known = s.eas_known != 0.0
     if known and s.ground_contact == 0.0:
-        step = p[c.THROTTLE_I] * missing * dt * (1.0 - under)
+        step = p.throttle_integral_1_s * missing * dt * (1.0 - under)
         if not ((previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)):
             s.throttle_integral = _clip(s.throttle_integral + step, -1.0, 1.0)
     # without airspeed a positive integral stays: it was needed when there was one (PX4)
     integral = s.throttle_integral if known else max(0.0, s.throttle_integral)
-    throttle += p[c.THROTTLE_DAMPING] * missing + integral
+    throttle += p.throttle_damping * missing + integral
     throttle = _clip(under * highest + (1.0 - under) * throttle, lowest, highest)
-    if p[c.THROTTLE_SLEW] > 0.0:
-        change = p[c.THROTTLE_SLEW] * dt
+    if p.throttle_slew_1_s > 0.0:
+        change = p.throttle_slew_1_s * dt
         throttle = _clip(throttle, previous - change, previous + change)
     s.throttle = _clip(throttle, lowest, highest)
 
 
 @kernel
-def _wanted_speed_rate(p: Array, s: FixedWingState, speed: float, weight: float) -> float:
+def _wanted_speed_rate(p: FixedWingParameters, s: FixedWingState, speed: float, weight: float) -> float:
     """Rate of change of the true airspeed to fly, m/s^2, within what half of the power can do."""
     if s.eas_known == 0.0:
         return 0.0
-    faster = 0.5 * GRAVITY_M_S2 * p[c.CLIMB_MAX] / speed
-    slower = -0.5 * GRAVITY_M_S2 * p[c.SINK_MIN] / speed
+    faster = 0.5 * GRAVITY_M_S2 * p.climb_max_m_s / speed
+    slower = -0.5 * GRAVITY_M_S2 * p.sink_min_m_s / speed
     if weight >= 2.0:
         faster, slower = _PITCH_ONLY_ACCELERATION_M_S2, -_PITCH_ONLY_ACCELERATION_M_S2
-    return _clip((s.airspeed_setpoint * s.eas_to_tas - speed) / p[c.AIRSPEED_TC], slower, faster)
+    return _clip((s.airspeed_setpoint * s.eas_to_tas - speed) / p.airspeed_time_constant_s, slower, faster)
 
 
 @kernel
-def energy_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float, entering: bool) -> None:
+def energy_control(
+    nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, entering: bool
+) -> None:
     """One guidance step: writes PITCH_SETPOINT, THROTTLE and what led to them."""
     pitch_given, throttle_given = math.isfinite(sp[to.PITCH_RAD]), math.isfinite(sp[to.THROTTLE])
-    powered, known = p[c.POWERED] != 0.0, s.eas_known != 0.0
+    powered, known = p.powered, s.eas_known != 0.0
     climb = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
     if entering or s.ground_contact != 0.0:
         reset_height(-nav[n.POS + 2], climb, s)
@@ -236,15 +246,15 @@ def energy_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float
     inertial_rate = speed * acceleration if math.isfinite(acceleration) else kinetic_rate
     powerless = _update_powerless(p, s, dt, energy_flown, potential_rate + inertial_rate)
 
-    airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
-    airspeed = sp[to.AIRSPEED_M_S] if math.isfinite(sp[to.AIRSPEED_M_S]) else p[c.AIRSPEED_TRIM]
+    airspeed_min = min(p.airspeed_max_m_s, p.airspeed_min_m_s * math.sqrt(load_factor))
+    airspeed = sp[to.AIRSPEED_M_S] if math.isfinite(sp[to.AIRSPEED_M_S]) else p.airspeed_trim_m_s
     airspeed = max(airspeed, s.airspeed_floor)
     # a glide lasts longest, with room left over the stall, a little above the lowest airspeed
     airspeed -= powerless * max(0.0, airspeed - _GLIDE_SHARE * airspeed_min)
     airspeed = under * airspeed_min + (1.0 - under) * airspeed
-    s.airspeed_setpoint = _clip(airspeed, airspeed_min, p[c.AIRSPEED_MAX])
+    s.airspeed_setpoint = _clip(airspeed, airspeed_min, p.airspeed_max_m_s)
 
-    weight = p[c.SPEED_WEIGHT] if powered else 2.0
+    weight = p.speed_weight if powered else 2.0
     if not known or flare:
         weight = 0.0
     elif throttle_given and not climb_given:
@@ -254,23 +264,23 @@ def energy_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float
 
     wanted_potential_rate = GRAVITY_M_S2 * wanted_climb if climb_given else potential_rate
     if not powered and not known:  # its glide, by the attitude it should have
-        wanted_potential_rate = -GRAVITY_M_S2 * p[c.SINK_MIN]
+        wanted_potential_rate = -GRAVITY_M_S2 * p.sink_min_m_s
     wanted_kinetic_rate = speed * _wanted_speed_rate(p, s, speed, weight)
 
     height_share, speed_share = _clip(2.0 - weight, 0.0, 1.0), _clip(weight, 0.0, 1.0)
     s.balance_rate = height_share * potential_rate - speed_share * kinetic_rate
     s.balance_rate_setpoint = height_share * wanted_potential_rate - speed_share * wanted_kinetic_rate
-    share = 1.0 if entering else min(1.0, dt / (dt + p[c.ENERGY_RATE_TC]))
+    share = 1.0 if entering else min(1.0, dt / (dt + p.energy_rate_time_constant_s))
     s.energy_rate += share * (potential_rate + kinetic_rate - s.energy_rate)
     s.energy_rate_setpoint = _clip(
-        wanted_potential_rate + wanted_kinetic_rate + p[c.TURN_ENERGY] * (load_factor - 1.0),
-        -GRAVITY_M_S2 * p[c.SINK_MIN],
-        GRAVITY_M_S2 * p[c.CLIMB_MAX],
+        wanted_potential_rate + wanted_kinetic_rate + p.turn_energy_rate_m2_s3 * (load_factor - 1.0),
+        -GRAVITY_M_S2 * p.sink_min_m_s,
+        GRAVITY_M_S2 * p.climb_max_m_s,
     )
 
     if pitch_given:
         s.pitch_setpoint = _clip(sp[to.PITCH_RAD], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
-    elif flare and known and p[c.LIFT_ANGLE] > 0.0:
+    elif flare and known and p.lift_angle_rad > 0.0:
         _fly_climb_by_pitch(nav, sp, p, s, dt, wanted_climb)
     else:
         if s.climb_flown != 0.0:

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -30,11 +30,11 @@ _STALL_SHARE_UNKNOWN: Final = 0.8  # of the lowest airspeed, where the stall spe
 
 
 @kernel
-def stall_speed(p: Array) -> float:
+def stall_speed(p: FixedWingParameters) -> float:
     """Stall speed at 1 g, equivalent, m/s."""
-    if p[c.AIRSPEED_STALL] > 0.0:
-        return p[c.AIRSPEED_STALL]
-    return _STALL_SHARE_UNKNOWN * p[c.AIRSPEED_MIN]
+    if p.airspeed_stall_m_s > 0.0:
+        return p.airspeed_stall_m_s
+    return _STALL_SHARE_UNKNOWN * p.airspeed_min_m_s
 
 
 @kernel
@@ -67,20 +67,20 @@ def airspeed_for_ground_speed(course: float, ground_speed: float, wind_n: float,
 
 
 @kernel
-def bank_limit(sp: Array, p: Array, s: FixedWingState) -> float:
+def bank_limit(sp: Array, p: FixedWingParameters, s: FixedWingState) -> float:
     """Largest bank angle, rad: of parameters, setpoint, load factor, and stall at the present airspeed."""
-    limit = min(p[c.ROLL_LIMIT], math.acos(1.0 / p[c.LOAD_FACTOR_MAX]))
+    limit = min(p.roll_limit_rad, math.acos(1.0 / p.load_factor_max))
     if sp[to.ROLL_LIMIT_RAD] >= 0.0:  # false for NaN
         limit = min(limit, sp[to.ROLL_LIMIT_RAD])
-    if p[c.STALL_PREVENTION] != 0.0 and s.eas_known != 0.0:
-        ratio = s.eas / (p[c.STALL_MARGIN] * stall_speed(p))
+    if p.stall_prevention and s.eas_known != 0.0:
+        ratio = s.eas / (p.stall_margin * stall_speed(p))
         by_stall = math.acos(1.0 / (ratio * ratio)) if ratio > 1.0 else 0.0
         limit = min(limit, max(by_stall, _BANK_ALWAYS_RAD))
     return limit
 
 
 @kernel
-def lateral_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: float) -> None:
+def lateral_control(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float) -> None:
     """One guidance step: writes ROLL_SETPOINT and what led to it."""
     true_airspeed = s.eas * s.eas_to_tas
     limit = bank_limit(sp, p, s)
@@ -110,7 +110,8 @@ def lateral_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: floa
         wanted = heading_for_course(sp[to.COURSE_RAD], airspeed, wind_n, wind_e)
         s.course_setpoint = wrap_pi(sp[to.COURSE_RAD])
         s.airspeed_floor = (
-            airspeed_for_ground_speed(sp[to.COURSE_RAD], p[c.GROUND_SPEED_MIN], wind_n, wind_e) / s.eas_to_tas
+            airspeed_for_ground_speed(sp[to.COURSE_RAD], p.ground_speed_min_m_s, wind_n, wind_e)
+            / s.eas_to_tas
         )
     elif math.isfinite(sp[to.HEADING_RAD]):
         present = yaw
@@ -119,9 +120,9 @@ def lateral_control(nav: Array, sp: Array, p: Array, s: FixedWingState, dt: floa
         error = wrap_pi(wanted - present)
         # beyond a right angle: turn at full strength, whichever way is shorter
         turn = math.sin(error) if abs(error) < 0.5 * math.pi else math.copysign(1.0, error)
-        acceleration += p[c.HEADING_P] * true_airspeed * turn
+        acceleration += p.heading_p_1_s * true_airspeed * turn
         s.heading_setpoint = wanted
     s.lateral_acceleration = acceleration
     roll = min(limit, max(-limit, math.atan(acceleration / GRAVITY_M_S2)))
-    step = p[c.ROLL_SLEW] * dt
+    step = p.roll_slew_rad_s * dt
     s.roll_setpoint += min(step, max(-step, roll - s.roll_setpoint))

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.controller import StateArray
+from autopilot_bridge.control.controller import RecordArray
 from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import update_air
 from autopilot_bridge.control.fixed_wing.attitude import (
@@ -19,6 +19,7 @@ from autopilot_bridge.control.fixed_wing.attitude import (
 from autopilot_bridge.control.fixed_wing.energy import PITCH_LIMIT_RAD, energy_control
 from autopilot_bridge.control.fixed_wing.lateral import lateral_control
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import quaternion_from_euler
@@ -117,7 +118,7 @@ def _sum_of_guidance(s: FixedWingState) -> float:
 
 
 @kernel
-def _guide(nav: Array, sp: Array, p: Array, s: FixedWingState, level: float) -> None:
+def _guide(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, level: float) -> None:
     """The 50 Hz part: airspeed filter, lateral guidance, energy control."""
     dt = s.dt * s.divisor
     update_air(nav, p, s, dt)
@@ -144,9 +145,11 @@ def _guide(nav: Array, sp: Array, p: Array, s: FixedWingState, level: float) -> 
 
 
 @kernel
-def control_step(nav: Array, sp: Array, p: Array, states: StateArray, actuators: Array) -> None:
+def control_step(
+    nav: Array, sp: Array, parameters: RecordArray, states: RecordArray, actuators: Array
+) -> None:
     """Write the actuators (MAX_ACTUATORS,) from navigation state, setpoint, parameters and state (1,)."""
-    s = states[0]
+    p, s = parameters[0], states[0]
     level = sp[to.LEVEL]
     flown = level == to.FLY or level == to.RATES or level == to.SURFACES_DIRECT
     known = True

@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
+from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -34,17 +34,23 @@ _STEEPEST_RAD: Final = math.radians(15.0)
 
 
 @kernel
-def _angle_of_attack(airspeed: float, load_factor: float, p: Array) -> float:
+def _angle_of_attack(airspeed: float, load_factor: float, p: FixedWingParameters) -> float:
     """Pitch over the flight path that gives a load factor at an airspeed; short of the stall."""
-    lift, trim = p[c.LIFT_ANGLE], p[c.AIRSPEED_TRIM]
+    lift, trim = p.lift_angle_rad, p.airspeed_trim_m_s
     most = trim / stall_speed(p)
     ratio = trim / max(airspeed, 1.0)
-    return p[c.TRIM_PITCH] - lift + lift * min(most * most, load_factor * ratio * ratio)
+    return p.trim_pitch_rad - lift + lift * min(most * most, load_factor * ratio * ratio)
 
 
 @kernel
 def pitch_for_climb(
-    nav: Array, p: Array, s: FixedWingState, dt: float, climb: float, lowest: float, highest: float
+    nav: Array,
+    p: FixedWingParameters,
+    s: FixedWingState,
+    dt: float,
+    climb: float,
+    lowest: float,
+    highest: float,
 ) -> float:
     """Pitch setpoint, rad, that flies a climb rate within limits of the pitch."""
     airspeed = nav[n.AIRSPEED_M_S] if math.isfinite(nav[n.AIRSPEED_M_S]) else s.eas
@@ -52,7 +58,9 @@ def pitch_for_climb(
     speed = max(s.eas, stall_speed(p)) * s.eas_to_tas
     actual = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
     missing = climb - actual
-    share = min(_ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN / p[c.PITCH_TC] * missing / GRAVITY_M_S2))
+    share = min(
+        _ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN / p.pitch_time_constant_s * missing / GRAVITY_M_S2)
+    )
     load_factor = (1.0 + share) / max(0.5, math.cos(s.roll_setpoint))
     path = min(_STEEPEST_RAD, max(-_STEEPEST_RAD, actual / speed))
     pitch = _angle_of_attack(airspeed, load_factor, p) + path
@@ -62,7 +70,7 @@ def pitch_for_climb(
     felt = -nav[n.FORCE + 2] / GRAVITY_M_S2
     if math.isfinite(felt):
         liftless = nav[n.PITCH] - path - _angle_of_attack(airspeed, felt, p)
-        lag_s = _GUST_LAG * p[c.PITCH_TC]
+        lag_s = _GUST_LAG * p.pitch_time_constant_s
         s.liftless_pitch += dt / (dt + lag_s) * (liftless - s.liftless_pitch)
     s.liftless_pitch = min(_GUST_MAX_RAD, max(-_GUST_MAX_RAD, s.liftless_pitch))
     wanted = pitch + s.liftless_pitch
@@ -83,23 +91,27 @@ def reset_height(height: float, climb: float, s: FixedWingState) -> None:
 
 
 @kernel
-def follow_height(wanted: float, slope: float, height: float, p: Array, s: FixedWingState, dt: float) -> None:
+def follow_height(
+    wanted: float, slope: float, height: float, p: FixedWingParameters, s: FixedWingState, dt: float
+) -> None:
     """Move the reference towards `wanted`, which itself climbs with `slope`, within the rates for steps.
 
     Heights up, m; rates m/s. The reference's rate, HEIGHT_RATE_REFERENCE, is that over the slope.
     """
-    acceleration = p[c.HEIGHT_ACCELERATION]
+    acceleration = p.height_acceleration_m_s2
     left = wanted - s.height_reference
     size = abs(left)
     linear = acceleration / (_CLOSING_1_S * _CLOSING_1_S)
     speed = size * _CLOSING_1_S if size <= linear else math.sqrt(acceleration * (2.0 * size - linear))
     rate = math.copysign(speed, left)
-    rate = min(min(p[c.CLIMB_TARGET], p[c.CLIMB_MAX]), max(-min(p[c.SINK_TARGET], p[c.SINK_MAX]), rate))
+    rate = min(
+        min(p.climb_rate_target_m_s, p.climb_max_m_s), max(-min(p.sink_rate_target_m_s, p.sink_max_m_s), rate)
+    )
     change = acceleration * dt
     s.height_rate_reference += min(change, max(-change, rate - s.height_rate_reference))
     reference = s.height_reference + (s.height_rate_reference + slope) * dt
     # where the vehicle can't follow (a glider, a stopped motor), the reference waits for it
-    ahead = _LEASH * p[c.CLIMB_MAX] * p[c.HEIGHT_TC]
-    behind = _LEASH * p[c.SINK_MAX] * p[c.HEIGHT_TC]
+    ahead = _LEASH * p.climb_max_m_s * p.height_time_constant_s
+    behind = _LEASH * p.sink_max_m_s * p.height_time_constant_s
     s.height_reference = min(height + ahead, max(height - behind, reference))
     s.height_controlled = 1.0

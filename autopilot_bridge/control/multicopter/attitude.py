@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter.layout import MulticopterState
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis, multiply
 
@@ -59,7 +59,9 @@ def quaternion_from_thrust_axis(zx: float, zy: float, zz: float, yaw: float, q: 
 
 
 @kernel
-def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_sp: Array, w: Array) -> None:
+def attitude_control(
+    q: Array, q_sp: Array, yaw_rate_ff: float, p: MulticopterParameters, rate_sp: Array, w: Array
+) -> None:
     """rate_sp (3,) FRD from the attitude error; `yaw_rate_ff` about NED down; `w` (8,) is scratch."""
     ex, ey, ez = body_z_of(q)
     dx, dy, dz = body_z_of(q_sp)
@@ -84,7 +86,7 @@ def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_s
             half -= math.pi
         elif half < -0.5 * math.pi:
             half += math.pi
-        half *= p[c.YAW_WEIGHT]
+        half *= p.yaw_weight
         cw, cz = math.cos(half), math.sin(half)
         a[0], a[1], a[2], a[3] = (
             a[0] * cw - a[3] * cz,
@@ -95,11 +97,11 @@ def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_s
     # error quaternion q^-1 (x) a, its vector part doubled
     qw = q[0] * a[0] + q[1] * a[1] + q[2] * a[2] + q[3] * a[3]
     sign = 2.0 if qw >= 0.0 else -2.0
-    yaw_p = p[c.ATTITUDE_P + 2]
-    if p[c.YAW_WEIGHT] > 1e-4:
-        yaw_p /= p[c.YAW_WEIGHT]  # small yaw errors keep their full gain
-    rate_sp[0] = p[c.ATTITUDE_P] * sign * (q[0] * a[1] - q[1] * a[0] - q[2] * a[3] + q[3] * a[2])
-    rate_sp[1] = p[c.ATTITUDE_P + 1] * sign * (q[0] * a[2] + q[1] * a[3] - q[2] * a[0] - q[3] * a[1])
+    yaw_p = p.yaw_p_1_s
+    if p.yaw_weight > 1e-4:
+        yaw_p /= p.yaw_weight  # small yaw errors keep their full gain
+    rate_sp[0] = p.roll_p_1_s * sign * (q[0] * a[1] - q[1] * a[0] - q[2] * a[3] + q[3] * a[2])
+    rate_sp[1] = p.pitch_p_1_s * sign * (q[0] * a[2] + q[1] * a[3] - q[2] * a[0] - q[3] * a[1])
     rate_sp[2] = yaw_p * sign * (q[0] * a[3] - q[1] * a[2] + q[2] * a[1] - q[3] * a[0])
     # NED down axis in body: third row of R(q)
     rate_sp[0] += yaw_rate_ff * 2.0 * (q[1] * q[3] - q[0] * q[2])
@@ -108,33 +110,58 @@ def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_s
 
 
 @kernel
-def limit_rates(rate_sp: Array, p: Array) -> None:
+def limit_rates(rate_sp: Array, p: MulticopterParameters) -> None:
     """Clip to the rate limits, in place."""
-    for i in range(3):
-        rate_sp[i] = min(p[c.RATE_MAX + i], max(-p[c.RATE_MAX + i], rate_sp[i]))
+    rate_sp[0] = min(p.roll_rate_max_rad_s, max(-p.roll_rate_max_rad_s, rate_sp[0]))
+    rate_sp[1] = min(p.pitch_rate_max_rad_s, max(-p.pitch_rate_max_rad_s, rate_sp[1]))
+    rate_sp[2] = min(p.yaw_rate_max_rad_s, max(-p.yaw_rate_max_rad_s, rate_sp[2]))
+
+
+@kernel
+def _rate_axis(
+    axis: int,
+    gains: tuple[float, float, float, float, float, float],
+    rates: Array,
+    rate_sp: Array,
+    s: MulticopterState,
+    alpha: float,
+    dt: float,
+    integrate: bool,
+) -> None:
+    """The rate PID of one axis; gains are p, i, d, feed-forward, k and the limit of the integral."""
+    kp, ki, kd, ff, k, limit = gains
+    error = rate_sp[axis] - rates[axis]
+    raw = (rates[axis] - s.rate_previous[axis]) / dt
+    s.rate_previous[axis] = rates[axis]
+    s.rate_derivative[axis] += alpha * (raw - s.rate_derivative[axis])
+    torque = k * (kp * error + s.rate_integral[axis] - kd * s.rate_derivative[axis]) + ff * rate_sp[axis]
+    missing = s.unallocated[axis]
+    winding = (missing > 0.01 and error > 0.0) or (missing < -0.01 and error < 0.0)
+    if integrate and not winding:
+        fade = error / _INTEGRAL_FADE_RAD_S
+        step = max(0.0, 1.0 - fade * fade) * ki * error * dt
+        s.rate_integral[axis] = min(limit, max(-limit, s.rate_integral[axis] + step))
+    s.unallocated[axis] = torque
 
 
 @kernel
 def rate_control(
-    rates: Array, rate_sp: Array, p: Array, s: MulticopterState, dt: float, integrate: bool
+    rates: Array, rate_sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, integrate: bool
 ) -> None:
     """Torques of the rate PID, left in UNALLOCATED of the state `s` for the mixer."""
-    alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
-    for i in range(3):
-        g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
-        error = rate_sp[i] - rates[i]
-        raw = (rates[i] - s.rate_previous[i]) / dt
-        s.rate_previous[i] = rates[i]
-        s.rate_derivative[i] += alpha * (raw - s.rate_derivative[i])
-        torque = (
-            p[g + 4] * (p[g] * error + s.rate_integral[i] - p[g + 2] * s.rate_derivative[i])
-            + p[g + 3] * rate_sp[i]
-        )
-        missing = s.unallocated[i]
-        winding = (missing > 0.01 and error > 0.0) or (missing < -0.01 and error < 0.0)
-        if integrate and not winding:
-            fade = error / _INTEGRAL_FADE_RAD_S
-            step = max(0.0, 1.0 - fade * fade) * p[g + 1] * error * dt
-            limit = p[g + 5]
-            s.rate_integral[i] = min(limit, max(-limit, s.rate_integral[i] + step))
-        s.unallocated[i] = torque
+    alpha = dt / (dt + 1.0 / (2.0 * math.pi * p.rate_derivative_cutoff_hz))
+    roll = (
+        *(p.rate_roll_p, p.rate_roll_i, p.rate_roll_d),
+        *(p.rate_roll_ff, p.rate_roll_k, p.rate_roll_integral_max),
+    )
+    pitch = (
+        *(p.rate_pitch_p, p.rate_pitch_i, p.rate_pitch_d),
+        *(p.rate_pitch_ff, p.rate_pitch_k, p.rate_pitch_integral_max),
+    )
+    yaw = (
+        *(p.rate_yaw_p, p.rate_yaw_i, p.rate_yaw_d),
+        *(p.rate_yaw_ff, p.rate_yaw_k, p.rate_yaw_integral_max),
+    )
+    _rate_axis(0, roll, rates, rate_sp, s, alpha, dt, integrate)
+    _rate_axis(1, pitch, rates, rate_sp, s, alpha, dt, integrate)
+    _rate_axis(2, yaw, rates, rate_sp, s, alpha, dt, integrate)

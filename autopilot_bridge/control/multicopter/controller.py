@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.control.controller import Array, Controller, StateArray
-from autopilot_bridge.control.multicopter import layout as c
+from autopilot_bridge.control.controller import Array, Controller, RecordArray
 from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import (
     attitude_control,
@@ -76,7 +75,9 @@ def _rest(nav: Array, s: MulticopterState, command: float, actuators: Array) -> 
 
 
 @kernel
-def _collective(nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float, entering: bool) -> float:
+def _collective(
+    nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, entering: bool
+) -> float:
     """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
     if math.isfinite(sp[to.THRUST]):
         s.vel_integral[2] = 0.0
@@ -87,18 +88,20 @@ def _collective(nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float,
     vz = sp[to.VEL + 2]
     ez = sp[to.POS + 2] - nav[n.POS + 2]
     if math.isfinite(ez):
-        vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
+        vz = (vz if math.isfinite(vz) else 0.0) + p.pos_z_p_1_s * ez
     elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
         vz = 0.0
-    s.vel_setpoint[2] = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz)) if vz == vz else vz
+    s.vel_setpoint[2] = min(p.speed_down_max_m_s, max(-p.speed_up_max_m_s, vz)) if vz == vz else vz
     up = vertical_control(nav, sp, p, s, dt, entering)
     _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
-    return min(p[c.THRUST_MAX], max(p[c.THRUST_MIN], up / max(_MIN_COS_TILT, cos_tilt)))
+    return min(p.thrust_max, max(p.thrust_min, up / max(_MIN_COS_TILT, cos_tilt)))
 
 
 @kernel
-def _step(nav: Array, sp: Array, p: Array, states: StateArray, scratch: Array, actuators: Array) -> None:
-    s = states[0]
+def _step(
+    nav: Array, sp: Array, parameters: RecordArray, states: RecordArray, scratch: Array, actuators: Array
+) -> None:
+    p, s = parameters[0], states[0]
     level = sp[to.LEVEL]
     dt = s.dt
     if not level >= to.IDLE:  # OFF, and NaN
@@ -107,7 +110,7 @@ def _step(nav: Array, sp: Array, p: Array, states: StateArray, scratch: Array, a
     rates = nav[n.RATES_FRD_RAD_S]
     attitude_known = _finite4(nav, n.Q) and math.isfinite(rates[0] + rates[1] + rates[2])
     if level < to.RATES or not attitude_known:
-        _rest(nav, s, p[c.MOTOR_IDLE], actuators)
+        _rest(nav, s, p.motor_idle, actuators)
         return
 
     switched = level != s.last_level
@@ -156,8 +159,8 @@ def _step(nav: Array, sp: Array, p: Array, states: StateArray, scratch: Array, a
     # on the ground the legs hold the vehicle: an integrator would only store a kick for take-off
     integrate = s.airborne != 0.0 or thrust > 0.6 * s.hover
     rate_control(rates, rate_sp, p, s, dt, integrate)
-    if p[c.YAW_TORQUE_CUTOFF] > 0.0:
-        alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.YAW_TORQUE_CUTOFF]))
+    if p.yaw_torque_cutoff_hz > 0.0:
+        alpha = dt / (dt + 1.0 / (2.0 * math.pi * p.yaw_torque_cutoff_hz))
         s.yaw_torque += alpha * (s.unallocated[2] - s.yaw_torque)
     else:
         s.yaw_torque = s.unallocated[2]
@@ -165,9 +168,9 @@ def _step(nav: Array, sp: Array, p: Array, states: StateArray, scratch: Array, a
     allocate(s.unallocated[0], s.unallocated[1], s.yaw_torque, thrust, motor, s.unallocated)
     s.thrust_given = 0.25 * (motor[0] + motor[1] + motor[2] + motor[3])
     for i in range(MOTORS):
-        command = command_from_thrust(motor[i], p[c.THRUST_MODEL])
-        command = max(p[c.MOTOR_IDLE], command)
-        actuators[i] = command if math.isfinite(command) else p[c.MOTOR_IDLE]
+        command = command_from_thrust(motor[i], p.thrust_model_factor)
+        command = max(p.motor_idle, command)
+        actuators[i] = command if math.isfinite(command) else p.motor_idle
     for i in range(MOTORS, actuators.shape[0]):
         actuators[i] = 0.0
 

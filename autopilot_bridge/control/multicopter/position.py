@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import body_z_of, quaternion_from_thrust_axis
 from autopilot_bridge.control.multicopter.layout import MulticopterState
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
@@ -47,16 +47,16 @@ def lowpass_gain(dt: float, cutoff_hz: float) -> float:
 
 
 @kernel
-def estimate_hover_thrust(nav: Array, p: Array, s: MulticopterState, dt: float) -> None:
+def estimate_hover_thrust(nav: Array, p: MulticopterParameters, s: MulticopterState, dt: float) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
     On the ground this is not valid: the decreasing thrust after a touchdown would be learnt as hover thrust,
     and the landing would not be detected.
     """
-    s.thrust_lagged += (s.thrust_given - s.thrust_lagged) * min(1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT]))
+    s.thrust_lagged += (s.thrust_given - s.thrust_lagged) * min(1.0, dt / max(dt, p.rotor_time_constant_s))
     measured = -nav[n.FORCE + 2]
-    if p[c.USE_HOVER_ESTIMATE] == 0.0 or s.airborne == 0.0 or s.ground_contact != 0.0:
+    if not p.use_hover_thrust_estimate or s.airborne == 0.0 or s.ground_contact != 0.0:
         return
     if not math.isfinite(measured):
         return
@@ -90,14 +90,14 @@ def update_airborne(nav: Array, s: MulticopterState) -> None:
 
 
 @kernel
-def update_filters(nav: Array, p: Array, s: MulticopterState, dt: float) -> None:
+def update_filters(nav: Array, p: MulticopterParameters, s: MulticopterState, dt: float) -> None:
     """Low-passed acceleration (the velocity derivative) and measured drag."""
-    alpha = lowpass_gain(dt, p[c.VEL_D_CUTOFF])
+    alpha = lowpass_gain(dt, p.vel_derivative_cutoff_hz)
     for i in range(3):
         acc = nav[n.ACC + i]
         if math.isfinite(acc):
             s.acc_filtered[i] += alpha * (acc - s.acc_filtered[i])
-    if p[c.DRAG_CUTOFF] <= 0.0 or s.airborne == 0.0:
+    if p.drag_compensation_cutoff_hz <= 0.0 or s.airborne == 0.0:
         s.drag[0] = 0.0
         s.drag[1] = 0.0
         return
@@ -115,28 +115,28 @@ def update_filters(nav: Array, p: Array, s: MulticopterState, dt: float) -> None
     if size > _DRAG_MAX_M_S2:
         north *= _DRAG_MAX_M_S2 / size
         east *= _DRAG_MAX_M_S2 / size
-    beta = lowpass_gain(dt, p[c.DRAG_CUTOFF])
+    beta = lowpass_gain(dt, p.drag_compensation_cutoff_hz)
     s.drag[0] += beta * (north - s.drag[0])
     s.drag[1] += beta * (east - s.drag[1])
 
 
 @kernel
-def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: MulticopterState) -> None:
+def _velocity_setpoint(nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState) -> None:
     """VEL_SETPOINT from position P and feed-forward, limited; NaN where the velocity isn't controlled."""
     px, py = 0.0, 0.0  # share of the position loop, which keeps its right of way under the speed limit
     vx, vy = sp[to.VEL], sp[to.VEL + 1]
     ex, ey = sp[to.POS] - nav[n.POS], sp[to.POS + 1] - nav[n.POS + 1]
     if math.isfinite(ex):
-        px = p[c.POS_XY_P] * ex
+        px = p.pos_xy_p_1_s * ex
         vx = vx if math.isfinite(vx) else 0.0
     elif math.isnan(vx) and math.isnan(sp[to.ACC]):
         vx = 0.0  # not commanded: stand still
     if math.isfinite(ey):
-        py = p[c.POS_XY_P] * ey
+        py = p.pos_xy_p_1_s * ey
         vy = vy if math.isfinite(vy) else 0.0
     elif math.isnan(vy) and math.isnan(sp[to.ACC + 1]):
         vy = 0.0
-    limit = p[c.SPEED_XY_MAX]
+    limit = p.speed_xy_max_m_s
     size = math.sqrt(px * px + py * py)
     if size > limit:
         px *= limit / size
@@ -158,11 +158,11 @@ def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: MulticopterState) -> 
     vz = sp[to.VEL + 2]
     ez = sp[to.POS + 2] - nav[n.POS + 2]
     if math.isfinite(ez):
-        vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
+        vz = (vz if math.isfinite(vz) else 0.0) + p.pos_z_p_1_s * ez
     elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
         vz = 0.0
     if math.isfinite(vz):
-        vz = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz))
+        vz = min(p.speed_down_max_m_s, max(-p.speed_up_max_m_s, vz))
     s.vel_setpoint[2] = vz
 
 
@@ -186,10 +186,10 @@ def _acceleration_axis(
 
 @kernel
 def vertical_control(
-    nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float, entering: bool
+    nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, entering: bool
 ) -> float:
     """Vertical thrust (positive up, normalised, before tilt) from the vertical part of the setpoint."""
-    acc, error, controlled = _acceleration_axis(2, nav, sp, p[c.VEL_Z_P], p[c.VEL_Z_D], s)
+    acc, error, controlled = _acceleration_axis(2, nav, sp, p.vel_z_p_1_s, p.vel_z_d, s)
     hover = s.hover
     if entering and s.airborne != 0.0:
         # start from the thrust flown so far, so that the switch isn't felt
@@ -201,26 +201,26 @@ def vertical_control(
     s.acc_setpoint[2] = acc
     up = hover * (1.0 - acc / GRAVITY_M_S2)
     if controlled:
-        at_min = up <= p[c.THRUST_MIN] and error >= 0.0
-        at_max = up >= p[c.THRUST_MAX] and error <= 0.0
+        at_min = up <= p.thrust_min and error >= 0.0
+        at_max = up >= p.thrust_max and error <= 0.0
         # before lift-off only upwards: the ground holds the vehicle back, not a lack of sinking
         grounded = s.airborne == 0.0 and error >= 0.0
         if not (at_min or at_max or grounded):
-            new = s.vel_integral[2] + p[c.VEL_Z_I] * error * dt
+            new = s.vel_integral[2] + p.vel_z_i_1_s2 * error * dt
             s.vel_integral[2] = min(GRAVITY_M_S2, max(-GRAVITY_M_S2, new))
-    return min(p[c.THRUST_MAX], max(0.0, up))
+    return min(p.thrust_max, max(0.0, up))
 
 
 @kernel
 def trajectory_control(
-    nav: Array, sp: Array, p: Array, s: MulticopterState, dt: float, entering: bool
+    nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, entering: bool
 ) -> None:
     """One step of the position loop: writes Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF."""
     _velocity_setpoint(nav, sp, p, s)
-    ax, error_x, control_x = _acceleration_axis(0, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
-    ay, error_y, control_y = _acceleration_axis(1, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
+    ax, error_x, control_x = _acceleration_axis(0, nav, sp, p.vel_xy_p_1_s, p.vel_xy_d, s)
+    ay, error_y, control_y = _acceleration_axis(1, nav, sp, p.vel_xy_p_1_s, p.vel_xy_d, s)
     hover = s.hover
-    thrust_max = p[c.THRUST_MAX]
+    thrust_max = p.thrust_max
     if entering and s.airborne != 0.0:
         zx, zy, _ = body_z_of(nav[n.Q_NED_FROM_FRD])
         pull = GRAVITY_M_S2 * s.thrust_given / hover
@@ -248,11 +248,11 @@ def trajectory_control(
     tx, ty = hover * wanted_x / GRAVITY_M_S2, hover * wanted_y / GRAVITY_M_S2
     wanted = math.sqrt(tx * tx + ty * ty)
     # vertical first, but keep a margin for staying on the path when climbing at full thrust
-    margin = min(wanted, p[c.THRUST_XY_MARGIN] * thrust_max)
+    margin = min(wanted, p.thrust_xy_margin * thrust_max)
     up = min(up, math.sqrt(thrust_max * thrust_max - margin * margin))
     room = math.sqrt(max(0.0, thrust_max * thrust_max - up * up))
     # a tilted vehicle must still push up: below half of hover the tilt is taken as if pushing half
-    room = min(room, math.tan(p[c.TILT_MAX]) * up)
+    room = min(room, math.tan(p.tilt_max_rad) * up)
     given = wanted
     if wanted > room:
         given = room
@@ -262,14 +262,14 @@ def trajectory_control(
     missing_x, missing_y = wanted_x - tx * scale, wanted_y - ty * scale
     if wanted > given:
         # tracking anti-windup (Visioli; PX4 uses gain 2 / P)
-        back = 2.0 / p[c.VEL_XY_P]
+        back = 2.0 / p.vel_xy_p_1_s
         error_x -= back * missing_x
         error_y -= back * missing_y
     if s.airborne != 0.0:
         if control_x:
-            s.vel_integral[0] += p[c.VEL_XY_I] * error_x * dt
+            s.vel_integral[0] += p.vel_xy_i_1_s2 * error_x * dt
         if control_y:
-            s.vel_integral[1] += p[c.VEL_XY_I] * error_y * dt
+            s.vel_integral[1] += p.vel_xy_i_1_s2 * error_y * dt
         size = math.sqrt(s.vel_integral[0] ** 2 + s.vel_integral[1] ** 2)
         if size > GRAVITY_M_S2:
             s.vel_integral[0] *= GRAVITY_M_S2 / size
@@ -282,7 +282,7 @@ def trajectory_control(
     zx, zy, zz = 0.0, 0.0, 1.0
     if thrust > 1e-6:
         zx, zy, zz = -tx / thrust, -ty / thrust, up / thrust
-    s.thrust_setpoint = max(thrust, p[c.THRUST_MIN])
+    s.thrust_setpoint = max(thrust, p.thrust_min)
     yaw = sp[to.YAW_RAD]
     if not math.isfinite(yaw):
         yaw = nav[n.YAW]

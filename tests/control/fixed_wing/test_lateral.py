@@ -16,14 +16,15 @@ from autopilot_bridge.control.fixed_wing.lateral import (
     heading_for_course,
     stall_speed,
 )
-from flightsim.foundation.records import new_record
+from flightsim.foundation import records
+from flightsim.foundation.records import new_record, the_record
 
 angles = st.floats(-math.pi, math.pi)
 winds = st.floats(-40.0, 40.0)
 
 
-def packed(parameters: FixedWingParameters) -> np.ndarray:
-    return np.array([float(getattr(parameters, name)) for name in c.PARAMETER_NAMES])
+def packed(parameters: FixedWingParameters) -> FixedWingParameters:
+    return the_record(records.packed(parameters), FixedWingParameters)
 
 
 def ground_velocity(heading: float, airspeed: float, wind: tuple[float, float]) -> np.ndarray:

@@ -706,8 +706,8 @@ def test_trim_throttle_is_known_near_the_trim_airspeed_too() -> None:
         s.eas = wanted + 1e-12
         setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = 0.0, wanted
         p = near.copy()
-        p[c.AIRSPEED_STALL] = 7.0
-        p[c.THROTTLE_DAMPING] = p[c.THROTTLE_I] = 0.0
+        p.airspeed_stall_m_s = 7.0
+        p.throttle_damping = p.throttle_integral_1_s = 0.0
         s.energy_rate_setpoint = 0.0
         energy_control(nav, setpoint, p, s, GUIDANCE_S, False)
         under = s.underspeed
