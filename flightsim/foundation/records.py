@@ -1,12 +1,13 @@
 """Named records that Python code and compiled kernels share: a class declares the fields and their sizes.
 
-The parameters of a kernel are a dataclass of numbers, which is packed into a record with the same fields.
+The parameters and constants of a kernel are a dataclass of numbers and arrays, which is packed into a record
+with the same fields.
 
 A kernel takes a record by its fields' names, and another record or a plain array in its place fails when the
 kernel is compiled. All numbers are float64, one after the other.
 """
 
-from dataclasses import astuple, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -46,12 +47,17 @@ def new_record(kind: type[RecordT]) -> RecordT:
 
 
 def packed(parameters: "DataclassInstance") -> NDArray[np.void]:
-    """An array (1,) with one record of a dataclass of numbers, by the names of its fields; True is 1."""
-    array = np.zeros(1, np.dtype([(each.name, np.float64) for each in fields(parameters)]))
+    """An array (1,) with one record of a dataclass of numbers and arrays, by the names of its fields; True
+    is 1.
+    """
+    places = [
+        (each.name, np.float64, np.shape(getattr(parameters, each.name))) for each in fields(parameters)
+    ]
+    array = np.zeros(1, np.dtype(places))
     pack(parameters, array)
     return array
 
 
 def pack(parameters: "DataclassInstance", array: NDArray[np.void]) -> None:
-    """Write the numbers of a dataclass to a record that `packed` has made of another one of its class."""
-    array[0] = astuple(parameters)
+    """Write the values of a dataclass to a record that `packed` has made of another one of its class."""
+    array[0] = tuple([getattr(parameters, each.name) for each in fields(parameters)])

@@ -21,30 +21,37 @@ from flightsim.foundation.atmosphere import ICE_POINT_K
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.interface import AIRSPEED_DIFFERENTIAL_PRESSURE_PA, AIRSPEED_SIZE, AIRSPEED_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
+from flightsim.sensors.sensor import RecordArray, SensorModel, gauss_markov, quantise, saturate
 
 Array = NDArray[np.float64]
 
 _GAMMA: Final = 1.4
 
-_NOISE: Final = 0
-_OFFSET: Final = 1
-_GAIN: Final = 2
-_DECAY: Final = 3
-_DRIVE: Final = 4
-_LAG_GAIN: Final = 5
-_QUANTUM: Final = 6
-_LIMIT: Final = 7
-_INSENSITIVE: Final = 8
-_RISE_K: Final = 9
-_TEMPERATURE_QUANTUM: Final = 10
-_CONSTANTS: Final = 11
-
-_DRIFT: Final = 0
-_LAGGED: Final = 1  # NaN before the first sample
 _NORMALS: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    noise_pa: float
+    offset_pa: float
+    gain: float
+    decay: float  # of the drift
+    drive_pa: float
+    lag_gain: float
+    quantum_pa: float
+    limit_pa: float
+    insensitive_rad: float
+    rise_k: float
+    temperature_quantum_k: float
+
+
+@dataclass(slots=True, kw_only=True)
+class _State:
+    drift_pa: float
+    lagged_pa: float  # NaN before the first sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,24 +96,25 @@ class AirspeedParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its offset, its scale error and where its drift starts."""
-        constants = np.zeros(_CONSTANTS)
-        constants[_NOISE] = self.noise_pa
-        constants[_OFFSET] = self.zero_offset_pa * rng.standard_normal()
-        constants[_GAIN] = 1.0 + self.scale_error * rng.standard_normal()
-        constants[_DECAY], constants[_DRIVE] = gauss_markov(
-            self.drift_pa, self.drift_time_constant_s, interval_s
+        decay, drive_pa = gauss_markov(self.drift_pa, self.drift_time_constant_s, interval_s)
+        constants = _Constants(
+            noise_pa=self.noise_pa,
+            offset_pa=self.zero_offset_pa * rng.standard_normal(),
+            gain=1.0 + self.scale_error * rng.standard_normal(),
+            decay=decay,
+            drive_pa=drive_pa,
+            lag_gain=1.0 if self.lag_s == 0.0 else 1.0 - math.exp(-interval_s / self.lag_s),
+            quantum_pa=self.quantum_pa,
+            limit_pa=self.range_pa,
+            insensitive_rad=self.insensitive_angle_rad,
+            rise_k=self.self_heating_k,
+            temperature_quantum_k=self.temperature_quantum_k,
         )
-        constants[_LAG_GAIN] = 1.0 if self.lag_s == 0.0 else 1.0 - math.exp(-interval_s / self.lag_s)
-        constants[_QUANTUM] = self.quantum_pa
-        constants[_LIMIT] = self.range_pa
-        constants[_INSENSITIVE] = self.insensitive_angle_rad
-        constants[_RISE_K] = self.self_heating_k
-        constants[_TEMPERATURE_QUANTUM] = self.temperature_quantum_k
-        state = np.array([self.drift_pa * rng.standard_normal(), np.nan])
+        state = _State(drift_pa=self.drift_pa * rng.standard_normal(), lagged_pa=math.nan)
         return SensorModel(
             kernel=_measure,
-            constants=constants,
-            state=state,
+            constants=packed(constants),
+            state=packed(state),
             normals_per_sample=_NORMALS,
             size=AIRSPEED_SIZE,
             fault_targets=(
@@ -148,27 +156,24 @@ def pressure_recovery(incidence_rad: float, insensitive_rad: float) -> float:
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+def _measure(
+    truth: Array, constants: RecordArray, states: RecordArray, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
+    s: _State = states[0]
     # of the flow to the body's x axis: u / V
     cosine = math.cos(truth[t.ANGLE_OF_ATTACK_RAD]) * math.cos(truth[t.SIDESLIP_RAD])
     incidence_rad = math.acos(min(1.0, max(-1.0, cosine)))
-    pressure_pa = pressure_recovery(incidence_rad, constants[_INSENSITIVE]) * impact_pressure_pa(
+    pressure_pa = pressure_recovery(incidence_rad, c.insensitive_rad) * impact_pressure_pa(
         truth[t.PRESSURE_PA], truth[t.DYNAMIC_PRESSURE_PA]
     )
-    if math.isnan(state[_LAGGED]):
-        state[_LAGGED] = pressure_pa
-    state[_LAGGED] += constants[_LAG_GAIN] * (pressure_pa - state[_LAGGED])
-    value_pa = (
-        constants[_GAIN] * state[_LAGGED]
-        + constants[_OFFSET]
-        + state[_DRIFT]
-        + constants[_NOISE] * normals[row, 0]
-    )
-    out[AIRSPEED_DIFFERENTIAL_PRESSURE_PA] = quantise(
-        saturate(value_pa, constants[_LIMIT]), constants[_QUANTUM]
-    )
+    if math.isnan(s.lagged_pa):
+        s.lagged_pa = pressure_pa
+    s.lagged_pa += c.lag_gain * (pressure_pa - s.lagged_pa)
+    value_pa = c.gain * s.lagged_pa + c.offset_pa + s.drift_pa + c.noise_pa * normals[row, 0]
+    out[AIRSPEED_DIFFERENTIAL_PRESSURE_PA] = quantise(saturate(value_pa, c.limit_pa), c.quantum_pa)
     out[AIRSPEED_TEMPERATURE_C] = quantise(
-        truth[t.TEMPERATURE_K] - ICE_POINT_K + constants[_RISE_K], constants[_TEMPERATURE_QUANTUM]
+        truth[t.TEMPERATURE_K] - ICE_POINT_K + c.rise_k, c.temperature_quantum_k
     )
-    state[_DRIFT] = constants[_DECAY] * state[_DRIFT] + constants[_DRIVE] * normals[row, 1]
+    s.drift_pa = c.decay * s.drift_pa + c.drive_pa * normals[row, 1]
     return True

@@ -12,26 +12,32 @@ from flightsim.foundation.atmosphere import ICE_POINT_K
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise
+from flightsim.sensors.sensor import RecordArray, SensorModel, gauss_markov, quantise
 
 Array = NDArray[np.float64]
 
-
-_NOISE: Final = 0
-_BIAS: Final = 1
-_DECAY: Final = 2
-_DRIVE: Final = 3
-_LAG_GAIN: Final = 4
-_QUANTUM: Final = 5
-_RISE_K: Final = 6
-_TEMPERATURE_QUANTUM: Final = 7
-_CONSTANTS: Final = 8
-
-_DRIFT: Final = 0
-_LAGGED: Final = 1  # NaN before the first sample
 _NORMALS: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    noise_pa: float
+    bias_pa: float
+    decay: float  # of the drift
+    drive_pa: float
+    lag_gain: float
+    quantum_pa: float
+    rise_k: float
+    temperature_quantum_k: float
+
+
+@dataclass(slots=True, kw_only=True)
+class _State:
+    drift_pa: float
+    lagged_pa: float  # NaN before the first sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,21 +70,22 @@ class BarometerParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its offset and where its drift starts."""
-        constants = np.zeros(_CONSTANTS)
-        constants[_NOISE] = self.noise_pa
-        constants[_BIAS] = self.turn_on_bias_pa * rng.standard_normal()
-        constants[_DECAY], constants[_DRIVE] = gauss_markov(
-            self.drift_pa, self.drift_time_constant_s, interval_s
+        decay, drive_pa = gauss_markov(self.drift_pa, self.drift_time_constant_s, interval_s)
+        constants = _Constants(
+            noise_pa=self.noise_pa,
+            bias_pa=self.turn_on_bias_pa * rng.standard_normal(),
+            decay=decay,
+            drive_pa=drive_pa,
+            lag_gain=1.0 if self.lag_s == 0.0 else 1.0 - math.exp(-interval_s / self.lag_s),
+            quantum_pa=self.quantum_pa,
+            rise_k=self.self_heating_k,
+            temperature_quantum_k=self.temperature_quantum_k,
         )
-        constants[_LAG_GAIN] = 1.0 if self.lag_s == 0.0 else 1.0 - math.exp(-interval_s / self.lag_s)
-        constants[_QUANTUM] = self.quantum_pa
-        constants[_RISE_K] = self.self_heating_k
-        constants[_TEMPERATURE_QUANTUM] = self.temperature_quantum_k
-        state = np.array([self.drift_pa * rng.standard_normal(), np.nan])
+        state = _State(drift_pa=self.drift_pa * rng.standard_normal(), lagged_pa=math.nan)
         return SensorModel(
             kernel=_measure,
-            constants=constants,
-            state=state,
+            constants=packed(constants),
+            state=packed(state),
             normals_per_sample=_NORMALS,
             size=BARO_SIZE,
             fault_targets=(
@@ -95,17 +102,20 @@ class BarometerParameters(Options):
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+def _measure(
+    truth: Array, constants: RecordArray, states: RecordArray, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
+    s: _State = states[0]
     pressure_pa = truth[t.PRESSURE_PA]
-    if math.isnan(state[_LAGGED]):
-        state[_LAGGED] = pressure_pa
-    state[_LAGGED] += constants[_LAG_GAIN] * (pressure_pa - state[_LAGGED])
+    if math.isnan(s.lagged_pa):
+        s.lagged_pa = pressure_pa
+    s.lagged_pa += c.lag_gain * (pressure_pa - s.lagged_pa)
     out[BARO_PRESSURE_PA] = quantise(
-        state[_LAGGED] + constants[_BIAS] + state[_DRIFT] + constants[_NOISE] * normals[row, 0],
-        constants[_QUANTUM],
+        s.lagged_pa + c.bias_pa + s.drift_pa + c.noise_pa * normals[row, 0], c.quantum_pa
     )
     out[BARO_TEMPERATURE_C] = quantise(
-        truth[t.TEMPERATURE_K] - ICE_POINT_K + constants[_RISE_K], constants[_TEMPERATURE_QUANTUM]
+        truth[t.TEMPERATURE_K] - ICE_POINT_K + c.rise_k, c.temperature_quantum_k
     )
-    state[_DRIFT] = constants[_DECAY] * state[_DRIFT] + constants[_DRIVE] * normals[row, 1]
+    s.drift_pa = c.decay * s.drift_pa + c.drive_pa * normals[row, 1]
     return True

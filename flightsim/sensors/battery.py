@@ -12,23 +12,29 @@ from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.sensor import SensorModel, quantise
+from flightsim.sensors.sensor import RecordArray, SensorModel, quantise
 
 Array = NDArray[np.float64]
 
-_VOLTAGE_NOISE: Final = 0
-_VOLTAGE_GAIN: Final = 1
-_VOLTAGE_QUANTUM: Final = 2
-_CURRENT_NOISE: Final = 3
-_CURRENT_GAIN: Final = 4
-_CURRENT_QUANTUM: Final = 5
-_INTERVAL_H: Final = 6
-_CONSTANTS: Final = 7
-
-_USED_AH: Final = 0  # NaN before the first sample
-_STATE: Final = 1
 _NORMALS: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    voltage_noise_v: float
+    voltage_gain: float
+    voltage_quantum_v: float
+    current_noise_a: float
+    current_gain: float
+    current_quantum_a: float
+    interval_h: float
+
+
+@dataclass(slots=True, kw_only=True)
+class _State:
+    used_ah: float  # NaN before the first sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,18 +63,19 @@ class BatteryMonitorParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its scale errors. The charge used before the first sample is taken as known."""
-        constants = np.zeros(_CONSTANTS)
-        constants[_VOLTAGE_NOISE] = self.voltage_noise_v
-        constants[_VOLTAGE_GAIN] = 1.0 + self.voltage_scale_error * rng.standard_normal()
-        constants[_VOLTAGE_QUANTUM] = self.voltage_quantum_v
-        constants[_CURRENT_NOISE] = self.current_noise_a
-        constants[_CURRENT_GAIN] = 1.0 + self.current_scale_error * rng.standard_normal()
-        constants[_CURRENT_QUANTUM] = self.current_quantum_a
-        constants[_INTERVAL_H] = interval_s / 3600.0
+        constants = _Constants(
+            voltage_noise_v=self.voltage_noise_v,
+            voltage_gain=1.0 + self.voltage_scale_error * rng.standard_normal(),
+            voltage_quantum_v=self.voltage_quantum_v,
+            current_noise_a=self.current_noise_a,
+            current_gain=1.0 + self.current_scale_error * rng.standard_normal(),
+            current_quantum_a=self.current_quantum_a,
+            interval_h=interval_s / 3600.0,
+        )
         return SensorModel(
             kernel=_measure,
-            constants=constants,
-            state=np.full(_STATE, np.nan),
+            constants=packed(constants),
+            state=packed(_State(used_ah=math.nan)),
             normals_per_sample=_NORMALS,
             size=i.BATTERY_SIZE,
             fault_targets=(
@@ -85,23 +92,23 @@ class BatteryMonitorParameters(Options):
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
-    voltage_v = (
-        constants[_VOLTAGE_GAIN] * truth[t.BATTERY_VOLTAGE_V] + constants[_VOLTAGE_NOISE] * normals[row, 0]
-    )
-    current_a = (
-        constants[_CURRENT_GAIN] * truth[t.BATTERY_CURRENT_A] + constants[_CURRENT_NOISE] * normals[row, 1]
-    )
-    out[i.BATTERY_VOLTAGE_V] = max(0.0, quantise(voltage_v, constants[_VOLTAGE_QUANTUM]))
-    out[i.BATTERY_CURRENT_A] = max(0.0, quantise(current_a, constants[_CURRENT_QUANTUM]))
-    if math.isnan(state[_USED_AH]):
-        state[_USED_AH] = truth[t.BATTERY_USED_AH]
+def _measure(
+    truth: Array, constants: RecordArray, states: RecordArray, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
+    s: _State = states[0]
+    voltage_v = c.voltage_gain * truth[t.BATTERY_VOLTAGE_V] + c.voltage_noise_v * normals[row, 0]
+    current_a = c.current_gain * truth[t.BATTERY_CURRENT_A] + c.current_noise_a * normals[row, 1]
+    out[i.BATTERY_VOLTAGE_V] = max(0.0, quantise(voltage_v, c.voltage_quantum_v))
+    out[i.BATTERY_CURRENT_A] = max(0.0, quantise(current_a, c.current_quantum_a))
+    if math.isnan(s.used_ah):
+        s.used_ah = truth[t.BATTERY_USED_AH]
     else:
-        state[_USED_AH] += constants[_INTERVAL_H] * out[i.BATTERY_CURRENT_A]
-    out[i.BATTERY_USED_AH] = state[_USED_AH]
+        s.used_ah += c.interval_h * out[i.BATTERY_CURRENT_A]
+    out[i.BATTERY_USED_AH] = s.used_ah
     capacity_ah = truth[t.BATTERY_CAPACITY_AH]
     if capacity_ah > 0.0:
-        out[i.BATTERY_REMAINING] = min(1.0, max(0.0, 1.0 - state[_USED_AH] / capacity_ah))
+        out[i.BATTERY_REMAINING] = min(1.0, max(0.0, 1.0 - s.used_ah / capacity_ah))
     else:
         out[i.BATTERY_REMAINING] = math.nan
     return True

@@ -11,20 +11,23 @@ from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.interface import VANE_ANGLE_OF_ATTACK_RAD, VANE_SIDESLIP_RAD, VANE_SIZE
-from flightsim.sensors.sensor import SensorModel, quantise, saturate
+from flightsim.sensors.sensor import RecordArray, SensorModel, quantise, saturate
 
 Array = NDArray[np.float64]
 
 _DEG: Final = math.pi / 180.0
 
-_MISALIGNMENT: Final = 0  # angle of attack, sideslip
-_NOISE: Final = 2
-_LAG_GAIN: Final = 3
-_LIMIT: Final = 4
-_QUANTUM: Final = 5
-_MIN_PRESSURE: Final = 6
-_CONSTANTS: Final = 7
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    misalignment_rad: Array  # angle of attack, sideslip
+    noise_rad: float
+    lag_gain: float
+    limit_rad: float
+    quantum_rad: float
+    min_pressure_pa: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,18 +58,17 @@ class FlowVaneParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its misalignments. Both vanes stand at zero before the first flow."""
-        constants = np.zeros(_CONSTANTS)
-        constants[_MISALIGNMENT : _MISALIGNMENT + VANE_SIZE] = self.misalignment_rad * rng.standard_normal(
-            VANE_SIZE
+        constants = _Constants(
+            misalignment_rad=self.misalignment_rad * rng.standard_normal(VANE_SIZE),
+            noise_rad=self.noise_rad,
+            lag_gain=1.0 if self.lag_s == 0.0 else 1.0 - math.exp(-interval_s / self.lag_s),
+            limit_rad=self.limit_rad,
+            quantum_rad=self.quantum_rad,
+            min_pressure_pa=self.min_dynamic_pressure_pa,
         )
-        constants[_NOISE] = self.noise_rad
-        constants[_LAG_GAIN] = 1.0 if self.lag_s == 0.0 else 1.0 - math.exp(-interval_s / self.lag_s)
-        constants[_LIMIT] = self.limit_rad
-        constants[_QUANTUM] = self.quantum_rad
-        constants[_MIN_PRESSURE] = self.min_dynamic_pressure_pa
         return SensorModel(
             kernel=_measure,
-            constants=constants,
+            constants=packed(constants),
             state=np.zeros(VANE_SIZE),
             normals_per_sample=VANE_SIZE,
             size=VANE_SIZE,
@@ -75,19 +77,20 @@ class FlowVaneParameters(Options):
 
 
 @kernel
-def _swing(angle_rad: float, constants: Array, state: Array, channel: int, normal: float) -> float:
-    state[channel] += constants[_LAG_GAIN] * (saturate(angle_rad, constants[_LIMIT]) - state[channel])
-    value_rad = state[channel] + constants[_MISALIGNMENT + channel] + constants[_NOISE] * normal
-    return quantise(value_rad, constants[_QUANTUM])
+def _swing(angle_rad: float, c: _Constants, state: Array, channel: int, normal: float) -> float:
+    state[channel] += c.lag_gain * (saturate(angle_rad, c.limit_rad) - state[channel])
+    value_rad = state[channel] + c.misalignment_rad[channel] + c.noise_rad * normal
+    return quantise(value_rad, c.quantum_rad)
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+def _measure(
+    truth: Array, constants: RecordArray, state: Array, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
     alpha_rad, beta_rad = truth[t.ANGLE_OF_ATTACK_RAD], truth[t.SIDESLIP_RAD]
-    if truth[t.DYNAMIC_PRESSURE_PA] < constants[_MIN_PRESSURE]:
+    if truth[t.DYNAMIC_PRESSURE_PA] < c.min_pressure_pa:
         alpha_rad, beta_rad = state[VANE_ANGLE_OF_ATTACK_RAD], state[VANE_SIDESLIP_RAD]
-    out[VANE_ANGLE_OF_ATTACK_RAD] = _swing(
-        alpha_rad, constants, state, VANE_ANGLE_OF_ATTACK_RAD, normals[row, 0]
-    )
-    out[VANE_SIDESLIP_RAD] = _swing(beta_rad, constants, state, VANE_SIDESLIP_RAD, normals[row, 1])
+    out[VANE_ANGLE_OF_ATTACK_RAD] = _swing(alpha_rad, c, state, VANE_ANGLE_OF_ATTACK_RAD, normals[row, 0])
+    out[VANE_SIDESLIP_RAD] = _swing(beta_rad, c, state, VANE_SIDESLIP_RAD, normals[row, 1])
     return True

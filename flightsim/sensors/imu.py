@@ -17,37 +17,43 @@ from flightsim.foundation.atmosphere import GRAVITY_M_S2, ICE_POINT_K
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.sensor import SensorModel, gauss_markov, quantise, saturate
+from flightsim.sensors.sensor import RecordArray, SensorModel, gauss_markov, quantise, saturate
 from flightsim.sensors.vibration import CONSTANTS, ROTORS, RotorVibrationParameters, add_vibration
 
 Array = NDArray[np.float64]
 
 _DEG: Final = math.pi / 180.0
 
-# Each triad has the same constants, accelerometer after gyro.
-_MATRIX: Final = 0  # 9 numbers: what the axes read of a vector in FRD
-_BIAS: Final = 9  # 3 numbers: turn-on bias
-_WHITE: Final = 12
-_DECAY: Final = 13
-_DRIVE: Final = 14
-_LIMIT: Final = 15
-_QUANTUM: Final = 16
-_TRIAD: Final = 17
-_RISE_K: Final = 2 * _TRIAD
-_WARMUP_DECAY: Final = _RISE_K + 1
-_TEMPERATURE_QUANTUM: Final = _RISE_K + 2
-_VIBRATION: Final = _RISE_K + 3
-_CONSTANTS: Final = _VIBRATION + CONSTANTS
-
-# state: wandering bias of gyro and accelerometer, share of the self-heating still to come, phases of the
-# rotors, rates and specific force with their vibration
-_WARMUP: Final = 6
-_PHASES: Final = 7
-_VIBRATING: Final = _PHASES + ROTORS
-_STATE: Final = _VIBRATING + 6
 _NORMALS: Final = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    """Constants of the triads: gyro, accelerometer."""
+
+    matrix: Array  # (2, 3, 3): what the axes read of a vector in FRD
+    bias: Array  # (2, 3): turn-on bias
+    white: Array  # (2,)
+    decay: Array  # (2,), of the wandering bias
+    drive: Array  # (2,)
+    limit: Array  # (2,)
+    quantum: Array  # (2,)
+    rise_k: float
+    warm_up_decay: float
+    temperature_quantum_k: float
+    vibrates: bool
+    vibration: Array  # flightsim.sensors.vibration
+
+
+@dataclass(slots=True, kw_only=True)
+class _State:
+    wander: Array  # (2, 3)
+    warm_up: float  # share of the self-heating that is still to come
+    phases: Array  # (ROTORS,)
+    vibrating: Array  # (2, 3): rates and specific force with their vibration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,8 +109,6 @@ class ImuParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its scale, cross-axis and turn-on errors and where its bias starts."""
-        constants = np.zeros(_CONSTANTS)
-        state = np.zeros(_STATE)
         triads = (
             (
                 self.gyro_scale_error,
@@ -123,27 +127,35 @@ class ImuParameters(Options):
                 (self.accel_range_m_s2, self.accel_quantum_m_s2),
             ),
         )
-        for index, (scale, cross_axis, turn_on, density, wander, converter) in enumerate(triads):
-            c = constants[index * _TRIAD : (index + 1) * _TRIAD]
+        matrix, bias, wander = np.zeros((2, 3, 3)), np.zeros((2, 3)), np.zeros((2, 3))
+        for index, (scale, cross_axis, turn_on, _, instability, _) in enumerate(triads):
             spread = np.full((3, 3), cross_axis) + (scale - cross_axis) * np.eye(3)
-            c[_MATRIX : _MATRIX + 9] = (np.eye(3) + spread * rng.standard_normal((3, 3))).ravel()
-            c[_BIAS : _BIAS + 3] = turn_on * rng.standard_normal(3)
-            c[_WHITE] = density / math.sqrt(interval_s)
-            c[_DECAY], c[_DRIVE] = gauss_markov(*wander, interval_s)
-            c[_LIMIT], c[_QUANTUM] = converter
-            state[3 * index : 3 * index + 3] = wander[0] * rng.standard_normal(3)
-        constants[_RISE_K] = self.self_heating_k
-        constants[_WARMUP_DECAY] = math.exp(-interval_s / self.warm_up_s)
-        constants[_TEMPERATURE_QUANTUM] = self.temperature_quantum_k
-        state[_WARMUP] = 1.0
+            matrix[index] = np.eye(3) + spread * rng.standard_normal((3, 3))
+            bias[index] = turn_on * rng.standard_normal(3)
+            wander[index] = instability[0] * rng.standard_normal(3)
+        decay, drive = np.array([gauss_markov(*triad[4], interval_s) for triad in triads]).T
+        vibration, phases = np.zeros(CONSTANTS), np.zeros(ROTORS)
         if self.vibration is not None:
             vibration, phases = self.vibration.build(interval_s, rng)
-            constants[_VIBRATION:] = vibration
-            state[_PHASES : _PHASES + ROTORS] = phases
+        constants = _Constants(
+            matrix=matrix,
+            bias=bias,
+            white=np.array([triad[3] / math.sqrt(interval_s) for triad in triads]),
+            decay=decay,
+            drive=drive,
+            limit=np.array([triad[5][0] for triad in triads]),
+            quantum=np.array([triad[5][1] for triad in triads]),
+            rise_k=self.self_heating_k,
+            warm_up_decay=math.exp(-interval_s / self.warm_up_s),
+            temperature_quantum_k=self.temperature_quantum_k,
+            vibrates=self.vibration is not None,
+            vibration=vibration,
+        )
+        state = _State(wander=wander, warm_up=1.0, phases=phases, vibrating=np.zeros((2, 3)))
         return SensorModel(
             kernel=_measure,
-            constants=constants,
-            state=state,
+            constants=packed(constants),
+            state=packed(state),
             normals_per_sample=_NORMALS,
             size=IMU_SIZE,
             fault_targets=(
@@ -174,37 +186,34 @@ _ACCEL: Final = IMU_ACCEL_FRD_M_S2.start
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
-    sensed = state[_VIBRATING : _VIBRATING + 6]
+def _measure(
+    truth: Array, constants: RecordArray, states: RecordArray, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
+    s: _State = states[0]
+    sensed = s.vibrating
     for axis in range(3):
-        sensed[axis] = truth[_RATES + axis]
-        sensed[3 + axis] = truth[_FORCE + axis]
-    if constants[_VIBRATION] > 0.0:
-        add_vibration(
-            truth, constants[_VIBRATION:], state[_PHASES : _PHASES + ROTORS], sensed[:3], sensed[3:]
-        )
+        sensed[0, axis] = truth[_RATES + axis]
+        sensed[1, axis] = truth[_FORCE + axis]
+    if c.vibrates:
+        add_vibration(truth, c.vibration, s.phases, sensed[0], sensed[1])
     for triad in range(2):
-        c = triad * _TRIAD
         target = _GYRO if triad == 0 else _ACCEL
-        x, y, z = sensed[3 * triad], sensed[3 * triad + 1], sensed[3 * triad + 2]
+        x, y, z = sensed[triad, 0], sensed[triad, 1], sensed[triad, 2]
         for axis in range(3):
-            wander = 3 * triad + axis
-            m = c + _MATRIX + 3 * axis
             value = (
-                constants[m] * x
-                + constants[m + 1] * y
-                + constants[m + 2] * z
-                + constants[c + _BIAS + axis]
-                + state[wander]
-                + constants[c + _WHITE] * normals[row, wander]
+                c.matrix[triad, axis, 0] * x
+                + c.matrix[triad, axis, 1] * y
+                + c.matrix[triad, axis, 2] * z
+                + c.bias[triad, axis]
+                + s.wander[triad, axis]
+                + c.white[triad] * normals[row, 3 * triad + axis]
             )
-            out[target + axis] = quantise(saturate(value, constants[c + _LIMIT]), constants[c + _QUANTUM])
-            state[wander] = (
-                constants[c + _DECAY] * state[wander] + constants[c + _DRIVE] * normals[row, 6 + wander]
+            out[target + axis] = quantise(saturate(value, c.limit[triad]), c.quantum[triad])
+            s.wander[triad, axis] = (
+                c.decay[triad] * s.wander[triad, axis] + c.drive[triad] * normals[row, 6 + 3 * triad + axis]
             )
     air_c = truth[t.TEMPERATURE_K] - ICE_POINT_K
-    out[IMU_TEMPERATURE_C] = quantise(
-        air_c + constants[_RISE_K] * (1.0 - state[_WARMUP]), constants[_TEMPERATURE_QUANTUM]
-    )
-    state[_WARMUP] *= constants[_WARMUP_DECAY]
+    out[IMU_TEMPERATURE_C] = quantise(air_c + c.rise_k * (1.0 - s.warm_up), c.temperature_quantum_k)
+    s.warm_up *= c.warm_up_decay
     return True

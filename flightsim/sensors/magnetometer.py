@@ -1,7 +1,6 @@
 """Magnetometer: the Earth's field in the body frame, residual hard and soft iron, noise, quantum."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,19 +9,22 @@ from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.foundation.rotations import rotate_inverse
 from flightsim.interface import MAG_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.sensor import SensorModel, quantise, saturate
+from flightsim.sensors.sensor import RecordArray, SensorModel, quantise, saturate
 
 Array = NDArray[np.float64]
 
-_SCALE: Final = 0  # 3 numbers
-_HARD_IRON: Final = 3  # 3 numbers
-_NOISE: Final = 6
-_LIMIT: Final = 7
-_QUANTUM: Final = 8
-_CONSTANTS: Final = 9
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    scale: Array
+    hard_iron_gauss: Array
+    noise_gauss: float
+    limit_gauss: float
+    quantum_gauss: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,15 +50,16 @@ class MagnetometerParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws its hard iron and scale errors."""
-        constants = np.zeros(_CONSTANTS)
-        constants[_SCALE : _SCALE + 3] = 1.0 + self.scale_error * rng.standard_normal(3)
-        constants[_HARD_IRON : _HARD_IRON + 3] = self.hard_iron_gauss * rng.standard_normal(3)
-        constants[_NOISE] = self.noise_gauss
-        constants[_LIMIT] = self.range_gauss
-        constants[_QUANTUM] = self.quantum_gauss
+        constants = _Constants(
+            scale=1.0 + self.scale_error * rng.standard_normal(MAG_SIZE),
+            hard_iron_gauss=self.hard_iron_gauss * rng.standard_normal(MAG_SIZE),
+            noise_gauss=self.noise_gauss,
+            limit_gauss=self.range_gauss,
+            quantum_gauss=self.quantum_gauss,
+        )
         return SensorModel(
             kernel=_measure,
-            constants=constants,
+            constants=packed(constants),
             state=np.zeros(1),
             normals_per_sample=MAG_SIZE,
             size=MAG_SIZE,
@@ -74,13 +77,12 @@ class MagnetometerParameters(Options):
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+def _measure(
+    truth: Array, constants: RecordArray, _states: Array, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
     rotate_inverse(truth[t.Q_NED_FROM_FRD], truth[t.MAG_NED_GAUSS], out)
     for axis in range(3):
-        value = (
-            constants[_SCALE + axis] * out[axis]
-            + constants[_HARD_IRON + axis]
-            + constants[_NOISE] * normals[row, axis]
-        )
-        out[axis] = quantise(saturate(value, constants[_LIMIT]), constants[_QUANTUM])
+        value = c.scale[axis] * out[axis] + c.hard_iron_gauss[axis] + c.noise_gauss * normals[row, axis]
+        out[axis] = quantise(saturate(value, c.limit_gauss), c.quantum_gauss)
     return True

@@ -11,22 +11,25 @@ from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
+from flightsim.foundation.records import packed
 from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
-from flightsim.sensors.sensor import SensorModel, quantise
+from flightsim.sensors.sensor import RecordArray, SensorModel, quantise
 
 Array = NDArray[np.float64]
 
-_MIN: Final = 0
-_MAX: Final = 1
-_NOISE: Final = 2
-_NOISE_PER_RANGE: Final = 3
-_QUANTUM: Final = 4
-_MIN_COSINE: Final = 5
-_CONSTANTS: Final = 6
-
 _QX: Final = t.Q_NED_FROM_FRD.start + 1
 _QY: Final = t.Q_NED_FROM_FRD.start + 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Constants:
+    min_m: float
+    max_m: float
+    noise_m: float
+    noise_per_range: float
+    quantum_m: float
+    min_cosine: float  # of the tilt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,17 +79,18 @@ class RangefinderParameters(Options):
 
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen; nothing about it is drawn."""
-        constants = np.zeros(_CONSTANTS)
-        constants[_MIN] = self.min_range_m
-        constants[_MAX] = self.max_range_m
-        constants[_NOISE] = self.noise_m
-        constants[_NOISE_PER_RANGE] = self.noise_per_range
-        constants[_QUANTUM] = self.quantum_m
-        constants[_MIN_COSINE] = math.cos(self.max_tilt_rad)
+        constants = _Constants(
+            min_m=self.min_range_m,
+            max_m=self.max_range_m,
+            noise_m=self.noise_m,
+            noise_per_range=self.noise_per_range,
+            quantum_m=self.quantum_m,
+            min_cosine=math.cos(self.max_tilt_rad),
+        )
         nan = math.nan
         return SensorModel(
             kernel=_measure,
-            constants=constants,
+            constants=packed(constants),
             state=np.zeros(1),
             normals_per_sample=1,
             size=RANGE_SIZE,
@@ -104,16 +108,19 @@ class RangefinderParameters(Options):
 
 
 @kernel
-def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
-    out[RANGE_MIN_M] = constants[_MIN]
-    out[RANGE_MAX_M] = constants[_MAX]
+def _measure(
+    truth: Array, constants: RecordArray, _states: Array, normals: Array, row: int, out: Array
+) -> bool:
+    c: _Constants = constants[0]
+    out[RANGE_MIN_M] = c.min_m
+    out[RANGE_MAX_M] = c.max_m
     out[RANGE_DISTANCE_M] = math.nan
     cos_tilt = 1.0 - 2.0 * (truth[_QX] * truth[_QX] + truth[_QY] * truth[_QY])
-    if cos_tilt < constants[_MIN_COSINE]:
+    if cos_tilt < c.min_cosine:
         return True
     distance_m = truth[t.HEIGHT_ABOVE_GROUND_M] / cos_tilt
-    sigma_m = math.hypot(constants[_NOISE], constants[_NOISE_PER_RANGE] * distance_m)
-    measured_m = quantise(distance_m + sigma_m * normals[row, 0], constants[_QUANTUM])
-    if constants[_MIN] <= measured_m <= constants[_MAX]:
+    sigma_m = math.hypot(c.noise_m, c.noise_per_range * distance_m)
+    measured_m = quantise(distance_m + sigma_m * normals[row, 0], c.quantum_m)
+    if c.min_m <= measured_m <= c.max_m:
         out[RANGE_DISTANCE_M] = measured_m
     return True

@@ -21,8 +21,9 @@ from flightsim.sensors.fault_kinds import FaultTarget
 from flightsim.sensors.fault_stage import FaultPoint
 
 Array = NDArray[np.float64]
+RecordArray = NDArray[np.void]
 
-Kernel = Callable[[Array, Array, Array, Array, int, Array], bool]
+Kernel = Callable[..., bool]
 """kernel(truth, constants, state, normals, row, out) -> a sample was taken.
 
 Writes one sample to `out`; takes its standard normals from `normals[row]`; keeps its state in `state`. When
@@ -38,16 +39,16 @@ class SensorModel:
 
     Attributes:
         kernel: compiled measurement, see `Kernel`.
-        constants: float64 array the kernel only reads.
-        state: float64 array with the initial state; the sensor owns it from then on.
+        constants: record, or float64 array, that the kernel only reads.
+        state: likewise, the initial state; the sensor owns it from then on.
         normals_per_sample: standard normals one sample consumes.
         size: channels of a sample.
         fault_targets: the units of MAVLink's FAILURE_UNIT in it, with their channels.
     """
 
     kernel: Kernel
-    constants: Array
-    state: Array
+    constants: RecordArray | Array
+    state: RecordArray | Array
     normals_per_sample: int
     size: int
     fault_targets: tuple[FaultTarget, ...]
