@@ -36,6 +36,7 @@ import numpy as np
 
 from autopilot_bridge.links import Link, open_link
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, decode, dialect
+from autopilot_bridge.mavlink.wire_units import degrees, metres, velocity_of
 from autopilot_bridge.payload import PayloadStation
 from benchmarks.firmware import FIRMWARES, VEHICLES, Firmware, FirmwareMissing
 from flightsim import truth as t
@@ -159,17 +160,17 @@ def state_of(frame: Frame, clock: VehicleTime) -> State | None:
         w, x, y, z = message.attitude_quaternion
         return State(
             time_us=time_us,
-            lat_deg=message.lat * 1e-7,
-            lon_deg=message.lon * 1e-7,
-            alt_m=message.alt * 1e-3,
-            vel_ned_m_s=(message.vx * 0.01, message.vy * 0.01, message.vz * 0.01),
+            lat_deg=degrees(message.lat),
+            lon_deg=degrees(message.lon),
+            alt_m=metres(message.alt),
+            vel_ned_m_s=velocity_of(message),
             q_ned_from_frd=(w, x, y, z),
             rates_frd_rad_s=(message.rollspeed, message.pitchspeed, message.yawspeed),
         )
     return State(
         time_us=time_us,
-        lat_deg=message.lat_int * 1e-7,
-        lon_deg=message.lon_int * 1e-7,
+        lat_deg=degrees(message.lat_int),
+        lon_deg=degrees(message.lon_int),
         alt_m=message.alt,
         vel_ned_m_s=(message.vn, message.ve, message.vd),
         q_ned_from_frd=(message.q1, message.q2, message.q3, message.q4),

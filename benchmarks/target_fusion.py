@@ -24,6 +24,7 @@ import numpy as np
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.mavlink import Frame, FrameParser, Packet, definition
+from autopilot_bridge.mavlink.wire_units import degrees
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from autopilot_bridge.tlog import TlogWriter
@@ -197,7 +198,7 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
         for parsed in parser.feed(raw):
             if parsed.system_id == TARGET_SYSTEM:
                 m = read_message(parsed)
-                north, east, _ = frame.ned_from_geodetic(1e-7 * m.lat, 1e-7 * m.lon, home.alt_m)
+                north, east, _ = frame.ned_from_geodetic(degrees(m.lat), degrees(m.lon), home.alt_m)
                 truth.append((1e-6 * m.time_usec, north, east))
 
     sitl.on_truth(on_truth)

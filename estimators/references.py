@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.wire_units import degrees, home, m_s, place_columns
 from estimators.received import received_positions
 from estimators.tracking.metrics import mean_square
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -186,9 +187,10 @@ def home_of(log: "Log", system_id: int, boot: int | None = None) -> GeodeticPosi
     if table is None:
         return None
     for k in range(len(table) - 1, -1, -1):
-        lat, lon = 1e-7 * float(table["latitude"][k]), 1e-7 * float(table["longitude"][k])
-        if (lat, lon) != (0.0, 0.0) and abs(lat) <= 90.0 and abs(lon) <= 180.0:
-            return GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=1e-3 * float(table["altitude"][k]))
+        lat_e7, lon_e7, alt_mm = (int(table[name][k]) for name in ("latitude", "longitude", "altitude"))
+        place = home(lat_e7, lon_e7, alt_mm)
+        if place is not None:
+            return place
     return None
 
 
@@ -239,7 +241,7 @@ def _from_hil_state(table: "Table", frame: LocalFrame | None) -> dict[str, Serie
 
 def _from_simstate(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
     angles = {f"{axis}_rad": _floats(table[axis]) for axis in ("roll", "pitch", "yaw")}
-    lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lng"])
+    lat, lon = degrees(_floats(table["lat"])), degrees(_floats(table["lng"]))
     return _series(table, angles | _placed(table.time_us, lat, lon, frame))
 
 
@@ -247,8 +249,8 @@ def _from_sim_state(table: "Table", frame: LocalFrame | None) -> dict[str, Serie
     angles = {f"{axis}_rad": _floats(table[axis]) for axis in ("roll", "pitch", "yaw")}
     # `lat` and `lon` are floats, accurate to some metres; the integers came later and may be 0.
     whole = np.any(table["lat_int"]) or np.any(table["lon_int"])
-    lat = 1e-7 * _floats(table["lat_int"]) if whole else _floats(table["lat"])
-    lon = 1e-7 * _floats(table["lon_int"]) if whole else _floats(table["lon"])
+    lat = degrees(_floats(table["lat_int"])) if whole else _floats(table["lat"])
+    lon = degrees(_floats(table["lon_int"])) if whole else _floats(table["lon"])
     moving = _moving(_floats(table["vn"]), _floats(table["ve"]))
     return _series(table, angles | _placed(table.time_us, lat, lon, frame) | moving)
 
@@ -263,10 +265,10 @@ _TRUTHS: Final[Mapping[str, Callable[["Table", LocalFrame | None], dict[str, Ser
 
 def _places(table: "Table", frame: LocalFrame | None) -> dict[str, Column]:
     """Position and velocity from GLOBAL_POSITION_INT and HIL_STATE_QUATERNION."""
-    lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lon"])
-    north, east = 1e-2 * _floats(table["vx"]), 1e-2 * _floats(table["vy"])
-    places = _placed(table.time_us, lat, lon, frame, 1e-3 * _floats(table["alt"]))
-    return places | _moving(north, east) | {"down_m_s": 1e-2 * _floats(table["vz"])}
+    lat_deg, lon_deg, alt_m = place_columns(table)
+    north, east, down = (m_s(_floats(table[name])) for name in ("vx", "vy", "vz"))
+    places = _placed(table.time_us, lat_deg, lon_deg, frame, alt_m)
+    return places | _moving(north, east) | {"down_m_s": down}
 
 
 def _placed(

@@ -422,6 +422,38 @@ def test_the_test_sees_longitudes():
     ) == ["t['lon'] * 1e-07 - o.lon_deg"]
 
 
+def degrees_on_the_wire(source):
+    """Products and quotients with 1e7 or 1e-7, by which degrees and degE7 are made of each other."""
+    return [
+        ast.unparse(node)
+        for node in ast.walk(parsed(source))
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div)
+        for factor in (node.left, node.right)
+        if isinstance(factor, ast.Constant) and factor.value in (1e7, 1e-7)
+    ]
+
+
+def test_units_of_the_wire_are_read_and_written_in_one_place():
+    """`wire_units` also knows what a place is; readers of their own accept places that are none."""
+    elsewhere = (
+        *("autopilot_bridge.telemetry.motion", "autopilot_bridge.sitl.truth"),  # compiled code
+        "estimators.logs.units",  # the units of the definition files, by their names
+        *("estimators.survey.sources", "flightsim.payload.signature"),  # the magnetic constant
+    )
+    found = found_by_module(
+        lambda name: degrees_on_the_wire(source_of(name)),
+        without=("autopilot_bridge.mavlink.wire_units", *elsewhere),
+    )
+    assert found == {}
+
+
+def test_the_test_sees_degrees_on_the_wire():
+    assert degrees_on_the_wire("lat = 1e-7 * m.lat\nx = round(lon * 1e7)\nabs(error) < 1e-7") == [
+        "1e-07 * m.lat",
+        "lon * 10000000.0",
+    ]
+
+
 def earth_constants(source):
     """Constants of WGS84 and of the standard atmosphere among the numbers of a source."""
     return sorted(

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
 
+from autopilot_bridge.errors import MessageError
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.definitions import MAVLinkMessage, definition
 from autopilot_bridge.mavlink.frame import CHECKSUM_SIZE, HEADER_SIZE_V1, HEADER_SIZE_V2, Frame
@@ -52,8 +53,14 @@ def field_reader(name: str, *fields: str) -> Callable[[Frame], tuple[Any, ...]]:
     Args:
         name: of the message.
         fields: names, in the order on the wire.
+
+    Raises:
+        MessageError: the message has no such field, or has them in another order.
     """
     found = definition(name)
+    on_the_wire = [field.name for field in found.wire_fields if field.name in fields]
+    if on_the_wire != list(fields):
+        raise MessageError(f"{name} has the fields {on_the_wire} in this order, not {list(fields)}")
     codes, at = "<", 0
     for field in found.wire_fields:
         if field.name in fields:

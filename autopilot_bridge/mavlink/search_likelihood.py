@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import degrees, e7
 from flightsim.foundation.vectors import Quaternion
 
 __all__ = [
@@ -89,8 +90,8 @@ def search_likelihood_message(
         m.tag_id,
         m.number & 0xFFFFFFFF,
         m.time_us,
-        round(m.lat_deg * 1e7),
-        round(m.lon_deg * 1e7),
+        e7(m.lat_deg),
+        e7(m.lon_deg),
         m.height_m,
         *(sign * value for value in vector),
         *m.place_m2,
@@ -139,8 +140,8 @@ def read_search_likelihood(payload_type: int, length: int, payload: Sequence[int
         tag_id=tag_id,
         number=number,
         time_us=time_us,
-        lat_deg=lat * 1e-7,
-        lon_deg=lon * 1e-7,
+        lat_deg=degrees(lat),
+        lon_deg=degrees(lon),
         height_m=height_m,
         q_ned_from_mount=(math.sqrt(max(0.0, 1.0 - norm)), vector[0], vector[1], vector[2]),
         place_m2=(place[0], place[1], place[2], place[3]),

@@ -7,6 +7,7 @@ from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.camera_scan import detection_message
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
+from autopilot_bridge.mavlink.wire_units import e7, mm, place_e7
 from autopilot_bridge.payload.camera_state import SENSOR_WIDTH_MM, CameraState
 from autopilot_bridge.payload.component import fixed_text
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -83,10 +84,10 @@ def image_captured(
         time_boot_ms=camera.time_ms,
         time_utc=camera.vehicle.unix_us(time_us),
         camera_id=0,
-        lat=0 if here is None else round(here.lat_deg * 1e7),
-        lon=0 if here is None else round(here.lon_deg * 1e7),
-        alt=0 if here is None else round(here.alt_m * 1e3),
-        relative_alt=0 if here is None or math.isnan(relative_alt_m) else round(relative_alt_m * 1e3),
+        lat=0 if here is None else e7(here.lat_deg),
+        lon=0 if here is None else e7(here.lon_deg),
+        alt=0 if here is None else mm(here.alt_m),
+        relative_alt=0 if here is None or math.isnan(relative_alt_m) else mm(relative_alt_m),
         q=[math.nan] * 4 if q is None else list(q),
         image_index=index,
         capture_result=1,
@@ -196,4 +197,4 @@ def _dege7(place: GeodeticPosition | None) -> tuple[int, int, int]:
     """Latitude, longitude (degE7) and altitude (mm); INT32_MAX: not known."""
     if place is None:
         return (_UNKNOWN_DEGE7,) * 3
-    return round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), round(place.alt_m * 1e3)
+    return place_e7(place)

@@ -15,6 +15,7 @@ from autopilot_bridge.dispatch import command, receives, streams
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
+from autopilot_bridge.mavlink.wire_units import degrees
 from autopilot_bridge.payload.component import CommandMessage, Component, Sender, parameters, whole
 from autopilot_bridge.payload.gimbal_aim import GimbalAim
 from autopilot_bridge.payload.gimbal_control import GimbalControl
@@ -227,7 +228,7 @@ class GimbalComponent(Component[Gimbal]):
     def _on_roi_location(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_LOCATION: latitude, longitude, altitude."""
         if isinstance(message, mavlink.MAVLink_command_int_message):
-            place = (1e-7 * message.x, 1e-7 * message.y, message.z, message.frame)
+            place = (degrees(message.x), degrees(message.y), message.z, message.frame)
         else:
             place = (message.param5, message.param6, message.param7, mavlink.MAV_FRAME_GLOBAL)
         return self._look_at(*place, sender)
@@ -302,9 +303,9 @@ class GimbalComponent(Component[Gimbal]):
                 )
                 return _ACCEPTED if turned else _DENIED
             case mavlink.MAV_MOUNT_MODE_GPS_POINT:
-                scale = 1e-7 if hasattr(message, "x") else 1.0
-                frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
-                return self._look_at(lat_deg * scale, lon_deg * scale, alt_m, frame, sender)
+                if isinstance(message, mavlink.MAVLink_command_int_message):
+                    lat_deg, lon_deg = degrees(lat_deg), degrees(lon_deg)
+                return self._look_at(lat_deg, lon_deg, alt_m, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, sender)
             case mavlink.MAV_MOUNT_MODE_RETRACT:
                 self._point(int(GimbalFlags.RETRACT), _NAN, _NAN, _NAN, _NAN)
             case mavlink.MAV_MOUNT_MODE_NEUTRAL:

@@ -5,6 +5,7 @@ from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import degrees, metres, velocity_of
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
 from autopilot_bridge.payload.reported_vehicle import STALE_US, ReportedVehicle
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -63,8 +64,8 @@ class GimbalAim:
             return
         match message:
             case mavlink.MAVLink_global_position_int_message():
-                alt_m = 1e-3 * message.alt
-                velocity = (1e-2 * message.vx, 1e-2 * message.vy, 1e-2 * message.vz)
+                alt_m = metres(message.alt)
+                velocity = velocity_of(message)
             case mavlink.MAVLink_follow_target_message() if message.est_capabilities & _HAS_POSITION:
                 alt_m = float(message.alt)
                 moves = message.est_capabilities & _HAS_VELOCITY
@@ -75,7 +76,9 @@ class GimbalAim:
         fits = abs(message.lat) <= 900_000_000 and abs(message.lon) <= 1_800_000_000 and abs(alt_m) < 1e5
         if not fits or not all(abs(speed) < _FASTEST_M_S for speed in velocity):
             return
-        self._place = GeodeticPosition(lat_deg=1e-7 * message.lat, lon_deg=1e-7 * message.lon, alt_m=alt_m)
+        self._place = GeodeticPosition(
+            lat_deg=degrees(message.lat), lon_deg=degrees(message.lon), alt_m=alt_m
+        )
         self._velocity_ned_m_s = velocity
         self._commanded_us = time_us
 

@@ -6,6 +6,7 @@ from typing import Final
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import heading_of, metres, place_of, velocity_of
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, from_euler
 
@@ -17,8 +18,6 @@ Report = (
 )
 """The messages that are used."""
 STALE_US: Final = 3_000_000
-_LAT_MAX: Final = 900_000_000
-_LON_MAX: Final = 1_800_000_000
 
 
 class ReportedVehicle:
@@ -79,13 +78,12 @@ class ReportedVehicle:
         return 0 if self._unix_minus_boot_us is None else time_us + self._unix_minus_boot_us
 
     def _note_position(self, message: mavlink.MAVLink_global_position_int_message, time_us: int) -> bool:
-        if abs(message.lat) > _LAT_MAX or abs(message.lon) > _LON_MAX or (message.lat == 0 == message.lon):
+        place = place_of(message)
+        if place is None or message.lat == 0 == message.lon:
             return False
-        self.position = GeodeticPosition(
-            lat_deg=1e-7 * message.lat, lon_deg=1e-7 * message.lon, alt_m=1e-3 * message.alt
-        )
-        self.relative_alt_m = 1e-3 * message.relative_alt
-        self.velocity_ned_m_s = (1e-2 * message.vx, 1e-2 * message.vy, 1e-2 * message.vz)
-        self.heading_rad = math.radians(1e-2 * message.hdg) if message.hdg < 36000 else math.nan
+        self.position = place
+        self.relative_alt_m = metres(message.relative_alt)
+        self.velocity_ned_m_s = velocity_of(message)
+        self.heading_rad = heading_of(message)
         self._position_us = time_us
         return True

@@ -15,6 +15,7 @@ from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.mavlink.definitions import definition
+from autopilot_bridge.mavlink.wire_units import e7, mm
 from autopilot_bridge.telemetry.records import record_type, whole
 from flightsim import truth as t
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
@@ -128,7 +129,7 @@ class TargetTruthEncoder:
         record, targets = self._records[index], self._targets
         north_m, east_m, down_m = targets.positions_ned_m[index].tolist()
         lat_deg, lon_deg = self._home.offset(north_m, east_m)
-        record["lat"], record["lon"] = round(lat_deg * 1e7), round(lon_deg * 1e7)
-        record["alt"] = round((self._home.alt_m - down_m) * 1e3)
+        record["lat"], record["lon"] = e7(lat_deg), e7(lon_deg)
+        record["alt"] = mm(self._home.alt_m - down_m)
         velocity_cm_s = (round(speed * 100.0) for speed in targets.velocities_ned_m_s[index].tolist())
         record["vx"], record["vy"], record["vz"] = velocity_cm_s

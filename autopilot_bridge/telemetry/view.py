@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.navigation import layout as nav
 from flightsim import interface
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_PRESSURE_PA
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import SensorReadings
 
-UINT16_UNKNOWN: Final = 65535
 VIBRATION_RATE_HZ: Final = 50.0  # of the slow loop
 
 Array = NDArray[np.float64]
@@ -105,8 +105,8 @@ class TelemetryView:
         if frame is not None:
             north, east, down = self.pos
             lat_deg, lon_deg, self.alt_amsl_m = frame.geodetic_from_ned(north, east, down)
-            self.lat_e7 = round(lat_deg * 1e7)
-            self.lon_e7 = round(lon_deg * 1e7)
+            self.lat_e7 = e7(lat_deg)
+            self.lon_e7 = e7(lon_deg)
             home_down = self.context.home_ned_m[2]
             self.alt_relative_m = (home_down if home_down == home_down else 0.0) - down
 

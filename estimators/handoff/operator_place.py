@@ -2,10 +2,11 @@
 
 import math
 
+from autopilot_bridge.mavlink.wire_units import degrees, home_of, metres
 from estimators import wire
 from estimators.interface import Need
 from estimators.messages import Message, is_a
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import LocalFrame
 
 _OLD_US = 1_000_000
 
@@ -35,12 +36,12 @@ class OperatorPlace:
     def take(self, time_us: int, message: Message) -> None:
         """Process a message of the aircraft."""
         if is_a(message, wire.HOME_POSITION):
-            lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
-            if (lat, lon) != (0.0, 0.0) and abs(lat) <= 90.0 and abs(lon) <= 180.0:
-                self._frame = LocalFrame(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt))
+            home = home_of(message)
+            if home is not None:
+                self._frame = LocalFrame(home)
         elif is_a(message, wire.GLOBAL_POSITION_INT) and self._frame is not None:
             north_m, east_m, _ = self._frame.ned_from_geodetic(
-                message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3
+                degrees(message.lat), degrees(message.lon), metres(message.alt)
             )
             self._own = (time_us, north_m, east_m)
         elif is_a(message, wire.ATTITUDE) and math.isfinite(message.yaw):

@@ -9,6 +9,14 @@ from typing import Final
 
 import numpy as np
 
+from autopilot_bridge.mavlink.wire_units import (
+    UNKNOWN_UINT16,
+    cdeg_degrees,
+    home_of,
+    m_s,
+    place_of,
+    velocity_of,
+)
 from estimators import wire
 from estimators.lissajous.model import Array
 from estimators.lissajous.motion_filter import MotionFilter
@@ -22,10 +30,7 @@ MESSAGES: Final = {
     Source.LOCAL: "LOCAL_POSITION_NED",
 }
 
-_NOT_KNOWN: Final = 65535
 _FIX_2D: Final = 2
-_MAX_LAT_E7: Final = 900_000_000
-_MAX_LON_E7: Final = 1_800_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +68,9 @@ class PositionReader:
 
     def take_home(self, message: wire.HOME_POSITION) -> bool:
         """Process a HOME_POSITION; returns False when its position is invalid."""
-        if abs(message.latitude) > _MAX_LAT_E7 or abs(message.longitude) > _MAX_LON_E7:
+        place = home_of(message)
+        if place is None:
             return False
-        place = GeodeticPosition(
-            lat_deg=1e-7 * message.latitude, lon_deg=1e-7 * message.longitude, alt_m=1e-3 * message.altitude
-        )
         self.home = place
         offset = (float(message.x), float(message.y), float(message.z))
         if all(map(math.isfinite, offset)):
@@ -81,23 +84,24 @@ class PositionReader:
         if is_a(message, wire.LOCAL_POSITION_NED):
             return self._read_local(message)
         if is_a(message, wire.GLOBAL_POSITION_INT):
-            velocity = (0.01 * message.vx, 0.01 * message.vy)
-            return self._fix(message.lat, message.lon, message.alt, velocity)
+            north_m_s, east_m_s, _ = velocity_of(message)
+            return self._fix(message, (north_m_s, east_m_s))
         if not is_a(message, wire.GPS_RAW_INT):
             return None
         if message.fix_type < _FIX_2D or (message.lat == 0 and message.lon == 0):
             return None
         velocity = (math.nan, math.nan)
-        if message.vel != _NOT_KNOWN and message.cog != _NOT_KNOWN:
-            course_rad = math.radians(0.01 * message.cog)
-            velocity = (0.01 * message.vel * math.cos(course_rad), 0.01 * message.vel * math.sin(course_rad))
-        return self._fix(message.lat, message.lon, message.alt, velocity)
+        if message.vel != UNKNOWN_UINT16 and message.cog != UNKNOWN_UINT16:
+            course_rad, speed_m_s = math.radians(cdeg_degrees(message.cog)), m_s(message.vel)
+            velocity = (speed_m_s * math.cos(course_rad), speed_m_s * math.sin(course_rad))
+        return self._fix(message, velocity)
 
     @staticmethod
-    def _fix(lat_e7: int, lon_e7: int, alt_mm: int, velocity_m_s: tuple[float, float]) -> Fix | None:
-        if abs(lat_e7) > _MAX_LAT_E7 or abs(lon_e7) > _MAX_LON_E7:
-            return None
-        return Fix(1e-7 * lat_e7, 1e-7 * lon_e7, 1e-3 * alt_mm, *velocity_m_s)
+    def _fix(
+        message: wire.GLOBAL_POSITION_INT | wire.GPS_RAW_INT, velocity_m_s: tuple[float, float]
+    ) -> Fix | None:
+        place = place_of(message)
+        return None if place is None else Fix(place.lat_deg, place.lon_deg, place.alt_m, *velocity_m_s)
 
     def _read_local(self, message: wire.LOCAL_POSITION_NED) -> Fix | None:
         if self._local is None:

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import to_e7
 from estimators.logs.ardupilot_firmware import Firmware
 from estimators.logs.dataflash_state import firmware, state_parts, throttle
 from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, value_at
@@ -101,8 +102,8 @@ def _attitude(tables: Mapping[str, Records]) -> list[Part]:
                 roll=np.radians(truth.columns["Roll"]),
                 pitch=np.radians(truth.columns["Pitch"]),
                 yaw=wrap_pi(np.radians(truth.columns["Yaw"])),
-                lat=truth.columns["Lat"] * 1e7,
-                lng=truth.columns["Lng"] * 1e7,
+                lat=to_e7(truth.columns["Lat"]),
+                lng=to_e7(truth.columns["Lng"]),
             )
         )
     return found
@@ -210,8 +211,8 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
             mavlink_part(
                 "GLOBAL_POSITION_INT",
                 times,
-                lat=c["Lat"] * 1e7,
-                lon=c["Lng"] * 1e7,
+                lat=to_e7(c["Lat"]),
+                lon=to_e7(c["Lng"]),
                 alt=c["Alt"] * 1e3,
                 relative_alt=c.get("RelHomeAlt", c.get("RelAlt", _height(tables, times, c["Alt"]))) * 1e3,
                 vx=100.0 * value_at(ekf, "VN", times),
@@ -227,8 +228,8 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
             mavlink_part(
                 "GLOBAL_POSITION_INT",
                 times,
-                lat=c["Lat"] * 1e7,
-                lon=c["Lng"] * 1e7,
+                lat=to_e7(c["Lat"]),
+                lon=to_e7(c["Lng"]),
                 alt=c["Alt"] * 1e3,
                 relative_alt=1e3 * (_height(tables, times, c["Alt"]) if height is None else height),
                 vx=100.0 * c["Spd"] * np.cos(np.radians(c["GCrs"])),
@@ -259,8 +260,8 @@ def _home(tables: Mapping[str, Records]) -> list[Part]:
         mavlink_part(
             "HOME_POSITION",
             home.time_us,
-            latitude=home.columns["Lat"] * 1e7,
-            longitude=home.columns["Lng"] * 1e7,
+            latitude=to_e7(home.columns["Lat"]),
+            longitude=to_e7(home.columns["Lng"]),
             altitude=home.columns["Alt"] * 1e3,
             **dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z", "q"), np.nan),
         )
@@ -283,8 +284,8 @@ def _gps(tables: Mapping[str, Records]) -> list[Part]:
                 name,
                 one.time_us,
                 fix_type=c["Status"],
-                lat=c["Lat"] * 1e7,
-                lon=c["Lng"] * 1e7,
+                lat=to_e7(c["Lat"]),
+                lon=to_e7(c["Lng"]),
                 alt=c["Alt"] * 1e3,
                 eph=c["HDop"] * 100.0 if "HDop" in c else 65535,
                 epv=65535,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MessageDefinition
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, INCOMPAT_SIGNED, MAGIC_V2
+from autopilot_bridge.mavlink.wire_units import degrees, to_e7
 from estimators.errors import LogError
 from estimators.logs.columns import record_dtype
 from estimators.logs.faults import Fault, FaultKind
@@ -170,7 +171,7 @@ def _changed(
             scale = _wire_per_metre(field, records)
         spoiled = _spoiled(column.astype(np.float64), times_s, fault, scale, rng)
         if field == "lon" and fault.kind is not FaultKind.GARBAGE:  # an error across 180 degrees
-            spoiled = 1e7 * longitude_near(1e-7 * spoiled)
+            spoiled = to_e7(longitude_near(degrees(spoiled)))
         records[field] = _fitted(spoiled, column.dtype)
     return {
         position: _reframed(frame, record.tobytes(), definition)
@@ -180,9 +181,9 @@ def _changed(
 
 def _wire_per_metre(field: str, records: NDArray[np.void]) -> float:
     """Wire value (degE7) of one metre to the north or the east."""
-    per_metre = math.degrees(1.0 / MEAN_RADIUS_M) * 1e7
+    per_metre = to_e7(math.degrees(1.0 / MEAN_RADIUS_M))
     if field == "lon":
-        per_metre /= max(0.01, math.cos(math.radians(float(records["lat"][0]) * 1e-7)))
+        per_metre /= max(0.01, math.cos(math.radians(degrees(float(records["lat"][0])))))
     return per_metre
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.plain_text import plain_text
+from autopilot_bridge.mavlink.wire_units import place_columns
 from estimators.logs.log import Log
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
@@ -186,7 +187,7 @@ def _left_out(log: Log) -> tuple[LeftOut, ...]:
             table = log.table(
                 stream.name, system_id=stream.system_id, component_id=stream.component_id, boot=boot
             )
-            lat_deg, lon_deg, alt_m = table["lat"] * 1e-7, table["lon"] * 1e-7, table["alt"] * 1e-3
+            lat_deg, lon_deg, alt_m = place_columns(table)
             placed = (lat_deg != 0.0) | (lon_deg != 0.0)  # ArduPilot sends 0, 0 until it has a position
             time_us = table[stamp[0]].astype(np.int64) * stamp[1]
             own = received_positions(time_us[placed], lat_deg[placed], lon_deg[placed], alt_m[placed])

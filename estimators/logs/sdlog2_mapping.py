@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import to_e7
 from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
@@ -110,8 +111,8 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
             mavlink_part(
                 "GLOBAL_POSITION_INT",
                 place.time_us,
-                lat=c["Lat"] * 1e7,
-                lon=c["Lon"] * 1e7,
+                lat=to_e7(c["Lat"]),
+                lon=to_e7(c["Lon"]),
                 alt=c["Alt"] * 1e3,
                 relative_alt=-1e3 * value_at(local, "Z", place.time_us),
                 vx=100.0 * c["VelN"],
@@ -128,8 +129,8 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
                 "GPS_RAW_INT",
                 gps.time_us,
                 fix_type=c["Fix"],
-                lat=c["Lat"] * 1e7,
-                lon=c["Lon"] * 1e7,
+                lat=to_e7(c["Lat"]),
+                lon=to_e7(c["Lon"]),
                 alt=c["Alt"] * 1e3,
                 eph=65535,
                 epv=65535,

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import to_e7
 from estimators.logs.mapped import Array, Part, Records, each_second, mappable, mavlink_part, newest, value_at
 from flightsim.foundation.vectors import euler_from_quaternions
 
@@ -260,8 +261,8 @@ def _positions(topics: Topics) -> list[Part]:
             mavlink_part(
                 "GLOBAL_POSITION_INT",
                 times,
-                lat=c["lat"] * 1e7,
-                lon=c["lon"] * 1e7,
+                lat=to_e7(c["lat"]),
+                lon=to_e7(c["lon"]),
                 alt=c["alt"].astype(np.float64) * 1e3,
                 relative_alt=(c["alt"] - base) * 1e3,
                 **{axis: 100.0 * value_at(local, axis, times) for axis in ("vx", "vy", "vz")},
@@ -280,8 +281,8 @@ def _home(topics: Topics) -> list[Part]:
         mavlink_part(
             "HOME_POSITION",
             home.time_us,
-            latitude=c["lat"] * 1e7,
-            longitude=c["lon"] * 1e7,
+            latitude=to_e7(c["lat"]),
+            longitude=to_e7(c["lon"]),
             altitude=c["alt"].astype(np.float64) * 1e3,
             **{axis: c.get(axis, np.nan) for axis in "xyz"},
             **dict.fromkeys(("approach_x", "approach_y", "approach_z", "q"), np.nan),
@@ -303,7 +304,7 @@ def _gps(topics: Topics) -> list[Part]:
         return []
     c, times = gps.columns, gps.time_us
     if gps.has("latitude_deg", "longitude_deg", "altitude_msl_m"):  # since 1.14
-        place = c["latitude_deg"] * 1e7, c["longitude_deg"] * 1e7, c["altitude_msl_m"] * 1e3
+        place = to_e7(c["latitude_deg"]), to_e7(c["longitude_deg"]), c["altitude_msl_m"] * 1e3
     elif gps.has("lat", "lon", "alt"):
         place = c["lat"], c["lon"], c["alt"]
     else:
@@ -375,8 +376,8 @@ def _truth(topics: Topics) -> list[Part]:
             "HIL_STATE_QUATERNION",
             times,
             attitude_quaternion=attitude.columns["q"],
-            lat=1e7 * value_at(place, "lat", times),
-            lon=1e7 * value_at(place, "lon", times),
+            lat=to_e7(value_at(place, "lat", times)),
+            lon=to_e7(value_at(place, "lon", times)),
             alt=1e3 * value_at(place, "alt", times),
             **{axis: 100.0 * value_at(local, axis, times) for axis in ("vx", "vy", "vz")},
         )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.wire_units import degrees, metres
 from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -140,7 +141,7 @@ class MagneticIdentificationEstimator(Estimator[MagneticIdentificationParameters
 
     def _on_position(self, time_us: int, message: wire.GLOBAL_POSITION_INT) -> Outcome:
         system = message.src_system
-        place = (message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
+        place = (degrees(message.lat), degrees(message.lon), metres(message.alt))
         refused = self._guard.check(time_us, (system, "position"), place, leads=False)
         if refused is Outcome.TIME_JUMP:
             self.reset()

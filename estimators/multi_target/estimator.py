@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.target_scan import read_scan_payload
+from autopilot_bridge.mavlink.wire_units import degrees, e7, heading_of, home_of, m_s, metres, place_of
 from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message, on
@@ -26,7 +27,6 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 __all__ = ["MultiTargetEstimator"]
 
 _POSITION_AGE_US: Final = 1_000_000  # a scan farther from every position is not placed
-_NO_HEADING: Final = 0xFFFF
 _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
 
 
@@ -95,16 +95,14 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         return handler(time_us, searcher, message)
 
     def _on_home(self, _time_us: int, searcher: _Searcher, message: wire.HOME_POSITION) -> Outcome:
-        lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
-        if (lat, lon) == (0.0, 0.0) or not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
+        home = home_of(message)
+        if home is None:
             return Outcome.IMPLAUSIBLE
-        searcher.home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+        searcher.home = home
         return Outcome.USED
 
     def _on_position(self, time_us: int, searcher: _Searcher, message: wire.GLOBAL_POSITION_INT) -> Outcome:
-        if message.hdg == _NO_HEADING or not (
-            abs(message.lat) <= 900_000_000 and abs(message.lon) <= 1_800_000_000
-        ):
+        if math.isnan(heading_of(message)) or place_of(message) is None:
             return Outcome.IMPLAUSIBLE
         if searcher.position is not None and message.time_boot_ms < searcher.position.time_boot_ms:
             return Outcome.LATE
@@ -143,11 +141,11 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         ahead_s = scan.time_us * 1e-6 - p.time_boot_ms * 1e-3
         if abs(ahead_s) * 1e6 > _POSITION_AGE_US:
             return None
-        north_m, east_m, _ = frame.ned_from_geodetic(p.lat * 1e-7, p.lon * 1e-7, frame.origin.alt_m)
+        north_m, east_m, _ = frame.ned_from_geodetic(degrees(p.lat), degrees(p.lon), frame.origin.alt_m)
         return Viewpoint(
-            north_m=north_m + ahead_s * p.vx * 0.01,
-            east_m=east_m + ahead_s * p.vy * 0.01,
-            heading_rad=math.radians(p.hdg * 0.01),
+            north_m=north_m + m_s(ahead_s * p.vx),
+            east_m=east_m + m_s(ahead_s * p.vy),
+            heading_rad=heading_of(p),
         )
 
     def _origin(self) -> LocalFrame | None:
@@ -166,7 +164,7 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
 
     def _in_the_air(self, searcher: _Searcher) -> bool:
         position = searcher.position
-        return position is not None and position.relative_alt * 1e-3 >= self.parameters.least_height_m
+        return position is not None and metres(position.relative_alt) >= self.parameters.least_height_m
 
     def _targets(self, time_us: int) -> MultiTargetEstimate:
         belief = self.belief
@@ -217,8 +215,8 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
                 dialect.MAVLink_follow_target_message(
                     target.time_us // 1000,
                     _POSITION_KNOWN,
-                    round(lat_deg * 1e7),
-                    round(lon_deg * 1e7),
+                    e7(lat_deg),
+                    e7(lon_deg),
                     frame.origin.alt_m,
                     [0.0] * 3,
                     [0.0] * 3,

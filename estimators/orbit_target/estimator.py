@@ -14,6 +14,7 @@ from typing import ClassVar, Final, Literal
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import degrees, home_of, metres, velocity_of
 from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -251,10 +252,10 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
         return Outcome.USED
 
     def _on_home(self, _time_us: int, message: wire.HOME_POSITION) -> Outcome:
-        lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
-        if (lat, lon) == (0.0, 0.0) or not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
+        home = home_of(message)
+        if home is None:
             return Outcome.IMPLAUSIBLE
-        self._home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+        self._home = home
         return Outcome.USED
 
     def _position(self, time_us: int, message: wire.GLOBAL_POSITION_INT) -> Outcome:
@@ -263,9 +264,9 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
         if self._home is None:
             return Outcome.WAITING
         north_m, east_m, _ = LocalFrame(self._home).ned_from_geodetic(
-            message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3
+            degrees(message.lat), degrees(message.lon), metres(message.alt)
         )
-        self._place = (north_m, east_m, message.vx * 0.01, message.vy * 0.01)
+        self._place = (north_m, east_m, *velocity_of(message)[:2])
         return Outcome.USED
 
     def _expect(self, time_us: int, airspeed_m_s: float, yaw_rad: float) -> None:

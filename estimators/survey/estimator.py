@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.wire_units import degrees, metres
 from estimators import wire
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -137,7 +138,7 @@ class SurveyEstimator(Estimator[SurveyEstimatorParameters]):
         elif not is_a(message, wire.GLOBAL_POSITION_INT):
             return Outcome.IGNORED
         else:
-            values = (message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
+            values = (degrees(message.lat), degrees(message.lon), metres(message.alt))
         refused = self._guard.check(time_us, name, values, leads=False)
         if refused is Outcome.TIME_JUMP:
             self.reset()

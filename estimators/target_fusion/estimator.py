@@ -10,6 +10,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import e7
 from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.model import Array
@@ -230,8 +231,8 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
                 dialect.MAVLink_follow_target_message(
                     e.time_us // 1000,
                     _POSITION_KNOWN,
-                    round(e.lat_deg * 1e7),
-                    round(e.lon_deg * 1e7),
+                    e7(e.lat_deg),
+                    e7(e.lon_deg),
                     e.alt_m,
                     [0.0] * 3,
                     [0.0] * 3,

@@ -20,6 +20,7 @@ from autopilot_bridge.mavlink.search_likelihood import (
     read_search_likelihood,
     search_likelihood_message,
 )
+from autopilot_bridge.mavlink.wire_units import e7, home_of, metres, place_of
 from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message, on
@@ -121,24 +122,23 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
         return Outcome.USED
 
     def _on_position(self, time_us: int, camera: Camera, message: wire.GLOBAL_POSITION_INT) -> Outcome:
-        if not (abs(message.lat) <= 900_000_000 and abs(message.lon) <= 1_800_000_000):
+        place = place_of(message)
+        if place is None:
             return Outcome.IMPLAUSIBLE
         camera.position = message
         camera.offset_us = time_us - message.time_boot_ms * 1000
         frame = self._origin()
         if frame is None:
             return Outcome.WAITING
-        north_m, east_m, _ = frame.ned_from_geodetic(
-            message.lat * 1e-7, message.lon * 1e-7, frame.origin.alt_m
-        )
-        camera.track.place(message.time_boot_ms * 1000, (north_m, east_m, -message.relative_alt * 1e-3))
+        north_m, east_m, _ = frame.ned_from_geodetic(place.lat_deg, place.lon_deg, frame.origin.alt_m)
+        camera.track.place(message.time_boot_ms * 1000, (north_m, east_m, -metres(message.relative_alt)))
         return Outcome.USED
 
     def _on_home(self, _time_us: int, camera: Camera, message: wire.HOME_POSITION) -> Outcome:
-        lat, lon, alt = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
-        if (lat, lon) == (0.0, 0.0) or not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
+        home = home_of(message)
+        if home is None:
             return Outcome.IMPLAUSIBLE
-        camera.home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+        camera.home = home
         return Outcome.USED
 
     def _origin(self) -> LocalFrame | None:
@@ -155,7 +155,7 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
 
     def _in_the_air(self, camera: Camera) -> bool:
         position = camera.position
-        return position is not None and position.relative_alt * 1e-3 >= self.parameters.least_height_m
+        return position is not None and metres(position.relative_alt) >= self.parameters.least_height_m
 
     # the camera
 
@@ -324,8 +324,8 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
             dialect.MAVLink_follow_target_message(
                 estimate.time_us // 1000,
                 _POSITION_KNOWN,
-                round(lat_deg * 1e7),
-                round(lon_deg * 1e7),
+                e7(lat_deg),
+                e7(lon_deg),
                 frame.origin.alt_m,
                 [0.0] * 3,
                 [0.0] * 3,

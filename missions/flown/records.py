@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS, Packet, definition
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import degrees, metres, place_columns
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs.columns import decode_records, record_dtype
@@ -113,22 +114,20 @@ class FlightRecords:
             else:
                 table = table[(table["lat"] != 0) | (table["lon"] != 0)]
                 time_us = table["time_boot_ms"].astype(np.int64) * 1000
-            found = received_positions(time_us, table["lat"] * 1e-7, table["lon"] * 1e-7, table["alt"] * 1e-3)
+            found = received_positions(time_us, *place_columns(table))
             self._positions[key] = table[found.rows], found.left_out
         return self._positions[key]
 
 
 def place_of(row: np.void) -> GeodeticPosition:
     """The place in one message with `lat`, `lon` (degE7) and `alt` (mm)."""
-    return GeodeticPosition(lat_deg=row["lat"] * 1e-7, lon_deg=row["lon"] * 1e-7, alt_m=row["alt"] * 1e-3)
+    lat, lon, alt = (float(row[name]) for name in ("lat", "lon", "alt"))
+    return GeodeticPosition(lat_deg=degrees(lat), lon_deg=degrees(lon), alt_m=metres(alt))
 
 
 def positions_ned_m(table: NDArray[np.void], frame: LocalFrame) -> NDArray[np.float64]:
     """Local positions (n, 3) of messages with `lat`, `lon` (degE7) and `alt` (mm)."""
-    lat_deg, lon_deg, alt_m = (
-        table[name] * scale for name, scale in (("lat", 1e-7), ("lon", 1e-7), ("alt", 1e-3))
-    )
-    return np.column_stack(frame.ned_from_geodetic(lat_deg, lon_deg, alt_m))
+    return np.column_stack(frame.ned_from_geodetic(*place_columns(table)))
 
 
 class FlightRecorder:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.clock import unix_time_us
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import metres
 from estimators.logs import open_log, report_of
 from missions.errors import MissionError, PlanError
 from missions.flown.records import FlightRecords
@@ -164,7 +165,7 @@ def _last_state(records: FlightRecords, notes: FlightNotes) -> str:
     kind = KIND_OF_TYPE[int(heartbeat["type"])]
     mode = FIRMWARES[notes.autopilot, kind].mode_name(int(heartbeat["custom_mode"]))
     armed = int(heartbeat["base_mode"]) & dialect.MAV_MODE_FLAG_SAFETY_ARMED
-    height_m = float(position["relative_alt"]) * 1e-3
+    height_m = metres(float(position["relative_alt"]))
     return f"mode {mode}, {height_m:.1f} m above home, {'armed' if armed else 'disarmed'}"
 
 

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, cdeg_degrees, metres
 from estimators.received import GAP_S, broken_at_gaps, gaps_of, not_in_gaps, received_times, together
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -246,12 +247,12 @@ def _estimate_track(
     if not len(table):
         return None
     position = positions_ned_m(table, LocalFrame(origin))
-    position[:, 2] = -table["relative_alt"] * 1e-3
+    position[:, 2] = -metres(table["relative_alt"])
     time_s = table["time_boot_ms"] * 1e-3
     if len(attitude):
         yaw = np.interp(time_s, attitude["time_boot_ms"] * 1e-3, np.unwrap(attitude["yaw"]))
     else:
-        yaw = np.where(table["hdg"] == 0xFFFF, 0.0, np.radians(table["hdg"] * 0.01))
+        yaw = np.where(table["hdg"] == UNKNOWN_UINT16, 0.0, np.radians(cdeg_degrees(table["hdg"])))
     return Track(time_s=time_s, pos_ned_m=position, yaw_rad=yaw)
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import Frame, field_reader
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import place
 from estimators.occupancy.detection import Anomaly, AnomalyDetector
 from estimators.occupancy.placed_readings import PlacedReading, ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap
@@ -69,8 +70,11 @@ class FieldWatch:
     def _on_position(self, frame: Frame) -> None:
         if frame.system_id != self._vehicle.system_id or frame.component_id != AUTOPILOT_COMPONENT:
             return
-        time_ms, lat, lon, alt_mm = _read_position(frame)
-        for reading in self.placer.add_position(time_ms * 1000, lat * 1e-7, lon * 1e-7, alt_mm * 1e-3):
+        time_ms, *here = _read_position(frame)
+        at = place(*here)
+        if at is None:
+            return
+        for reading in self.placer.add_position(time_ms * 1000, at.lat_deg, at.lon_deg, at.alt_m):
             map_nt = self._map.total_nt(reading.north_m, reading.east_m, reading.height_m)
             anomaly = self.detector.update(
                 reading.time_us, reading.total_nt, map_nt, reading.north_m, reading.east_m

@@ -3,8 +3,8 @@
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect, enum_name
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect, enum_name, wire_units
+from flightsim.foundation.geodesy import LocalFrame
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.snapshot import Snapshot
 from missions.vehicle.arming_reasons import PREARM_BIT, bit_names, reasons_against_arming
@@ -148,18 +148,20 @@ def _fit(values: dict[str, float], what: str, warn: float, bad: float) -> Findin
 
 def home(snapshot: Snapshot) -> Finding:
     """Finding about the home position and the vehicle's place."""
-    lat = snapshot.number("HOME_POSITION", "latitude")
-    lon = snapshot.number("HOME_POSITION", "longitude")
-    alt = snapshot.number("HOME_POSITION", "altitude")
-    if lat is None or lon is None or alt is None or (lat == 0 and lon == 0):
+    lat = snapshot.whole("HOME_POSITION", "latitude")
+    lon = snapshot.whole("HOME_POSITION", "longitude")
+    alt = snapshot.whole("HOME_POSITION", "altitude")
+    place = None if lat is None or lon is None or alt is None else wire_units.home(lat, lon, alt)
+    if place is None:
         return problem(
             "home", "not set: there would be no way back", "wait for GPS; it is set when it is ready"
         )
-    place = GeodeticPosition(lat_deg=lat * 1e-7, lon_deg=lon * 1e-7, alt_m=alt * 1e-3)
     text = f"{place.lat_deg:.6f}, {place.lon_deg:.6f}, {place.alt_m:.0f} m"
-    lat, lon = snapshot.number("GLOBAL_POSITION_INT", "lat"), snapshot.number("GLOBAL_POSITION_INT", "lon")
+    lat, lon = snapshot.whole("GLOBAL_POSITION_INT", "lat"), snapshot.whole("GLOBAL_POSITION_INT", "lon")
     if lat is not None and lon is not None:
-        north, east, _ = LocalFrame(place).ned_from_geodetic(lat * 1e-7, lon * 1e-7, place.alt_m)
+        north, east, _ = LocalFrame(place).ned_from_geodetic(
+            wire_units.degrees(lat), wire_units.degrees(lon), place.alt_m
+        )
         away_m = math.hypot(north, east)
         armed = (snapshot.whole("HEARTBEAT", "base_mode") or 0) & dialect.MAV_MODE_FLAG_SAFETY_ARMED
         if away_m > _HOME_AWAY_M and not armed:

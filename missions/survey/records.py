@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
+from autopilot_bridge.mavlink.wire_units import place_columns
 from estimators import survey_magnetometer
 from estimators.errors import EstimatorError
 from estimators.survey.compensation import (
@@ -29,6 +30,8 @@ __all__ = ["Calibration", "calibrated", "flight_readings"]
 
 Array = NDArray[np.float64]
 
+_ANGLES: Final = ("roll", "pitch", "yaw")
+
 _MARGIN_S: Final = 5.0  # of the flight around the manoeuvres, for the filter's ends
 
 
@@ -47,13 +50,13 @@ def flight_readings(
     sent = sent[sent["name"] == survey_magnetometer.TOTAL_FIELD_NAME.encode()]
     positions = records.positions(system_id)
     attitudes = records.table("ATTITUDE", system_id, AUTOPILOT_COMPONENT)
-    finite = np.all([np.isfinite(attitudes[name]) for name in ("roll", "pitch", "yaw")], axis=0)
+    finite = np.all([np.isfinite(attitudes[name]) for name in _ANGLES], axis=0)
     attitudes = attitudes[finite]
     return placed_readings(
         sent["time_boot_ms"] * 1e-3,
         sent["value"].astype(np.float64),
-        positions=_columns(positions, ("lat", 1e-7), ("lon", 1e-7), ("alt", 1e-3)),
-        attitudes=_columns(attitudes, ("roll", 1.0), ("pitch", 1.0), ("yaw", 1.0)) if attitude else None,
+        positions=_columns(positions, *place_columns(positions)),
+        attitudes=_columns(attitudes, *(attitudes[name] for name in _ANGLES)) if attitude else None,
         frame=frame,
     )
 
@@ -139,6 +142,6 @@ def calibrated(
     )
 
 
-def _columns(table: NDArray[np.void], *fields: tuple[str, float]) -> Array:
-    columns = [table["time_boot_ms"] * 1e-3, *(table[name] * scale for name, scale in fields)]
+def _columns(table: NDArray[np.void], *values: Array) -> Array:
+    columns = table["time_boot_ms"] * 1e-3, *values
     return np.column_stack([np.asarray(column, dtype=np.float64) for column in columns])

@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import e7
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.kind import VehicleKind
 from missions.vehicle.commands import VehicleCommands
@@ -90,9 +91,7 @@ class Adapter(ABC):
         frame: int = dialect.MAV_FRAME_GLOBAL,
     ) -> None:
         """Send a COMMAND_INT with a place and a height."""
-        await self._commands.command_int(
-            command, frame, params, round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), alt_m
-        )
+        await self._commands.command_int(command, frame, params, e7(place.lat_deg), e7(place.lon_deg), alt_m)
 
 
 _EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions

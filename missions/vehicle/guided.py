@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import home_of
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.vehicle.commands import VehicleCommands
@@ -211,12 +212,10 @@ class LocalOrigin:
         """
         if self._origin is None:
             try:
-                m = await self._commands.request(dialect.MAVLink_gps_global_origin_message, 1.5)
-                self._origin = GeodeticPosition(
-                    lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3
-                )
+                origin = home_of(await self._commands.request(dialect.MAVLink_gps_global_origin_message, 1.5))
             except VehicleTimeout:
-                self._origin = await self._from_positions()
+                origin = None
+            self._origin = origin or await self._from_positions()
         return self._origin
 
     async def _from_positions(self) -> GeodeticPosition:

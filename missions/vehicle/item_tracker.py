@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.mavlink.wire_units import place_of
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -238,7 +239,9 @@ class ItemTracker:
         elif isinstance(message, dialect.MAVLink_mission_current_message):
             self.on_current(message.seq - self.first, time_us, message.mission_state)
         elif isinstance(message, dialect.MAVLink_global_position_int_message):
-            self.on_position(message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3, time_us)
+            at = place_of(message)
+            if at is not None:
+                self.on_position(at.lat_deg, at.lon_deg, at.alt_m, time_us)
 
     def on_reached(self, index: int, time_us: int) -> None:
         """Process a MISSION_ITEM_REACHED; the index counts from 0."""

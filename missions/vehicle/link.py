@@ -23,6 +23,7 @@ from autopilot_bridge.mavlink import (
     field_reader,
 )
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import home_of, metres, place
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, TakenOver, VehicleTimeout
 from missions.how_left import height_text
@@ -36,7 +37,7 @@ from missions.vehicle.link_watch import LOST_AFTER_S, QUIET_AFTER_S, LinkWatch
 from missions.vehicle.mode_tasks import ModeTasks
 from missions.vehicle.notes import FlightNotes, LinkLoss
 from missions.vehicle.system_id_check import SystemIdCheck
-from missions.vehicle.telemetry import Position, StatusText, StatusTextAssembler, home, source_of
+from missions.vehicle.telemetry import Position, StatusText, StatusTextAssembler, source_of
 
 T = TypeVar("T")
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
@@ -202,8 +203,9 @@ class VehicleLink:
         listen("GLOBAL_POSITION_INT", self._on_position)
 
     def _on_position(self, frame: Frame) -> None:
-        lat, lon, alt = _read_position(frame)
-        self.tasks.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self.clock.stamp_us)
+        at = place(*_read_position(frame))
+        if at is not None:
+            self.tasks.on_position(at.lat_deg, at.lon_deg, at.alt_m, self.clock.stamp_us)
 
     def _judge_mode(self, heartbeat: dialect.MAVLink_heartbeat_message) -> None:
         """Decide who commands the vehicle. After a take-over all waits end."""
@@ -391,7 +393,7 @@ class VehicleLink:
     def home_or_none(self) -> GeodeticPosition | None:
         """Home as reported by the vehicle, or None."""
         message = self.message(dialect.MAVLink_home_position_message)
-        return None if message is None else home(message)
+        return None if message is None else home_of(message)
 
     @property
     def home(self) -> GeodeticPosition:
@@ -523,7 +525,7 @@ class VehicleLink:
         position = self.message(dialect.MAVLink_global_position_int_message)
         if position is not None:
             older_s = self.older_s(position.time_boot_ms * 1000)
-            parts.append(height_text(position.relative_alt * 1e-3, older_s, " above home"))
+            parts.append(height_text(metres(position.relative_alt), older_s, " above home"))
         silent_s = (self.clock.time_us - self.heartbeat_us) * 1e-6
         if silence and silent_s > 3.0:
             parts.append(f"no heartbeat for {silent_s:.0f} s")

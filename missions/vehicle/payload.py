@@ -14,6 +14,7 @@ from autopilot_bridge.mavlink.components import (
     GIMBAL_COMPONENT,
     SURVEY_MAGNETOMETER_COMPONENT,
 )
+from autopilot_bridge.mavlink.wire_units import e7
 from estimators import survey_magnetometer
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude, detection, gimbal_attitude
 from missions.vehicle.link import VehicleLink
@@ -198,8 +199,8 @@ class Payload:
                 param2=0.0,
                 param3=0.0,
                 param4=0.0,
-                x=round(lat_deg * 1e7),
-                y=round(lon_deg * 1e7),
+                x=e7(lat_deg),
+                y=e7(lon_deg),
                 z=alt_m,
             )
         )

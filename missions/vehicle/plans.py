@@ -5,6 +5,7 @@ from typing import Final
 
 from autopilot_bridge.mavlink import Frame, decode, definition, dialect, field_reader
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle.firmware import Mode
@@ -180,8 +181,9 @@ class VehiclePlans:
         def handle(frame: Frame) -> bool:
             nonlocal flying
             if frame.message_id == _POSITION:
-                lat, lon, alt = _read_position(frame)
-                tracker.on_position(lat * 1e-7, lon * 1e-7, alt * 1e-3, self._link.clock.stamp_us)
+                at = place(*_read_position(frame))
+                if at is not None:
+                    tracker.on_position(at.lat_deg, at.lon_deg, at.alt_m, self._link.clock.stamp_us)
                 return there()
             message = decode(frame)
             if not isinstance(message, dialect.MAVLink_heartbeat_message):

@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.wire_units import e7
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError, PlanError
 from missions.vehicle.commands import HEARTBEAT_AGE_US, VehicleCommands
@@ -35,8 +36,8 @@ class PointFlight:
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,
             (-1.0, 1.0, 0.0, firmware.unset),
-            round(target.lat_deg * 1e7),
-            round(target.lon_deg * 1e7),
+            e7(target.lat_deg),
+            e7(target.lon_deg),
             target.alt_m,
         )
         accepted_us = link.clock.time_us

@@ -9,7 +9,7 @@ from typing import Final, Generic, NamedTuple, TypeVar, cast
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage, dialect, field_reader
 from autopilot_bridge.mavlink.plain_text import plain_text
-from flightsim.foundation.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, m_s, metres, place
 
 T = TypeVar("T")
 
@@ -129,15 +129,18 @@ class MissionProgress:
 
 def position(
     time_boot_ms: int, lat: int, lon: int, alt: int, relative_alt: int, vx: int, vy: int, vz: int
-) -> Position:
-    """From GLOBAL_POSITION_INT."""
+) -> Position | None:
+    """From GLOBAL_POSITION_INT; None when the position is not on the Earth."""
+    at = place(lat, lon, alt)
+    if at is None:
+        return None
     return Position(
         time_us=time_boot_ms * 1000,
-        lat_deg=lat * 1e-7,
-        lon_deg=lon * 1e-7,
-        alt_m=alt * 1e-3,
-        height_m=relative_alt * 1e-3,
-        vel_ned_m_s=(vx * 0.01, vy * 0.01, vz * 0.01),
+        lat_deg=at.lat_deg,
+        lon_deg=at.lon_deg,
+        alt_m=at.alt_m,
+        height_m=metres(relative_alt),
+        vel_ned_m_s=(m_s(vx), m_s(vy), m_s(vz)),
     )
 
 
@@ -186,7 +189,7 @@ def pressure(time_boot_ms: int, press_abs: float) -> Pressure:
 def battery(voltage_battery: int, current_battery: int, battery_remaining: int) -> Battery:
     """From SYS_STATUS."""
     return Battery(
-        voltage_v=voltage_battery * 1e-3 if voltage_battery != 0xFFFF else math.nan,
+        voltage_v=voltage_battery * 1e-3 if voltage_battery != UNKNOWN_UINT16 else math.nan,
         current_a=current_battery * 0.01 if current_battery >= 0 else math.nan,
         remaining=battery_remaining * 0.01 if battery_remaining >= 0 else math.nan,
     )
@@ -198,13 +201,8 @@ def gps(time_usec: int, eph: int, fix_type: int, satellites_visible: int) -> Gps
         time_us=time_usec,
         fix_type=fix_type,
         satellites=satellites_visible if satellites_visible != 255 else 0,
-        hdop=eph * 0.01 if eph != 0xFFFF else math.nan,
+        hdop=eph * 0.01 if eph != UNKNOWN_UINT16 else math.nan,
     )
-
-
-def home(m: dialect.MAVLink_home_position_message) -> GeodeticPosition:
-    """From HOME_POSITION."""
-    return GeodeticPosition(lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3)
 
 
 def progress(seq: int) -> MissionProgress:

@@ -7,6 +7,7 @@ from mavsdk.plugins.info import InfoError
 
 from autopilot_bridge.mavlink import dialect, enum_name
 from autopilot_bridge.mavlink.plain_text import plain_text
+from autopilot_bridge.mavlink.wire_units import degrees, metres
 from missions.vehicle_client.client import WANTED, VehicleClient
 
 _WAIT_S: Final = 4.0
@@ -109,10 +110,10 @@ def _position(client: VehicleClient) -> dict[str, float] | None:
     if m is None:
         return None
     return {
-        "lat_deg": m["lat"] * 1e-7,
-        "lon_deg": m["lon"] * 1e-7,
-        "alt_m": m["alt"] * 1e-3,
-        "height_m": m["relative_alt"] * 1e-3,
+        "lat_deg": degrees(m["lat"]),
+        "lon_deg": degrees(m["lon"]),
+        "alt_m": metres(m["alt"]),
+        "height_m": metres(m["relative_alt"]),
     }
 
 
@@ -120,7 +121,11 @@ def _home(client: VehicleClient) -> dict[str, float] | None:
     m = client.messages.get("HOME_POSITION")
     if m is None:
         return None
-    return {"lat_deg": m["latitude"] * 1e-7, "lon_deg": m["longitude"] * 1e-7, "alt_m": m["altitude"] * 1e-3}
+    return {
+        "lat_deg": degrees(m["latitude"]),
+        "lon_deg": degrees(m["longitude"]),
+        "alt_m": metres(m["altitude"]),
+    }
 
 
 def _gps(client: VehicleClient) -> dict[str, Any] | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import metres
 from estimators.received import not_in_gaps, received_times
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
@@ -70,8 +71,8 @@ def pose_errors(
         for own, true in zip(own_ne_m, true_ne_m, strict=True)
     )
     # height above home: that of the truth from its own begin, before the take-off
-    height = _at(times, own_us, position["relative_alt"] * 1e-3)
-    height = height - _at(times, true_us, truth["alt"] * 1e-3) + float(truth["alt"][0]) * 1e-3
+    height = _at(times, own_us, metres(position["relative_alt"]))
+    height = height - _at(times, true_us, metres(truth["alt"])) + metres(float(truth["alt"][0]))
     cosine, sine = np.cos(true_angles[2]), np.sin(true_angles[2])
     figures = {
         "forward_m": _rms(north * cosine + east * sine),

@@ -12,6 +12,7 @@ from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import degrees, e7
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Source
@@ -161,7 +162,7 @@ class OldPoints(Microservice):
 
     def _take_rally_point(self, message: mavlink.MAVLink_rally_point_message) -> None:
         total = self._total(RALLY_TOTAL)
-        lat, lon = message.lat * 1e-7, message.lng * 1e-7
+        lat, lon = degrees(message.lat), degrees(message.lng)
         if message.idx >= total:
             self._announce(_WARNING, "Bad rally point message ID")
         elif message.count != total:
@@ -189,8 +190,8 @@ class OldPoints(Microservice):
                 source.component_id,
                 index,
                 min(len(items), 255),
-                round(item.x * 1e7),
-                round(item.y * 1e7),
+                e7(item.x),
+                e7(item.y),
                 max(-32768, min(32767, round(item.z))) if math.isfinite(item.z) else 0,
                 0,
                 0,

@@ -14,6 +14,7 @@ from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import degrees, m_s, metres
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -128,8 +129,8 @@ def _hil_gps(message: mavlink.MAVLink_hil_gps_message) -> list[float] | None:
     """The values of a HIL_GPS, which has integers."""
     return _fix(
         message,
-        alt_m=message.alt * 1e-3,
-        velocity=(message.vn * 0.01, message.ve * 0.01, message.vd * 0.01),
+        alt_m=metres(message.alt),
+        velocity=(m_s(message.vn), m_s(message.ve), m_s(message.vd)),
         hdop=message.eph * 0.01,
         vdop=message.epv * 0.01,
     )
@@ -152,8 +153,8 @@ def _fix(
         return None
     hdop, vdop = _least(hdop, _UNKNOWN_DOP), _least(vdop, _UNKNOWN_DOP)
     values = [0.0] * i.GPS_SIZE
-    values[i.GPS_LAT_DEG] = message.lat * 1e-7
-    values[i.GPS_LON_DEG] = message.lon * 1e-7
+    values[i.GPS_LAT_DEG] = degrees(message.lat)
+    values[i.GPS_LON_DEG] = degrees(message.lon)
     values[i.GPS_ALT_M] = alt_m
     values[i.GPS_VEL_NED_M_S] = velocity
     values[i.GPS_EPH_M] = min(_least(eph_m, _RANGE_ERROR_M * hdop), _UNKNOWN_ACCURACY_M)

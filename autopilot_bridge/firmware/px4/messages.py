@@ -8,6 +8,7 @@ from typing import Final
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_rates
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, e7
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.messages.common import (
@@ -20,7 +21,7 @@ from autopilot_bridge.services.messages.common import (
 from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
-from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
+from autopilot_bridge.telemetry.view import pressure_altitude_m
 
 _M = mavlink
 _ESTIMATOR_STATUS: Final = fields("ESTIMATOR_STATUS")
@@ -159,8 +160,8 @@ class Px4Messages(CommonMessages):
             time_usec=self.view.time_us,
             radius=radius_m,
             frame=mavlink.MAV_FRAME_GLOBAL_INT,
-            x=round(lat_deg * 1e7),
-            y=round(lon_deg * 1e7),
+            x=e7(lat_deg),
+            y=e7(lon_deg),
             z=alt_m,
         )
 
@@ -193,7 +194,7 @@ class Px4Messages(CommonMessages):
             vertical_accuracy=mavlink.MAV_ODID_VER_ACC_1_METER,
             barometer_accuracy=mavlink.MAV_ODID_VER_ACC_UNKNOWN,
             speed_accuracy=mavlink.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
-            timestamp=float(UINT16_UNKNOWN),
+            timestamp=float(UNKNOWN_UINT16),
         )
 
     @streams(_M.MAVLink_open_drone_id_system_message)

@@ -9,10 +9,12 @@ from typing import Final, NamedTuple
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import degrees
 from autopilot_bridge.mission_wire import UNSET_INT
 from autopilot_bridge.services.channel import Source
 
 FORCE_NUMBER: Final = 21196
+_LOCAL_M: Final = 1e-4
 _LOCAL_FRAMES: Final = frozenset(
     {
         mavlink.MAV_FRAME_LOCAL_NED,
@@ -62,13 +64,18 @@ def command_from_message(
     if isinstance(message, mavlink.MAVLink_command_long_message):
         x, y, z = message.param5, message.param6, message.param7
     else:
-        scale = 1e-4 if message.frame in _LOCAL_FRAMES else 1e-7
-        x = math.nan if message.x == UNSET_INT else message.x * scale
-        y = math.nan if message.y == UNSET_INT else message.y * scale
         z, frame = message.z, message.frame
+        x, y = _coordinate(message.x, frame), _coordinate(message.y, frame)
     return Command(
         message.command, message.param1, message.param2, message.param3, message.param4, x, y, z, frame
     )
+
+
+def _coordinate(value: int, frame: int) -> float:
+    """Metres of a COMMAND_INT's x or y in a local frame, else degrees; NaN: not set."""
+    if value == UNSET_INT:
+        return math.nan
+    return value * _LOCAL_M if frame in _LOCAL_FRAMES else degrees(value)
 
 
 def whole(value: float, default: int | None = None) -> int | None:

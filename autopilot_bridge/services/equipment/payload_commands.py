@@ -19,6 +19,7 @@ from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT
+from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, Handler
@@ -209,5 +210,5 @@ def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessag
 
 
 def _e7(degrees: float) -> int:
-    scaled = round(degrees * 1e7) if math.isfinite(degrees) else 0
+    scaled = e7(degrees) if math.isfinite(degrees) else 0
     return max(-(2**31), min(2**31 - 1, scaled))

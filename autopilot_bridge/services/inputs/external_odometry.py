@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import external as external
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
-from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, conjugate, from_euler, product
 
 Array = NDArray[np.float64]
@@ -125,10 +125,10 @@ class ExternalOdometryService(Microservice):
         """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
         if self._navigation.frame is not None or message.target_system != self._system_id:
             return
-        lat_deg, lon_deg, alt_m = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
-        if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and abs(alt_m) < 1e5):
+        origin = place(message.latitude, message.longitude, message.altitude)
+        if origin is None or abs(origin.alt_m) >= 1e5:
             return
-        self._navigation.set_origin(GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m))
+        self._navigation.set_origin(origin)
         send_to_all(
             self._broadcast,
             mavlink.MAVLink_gps_global_origin_message(

@@ -13,6 +13,7 @@ import numpy as np
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import degrees, metres, velocity_of
 from autopilot_bridge.services.channel import Receiver, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -83,7 +84,7 @@ class FollowService(Microservice):
             if self.leader_id and leader.age_s(time_us) <= _FORGET_S:
                 return
             leader.forget()
-        lat_deg, lon_deg = _of_degrees(message)
+        lat_deg, lon_deg = degrees(message.lat), degrees(message.lon)
         if not (math.isfinite(alt_m) and abs(alt_m) < 1e5 and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
             return
         if lat_deg == 0.0 and lon_deg == 0.0:
@@ -98,20 +99,14 @@ class FollowService(Microservice):
     ) -> tuple[float, tuple[float, float, float] | None, float]:
         """(altitude over mean sea level, velocity, 1-sigma) of a GLOBAL_POSITION_INT."""
         context = self._context
-        alt_m = message.alt * 1e-3
+        alt_m = metres(message.alt)
         parameters: Any = getattr(context.parameters, "follow", None)
         home_down_m = float(context.home_ned_m[2])
         if parameters is not None and parameters.relative_altitude and context.frame is not None:
-            over_home_m = message.relative_alt * 1e-3
+            over_home_m = metres(message.relative_alt)
             alt_m = context.frame.origin.alt_m - (home_down_m if math.isfinite(home_down_m) else 0.0)
             alt_m += over_home_m
-        return alt_m, (message.vx * 1e-2, message.vy * 1e-2, message.vz * 1e-2), _SIGMA_M
-
-
-def _of_degrees(
-    message: mavlink.MAVLink_global_position_int_message | mavlink.MAVLink_follow_target_message,
-) -> tuple[float, float]:
-    return message.lat * 1e-7, message.lon * 1e-7
+        return alt_m, velocity_of(message), _SIGMA_M
 
 
 def _of_follow(

@@ -14,6 +14,7 @@ import numpy as np
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import layout as nav
 from flightsim.foundation.rotations import rotate
 
@@ -146,12 +147,13 @@ def local_from_global(
     frame = context.frame
     if frame is None or not math.isfinite(altitude_m) or abs(altitude_m) > _MAX_POSITION_M:
         return None
-    if abs(lat_e7) > 900_000_000 or abs(lon_e7) > 1_800_000_000:
+    there = place(lat_e7, lon_e7, 0)
+    if there is None:
         return None
     reference_down_m = float(context.home_ned_m[2]) if relative else frame.origin.alt_m
     if not math.isfinite(reference_down_m):
         return None
-    north_m, east_m, _ = frame.ned_from_geodetic(lat_e7 * 1e-7, lon_e7 * 1e-7, frame.origin.alt_m)
+    north_m, east_m, _ = frame.ned_from_geodetic(there.lat_deg, there.lon_deg, frame.origin.alt_m)
     if max(abs(north_m), abs(east_m)) > _MAX_POSITION_M:
         return None
     return north_m, east_m, reference_down_m - altitude_m

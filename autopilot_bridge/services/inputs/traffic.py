@@ -12,6 +12,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.dispatch import receives, streams
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
+from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.microservice import Microservice
@@ -124,14 +125,16 @@ class TrafficService(Microservice):
         frame = self._commander.context.frame
         if frame is None or message.flags & _NEEDED != _NEEDED:
             return None
-        lat_deg, lon_deg, alt_m = message.lat * 1e-7, message.lon * 1e-7, message.altitude * 1e-3
-        if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+        there = place(message.lat, message.lon, message.altitude)
+        if there is None:
             return None
         own = self._commander.context.nav
         north_m, east_m, down_m = (
-            there - here
-            for there, here in zip(
-                frame.ned_from_geodetic(lat_deg, lon_deg, alt_m), own[nav.POS_NED_M].tolist(), strict=True
+            other - here
+            for other, here in zip(
+                frame.ned_from_geodetic(there.lat_deg, there.lon_deg, there.alt_m),
+                own[nav.POS_NED_M].tolist(),
+                strict=True,
             )
         )
         parameters = self._parts.parameters

@@ -6,11 +6,11 @@ from typing import Final
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, e7, mm, place_e7
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
-from autopilot_bridge.telemetry.view import UINT16_UNKNOWN
 from flightsim import interface
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
@@ -56,7 +56,7 @@ class CommonMessages(Microservice):
     def sys_status(self) -> Values:
         """SYS_STATUS (1)."""
         present, enabled, health = self.parts.status.sys_status()
-        voltage_mv, current_ca, remaining = UINT16_UNKNOWN, -1, -1
+        voltage_mv, current_ca, remaining = UNKNOWN_UINT16, -1, -1
         battery = self.view.battery
         if battery is not None:
             voltage_mv = round(battery[0] * 1000.0)
@@ -87,13 +87,13 @@ class CommonMessages(Microservice):
             if not self.gps_sent_before_first:
                 return None
             return _GPS_RAW_INT(
-                time_usec=self.view.time_us, fix_type=_NO_GPS, eph=UINT16_UNKNOWN, epv=UINT16_UNKNOWN
+                time_usec=self.view.time_us, fix_type=_NO_GPS, eph=UNKNOWN_UINT16, epv=UNKNOWN_UINT16
             )
         v = gps.values.tolist()
         silent = self.view.time_us - gps.time_us > self.gps_timeout_us
         fix_type = _NO_GPS if silent else int(v[interface.GPS_FIX_TYPE])
         vn, ve, _ = v[interface.GPS_VEL_NED_M_S]
-        speed_cm_s = course_cdeg = UINT16_UNKNOWN
+        speed_cm_s = course_cdeg = UNKNOWN_UINT16
         if vn == vn:  # else it was not sent
             speed_cm_s = round(math.hypot(vn, ve) * 100.0)
             course_cdeg = round(math.degrees(math.atan2(ve, vn)) % 360.0 * 100.0) % 36000
@@ -103,16 +103,16 @@ class CommonMessages(Microservice):
             return _GPS_RAW_INT(
                 time_usec=gps.time_us,
                 fix_type=fix_type,
-                eph=UINT16_UNKNOWN,
-                epv=UINT16_UNKNOWN,
+                eph=UNKNOWN_UINT16,
+                epv=UNKNOWN_UINT16,
                 satellites_visible=satellites,
             )
-        alt_mm = round(v[interface.GPS_ALT_M] * 1000.0)
+        alt_mm = mm(v[interface.GPS_ALT_M])
         return _GPS_RAW_INT(
             time_usec=gps.time_us,
             fix_type=fix_type,
-            lat=round(v[interface.GPS_LAT_DEG] * 1e7),
-            lon=round(v[interface.GPS_LON_DEG] * 1e7),
+            lat=e7(v[interface.GPS_LAT_DEG]),
+            lon=e7(v[interface.GPS_LON_DEG]),
             alt=alt_mm,
             eph=round(v[interface.GPS_HDOP] * 100.0),
             epv=round(v[interface.GPS_VDOP] * 100.0),
@@ -159,13 +159,7 @@ class CommonMessages(Microservice):
         frame = self.context.frame
         if frame is None:
             return None
-        origin = frame.origin
-        return (
-            round(origin.lat_deg * 1e7),
-            round(origin.lon_deg * 1e7),
-            round(origin.alt_m * 1000.0),
-            self.view.time_us,
-        )
+        return (*place_e7(frame.origin), self.view.time_us)
 
     @streams(mavlink.MAVLink_vfr_hud_message)
     def vfr_hud(self) -> Values:
@@ -236,8 +230,8 @@ class CommonMessages(Microservice):
         return POSITION_TARGET_GLOBAL_INT(
             time_boot_ms=self.view.time_ms,
             coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT,
-            lat_int=round(lat_deg * 1e7),
-            lon_int=round(lon_deg * 1e7),
+            lat_int=e7(lat_deg),
+            lon_int=e7(lon_deg),
             alt=alt_m,
             **dict(zip(TARGET_FIELDS[3:], target[3:], strict=True)),
         )
@@ -273,7 +267,7 @@ class CommonMessages(Microservice):
             battery_function=mavlink.MAV_BATTERY_FUNCTION_ALL,
             type=mavlink.MAV_BATTERY_TYPE_LIPO,
             temperature=_NO_TEMPERATURE,
-            voltages=(round(voltage_v * 1000.0), *(UINT16_UNKNOWN,) * 9),
+            voltages=(round(voltage_v * 1000.0), *(UNKNOWN_UINT16,) * 9),
             current_battery=round(current_a * 100.0),
             current_consumed=round(used_ah * 1000.0),
             energy_consumed=-1,
@@ -312,7 +306,7 @@ class CommonMessages(Microservice):
         if context.frame is None or not math.isfinite(north):
             return None
         lat_deg, lon_deg, alt_m = context.frame.geodetic_from_ned(north, east, down)
-        return round(lat_deg * 1e7), round(lon_deg * 1e7), round(alt_m * 1000.0)
+        return e7(lat_deg), e7(lon_deg), mm(alt_m)
 
     def home_quaternion(self) -> tuple[float, float, float, float]:
         """Heading at home as HOME_POSITION carries it."""

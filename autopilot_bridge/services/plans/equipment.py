@@ -14,6 +14,7 @@ from autopilot_bridge.flight.plan_reading import is_waypoint
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT, GIMBAL_COMPONENT
+from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import TERRAIN_FRAMES, UNSET_INT, is_geodetic
 from autopilot_bridge.services.channel import MavlinkMessage, send_to_all
@@ -176,4 +177,4 @@ def _command(item: MissionItem) -> Command:
 
 
 def _degrees_e7(degrees: float) -> int:
-    return round(degrees * 1e7) if math.isfinite(degrees) else UNSET_INT
+    return e7(degrees) if math.isfinite(degrees) else UNSET_INT

@@ -10,6 +10,7 @@ from autopilot_bridge.firmware.ardupilot import messages as ardupilot
 from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_flags
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.services.messages.common import POSITION_TARGET_GLOBAL_INT, POSITION_TARGET_LOCAL_NED
 from autopilot_bridge.services.parts import AutopilotParts
@@ -158,8 +159,8 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             time_boot_ms=self.view.time_ms,
             coordinate_frame=mavlink.MAV_FRAME_GLOBAL,
             type_mask=_TARGET_MASK,
-            lat_int=round(lat_deg * 1e7),
-            lon_int=round(lon_deg * 1e7),
+            lat_int=e7(lat_deg),
+            lon_int=e7(lon_deg),
             alt=alt_m,
         )
 

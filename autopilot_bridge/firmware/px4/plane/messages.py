@@ -10,6 +10,7 @@ from autopilot_bridge.firmware.px4 import messages as px4
 from autopilot_bridge.firmware.px4.messages import Px4Messages
 from autopilot_bridge.flight.context import LandedState
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.services.messages.common import (
     NAN,
@@ -126,8 +127,8 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         return POSITION_TARGET_GLOBAL_INT(
             time_boot_ms=self.view.time_ms,
             coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT,
-            lat_int=round(lat_deg * 1e7),
-            lon_int=round(lon_deg * 1e7),
+            lat_int=e7(lat_deg),
+            lon_int=e7(lon_deg),
             alt=alt_m,
             **_NOTHING,
         )
