@@ -1,24 +1,19 @@
 """The messages of a camera that searches its pictures: each detection, and the end of each frame.
 
 LANDING_TARGET reports what was detected. It cannot report that a picture shows nothing, which a search must
-know; a TUNNEL message does. docs/mavlink/camera_scan.md documents its payload.
-
-All numbers are little-endian: version (uint8), kind (uint8), detections (uint16), number (uint32), time
-(uint64, microseconds since boot, of the exposure), width and height (uint16), focal length (float32, pixels),
-k1, k2, p1, p2, k3 (float32), roll, pitch and yaw of the mount (float32, rad; NaN: on a gimbal), and forward,
-right and down of the camera on the vehicle (float32, m).
+know; a TUNNEL message does. docs/mavlink/camera_scan.md has the payload's table.
 """
 
 import math
-import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.tunnel import Tunnel, Wire
 from flightsim.foundation.vectors import Vector
 
 __all__ = [
+    "CAMERA_SCAN",
     "CAMERA_SCAN_PAYLOAD",
     "CameraScan",
     "camera_scan_message",
@@ -27,41 +22,53 @@ __all__ = [
 ]
 
 CAMERA_SCAN_PAYLOAD: Final = 0xF517
-"""Payload type; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""
-
 
 _MOST_TAG: Final = 255
-_VERSION: Final = 1
-_END_OF_FRAME: Final = 1
-_LAYOUT: Final = struct.Struct("<BBHIQHHf5f3f3f")
-_PAYLOAD_SIZE: Final = 128
+_DETECTIONS: Final = Wire(
+    "H", "number of LANDING_TARGET messages with the same time", send=lambda count: min(count, 0xFFFF)
+)
+_MOUNT: Final = Wire(
+    "3f",
+    "roll, pitch, yaw of the camera against the body, rad; NaN: on a gimbal, which reports its attitude",
+    nan=True,
+    send=lambda mount: mount or (math.nan,) * 3,
+    receive=lambda angles: None if any(map(math.isnan, angles)) else angles,
+)
+_FOCAL: Final = Wire(
+    "f",
+    "pixels, at the present zoom; the pixels are square, the optical axis is in the middle",
+    name="focal length",
+    above=0.0,
+)
+_PLACE: Final = Wire("3f", "of the camera on the vehicle: forward, right, down, m", name="place")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraScan:
-    """One searched picture.
+    """One searched picture. The axes of the camera are x optical, y right, z down."""
 
-    Attributes:
-        number: of the frame, from 0 at the camera's boot.
-        time_us: vehicle time of its exposure; the LANDING_TARGET messages of the frame have the same.
-        detections: number of those messages.
-        width_px, height_px: size of the picture.
-        focal_px: focal length at the present zoom; square pixels, the optical axis in the middle.
-        distortion: k1, k2, p1, p2, k3 of Brown's model.
-        mount_rad: roll, pitch and yaw of the camera (x optical, y right, z down) against the body; None: on a
-            gimbal, which reports its attitude.
-        position_frd_m: place on the vehicle.
-    """
+    detections: Annotated[int, _DETECTIONS]
+    number: Annotated[int, Wire("I", "of the frame; counts from 0 at the camera's boot", modulo=True)]
+    time_us: Annotated[int, Wire("Q", "vehicle time of the exposure, microseconds since boot")]
+    width_px: Annotated[int, Wire("H", "of the picture, pixels", least=1)]
+    height_px: Annotated[int, Wire("H", "of the picture, pixels", least=1)]
+    focal_px: Annotated[float, _FOCAL]
+    distortion: Annotated[
+        tuple[float, ...], Wire("5f", "k1, k2, p1, p2, k3 of Brown's model, in OpenCV's order")
+    ]
+    mount_rad: Annotated[Vector | None, _MOUNT]
+    position_frd_m: Annotated[Vector, _PLACE]
 
-    number: int
-    time_us: int
-    detections: int
-    width_px: int
-    height_px: int
-    focal_px: float
-    distortion: tuple[float, ...]
-    mount_rad: Vector | None
-    position_frd_m: Vector
+
+def _possible(scan: CameraScan) -> bool:
+    return scan.mount_rad is None or max(map(abs, scan.mount_rad)) <= math.tau
+
+
+CAMERA_SCAN: Final = Tunnel(
+    CameraScan, CAMERA_SCAN_PAYLOAD, subtype=(1, "end of a frame"), possible=_possible
+)
+camera_scan_message = CAMERA_SCAN.message
+read_camera_scan = CAMERA_SCAN.read
 
 
 def detection_message(
@@ -99,57 +106,4 @@ def detection_message(
         if tag_id is None
         else dialect.LANDING_TARGET_TYPE_VISION_FIDUCIAL,
         0,
-    )
-
-
-def camera_scan_message(scan: CameraScan) -> dialect.MAVLink_tunnel_message:
-    """The TUNNEL message of a scan, to all systems and components."""
-    mount_rad = (math.nan,) * 3 if scan.mount_rad is None else scan.mount_rad
-    payload = _LAYOUT.pack(
-        _VERSION,
-        _END_OF_FRAME,
-        min(scan.detections, 0xFFFF),
-        scan.number & 0xFFFFFFFF,
-        scan.time_us,
-        scan.width_px,
-        scan.height_px,
-        scan.focal_px,
-        *scan.distortion,
-        *mount_rad,
-        *scan.position_frd_m,
-    )
-    return dialect.MAVLink_tunnel_message(
-        0, 0, CAMERA_SCAN_PAYLOAD, len(payload), list(payload.ljust(_PAYLOAD_SIZE, b"\0"))
-    )
-
-
-def read_camera_scan(payload_type: int, length: int, payload: Sequence[int]) -> CameraScan | None:
-    """The content of a TUNNEL message; None for other payloads and for malformed ones. It never raises.
-
-    Args:
-        payload_type, length, payload: fields of the message.
-    """
-    if payload_type != CAMERA_SCAN_PAYLOAD or not _LAYOUT.size <= length <= len(payload):
-        return None
-    version, kind, detections, number, time_us, width_px, height_px, focal_px, *rest = _LAYOUT.unpack(
-        bytes(payload[: _LAYOUT.size])
-    )
-    distortion, mount, place = tuple(rest[:5]), rest[5:8], rest[8:11]
-    if version != _VERSION or kind != _END_OF_FRAME or not (width_px and height_px):
-        return None
-    if not (math.isfinite(focal_px) and focal_px > 0.0 and all(map(math.isfinite, (*distortion, *place)))):
-        return None
-    gimballed = any(map(math.isnan, mount))
-    if not gimballed and not all(abs(angle) <= math.tau for angle in mount):
-        return None
-    return CameraScan(
-        number=number,
-        time_us=time_us,
-        detections=detections,
-        width_px=width_px,
-        height_px=height_px,
-        focal_px=focal_px,
-        distortion=distortion,
-        mount_rad=None if gimballed else (mount[0], mount[1], mount[2]),
-        position_frd_m=(place[0], place[1], place[2]),
     )

@@ -1,24 +1,20 @@
 """Moving points of a camera's frames in TUNNEL messages: one or more messages per frame.
 
 MAVLink has no message for any number of anonymous points of one frame. LANDING_TARGET reports one object, and
-cannot report that a frame was searched and shows nothing that moves. docs/mavlink/moving_points.md documents
-the payload.
-
-All numbers are little-endian: version (uint8), points in this message (uint8), number of its first point
-(uint8), points of the scan (uint8), scan (uint32), time (uint64, microseconds since the vehicle's boot, of
-the exposure), standard deviation (float32), then for each point the tangents to the right and down (float32).
+cannot report that a frame was searched and shows nothing that moves. docs/mavlink/moving_points.md has the
+payload's table.
 """
 
-import math
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink.tunnel import Many, Tunnel, Wire
 
 __all__ = [
     "MAX_POINTS",
+    "MOVING_POINTS",
     "MOVING_POINTS_PAYLOAD",
     "MovingPoints",
     "moving_points_messages",
@@ -26,43 +22,45 @@ __all__ = [
 ]
 
 MOVING_POINTS_PAYLOAD: Final = 0xF51A
-"""Payload type; from 32768 on they are not registered (MAV_TUNNEL_PAYLOAD_TYPE)."""
 MAX_POINTS: Final = 255
 
-_VERSION: Final = 1
-_HEAD: Final = struct.Struct("<BBBBIQf")
-_POINT: Final = struct.Struct("<ff")
-_PAYLOAD_SIZE: Final = 128
-_POINTS_PER_MESSAGE: Final = (_PAYLOAD_SIZE - _HEAD.size) // _POINT.size
 _LARGEST: Final = 20.0  # tangent of an angle in a picture
+_POINT: Final = Wire(
+    "2f",
+    "of point i: tangents of the angles from the optical axis to the right and downwards",
+    name="right, down",
+    least=-_LARGEST,
+    most=_LARGEST,
+)
 
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingPoints:
-    """One message: some points of a scan.
+    """One message: some points of a scan, as normalized image coordinates of unit focal length."""
 
-    Attributes:
-        scan: number of the scan, from 0 at the camera's boot.
-        time_us: vehicle time of the exposure.
-        first: number of the first of `points` in the scan.
-        total: points of the scan; the message that has the last one ends the scan.
-        sigma: standard deviation of a point per axis, as a tangent.
-        points: normalized image coordinates, right and down, of unit focal length.
-    """
-
-    scan: int
-    time_us: int
-    first: int
-    total: int
-    sigma: float
-    points: tuple[Point, ...]
+    first: Annotated[int, Wire("B", "number of its first point in the scan")]
+    total: Annotated[int, Wire("B", "points of the scan; the message with the last of them ends the scan")]
+    scan: Annotated[int, Wire("I", "number of the frame; counts from 0 at the camera's boot", modulo=True)]
+    time_us: Annotated[int, Wire("Q", "vehicle time of the exposure, microseconds since boot")]
+    sigma: Annotated[
+        float, Wire("f", "standard deviation of a point per axis, as a tangent, above 0", above=0.0)
+    ]
+    points: Annotated[tuple[Point, ...], Many(_POINT, "points in this message, up to 13")]
 
     @property
     def last(self) -> bool:
         """Whether it ends the scan."""
         return self.first + len(self.points) == self.total
+
+
+def _possible(scan: MovingPoints) -> bool:
+    return scan.first + len(scan.points) <= scan.total and (scan.points != () or scan.total == 0)
+
+
+MOVING_POINTS: Final = Tunnel(MovingPoints, MOVING_POINTS_PAYLOAD, possible=_possible)
+read_moving_points = MOVING_POINTS.read
 
 
 def moving_points_messages(
@@ -76,35 +74,17 @@ def moving_points_messages(
         points: normalized image coordinates; at most `MAX_POINTS`, further ones are left out.
         sigma: their standard deviation.
     """
-    kept = points[:MAX_POINTS]
-    messages = []
-    for first in range(0, max(1, len(kept)), _POINTS_PER_MESSAGE):
-        part = kept[first : first + _POINTS_PER_MESSAGE]
-        payload = _HEAD.pack(_VERSION, len(part), first, len(kept), scan & 0xFFFFFFFF, time_us, sigma)
-        payload += b"".join(_POINT.pack(*point) for point in part)
-        messages.append(
-            dialect.MAVLink_tunnel_message(
-                0, 0, MOVING_POINTS_PAYLOAD, len(payload), list(payload.ljust(_PAYLOAD_SIZE, b"\0"))
+    sent, room = tuple(points[:MAX_POINTS]), MOVING_POINTS.room
+    return [
+        MOVING_POINTS.message(
+            MovingPoints(
+                scan=scan,
+                time_us=time_us,
+                first=first,
+                total=len(sent),
+                sigma=sigma,
+                points=sent[first : first + room],
             )
         )
-    return messages
-
-
-def read_moving_points(payload_type: int, length: int, payload: Sequence[int]) -> MovingPoints | None:
-    """The content of a TUNNEL message; None for other payloads and for malformed ones. It never raises.
-
-    Args:
-        payload_type, length, payload: fields of the message.
-    """
-    if payload_type != MOVING_POINTS_PAYLOAD or not _HEAD.size <= length <= len(payload):
-        return None
-    data = bytes(payload[:length])
-    version, count, first, total, scan, time_us, sigma = _HEAD.unpack_from(data)
-    if version != _VERSION or length < _HEAD.size + count * _POINT.size or first + count > total:
-        return None
-    if not (math.isfinite(sigma) and sigma > 0.0) or (total and not count):
-        return None
-    points = tuple(_POINT.iter_unpack(data[_HEAD.size : _HEAD.size + count * _POINT.size]))
-    if not all(abs(x) <= _LARGEST and abs(y) <= _LARGEST for x, y in points):  # NaN is not
-        return None
-    return MovingPoints(scan=scan, time_us=time_us, first=first, total=total, sigma=sigma, points=points)
+        for first in range(0, max(1, len(sent)), room)
+    ]
