@@ -42,7 +42,8 @@ def best_us(run: Callable[[], object], samples: int) -> float:
 def made(name: str, **values: float) -> Message:
     """A message with zeros where nothing is given."""
     found = definition(name)
-    return message_class(found)(1, 1, **({field.name: 0 for field in found.wire_fields} | values))
+    numbers = {field.name: 0 for field in found.wire_fields} | values
+    return message_class(found)._make((1, 1, *numbers.values()))
 
 
 def flight() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

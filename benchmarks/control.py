@@ -7,6 +7,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
@@ -100,7 +101,7 @@ def main() -> None:
     store.replace((MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0),), 1)
     offboard = OffboardTask()
     offboard.set_trajectory((0.0, 0.0, -1.0))
-    tasks = {
+    tasks: dict[str, Any] = {
         "HoldTask": HoldTask(),
         "GotoTask": GotoTask(np.array([500.0, 0.0, -10.0])),
         "MissionTask": MissionTask(store),

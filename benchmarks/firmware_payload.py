@@ -149,14 +149,13 @@ def state_of(frame: Frame, clock: VehicleTime) -> State | None:
     if frame.message_id not in _FOLLOWED:
         return None
     message = decode(frame)
-    name = message.get_type()
-    if name == "ATTITUDE":
+    if isinstance(message, dialect.MAVLink_attitude_message):
         clock.take(message.time_boot_ms * 1000)
         return None
     time_us = clock.now_us
     if time_us is None:
         return None
-    if name == "HIL_STATE_QUATERNION":
+    if isinstance(message, dialect.MAVLink_hil_state_quaternion_message):
         w, x, y, z = message.attitude_quaternion
         return State(
             time_us=time_us,
@@ -167,6 +166,8 @@ def state_of(frame: Frame, clock: VehicleTime) -> State | None:
             q_ned_from_frd=(w, x, y, z),
             rates_frd_rad_s=(message.rollspeed, message.pitchspeed, message.yawspeed),
         )
+    if not isinstance(message, dialect.MAVLink_sim_state_message):
+        return None
     return State(
         time_us=time_us,
         lat_deg=degrees(message.lat_int),

@@ -22,7 +22,7 @@ from estimators.attitude.parameters import AttitudeParameters
 from estimators.comparison import comparisons
 from estimators.log_replay import replay
 from estimators.logs import Log, LogError, open_log, report_of
-from estimators.logs.dataflash import META
+from estimators.logs.dataflash_scan import META
 
 _COLUMNS: Final = (
     "log", "format", "opened", "vehicle", "firmware", "modes", "messages", "theirs", "counts", "air_s",

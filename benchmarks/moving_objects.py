@@ -24,7 +24,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -220,7 +220,8 @@ def plain_calls_ms(frames: list[VideoFrame], setting: VideoSetting) -> dict[str,
     for before, now in pairwise(greys):
         at = time.process_time()
         corners = cv2.goodFeaturesToTrack(before, 400, 0.02, 9.0)
-        ends, found, _ = cv2.calcOpticalFlowPyrLK(before, now, corners, None, winSize=(13, 13), maxLevel=3)
+        flow_of: Any = cv2.calcOpticalFlowPyrLK  # its stub has no None for the places that are to be found
+        ends, found, _ = flow_of(before, now, corners, None, winSize=(13, 13), maxLevel=3)
         good = found.ravel() == 1
         homography, _ = cv2.findHomography(corners[good], ends[good], cv2.USAC_MAGSAC, 1.5)
         flow = time.process_time() - at

@@ -124,7 +124,7 @@ class Child:
             return "timeout"
         if os.WIFSIGNALED(status):
             return "timeout" if os.WTERMSIG(status) == signal.SIGXCPU else "killed"
-        return {pytest.ExitCode.OK: "survived"}.get(os.WEXITSTATUS(status), "killed")
+        return "survived" if os.WEXITSTATUS(status) == pytest.ExitCode.OK else "killed"
 
     def first_failure(self) -> str:
         name = self._failure.read_text()
@@ -142,9 +142,8 @@ def _test(mutant: Mutant, text: str, tests: Sequence[str], failure: Path, limit_
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT_BYTES, MEMORY_LIMIT_BYTES))
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
         numba.config.DISABLE_JIT = is_plain(mutant.path)
-        flightsim.foundation.kernels._CacheFile.save = lambda *_: (
-            None
-        )  # mutants stay out of the kernels' cache
+        # mutants stay out of the kernels' cache
+        setattr(flightsim.foundation.kernels._CacheFile, "save", lambda *_: None)  # noqa: B010
         sys.meta_path.insert(0, MutatedModule(mutant.module, ROOT / mutant.path, text))
         code = int(
             pytest.main([*PYTEST_OPTIONS, "-x", "--timeout=0", *tests], plugins=[FirstFailure(failure)])

@@ -25,7 +25,7 @@ from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parse_wind
 from missions.errors import PlanError
 from missions.library import find_mission
-from missions.orbit.options import OrbitOptions
+from missions.orbit.options import Direction, OrbitOptions
 from missions.orbit.world import orbit_world
 from missions.runs.session import COMPLETED, RunRequest, fly
 
@@ -79,7 +79,7 @@ class Case:
         """As `flightstack fly orbit` makes them; a moving target goes north-east."""
         entry = ENTRIES[self.entry]
         return OrbitOptions(
-            direction=1 if self.direction == "cw" else -1,
+            direction=Direction.CW if self.direction == "cw" else Direction.CCW,
             duration_s=duration_s,
             radius_m=radius_m,
             target_speed_m_s=self.target_speed_m_s,

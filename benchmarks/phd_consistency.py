@@ -49,8 +49,8 @@ class Bound:
     def places(self) -> Array:
         """Places of the targets that were detected."""
         known = self._information[:, 0, 0] > 0.0
-        found: Array = np.linalg.solve(self._information[known], self._vector[known][..., None])[..., 0]
-        return found
+        found = np.linalg.solve(self._information[known], self._vector[known][..., None])[..., 0]
+        return found.astype(np.float64, copy=False)
 
 
 def scene(number: int, kind: Belief, clutter: float, scans: int, *, find: bool) -> tuple[Array, Array]:

@@ -22,11 +22,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links import Link, open_link, parse_address
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, MAVLinkMessage, decode_as
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
 from tests.clients.sitl_process import free_port
 from tests.telemetry.test_default_streams import (
@@ -68,9 +67,12 @@ class Listener:
                 known = DEFINITIONS.get(frame.message_id)
                 self.counts[known.name if known else str(frame.message_id)] += 1
                 if frame.message_id == mavlink.MAVLINK_MSG_ID_ATTITUDE:
-                    self.boot_us, self.wall_s = decode(frame).time_boot_ms * 1000, time.monotonic()
+                    self.boot_us, self.wall_s = (
+                        decode_as(frame, mavlink.MAVLink_attitude_message).time_boot_ms * 1000,
+                        time.monotonic(),
+                    )
 
-    def send(self, message: object) -> None:
+    def send(self, message: MAVLinkMessage) -> None:
         """Send as a ground station."""
         self.link.send(FrameEncoder(255, 190).encode(message))
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,7 @@ class Searched:
 def search(name: str, experiment: str, seed: int) -> Searched:
     """One search."""
     tried = EXPERIMENTS[experiment]
-    changes = dict(_PLANNERS[name])
+    changes: dict[str, Any] = dict(_PLANNERS[name])
     options = MultiTargetOptions(
         steps=tried.steps,
         planner=changes.pop("planner", PlannerKind.EXPLORING),

@@ -28,7 +28,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from autopilot_bridge.mavlink import decode, definition
+from autopilot_bridge.mavlink import decode, decode_as, definition, dialect
 from autopilot_bridge.tlog import TlogReader
 from tests.clients.sitl_process import running_sitl
 from tests.serial_line import SerialLine, serial_line
@@ -121,6 +121,9 @@ def answers(log: Path) -> Answers:
     for time_us, frame in TlogReader(log):
         if frame.message_id in (_LONG, _INT):
             message = decode(frame)
+            assert isinstance(
+                message, dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message
+            )
             if message.target_component not in (0, 1):
                 continue
             if message.command in sent_us:
@@ -129,7 +132,7 @@ def answers(log: Path) -> Answers:
                 commands += 1
                 sent_us[message.command] = time_us
         elif frame.message_id == _ACK and frame.component_id == 1:
-            since_us = sent_us.pop(decode(frame).command, None)
+            since_us = sent_us.pop(decode_as(frame, dialect.MAVLink_command_ack_message).command, None)
             if since_us is not None:
                 slowest_us = max(slowest_us, time_us - since_us)
     return Answers(commands=commands, repeated=repeated, slowest_s=slowest_us * 1e-6)

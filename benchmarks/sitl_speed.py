@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -181,7 +182,7 @@ def measure(model: str, flavour: str, seconds: float, folder: Path) -> None:
         flight = Flight(vehicles, model, flavour, folder / f"{Path(model).stem}{vehicles}.tlog")
         flight.take_off()
         before = flight.log.records
-        wall_s = timed(lambda flight=flight: flight.run(piece_s))
+        wall_s = timed(partial(flight.run, piece_s))
         speed = piece_s / wall_s
         rate = (flight.log.records - before) / seconds / vehicles
         share = speed * vehicles / base

@@ -161,7 +161,10 @@ def main() -> int:
     )
     parser.add_argument("--turns", type=int, default=3, help="how often each engine takes its turn")
     arguments = parser.parse_args()
-    studies = [("computed trials of about 50 ms", computed(500_000), 80), ("empty trials", computed(1), 2000)]
+    studies: list[tuple[str, Study[Any, Any], int]] = [
+        ("computed trials of about 50 ms", computed(500_000), 80),
+        ("empty trials", computed(1), 2000),
+    ]
     if arguments.flights:
         flights = sweep_study("lissajous", ["wind-speed=0,8"], [], sampling="random")
         studies.insert(0, ("flights: lissajous over two winds", flights, arguments.flights))

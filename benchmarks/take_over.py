@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from pymavlink import mavutil
 
-from autopilot_bridge.mavlink import decode, definition, dialect
+from autopilot_bridge.mavlink import decode, decode_as, definition, dialect
 from autopilot_bridge.mavlink.components import GROUND_STATION
 from autopilot_bridge.tlog import TlogReader
 from benchmarks.firmware import FIRMWARES, VEHICLES, Firmware, FirmwareMissing
@@ -175,7 +175,7 @@ def sent_afterwards(log: Path, system_id: int, before: int) -> tuple[int | None,
     names: list[str] = []
     for _, frame in TlogReader(log):
         if (frame.system_id, frame.component_id, frame.message_id) == (system_id, 1, HEARTBEAT):
-            mode = int(decode(frame).custom_mode)
+            mode = decode_as(frame, dialect.MAVLink_heartbeat_message).custom_mode
             if mode == before:
                 taken, names = None, []  # on the way to the pattern
             elif taken is None:

@@ -28,8 +28,9 @@ from autopilot_bridge.mavlink.wire_units import degrees
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from autopilot_bridge.tlog import TlogWriter
+from estimators import wire
 from estimators.interface import Estimator
-from estimators.messages import read_message
+from estimators.messages import read_as
 from estimators.runner import Runner
 from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
 from estimators.tracking.metrics import rms
@@ -197,7 +198,7 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
     def on_truth(time_us: int, raw: bytes) -> None:
         for parsed in parser.feed(raw):
             if parsed.system_id == TARGET_SYSTEM:
-                m = read_message(parsed)
+                m = read_as(parsed, wire.HIL_STATE_QUATERNION)
                 north, east, _ = frame.ned_from_geodetic(degrees(m.lat), degrees(m.lon), home.alt_m)
                 truth.append((1e-6 * m.time_usec, north, east))
 
