@@ -1,7 +1,7 @@
 """What stands between the simulated sensors and the actuators of a vehicle: an autopilot, emulated or real.
 
-Every backend is an `AutopilotBackend`. What only some can do has a protocol of its own (`ReportsLiftOff`,
-`ReadsParameters`); the SITL does without where a backend has none.
+Every backend is an `AutopilotBackend`. What only some can do has a protocol of its own (`ComputesElsewhere`,
+`ReportsLiftOff`, `ReadsParameters`); the SITL does without where a backend has none.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -62,6 +62,18 @@ class AutopilotBackend(Protocol):
 
 
 @runtime_checkable
+class ComputesElsewhere(Protocol):
+    """A backend in another process, which computes while this one goes on.
+
+    The readings of a step are sent for all vehicles before the commands of any are received, so that no
+    vehicle waits for another.
+    """
+
+    def begin_step(self, time_us: int) -> None:
+        """Send the readings of the step that ends at `time_us`; `AutopilotBackend.step` follows."""
+
+
+@runtime_checkable
 class ReportsLiftOff(Protocol):
     """A backend that reports when its flight task starts to take off; a launch crew then launches."""
 
@@ -86,6 +98,7 @@ class BackendSetup:
         vehicle, world: from the description of the world.
         airframe: the vehicle's.
         readings: its sensors, written before each step.
+        truth: its true motion (`flightsim.truth`), for a firmware whose simulator makes its own sensors.
         failures: executes MAV_CMD_INJECT_FAILURE and simulator parameters.
         card: its memory card.
         power: takes a request to reboot or to shut down, and whether the simulated vehicle also starts again.
@@ -95,6 +108,7 @@ class BackendSetup:
     world: WorldSpec
     airframe: Airframe
     readings: SensorReadings
+    truth: NDArray[np.float64]
     failures: FailureInjector
     card: MemoryCard
     power: Callable[[PowerAction, bool], None]

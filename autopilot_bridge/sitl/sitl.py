@@ -80,6 +80,7 @@ class Sitl:
             )
             for index, (vehicle, card) in enumerate(zip(spec.vehicles, cards, strict=True))
         )
+        self._elsewhere = any(vehicle.computes_elsewhere for vehicle in self.vehicles)
         self.shared_links: list[SharedLink] = []
         self._step_us = 1_000_000 // spec.physics_rate_hz
         self.time_us = 0
@@ -100,8 +101,14 @@ class Sitl:
         """Make one physics step."""
         time_us = self.time_us + self._step_us
         self.time_us = time_us
-        for vehicle in self.vehicles:
-            vehicle.step(time_us)
+        if self._elsewhere:
+            for vehicle in self.vehicles:
+                vehicle.begin_step(time_us)
+            for vehicle in self.vehicles:
+                vehicle.end_step(time_us)
+        else:
+            for vehicle in self.vehicles:
+                vehicle.step(time_us)
         self.world.advance()
         if time_us >= self._next_poll_us:
             self._next_poll_us = time_us + self._poll_us

@@ -5,7 +5,7 @@ payload.
 """
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final
 
@@ -18,7 +18,14 @@ from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.payload import PayloadStation
 from autopilot_bridge.services.vehicle_memory import PowerAction
-from autopilot_bridge.sitl.backend import BackendMaker, BackendSetup, EmulatedBackend, ReadsParameters
+from autopilot_bridge.sitl.backend import (
+    AutopilotBackend,
+    BackendMaker,
+    BackendSetup,
+    ComputesElsewhere,
+    EmulatedBackend,
+    ReadsParameters,
+)
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.containment import Aftermath, FailureReport, Probation, VehicleFailure, reason_of
 from autopilot_bridge.sitl.failures import NEVER_US, FailureInjector, FaultSchedule
@@ -97,6 +104,7 @@ class SitlVehicle:
                 world=world_spec,
                 airframe=airframe,
                 readings=self.sensors.readings,
+                truth=self.vehicle.truth,
                 failures=self.failures,
                 card=card,
                 power=self._on_power,
@@ -106,7 +114,7 @@ class SitlVehicle:
         self._actuators = self._off
         self._crew_of = partial(LaunchCrew, self.vehicle, step_us=world.step_us)
         self._crew: LaunchCrew | None = None
-        self.backend = self._boot(self._epoch_us)
+        self.backend, self._elsewhere = self._booted(self._epoch_us)
         if self.vehicle.launcher is not None:
             self._crew = self._crew_of(self.backend)
         self.links = Switchboard(
@@ -122,6 +130,7 @@ class SitlVehicle:
         self.crashed = False
         self.stopped = False
         self._time_us = 0
+        self._begun = False
         self._card = card
         self._report_failure: FailureReport | None = None
         self._probation = Probation()
@@ -143,6 +152,11 @@ class SitlVehicle:
                 ],
             )
             self._fit(Payload(specification.payload, carrier))
+
+    def _booted(self, unix_epoch_us: int) -> tuple[AutopilotBackend, ComputesElsewhere | None]:
+        """A backend that has just booted, and the same one again if it computes elsewhere."""
+        backend = self._boot(unix_epoch_us)
+        return backend, backend if isinstance(backend, ComputesElsewhere) else None
 
     def _fit(self, payload: Payload) -> None:
         """Connect the payload's components on a separate link."""
@@ -183,19 +197,38 @@ class SitlVehicle:
         self._report_failure = report
         self.links.contain(self._fail)
 
+    @property
+    def computes_elsewhere(self) -> bool:
+        """Whether its autopilot is another process, which computes between `begin_step` and `end_step`."""
+        return self._elsewhere is not None
+
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
+        self.begin_step(time_us)
+        self.end_step(time_us)
+
+    def begin_step(self, time_us: int) -> None:
+        """The first part of a step: motion and sensors, up to where the autopilot computes."""
         self._time_us = time_us
-        if self.stopped:
-            return
+        self._begun = not self.stopped
+        if self._begun:
+            self._contained(self._begin, time_us)
+
+    def end_step(self, time_us: int) -> None:
+        """The second part of a step: autopilot and payload. Nothing, after a failure in the first part."""
+        if self._begun:
+            self._contained(self._end, time_us)
+
+    def _contained(self, part: Callable[[int], None], time_us: int) -> None:
         try:
-            self._step(time_us)
+            part(time_us)
         except Exception as error:
+            self._begun = False
             if self._report_failure is None:
                 raise
             self._fail(error)
 
-    def _step(self, time_us: int) -> None:
+    def _begin(self, time_us: int) -> None:
         if time_us >= self._power_us:
             self._power_cycle(time_us)
         if time_us >= self._faults.next_us:
@@ -203,6 +236,11 @@ class SitlVehicle:
         boot_us = self._boot_us
         self.vehicle.step(self._actuators)
         self.sensors.step(time_us - boot_us)
+        if time_us > boot_us and self._elsewhere is not None:
+            self._elsewhere.begin_step(time_us - boot_us)
+
+    def _end(self, time_us: int) -> None:
+        boot_us = self._boot_us
         if time_us > boot_us:
             actuators = self.backend.step(time_us - boot_us)
             if self._boot_us == boot_us:  # it did not fail on a frame that it was sent within the step
@@ -258,7 +296,7 @@ class SitlVehicle:
         """Shut the autopilot down, to boot after `REBOOT_US` unless it is to stay down; or boot it."""
         if self._power is None:
             self._boot_us, self._power_us = time_us, NEVER_US
-            self.backend = self._boot(self._epoch_us + time_us)
+            self.backend, self._elsewhere = self._booted(self._epoch_us + time_us)
             self.links.restart(self.backend.links)
             if self._crew is not None or (self._starts_again and self.vehicle.launcher is not None):
                 self._crew = self._crew_of(self.backend)

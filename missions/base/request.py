@@ -13,6 +13,7 @@ from missions.vehicle.firmware import Mode
 from missions.vehicle.limits import FORECAST_WIND_M_S
 
 if TYPE_CHECKING:
+    from autopilot_bridge.firmware_process import FirmwareBuild
     from flightsim.world_spec import WorldSpec
     from missions.preflight.before_flight import Confirm
 
@@ -32,6 +33,8 @@ class RunRequest:
         world: the embedded world; None: quadrotors with PX4 in still air, one per vehicle of the options.
             Missions and estimators can't reach it. With `connect` only its magnetic target is used, as the
             place that a result is compared with.
+        firmware: the real firmware that flies the vehicles of the embedded world, which name it as their
+            autopilot; None: the emulated autopilots.
         speedup: simulated seconds per wall second at most in the embedded world; None: no limit.
         forecast_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
             is not used: a mission plans in the same way for embedded and for other vehicles.
@@ -64,6 +67,7 @@ class RunRequest:
     connect: Sequence[str] = ()
     system_ids: Sequence[int] = ()
     world: "WorldSpec | None" = None
+    firmware: "FirmwareBuild | None" = None
     speedup: float | None = None
     forecast_wind_m_s: float | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)

@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot_bridge.clock import VirtualTimeLoop
+from autopilot_bridge.firmware_process import FirmwareBuild, firmware_backend
 from autopilot_bridge.links import Link
-from autopilot_bridge.sitl import Sitl
+from autopilot_bridge.sitl import EmulatedBackend, Sitl, emulated
 from autopilot_bridge.sitl.sitl import TruthListener
 from estimators.errors import LogError, VideoError
 from estimators.logs.new_file import new_file
 from flightsim.airframe import load_airframe
 from flightsim.foundation.geodesy import GeodeticPosition
-from flightsim.hover_endurance import hover_endurance_s
+from flightsim.hover_figures import hover_endurance_s
 from flightsim.payload import MagneticMap, MagneticSpec, PayloadParameters
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.world_spec import WorldSpec
@@ -36,6 +37,8 @@ class EmbeddedSitl:
         films_to: folder for the videos of cameras whose pictures are kept; None: they are not kept.
         speedup: simulated seconds per wall second at most; None: as fast as the machine can.
         max_flight_s: vehicle time, s, after which a run that has not ended fails.
+        firmware: the real firmware that flies the vehicles; None: the emulated autopilots.
+        logs_to: existing folder for the logs of a real firmware; None: they are not kept.
 
     Attributes:
         sitl: the world.
@@ -56,10 +59,13 @@ class EmbeddedSitl:
         films_to: Path | None = None,
         speedup: float | None = None,
         max_flight_s: float = MAX_FLIGHT_S,
+        firmware: FirmwareBuild | None = None,
+        logs_to: Path | None = None,
     ) -> None:
         if speedup is not None and not 0.0 < speedup < float("inf"):
             raise ValueError(f"speed factor {speedup} is not accepted; give a number above 0")
-        self.sitl = sitl = Sitl(world)
+        backend = emulated if firmware is None else firmware_backend(firmware, logs_to=logs_to)
+        self.sitl = sitl = Sitl(world, backend=backend)
         field = world.magnetic_field
         self.published_map = field.map_file if isinstance(field, MagneticSpec) else None
         if self.published_map is None and sitl.published_map is not None and publish_to is not None:
@@ -82,6 +88,11 @@ class EmbeddedSitl:
         self.loop = VirtualTimeLoop(
             advance, lambda: sitl.time_us, speedup=speedup, max_time_us=round(max_flight_s * 1e6)
         )
+
+    @property
+    def emulated(self) -> bool:
+        """Whether the autopilots are emulated; their parameters can then be read."""
+        return all(isinstance(vehicle.backend, EmulatedBackend) for vehicle in self.sitl.vehicles)
 
     def parameters(self, index: int, names: Sequence[str]) -> dict[str, float]:
         """Parameter values of a vehicle's autopilot, as it would send them; names it does not have are left

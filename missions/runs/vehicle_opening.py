@@ -68,7 +68,7 @@ def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
         epoch_us=EPOCH_UNIX_US,
         time_us=lambda: sitl.time_us,
         on_truth=sitl.on_truth,
-        parameters=sitl.parameters,
+        parameters=sitl.parameters if sitl.emulated else None,
         home=sitl.home,
         close=sitl.close,
         endurance_s=sitl.endurance_s,
@@ -110,6 +110,8 @@ class VehicleOpener:
                 publish_to=folder.path / MAP_NAME,
                 films_to=folder.path,
                 speedup=request.speedup,
+                firmware=request.firmware,
+                logs_to=folder.path,
             )
         except ValueError as error:
             raise PlanError(str(error)) from error

@@ -2,7 +2,7 @@
 
 import pytest
 
-from flightsim.hover_endurance import hover_endurance_s
+from flightsim.hover_figures import hover_endurance_s
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.base.options import FlightOptions
 from missions.base.request import RunRequest
