@@ -10,6 +10,7 @@ Source: ArduPilot's documentation of the JSON interface ("libraries/SITL/example
 import json
 import math
 import os
+import re
 import socket
 import struct
 from collections.abc import Mapping
@@ -49,6 +50,7 @@ _VEHICLE_TYPES: Final[Mapping[AirframeKind, frozenset[int]]] = {
     AirframeKind.FIXED_WING: frozenset({dialect.MAV_TYPE_FIXED_WING}),
 }
 _FASTEST_LOOP_HZ: Final = 400  # ArduCopter's own rate
+_UNKNOWN_PARAMETER: Final = re.compile(r"unknown param (\w+)")
 _OWN_PARAMETERS: Final[Mapping[str, float]] = {
     # it takes sensors without offsets for sensors that were not calibrated, and refuses to arm
     **{f"INS_ACC{n}OFFS_{axis}": 0.001 for n in ("", "2") for axis in "XYZ"},
@@ -98,6 +100,8 @@ class ArduPilotBackend:
         self._actuators = np.zeros(i.MAX_ACTUATORS)
         self._peer: tuple[str, int] | None = None
         self._folder = folder
+        self._given = tuple(setup.vehicle.parameters)
+        self._received = False
         instance, self._physics = _free_instance()
         ports = {role: FirmwarePort() for role in _ROLES}
         self._links = FirmwareLinks(setup.vehicle.system_id, ports, self._look)
@@ -243,6 +247,9 @@ class ArduPilotBackend:
         if frame.message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT:
             return
         heartbeat = decode_as(frame, dialect.MAVLink_heartbeat_message)
+        if not self._received:
+            self._received = True
+            self._process.require_known(self._given, _UNKNOWN_PARAMETER)
         self.armed = bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         if heartbeat.type not in _VEHICLE_TYPES[self._kind]:
             raise FirmwareError(

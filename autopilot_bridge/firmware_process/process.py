@@ -1,10 +1,11 @@
 """The process of a firmware: started, watched and ended."""
 
+import re
 import select
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -82,6 +83,20 @@ class FirmwareProcess:
         text = self.console()[-_TAIL_BYTES:]
         lines = [plain_text(line).strip() for line in text.splitlines() if line.strip()][-_LAST_LINES:]
         return f"; its last output: {' | '.join(lines)}" if lines else ""
+
+    def require_known(self, names: Iterable[str], unknown: re.Pattern[str]) -> None:
+        """Make sure that it has printed nothing against parameters that a user gave.
+
+        Args:
+            names: of the parameters.
+            unknown: what it prints for a parameter that it does not have; the group is the name.
+
+        Raises:
+            FirmwareError: it does not have some.
+        """
+        missing = sorted(set(names) & set(unknown.findall(self.console())))
+        if missing:
+            raise FirmwareError(f"{self.name} has no parameter {', '.join(missing)}")
 
     def wait_readable(self, source: socket.socket, longest_s: float) -> bool:
         """Wait until a socket has data; False: it had none in this time.

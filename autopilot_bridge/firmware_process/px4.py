@@ -10,6 +10,7 @@ guide, "Simulation", "Simulator MAVLink API" and "Lockstep simulation".
 
 import math
 import os
+import re
 import socket
 import tempfile
 from collections.abc import Mapping
@@ -45,6 +46,7 @@ _BAROMETER: Final = 0x1A00  # pressure, pressure altitude, temperature
 _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _CONTROLS: Final = dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
 _FULL_CIRCLE_CDEG: Final = 36000
+_UNKNOWN_PARAMETER: Final = re.compile(r"[Pp]arameter (\w+) not found")
 _OWN_PARAMETERS: Final[Mapping[str, float]] = {
     "IMU_GYRO_CAL_EN": 0,  # its timers may be lost by it (docs/firmware/flights.md)
     "EKF2_GPS_DELAY": 110,  # of the receivers of `flightsim`; the start script assumes 10 ms
@@ -73,6 +75,7 @@ class Px4Backend:
         self._readings = setup.readings
         self._aircraft = setup.airframe.kind is AirframeKind.FIXED_WING
         self._unix_us = unix_us
+        self._given = tuple(setup.vehicle.parameters)
         self._time_us = 0
         self._answered_us = -1  # newest time that PX4 has answered
         self._boot_until_s = wall_time_s() + _BOOT_LIMIT_S
@@ -152,6 +155,8 @@ class Px4Backend:
         """The actuator commands of a step."""
         if self._answered_us < 0:
             self._boot()
+            if self._answered_us >= 0:
+                self._process.require_known(self._given, _UNKNOWN_PARAMETER)
         elif not self._answer(time_us, _ANSWER_LIMIT_S):
             raise FirmwareError(
                 f"PX4 gave no actuator commands for {_ANSWER_LIMIT_S:g} s at {time_us * 1e-6:.3f} s of its "

@@ -19,7 +19,7 @@ from missions.cli.mission_command import FlightOption, Scope
 from missions.cli.options import SECONDS, SPEEDUP, FiniteRange, in_options, report
 from missions.cli.params import STRICT_HELP, known_to_all
 from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.world import WORLD_HELP, world_of
+from missions.cli.world import FIRMWARE_HELP, WORLD_HELP, firmware_of, world_of
 from missions.errors import MissionError, PlanError
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
     type=click.Choice(["px4", "ardupilot"]),
     help="Firmware whose ways the autopilot has. [default: px4, or what a mission file is for]",
 )
+@_embedded("--firmware", metavar="NAME[=BUILD]", help=FIRMWARE_HELP)
 @_embedded(
     "--model",
     multiple=True,
@@ -221,7 +222,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
         forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     left_out_parameters: tuple[str, ...] = ()
-    if parameters and world is not None:
+    if parameters and world is not None and given["firmware"] is None:
         parameters, left_out_parameters = known_to_all(parameters, world, strict=given["strict_params"])
     from autopilot_bridge.mavlink.components import GROUND_STATION
     from missions.base.request import REGAIN_S, RunRequest
@@ -233,6 +234,7 @@ def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
         connect=given["connect"],
         system_ids=given["system_id"],
         world=world,
+        firmware=firmware_of(given),
         speedup=given["speedup"],
         forecast_wind_m_s=forecast_m_s,
         parameters=parameters,

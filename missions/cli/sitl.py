@@ -17,7 +17,7 @@ from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_i
 from missions.cli.status_line import StatusLine, announce_compiling
 from missions.cli.storage import Losses, VehicleCards, storage_option
 from missions.cli.video import start_video, video_options
-from missions.cli.world import WORLD_HELP, equipped, world_of
+from missions.cli.world import FIRMWARE_HELP, WORLD_HELP, equipped, firmware_of, world_of
 from missions.process.ending import EndRequests
 
 if TYPE_CHECKING:
@@ -116,6 +116,7 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
 @click.command()
 @click.option("--world", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=WORLD_HELP)
 @click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
+@click.option("--firmware", metavar="NAME[=BUILD]", help=FIRMWARE_HELP)
 @click.option(
     "--model",
     multiple=True,
@@ -210,6 +211,12 @@ def _recording(simulated: "Sitl", path: str, losses: Losses) -> Iterator[None]:
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--strict-params", is_flag=True, help=STRICT_HELP)
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
+@click.option(
+    "--firmware-logs",
+    type=click.Path(path_type=Path, file_okay=False, exists=True),
+    metavar="FOLDER",
+    help="Folder for the logs of a real firmware (.ulg, .bin) and what it prints.",
+)
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
 @click.option(
     "--duration", type=FiniteRange(min=0.0, max=1e9), help="Stop after so many seconds of vehicle time."
@@ -233,6 +240,7 @@ def sitl(
     params: str | None,
     strict_params: bool,
     log: str | None,
+    firmware_logs: Path | None,
     no_wait: bool,
     duration: float | None,
     **_world: Any,
@@ -248,8 +256,9 @@ def sitl(
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.firmware.simulator import simulator_defaults
+    from autopilot_bridge.firmware_process import firmware_backend
     from autopilot_bridge.parameter_files import left_out
-    from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
+    from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code, emulated
     from missions.base.given_text import parameters_from_file
     from missions.base.mission import WorldDefaults
 
@@ -260,12 +269,14 @@ def sitl(
         try:
             ports = _ports(links, gcs_links)
             signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
+            firmware = firmware_of(context.params)
             spec = world_of(
                 context.params, chosen, count=count if "count" in chosen else None, defaults=WorldDefaults()
             )
             parameters: dict[str, float] = {}
             if params is not None:
-                parameters, names = known_to_all(parameters_from_file(params), spec, strict=strict_params)
+                strict = strict_params or firmware is not None  # a real one names what it does not have
+                parameters, names = known_to_all(parameters_from_file(params), spec, strict=strict)
                 if names:
                     report(f"--params: {left_out(names)}")
             spec = _for_clients(
@@ -276,8 +287,10 @@ def sitl(
             at_end.callback(memory.close)
             click.echo("starting", err=True)
             at_end.enter_context(announce_compiling(partial(click.echo, err=True)))
-            simulated = Sitl(spec, signing=signing, cards=memory.cards)
-            compile_flight_code(spec.vehicles)
+            backend = emulated if firmware is None else firmware_backend(firmware, logs_to=firmware_logs)
+            simulated = Sitl(spec, signing=signing, cards=memory.cards, backend=backend)
+            if firmware is None:
+                compile_flight_code(spec.vehicles)
             server = SitlServer(
                 simulated, speedup=speedup or None, monotonic=wall_time_s, on_failure=losses.vehicle_failed
             )

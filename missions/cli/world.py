@@ -9,10 +9,16 @@ from typing import TYPE_CHECKING, Any, Final
 from missions.cli.mission_command import Given
 
 if TYPE_CHECKING:
+    from autopilot_bridge.firmware_process import FirmwareBuild
     from flightsim.payload import GroundTargetParameters
     from flightsim.world_spec import VehicleSpec, WorldSpec
     from missions.base.mission import WorldDefaults
 
+FIRMWARE_HELP: Final = (
+    "Real firmware that flies the vehicles in lockstep with the world: px4=FOLDER (with bin/px4 and etc) or "
+    "ardupilot=FILE; without a build, what FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER, FLIGHTSTACK_ARDUPLANE say. "
+    "[default: the emulated autopilot]"
+)
 WORLD_HELP: Final = (
     "Description of the world (TOML, docs/world.md). An option that is also given overrides the file's value."
 )
@@ -32,14 +38,27 @@ def models_of(given: tuple[str, ...]) -> list[str]:
     return models
 
 
+def firmware_of(given: Given) -> "FirmwareBuild | None":
+    """The real firmware that the option `firmware` names; None: the emulated autopilots.
+
+    Raises:
+        ValueError: it names none.
+    """
+    if given["firmware"] is None:
+        return None
+    from autopilot_bridge.firmware_process.build import FirmwareBuild
+
+    return FirmwareBuild.parse(given["firmware"])
+
+
 def world_of(
     given: Given, chosen: frozenset[str], *, count: int | None, defaults: "WorldDefaults"
 ) -> "WorldSpec":
     """The world of `fly` or `sitl`.
 
     Args:
-        given: values of the options `world`, `model`, `autopilot`, `launch`, `gps`, `home`, `seed`, `wind`,
-            `wind_profile`, `turbulence`.
+        given: values of the options `world`, `model`, `autopilot`, `firmware`, `launch`, `gps`, `home`,
+            `seed`, `wind`, `wind_profile`, `turbulence`.
         chosen: names of the options that the user specified.
         count: number of vehicles that the user specified; None: as many as models, or as the file has.
         defaults: values where neither an option nor a file gives one.
@@ -50,6 +69,13 @@ def world_of(
     from flightsim.home import Home
     from flightsim.world_spec import VehicleSpec, WorldSpec
 
+    build = firmware_of(given)
+    if build is not None:
+        if "autopilot" in chosen and given["autopilot"] != build.firmware:
+            raise ValueError(
+                f"--autopilot {given['autopilot']} and --firmware {build}: leave one of them out"
+            )
+        given, chosen = {**given, "autopilot": build.firmware}, chosen | {"autopilot"}
     models = models_of(given["model"])
     home = given["home"]
     file = None if given["world"] is None else WorldSpec.load(given["world"])

@@ -563,6 +563,7 @@ def _summary(
         if world is None
         else ",".join(dict.fromkeys(str(spec.model) for spec in vehicles)),
         "autopilot": notes[0].autopilot if notes else vehicles[0].autopilot if vehicles else None,
+        "firmware": None if request.firmware is None or world is None else str(request.firmware),
         "seed": None if world is None else world.seed,
         "outcome": outcome,
         "reason": reason,
