@@ -20,6 +20,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.firmware_process.airframes import airframe_parameters, ardupilot_outputs
 from autopilot_bridge.firmware_process.errors import FirmwareError
 from autopilot_bridge.firmware_process.process import FirmwareProcess
@@ -51,27 +52,11 @@ _VEHICLE_TYPES: Final[Mapping[AirframeKind, frozenset[int]]] = {
 }
 _FASTEST_LOOP_HZ: Final = 400  # ArduCopter's own rate
 _UNKNOWN_PARAMETER: Final = re.compile(r"unknown param (\w+)")
-_OWN_PARAMETERS: Final[Mapping[str, float]] = {
-    # it takes sensors without offsets for sensors that were not calibrated, and refuses to arm
-    **{f"INS_ACC{n}OFFS_{axis}": 0.001 for n in ("", "2") for axis in "XYZ"},
-    **{f"INS_ACC{n}SCAL_{axis}": 1.001 for n in ("", "2") for axis in "XYZ"},
-    **{
-        f"COMPASS_OFS{n}_{axis}": offset
-        for n in ("", "2", "3")
-        for axis, offset in (("X", 5), ("Y", 13), ("Z", -18))
-    },
-    **{f"RC{n}_{name}": value for n in range(1, 9) for name, value in (("MIN", 1000), ("MAX", 2000))},
-    "RC3_TRIM": 1000,
-    "BATT_MONITOR": 4,
-    "ARSPD_PIN": 1,
-    "ARSPD_BUS": 2,
-}
-_AIRCRAFT_PARAMETERS: Final[Mapping[str, float]] = {
-    "ARSPD_USE": 1,
-    "FLTMODE_CH": 8,
-    "FLTMODE1": 10,
-    "INS_GYR_CAL": 0,
-}
+_ITS_OWN: Final = (
+    *("STAT_", "SR0_", "SR1_", "SR2_", "SYSID_", "SERIAL", "SIM_"),
+    *("BARO", "INS_GYR", "ARSPD_OFFSET", "COMPASS_DEV_ID", "COMPASS_PRIO"),
+)
+"""Parameters of the emulated table that a firmware finds out, counts, or has from its command line."""
 
 
 class ArduPilotBackend:
@@ -269,15 +254,20 @@ def position_ned_m(home: Home, lat_deg: float, lon_deg: float, alt_m: float) -> 
 
 
 def _write_parameters(path: Path, setup: BackendSetup) -> None:
-    values: dict[str, float] = {
-        **_OWN_PARAMETERS,
-        **airframe_parameters(setup),
-        **ardupilot_outputs(setup),
-        "SYSID_THISMAV": setup.vehicle.system_id,
+    """The values of the emulated autopilot, so that both fly with equal ones, and the vehicle's own."""
+    flavour = get_flavour(setup.vehicle.autopilot, setup.airframe.kind)
+    values = {
+        definition.name: float(definition.default)
+        for definition in flavour.parameter_definitions()
+        if not definition.name.startswith(_ITS_OWN)
     }
-    if setup.airframe.kind is AirframeKind.FIXED_WING:
-        values |= _AIRCRAFT_PARAMETERS
-    else:  # its loop runs between two answers at most
+    # the emulated vehicle has one compass, ArduPilot's simulator three, all with the same offsets
+    values |= {
+        f"COMPASS_OFS{number}_{axis}": values[f"COMPASS_OFS_{axis}"] for number in (2, 3) for axis in "XYZ"
+    }
+    values |= airframe_parameters(setup) | ardupilot_outputs(setup)
+    values["SYSID_THISMAV"] = setup.vehicle.system_id
+    if setup.airframe.kind is AirframeKind.MULTICOPTER:  # its loop runs between two answers at most
         values["SCHED_LOOP_RATE"] = min(_FASTEST_LOOP_HZ, setup.world.physics_rate_hz // 2)
     values |= setup.vehicle.parameters
     path.write_text("".join(f"{name} {value:.9g}\n" for name, value in values.items()), encoding="ascii")

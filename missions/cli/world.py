@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 FIRMWARE_HELP: Final = (
     "Real firmware that flies the vehicles in lockstep with the world: px4=FOLDER (with bin/px4 and etc) or "
-    "ardupilot=FILE; without a build, what FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER, FLIGHTSTACK_ARDUPLANE say. "
+    "ardupilot=FILE. Without a build it is FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER or FLIGHTSTACK_ARDUPLANE. "
     "[default: the emulated autopilot]"
 )
 WORLD_HELP: Final = (
