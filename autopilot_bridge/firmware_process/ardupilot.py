@@ -1,8 +1,9 @@
 """ArduPilot as a backend: its SITL with the model JSON, in lockstep with the world.
 
 ArduPilot sends its servo outputs to a UDP port and waits for the answer, one line of JSON with the motion of
-the vehicle; each answer is one step of its clock. Its sensors are its own, made from that motion: the world's
-sensors and their faults do not reach it.
+the vehicle; each answer is one step of its clock. ArduCopter's loop runs once in two of these at most, so
+there a physics step is answered twice, in the middle and at its end, with the same motion. Its sensors are
+its own, made from that motion: the world's sensors and their faults do not reach it.
 
 Source: ArduPilot's documentation of the JSON interface ("libraries/SITL/examples/JSON/readme.md").
 """
@@ -13,6 +14,7 @@ import os
 import re
 import socket
 import struct
+from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -38,7 +40,6 @@ _INSTANCES: Final = 100
 _ROLES: Final = ("onboard", "gcs", "payload")  # on the serial ports 0, 1 and 2
 _STARTING_S: Final = 30.0
 _ANSWER_LIMIT_S: Final = 30.0  # a process may be paused for as long
-_REPEAT_S: Final = 5.0  # a datagram may be lost
 _SPEEDUP: Final = 100  # as fast as the world asks it to
 _SERVOS: Final = struct.Struct("<HHI16H")  # magic number, frame rate, frame count, pulse widths, us
 _MAGIC: Final = 18458
@@ -51,6 +52,7 @@ _VEHICLE_TYPES: Final[Mapping[AirframeKind, frozenset[int]]] = {
     AirframeKind.FIXED_WING: frozenset({dialect.MAV_TYPE_FIXED_WING}),
 }
 _FASTEST_LOOP_HZ: Final = 400  # ArduCopter's own rate
+_COPTER_PARTS: Final = 2  # answers in a physics step
 _UNKNOWN_PARAMETER: Final = re.compile(r"unknown param (\w+)")
 _ITS_OWN: Final = (
     *("STAT_", "SR0_", "SR1_", "SR2_", "SYSID_", "SERIAL", "SIM_"),
@@ -85,6 +87,9 @@ class ArduPilotBackend:
         self._actuators = np.zeros(i.MAX_ACTUATORS)
         self._peer: tuple[str, int] | None = None
         self._folder = folder
+        self._parts = _COPTER_PARTS if self._kind is AirframeKind.MULTICOPTER else 1
+        self._stepped_us = 0
+        self._answers: deque[dict[str, Any]] = deque()
         self._given = tuple(setup.vehicle.parameters)
         self._received = False
         instance, self._physics = _free_instance()
@@ -137,20 +142,20 @@ class ArduPilotBackend:
         return self._links
 
     def begin_step(self, time_us: int) -> None:
-        """Send the motion of a step, and with it its time."""
-        self._answer = self._motion(time_us)
+        """Send the motion of a step, and with it its time, or that of its first part."""
+        motion = self._motion()
+        part_us = (time_us - self._stepped_us) // self._parts
+        times_us = [time_us - part_us * (self._parts - part) for part in range(1, self._parts + 1)]
+        self._answers = deque({"timestamp": at_us * 1e-6, **motion} for at_us in times_us)
+        self._stepped_us = time_us
         self._send()
 
     def step(self, time_us: int) -> NDArray[np.float64]:
         """The actuator commands of a step."""
-        waited_s = 0.0
-        while not self._servos(_REPEAT_S):
-            waited_s += _REPEAT_S
-            if waited_s >= _ANSWER_LIMIT_S:
-                raise FirmwareError(
-                    f"ArduPilot gave no servo outputs for {_ANSWER_LIMIT_S:g} s at {time_us * 1e-6:.3f} s of "
-                    f"vehicle time{self._process.last_words()}"
-                )
+        self._await_servos(time_us)
+        while self._answers:
+            self._send()
+            self._await_servos(time_us)
         self._links.exchange()
         return self._actuators
 
@@ -161,10 +166,19 @@ class ArduPilotBackend:
         self._links.close()
         self._folder.keep("logs/*.BIN")
 
+    def _await_servos(self, time_us: int) -> None:
+        if not self._servos(_ANSWER_LIMIT_S):
+            raise FirmwareError(
+                f"ArduPilot gave no servo outputs for {_ANSWER_LIMIT_S:g} s at {time_us * 1e-6:.3f} s of "
+                f"vehicle time{self._process.last_words()}"
+            )
+
     def _send(self) -> None:
+        """Send the next answer."""
         assert self._peer is not None
+        text = json.dumps(self._answers.popleft(), separators=(",", ":"))  # no space is accepted after a name
         try:
-            self._physics.sendto(self._answer, self._peer)
+            self._physics.sendto(f"\n{text}\n".encode(), self._peer)
         except ConnectionError:
             self._process.require_running()
 
@@ -196,10 +210,9 @@ class ArduPilotBackend:
             else:
                 self._actuators[index] = min(1.0, max(-1.0, (pulse_us - _NEUTRAL_US) / _RANGE_US))
 
-    def _motion(self, time_us: int) -> bytes:
+    def _motion(self) -> dict[str, Any]:
         truth, imu = self._truth, self._readings.imu.values
         state: dict[str, Any] = {
-            "timestamp": time_us * 1e-6,
             "imu": {
                 "gyro": imu[i.IMU_GYRO_FRD_RAD_S].tolist(),
                 "accel_body": imu[i.IMU_ACCEL_FRD_M_S2].tolist(),
@@ -221,7 +234,7 @@ class ArduPilotBackend:
         voltage_v, current_a = truth[t.BATTERY_VOLTAGE_V], truth[t.BATTERY_CURRENT_A]
         if voltage_v > 0.0:
             state["battery"] = {"voltage": float(voltage_v), "current": float(current_a)}
-        return f"\n{json.dumps(state, separators=(',', ':'))}\n".encode()  # it accepts no space after a name
+        return state
 
     def _look(self, frame: Frame) -> None:
         """Learn from a heartbeat whether it is armed.
@@ -267,8 +280,8 @@ def _write_parameters(path: Path, setup: BackendSetup) -> None:
     }
     values |= airframe_parameters(setup) | ardupilot_outputs(setup)
     values["SYSID_THISMAV"] = setup.vehicle.system_id
-    if setup.airframe.kind is AirframeKind.MULTICOPTER:  # its loop runs between two answers at most
-        values["SCHED_LOOP_RATE"] = min(_FASTEST_LOOP_HZ, setup.world.physics_rate_hz // 2)
+    if setup.airframe.kind is AirframeKind.MULTICOPTER:
+        values["SCHED_LOOP_RATE"] = min(_FASTEST_LOOP_HZ, setup.world.physics_rate_hz * _COPTER_PARTS // 2)
     values |= setup.vehicle.parameters
     path.write_text("".join(f"{name} {value:.9g}\n" for name, value in values.items()), encoding="ascii")
 
