@@ -1,5 +1,6 @@
 """The process of a firmware: started, watched and ended."""
 
+import contextlib
 import re
 import select
 import socket
@@ -7,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.firmware_process import launch
@@ -77,6 +78,17 @@ class FirmwareProcess:
         if code is not None:
             how = f"was ended by signal {-code}" if code < 0 else f"ended with exit code {code}"
             raise FirmwareError(f"{self.name} {how}{self.last_words()}")
+
+    def link_closed(self, what: str) -> NoReturn:
+        """A link to it has closed: raise how it ended, or, when it still runs, that it closed the link.
+
+        Raises:
+            FirmwareError: always.
+        """
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_LOOK_S)
+        self.require_running()
+        raise FirmwareError(f"{self.name} has closed {what}{self.last_words()}")
 
     def last_words(self) -> str:
         """Its last lines of output, as the end of a sentence; "" when it has printed nothing."""

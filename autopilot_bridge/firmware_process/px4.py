@@ -87,21 +87,19 @@ class Px4Backend:
         self._links = FirmwareLinks(setup.vehicle.system_id, ports, self._look)
         self._folder = folder
         try:
-            etc = folder.path / "px4" / "etc"
-            if not etc.exists():
-                write_start_files(
-                    build,
-                    folder.path,
-                    kind=setup.airframe.kind,
-                    system_id=setup.vehicle.system_id,
-                    parameters={
-                        **_OWN_PARAMETERS,
-                        **airframe_parameters(setup),
-                        **px4_outputs(setup),
-                        **setup.vehicle.parameters,
-                    },
-                    links={role: (port.remote, port.number) for role, port in ports.items()},
-                )
+            etc = write_start_files(
+                build,
+                folder.path,
+                kind=setup.airframe.kind,
+                system_id=setup.vehicle.system_id,
+                parameters={
+                    **_OWN_PARAMETERS,
+                    **airframe_parameters(setup),
+                    **px4_outputs(setup),
+                    **setup.vehicle.parameters,
+                },
+                links={role: (port.remote, port.number) for role, port in ports.items()},
+            )
             home = setup.world.place
             self._process = FirmwareProcess(
                 "PX4",
@@ -148,8 +146,7 @@ class Px4Backend:
         try:
             self._simulator.sendall(data)
         except OSError:
-            self._process.require_running()
-            raise FirmwareError(f"PX4 has closed its simulator link{self._process.last_words()}") from None
+            self._process.link_closed("its simulator link")
 
     def step(self, time_us: int) -> NDArray[np.float64]:
         """The actuator commands of a step."""
@@ -191,8 +188,7 @@ class Px4Backend:
             except ConnectionError:
                 data = b""
             if not data:
-                self._process.require_running()
-                raise FirmwareError(f"PX4 has closed its simulator link{self._process.last_words()}")
+                self._process.link_closed("its simulator link")
             for frame in self._parser.feed(data):
                 if frame.message_id == _CONTROLS:
                     self._take(decode_as(frame, dialect.MAVLink_hil_actuator_controls_message))

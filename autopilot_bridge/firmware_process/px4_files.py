@@ -7,6 +7,7 @@ set as defaults, so that one that equals PX4's own default counts too, and after
 start file.
 """
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -47,7 +48,7 @@ def write_start_files(
     parameters: Mapping[str, float],
     links: Mapping[str, tuple[int, int]],
 ) -> Path:
-    """Write the `etc` of one vehicle.
+    """Write the `etc` of one vehicle, in place of an earlier one.
 
     Args:
         build: PX4's build folder.
@@ -61,6 +62,8 @@ def write_start_files(
         The `etc`.
     """
     own = folder / "px4" / "etc"
+    if own.exists():
+        shutil.rmtree(own)
     scripts = own / "init.d-posix"
     (scripts / "airframes").mkdir(parents=True)
     for entry in (build / "etc").iterdir():

@@ -14,6 +14,7 @@ from enum import Enum
 from pathlib import PurePath
 from typing import Final
 
+from autopilot_bridge.errors import BridgeError
 from flightsim.vehicle import VehicleDivergedError
 
 _PROBATION_US: Final = 60_000_000
@@ -90,8 +91,8 @@ class Probation:
 
 
 def reason_of(error: Exception) -> str:
-    """A failure in words: that of the simulation, or the exception and where it was raised."""
-    if isinstance(error, VehicleDivergedError):
+    """A failure in words: of the simulation, of a firmware, or the exception and where it was raised."""
+    if isinstance(error, VehicleDivergedError | BridgeError):
         return str(error)
     place = traceback.extract_tb(error.__traceback__)[-1]
     what = " ".join(f"{type(error).__name__}: {error}".split())
