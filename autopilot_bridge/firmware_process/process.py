@@ -22,6 +22,7 @@ _ENDING_S: Final = 5.0  # after the request to end
 _LOOK_S: Final = 0.25  # between looks whether it runs
 _LAST_LINES: Final = 3
 _TAIL_BYTES: Final = 4096
+_COLOURS: Final = re.compile(r"\x1b\[[0-9;]*m")
 
 
 class FirmwareProcess:
@@ -92,7 +93,7 @@ class FirmwareProcess:
 
     def last_words(self) -> str:
         """Its last lines of output, as the end of a sentence; "" when it has printed nothing."""
-        text = self.console()[-_TAIL_BYTES:]
+        text = _COLOURS.sub("", self.console()[-_TAIL_BYTES:])
         lines = [plain_text(line).strip() for line in text.splitlines() if line.strip()][-_LAST_LINES:]
         return f"; its last output: {' | '.join(lines)}" if lines else ""
 
