@@ -33,6 +33,7 @@ from autopilot_bridge.sitl.backend import BackendSetup
 from flightsim import interface as i
 from flightsim import truth as t
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.vectors import wrap_180
 from flightsim.home import Home
 
 _FIRST_PORT: Final = 9002  # of the physics; plus 10 for each instance
@@ -261,7 +262,7 @@ def position_ned_m(home: Home, lat_deg: float, lon_deg: float, alt_m: float) -> 
     parallel = math.cos(math.radians(0.5 * (lat_deg + home.lat_deg)))
     return (
         (lat_deg - home.lat_deg) * _M_PER_DEG,
-        (lon_deg - home.lon_deg) * _M_PER_DEG * parallel,
+        wrap_180(lon_deg - home.lon_deg) * _M_PER_DEG * parallel,
         home.alt_m - alt_m,
     )
 

@@ -1,12 +1,18 @@
 """Makes backends of a real firmware's build, for `Sitl`."""
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
+from typing import Final
 
 from autopilot_bridge.firmware_process.ardupilot import ArduPilotBackend
 from autopilot_bridge.firmware_process.build import FirmwareBuild
 from autopilot_bridge.firmware_process.px4 import Px4Backend
 from autopilot_bridge.firmware_process.working_folder import WorkingFolder
 from autopilot_bridge.sitl.backend import AutopilotBackend, BackendMaker, BackendSetup, Boot
+
+_Started = Callable[[BackendSetup, Path, WorkingFolder, int], AutopilotBackend]
+_BACKENDS: Final[Mapping[str, _Started]] = {"px4": Px4Backend, "ardupilot": ArduPilotBackend}
 
 
 def firmware_backend(build: FirmwareBuild, *, logs_to: Path | None = None) -> BackendMaker:
@@ -28,11 +34,6 @@ def firmware_backend(build: FirmwareBuild, *, logs_to: Path | None = None) -> Ba
         program = build.located(setup.airframe.kind)
         folder = WorkingFolder(f"vehicle{vehicle.system_id}", logs_to)
 
-        def boot(unix_epoch_us: int) -> AutopilotBackend:
-            if build.firmware == "px4":
-                return Px4Backend(setup, program, folder, unix_epoch_us)
-            return ArduPilotBackend(setup, program, folder, unix_epoch_us)
-
-        return boot
+        return partial(_BACKENDS[build.firmware], setup, program, folder)
 
     return make

@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
@@ -62,15 +62,26 @@ class FirmwareBuild:
             if not given:
                 raise ValueError(f"firmware {self}: give its build ({FORMS}), or set {variable}")
             path, source = Path(given), variable
-        if self.firmware == "px4":
-            missing = [name for name in ("bin/px4", "etc") if not (path / name).exists()]
-            if missing:
-                raise ValueError(
-                    f"{source}: {path} has no {' and no '.join(missing)}; it must be PX4's build folder for "
-                    "SITL"
-                )
-            return path.resolve()
-        found = shutil.which(path)
-        if found is None:
-            raise ValueError(f"{source}: {path} is not a program; give ArduPilot's SITL binary")
-        return Path(found).resolve()
+        return _FOUND[self.firmware](path, source)
+
+
+def _px4_folder(path: Path, source: str) -> Path:
+    missing = [name for name in ("bin/px4", "etc") if not (path / name).exists()]
+    if missing:
+        raise ValueError(
+            f"{source}: {path} has no {' and no '.join(missing)}; it must be PX4's build folder for SITL"
+        )
+    return path.resolve()
+
+
+def _ardupilot_program(path: Path, source: str) -> Path:
+    found = shutil.which(path)
+    if found is None:
+        raise ValueError(f"{source}: {path} is not a program; give ArduPilot's SITL binary")
+    return Path(found).resolve()
+
+
+_FOUND: Final[Mapping[str, Callable[[Path, str], Path]]] = {
+    "px4": _px4_folder,
+    "ardupilot": _ardupilot_program,
+}

@@ -13,7 +13,7 @@ from missions.vehicle.firmware import Mode
 from missions.vehicle.limits import FORECAST_WIND_M_S
 
 if TYPE_CHECKING:
-    from autopilot_bridge.firmware_process import FirmwareBuild
+    from autopilot_bridge.firmware_process.build import FirmwareBuild
     from flightsim.world_spec import WorldSpec
     from missions.preflight.before_flight import Confirm
 

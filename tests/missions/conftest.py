@@ -429,6 +429,8 @@ class FakeAutopilot:
 class FakeSitl:
     """Fake autopilots under a virtual-time loop; has the surface of an embedded SITL."""
 
+    emulated = True
+
     def __init__(self, flavour="px4", vehicles=1, truth=True):
         self.time_us = 0
         self.home = HOME

@@ -21,7 +21,7 @@ from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 
 NOT_GIVEN = {
-    "world": None, "model": (), "autopilot": None, "launch": None, "gps": None, "home": None, "seed": 0,
+    "world": None, "model": (), "autopilot": None, "firmware": None, "launch": None, "gps": None, "home": None, "seed": 0,
     "wind": None, "wind_profile": "log", "turbulence": None,
 }  # fmt: skip
 FILE = """
@@ -154,3 +154,13 @@ def test_fly_refuses_a_world_for_a_vehicle_elsewhere(file: Path) -> None:
     result = CliRunner().invoke(fly, ["sector", "--connect", "udpin:127.0.0.1:1", "--world", str(file)])
     assert result.exit_code == 2
     assert "--world: of the embedded SITL only" in " ".join(result.output.split())
+
+
+def test_a_real_firmware_is_the_autopilot_of_all_vehicles(file: Path) -> None:
+    world = made(world=file, firmware="ardupilot=arducopter")
+    assert [vehicle.autopilot for vehicle in world.vehicles] == ["ardupilot", "ardupilot"]
+    assert made(firmware="ardupilot").place == made(autopilot="ardupilot").place
+    with pytest.raises(ValueError, match="--autopilot px4 and --firmware ardupilot: leave one of them out"):
+        made(firmware="ardupilot", autopilot="px4")
+    with pytest.raises(ValueError, match="firmware 'x' is not accepted"):
+        made(firmware="x")
