@@ -21,8 +21,8 @@ from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 
 NOT_GIVEN = {
-    "world": None, "model": (), "autopilot": None, "firmware": None, "launch": None, "gps": None, "home": None,
-    "seed": 0, "wind": None, "wind_profile": "log", "turbulence": None,
+    "world": None, "model": (), "autopilot": None, "firmware": None, "launch": None, "gps": None,
+    "home": None, "seed": 0, "wind": None, "wind_profile": "log", "turbulence": None,
 }  # fmt: skip
 FILE = """
 seed = 7
