@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import NotNegative, Positive, Rate, require_finite
+from flightsim.foundation.kernels import bound
+from flightsim.foundation.records import packed, record_array, the_record
 from flightsim.payload import gimbal_kernel as k
 from flightsim.payload.device import Carrier, Device, DeviceParameters
 from flightsim.sensors.sensor import gauss_markov
@@ -156,35 +158,39 @@ class Gimbal(Device[Literal[True]]):
         self._row = _NOISE_ROWS
         self._euler: Array = np.zeros(3)
         interval_s = 1.0 / p.rate_hz
-        c = self._constants = np.zeros(k.CONSTANTS)
-        c[k.INTERVAL_S] = interval_s
-        c[k.GAIN] = 1.0 - math.exp(-interval_s / p.time_constant_s)
-        c[k.AXES] = p.axes
-        c[k.LOW] = (-p.roll_limit_rad, p.pitch_min_rad, -p.yaw_limit_rad)
-        c[k.HIGH] = (p.roll_limit_rad, p.pitch_max_rad, p.yaw_limit_rad)
-        c[k.ENDLESS] = float(p.yaw_limit_rad >= math.pi)
-        c[k.MAX_STEP] = p.max_rate_rad_s * interval_s
-        c[k.JITTER] = p.jitter_rad
-        c[k.ENCODER] = p.encoder_noise_rad
-        c[k.ATTITUDE_NOISE] = p.attitude_noise_rad
-        c[k.GYRO_NOISE] = p.gyro_noise_rad_s
-        c[k.DECAY], unit_drive = gauss_markov(1.0, p.error_time_constant_s, interval_s)
+        decay, unit_drive = gauss_markov(1.0, p.error_time_constant_s, interval_s)
         sigma = np.array([p.tilt_error_rad, p.tilt_error_rad, p.heading_error_rad])
-        c[k.DRIVE] = unit_drive * sigma
-        self._state: Array = np.zeros(k.STATE)
-        self._state[k.ERROR] = sigma * self._rng.standard_normal(3)
-        self._state[k.BODY] = (1.0, 0.0, 0.0, 0.0)
-        out = self._out = np.zeros(k.OUT)
-        self.joints_rad: Array = out[k.JOINTS]
-        self.q_frd_from_gimbal: Array = out[k.Q_FRD_FROM_GIMBAL]
-        self.q_ned_from_gimbal: Array = out[k.Q_NED_FROM_GIMBAL]
-        self.rates_gimbal_rad_s: Array = out[k.RATES]
-        self.measured_joints_rad: Array = out[k.MEASURED_JOINTS]
-        self.measured_q_ned_from_gimbal: Array = out[k.MEASURED_Q_NED]
-        self.measured_q_heading_from_gimbal: Array = out[k.MEASURED_Q_HEADING]
-        self.measured_rates_rad_s: Array = out[k.MEASURED_RATES]
-        for q in (k.Q_FRD_FROM_GIMBAL, k.Q_NED_FROM_GIMBAL, k.MEASURED_Q_NED, k.MEASURED_Q_HEADING):
-            out[q.start] = 1.0
+        constants = k.GimbalConstants(
+            interval_s=interval_s,
+            gain=1.0 - math.exp(-interval_s / p.time_constant_s),
+            axes=p.axes,
+            low=np.array([-p.roll_limit_rad, p.pitch_min_rad, -p.yaw_limit_rad]),
+            high=np.array([p.roll_limit_rad, p.pitch_max_rad, p.yaw_limit_rad]),
+            endless=p.yaw_limit_rad >= math.pi,
+            max_step=p.max_rate_rad_s * interval_s,
+            jitter=p.jitter_rad,
+            encoder=p.encoder_noise_rad,
+            attitude_noise=p.attitude_noise_rad,
+            gyro_noise=p.gyro_noise_rad_s,
+            decay=decay,
+            drive=unit_drive * sigma,
+        )
+        states, outputs = record_array(k.GimbalState), record_array(k.GimbalOutput)
+        state = self._state = the_record(states, k.GimbalState)
+        state.error[:] = sigma * self._rng.standard_normal(3)
+        state.body[0] = 1.0
+        out = self._out = the_record(outputs, k.GimbalOutput)
+        self.joints_rad: Array = out.joints
+        self.q_frd_from_gimbal: Array = out.q_frd_from_gimbal
+        self.q_ned_from_gimbal: Array = out.q_ned_from_gimbal
+        self.rates_gimbal_rad_s: Array = out.rates
+        self.measured_joints_rad: Array = out.measured_joints
+        self.measured_q_ned_from_gimbal: Array = out.measured_q_ned
+        self.measured_q_heading_from_gimbal: Array = out.measured_q_heading
+        self.measured_rates_rad_s: Array = out.measured_rates
+        for q in (out.q_frd_from_gimbal, out.q_ned_from_gimbal, out.measured_q_ned, out.measured_q_heading):
+            q[0] = 1.0
+        self._advance = bound(k.advance, truth, packed(constants), states, self._block, outputs, then=(0,))
         self.time_us = -1
         self.flags = LEVEL
         self.command(LEVEL)
@@ -197,7 +203,7 @@ class Gimbal(Device[Literal[True]]):
     @property
     def limits_reached(self) -> tuple[bool, bool, bool]:
         """Whether the command in force lies beyond the limits: roll, pitch, yaw."""
-        roll, pitch, yaw = self._out[k.AT_LIMIT].tolist()
+        roll, pitch, yaw = self._out.at_limit.tolist()
         return bool(roll), bool(pitch), bool(yaw)
 
     def command(
@@ -252,22 +258,22 @@ class Gimbal(Device[Literal[True]]):
             locked and not flags & GimbalFlags.YAW_IN_VEHICLE_FRAME
         )
         # By its own reference, as it can only know that one.
-        k.body_euler(self._truth, state, self._euler)
+        k.body_euler(self._truth, state.error, self._euler)
         heading_rad = float(self._euler[2])
         if math.isnan(yaw_rad):
-            yaw_rad = float(state[k.SETPOINT][2])
-            given_in_earth = bool(state[k.YAW_LOCKED])
+            yaw_rad = float(state.setpoint[2])
+            given_in_earth = bool(state.yaw_locked)
         if math.isnan(pitch_rad):
-            pitch_rad = float(state[k.SETPOINT][1])
+            pitch_rad = float(state.setpoint[1])
         if given_in_earth and not locked:
             yaw_rad -= heading_rad
         elif locked and not given_in_earth:
             yaw_rad += heading_rad
-        state[k.SETPOINT] = (roll_rad, pitch_rad, yaw_rad)
-        state[k.SETPOINT_RATES] = rates
-        state[k.LEVELLED] = float(bool(flags & GimbalFlags.PITCH_LOCK))
-        state[k.YAW_LOCKED] = float(locked)
-        state[k.PARKED] = float(bool(flags & (GimbalFlags.NEUTRAL | GimbalFlags.RETRACT)))
+        state.setpoint[:] = (roll_rad, pitch_rad, yaw_rad)
+        state.pitch_rate, state.yaw_rate = rates
+        state.levelled = float(bool(flags & GimbalFlags.PITCH_LOCK))
+        state.yaw_locked = float(locked)
+        state.parked = float(bool(flags & (GimbalFlags.NEUTRAL | GimbalFlags.RETRACT)))
         self.flags = flags
 
     def step(self, time_us: int) -> Literal[True] | None:
@@ -279,7 +285,7 @@ class Gimbal(Device[Literal[True]]):
         if self._row == _NOISE_ROWS:
             self._rng.standard_normal(out=self._block)
             self._row = 0
-        k.advance(self._truth, self._constants, self._state, self._block, self._row, self._out)
+        self._advance(self._row)
         self._row += 1
         self.time_us = time_us
         return True

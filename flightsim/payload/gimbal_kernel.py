@@ -6,6 +6,7 @@ steadying lags only where the rate limit or a stop is reached.
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.records import Record, Vector3, Vector4
 from flightsim.foundation.rotations import (
     euler_from_quaternion,
     integrate,
@@ -23,59 +25,62 @@ from flightsim.foundation.rotations import (
 )
 
 Array = NDArray[np.float64]
-
-# constants
-INTERVAL_S: Final = 0
-GAIN: Final = 1
-AXES: Final = 2
-LOW: Final = slice(3, 6)  # roll, pitch, yaw
-HIGH: Final = slice(6, 9)
-ENDLESS: Final = 9
-MAX_STEP: Final = 10
-JITTER: Final = 11
-ENCODER: Final = 12
-ATTITUDE_NOISE: Final = 13
-GYRO_NOISE: Final = 14
-DECAY: Final = 15
-DRIVE: Final = slice(16, 19)  # tilt about north and east, heading
-CONSTANTS: Final = 19
-
-# state
-SETPOINT: Final = slice(0, 3)  # roll, pitch, yaw
-SETPOINT_RATES: Final = slice(3, 5)  # pitch, yaw
-LEVELLED: Final = 5
-YAW_LOCKED: Final = 6
-PARKED: Final = 7
-ERROR: Final = slice(8, 11)  # of the attitude reference: rotation vector in NED
-BODY: Final = slice(11, 15)  # vehicle's attitude at the last step, by the attitude reference
-STARTED: Final = 15
-HELD: Final = slice(16, 19)  # joints without jitter: roll, pitch, yaw
-STATE: Final = 19
+RecordArray = NDArray[np.void]
 
 NORMALS: Final = 15  # jitter, error, encoders, attitude, gyros
 
-# out
-JOINTS: Final = slice(0, 3)
-Q_FRD_FROM_GIMBAL: Final = slice(3, 7)
-Q_NED_FROM_GIMBAL: Final = slice(7, 11)
-RATES: Final = slice(11, 14)
-MEASURED_JOINTS: Final = slice(14, 17)
-MEASURED_Q_NED: Final = slice(17, 21)
-MEASURED_Q_HEADING: Final = slice(21, 25)
-MEASURED_RATES: Final = slice(25, 28)
-AT_LIMIT: Final = slice(28, 31)
-OUT: Final = 31
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GimbalConstants:
+    """What a gimbal is; joints are roll, pitch, yaw."""
+
+    interval_s: float
+    gain: float
+    axes: float
+    low: Array  # (3,), stops of the joints
+    high: Array  # (3,)
+    endless: bool  # yaw turns without end
+    max_step: float
+    jitter: float
+    encoder: float
+    attitude_noise: float
+    gyro_noise: float
+    decay: float
+    drive: Array  # (3,): tilt about north and east, heading
+
+
+class GimbalState(Record):
+    """What a gimbal carries from step to step."""
+
+    setpoint: Vector3  # roll, pitch, yaw
+    pitch_rate: float  # of the setpoint
+    yaw_rate: float
+    levelled: float
+    yaw_locked: float
+    parked: float
+    error: Vector3  # of the attitude reference: rotation vector in NED
+    body: Vector4  # vehicle's attitude at the last step, by the attitude reference
+    started: float
+    held: Vector3  # joints without jitter
+
+
+class GimbalOutput(Record):
+    """Where a gimbal is and what it reports, as `flightsim.payload.gimbal.Gimbal` describes it."""
+
+    joints: Vector3
+    q_frd_from_gimbal: Vector4
+    q_ned_from_gimbal: Vector4
+    rates: Vector3
+    measured_joints: Vector3
+    measured_q_ned: Vector4
+    measured_q_heading: Vector4
+    measured_rates: Vector3
+    at_limit: Vector3
+
 
 _ROLL: Final = 0
 _PITCH: Final = 1
 _YAW: Final = 2
-_LOW: Final = LOW.start
-_HIGH: Final = HIGH.start
-_SETPOINT: Final = SETPOINT.start
-_RATES: Final = SETPOINT_RATES.start
-_HELD: Final = HELD.start
-_ERROR: Final = ERROR.start
-_DRIVE: Final = DRIVE.start
 
 
 @kernel
@@ -88,10 +93,10 @@ def _tilted(q: Array, rotation: Array, out: Array) -> None:
 
 
 @kernel
-def body_euler(truth: Array, state: Array, out: Array) -> None:
-    """out = roll, pitch, yaw of the vehicle by the gimbal's attitude reference."""
+def body_euler(truth: Array, error: Array, out: Array) -> None:
+    """out = roll, pitch, yaw of the vehicle by the gimbal's attitude reference, which has an error."""
     q = np.zeros(4)
-    _tilted(truth[t.Q_NED_FROM_FRD], state[ERROR], q)
+    _tilted(truth[t.Q_NED_FROM_FRD], error, q)
     euler_from_quaternion(q, out)
 
 
@@ -136,89 +141,92 @@ def joints_from_quaternion(q: Array, axes: float, yaw_now: float, out: Array) ->
 
 
 @kernel
-def _demand(body: Array, constants: Array, state: Array, out: Array) -> None:
+def _demand(body: Array, c: GimbalConstants, s: GimbalState, out: Array) -> None:
     """out = joint angles of the command on a vehicle of attitude `body`; without limits."""
-    if state[PARKED] > 0.0:
+    if s.parked > 0.0:
         out[:] = 0.0
         return
     euler = np.zeros(3)
     euler_from_quaternion(body, euler)
-    roll, pitch, yaw = state[_SETPOINT], state[_SETPOINT + 1], state[_SETPOINT + 2]
+    roll, pitch, yaw = s.setpoint[0], s.setpoint[1], s.setpoint[2]
     wanted, relative, inverse = np.zeros(4), np.zeros(4), np.zeros(4)
-    if state[LEVELLED] > 0.0:
-        if state[YAW_LOCKED] <= 0.0:
+    if s.levelled > 0.0:
+        if s.yaw_locked <= 0.0:
             yaw += euler[2]
         quaternion_from_euler(roll, pitch, yaw, wanted)
         inverse[0], inverse[1], inverse[2], inverse[3] = body[0], -body[1], -body[2], -body[3]
         multiply(inverse, wanted, relative)
     else:
-        if state[YAW_LOCKED] > 0.0:
+        if s.yaw_locked > 0.0:
             yaw -= euler[2]
         quaternion_from_euler(roll, pitch, yaw, relative)
-    joints_from_quaternion(relative, constants[AXES], state[_HELD + _YAW], out)
+    joints_from_quaternion(relative, c.axes, s.held[_YAW], out)
 
 
 @kernel
-def _limited(joints: Array, constants: Array, near: float, out: Array) -> None:
+def _limited(joints: Array, c: GimbalConstants, near: float, out: Array) -> None:
     """Keep joints within their stops, in place; yaw without end is taken next to `near`. `out`: which."""
     for axis in range(3):
         out[axis] = 0.0
-        if axis == _YAW and constants[ENDLESS] > 0.0:
+        if axis == _YAW and c.endless:
             joints[axis] = near + wrap_pi(joints[axis] - near)
-        elif not constants[_LOW + axis] <= joints[axis] <= constants[_HIGH + axis]:
-            joints[axis] = min(constants[_HIGH + axis], max(constants[_LOW + axis], joints[axis]))
+        elif not c.low[axis] <= joints[axis] <= c.high[axis]:
+            joints[axis] = min(c.high[axis], max(c.low[axis], joints[axis]))
             out[axis] = 1.0
 
 
 @kernel
-def advance(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> None:
-    """One control step; the layouts are this module's constants."""
-    interval_s = constants[INTERVAL_S]
+def advance(
+    truth: Array, constants: RecordArray, states: RecordArray, normals: Array, outputs: RecordArray, row: int
+) -> None:
+    """One control step, with the records of one gimbal."""
+    c: GimbalConstants = constants[0]
+    s: GimbalState = states[0]
+    out: GimbalOutput = outputs[0]
+    interval_s = c.interval_s
     body, before, demand = np.zeros(4), np.zeros(3), np.zeros(3)
-    held, at_limit = state[HELD], out[AT_LIMIT]
-    _tilted(truth[t.Q_NED_FROM_FRD], state[ERROR], body)
-    if state[STARTED] <= 0.0:
+    held, at_limit = s.held, out.at_limit
+    _tilted(truth[t.Q_NED_FROM_FRD], s.error, body)
+    if s.started <= 0.0:
         for i in range(4):
-            state[BODY.start + i] = body[i]
-        state[STARTED] = 1.0
+            s.body[i] = body[i]
+        s.started = 1.0
 
     # The joint angles for the old command and the old attitude, then the change since.
-    _demand(state[BODY], constants, state, before)
-    _limited(before, constants, held[_YAW], at_limit)
+    _demand(s.body, c, s, before)
+    _limited(before, c, held[_YAW], at_limit)
     steer = np.zeros(3)
     for axis in range(3):
-        steer[axis] = constants[GAIN] * (before[axis] - held[axis])
-    state[_SETPOINT + _PITCH] += state[_RATES] * interval_s
-    if state[_RATES] != 0.0:
-        state[_SETPOINT + _PITCH] = min(
-            constants[_HIGH + _PITCH], max(constants[_LOW + _PITCH], state[_SETPOINT + _PITCH])
-        )
-    state[_SETPOINT + _YAW] = wrap_pi(state[_SETPOINT + _YAW] + state[_RATES + 1] * interval_s)
-    _demand(body, constants, state, demand)
-    _limited(demand, constants, before[_YAW], at_limit)
+        steer[axis] = c.gain * (before[axis] - held[axis])
+    s.setpoint[_PITCH] += s.pitch_rate * interval_s
+    if s.pitch_rate != 0.0:
+        s.setpoint[_PITCH] = min(c.high[_PITCH], max(c.low[_PITCH], s.setpoint[_PITCH]))
+    s.setpoint[_YAW] = wrap_pi(s.setpoint[_YAW] + s.yaw_rate * interval_s)
+    _demand(body, c, s, demand)
+    _limited(demand, c, before[_YAW], at_limit)
     rates = np.zeros(3)
     for axis in range(3):
         step = steer[axis] + demand[axis] - before[axis]
-        step = min(constants[MAX_STEP], max(-constants[MAX_STEP], step))
+        step = min(c.max_step, max(-c.max_step, step))
         rates[axis] = step / interval_s
         held[axis] += step
-    if constants[ENDLESS] > 0.0:
+    if c.endless:
         held[_YAW] = wrap_pi(held[_YAW])
     for i in range(4):
-        state[BODY.start + i] = body[i]
+        s.body[i] = body[i]
 
-    joints = out[JOINTS]
+    joints = out.joints
     for axis in range(3):
-        joints[axis] = held[axis] + constants[JITTER] * normals[row, axis]
-    if constants[AXES] < 3.0:
+        joints[axis] = held[axis] + c.jitter * normals[row, axis]
+    if c.axes < 3.0:
         joints[_ROLL] = 0.0
     roll, pitch, yaw = joints[_ROLL], joints[_PITCH], joints[_YAW]
-    quaternion_from_joints(roll, pitch, yaw, out[Q_FRD_FROM_GIMBAL])
-    multiply(truth[t.Q_NED_FROM_FRD], out[Q_FRD_FROM_GIMBAL], out[Q_NED_FROM_GIMBAL])
+    quaternion_from_joints(roll, pitch, yaw, out.q_frd_from_gimbal)
+    multiply(truth[t.Q_NED_FROM_FRD], out.q_frd_from_gimbal, out.q_ned_from_gimbal)
 
     # Angular velocity: the vehicle's, and that of each joint about its axis.
-    turning = out[RATES]
-    rotate_inverse(out[Q_FRD_FROM_GIMBAL], truth[t.RATES_FRD_RAD_S], turning)
+    turning = out.rates
+    rotate_inverse(out.q_frd_from_gimbal, truth[t.RATES_FRD_RAD_S], turning)
     sr, cr = math.sin(roll), math.cos(roll)
     sp, cp = math.sin(pitch), math.cos(pitch)
     turning[0] += cp * rates[_ROLL] - sp * cr * rates[_YAW]
@@ -227,19 +235,17 @@ def advance(truth: Array, constants: Array, state: Array, normals: Array, row: i
 
     # The reported attitude.
     for axis in range(3):
-        out[MEASURED_JOINTS.start + axis] = joints[axis] + constants[ENCODER] * normals[row, 6 + axis]
-        out[MEASURED_RATES.start + axis] = turning[axis] + constants[GYRO_NOISE] * normals[row, 12 + axis]
-    if constants[AXES] < 3.0:
-        out[MEASURED_JOINTS.start + _ROLL] = 0.0
-    error, attitude, euler, turn = np.zeros(3), out[MEASURED_Q_NED], np.zeros(3), np.zeros(4)
+        out.measured_joints[axis] = joints[axis] + c.encoder * normals[row, 6 + axis]
+        out.measured_rates[axis] = turning[axis] + c.gyro_noise * normals[row, 12 + axis]
+    if c.axes < 3.0:
+        out.measured_joints[_ROLL] = 0.0
+    error, attitude, euler, turn = np.zeros(3), out.measured_q_ned, np.zeros(3), np.zeros(4)
     for axis in range(3):
-        error[axis] = state[_ERROR + axis] + constants[ATTITUDE_NOISE] * normals[row, 9 + axis]
-    _tilted(out[Q_NED_FROM_GIMBAL], error, attitude)
+        error[axis] = s.error[axis] + c.attitude_noise * normals[row, 9 + axis]
+    _tilted(out.q_ned_from_gimbal, error, attitude)
     euler_from_quaternion(body, euler)
     quaternion_from_euler(0.0, 0.0, -euler[2], turn)
-    multiply(turn, attitude, out[MEASURED_Q_HEADING])
+    multiply(turn, attitude, out.measured_q_heading)
 
     for axis in range(3):
-        state[_ERROR + axis] = (
-            constants[DECAY] * state[_ERROR + axis] + constants[_DRIVE + axis] * normals[row, 3 + axis]
-        )
+        s.error[axis] = c.decay * s.error[axis] + c.drive[axis] * normals[row, 3 + axis]
