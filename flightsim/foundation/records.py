@@ -27,12 +27,12 @@ class Record:
     """Base of the declarations: each annotation is a field, a `float`, `Vector3` or `Vector4`."""
 
 
-def record_array(kind: type[Record]) -> NDArray[np.void]:
-    """An array (1,) with one record of zeros, for kernels that are bound to it."""
+def record_array(kind: type[Record], count: int = 1) -> NDArray[np.void]:
+    """An array (count,) of records of zeros, for kernels; an array's column has the name of its field."""
     places: list[Any] = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
         places.append((name, np.float64) if hint is float else (name, np.float64, (get_args(hint)[1],)))
-    return np.zeros(1, np.dtype(places))
+    return np.zeros(count, np.dtype(places))
 
 
 def the_record(array: NDArray[np.void], kind: type[T]) -> T:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
+from flightsim.foundation.records import record_array, the_record
 from flightsim.foundation.rotations import multiply, quaternion_from_euler, rotate
 from flightsim.foundation.vectors import Quaternion, conjugate, product
 from flightsim.foundation.vectors import rotate as rotate_vector
@@ -178,24 +179,24 @@ class Camera(Device[CameraFrame]):
         self._focal_px = p.model.focal_px
         self._zoom = 1.0
         self.focus_distance_m: float | None = None
-        self._constants: Array = np.zeros(k.CONSTANTS)
-        self._constants[k.FOCAL_PX] = p.model.focal_px
-        self._constants[k.WIDTH_PX] = p.model.width_px
-        self._constants[k.HEIGHT_PX] = p.model.height_px
-        self._constants[k.MAX_RANGE_M] = p.max_range_m
-        self._constants[k.MIN_SINE] = math.sin(p.min_depression_rad)
-        self._constants[k.POSITION_FRD_M] = p.position_frd_m
-        self._constants[k.PIXEL_NOISE] = p.pixel_noise_px
-        self._constants[k.SIZE_NOISE] = p.size_noise
-        self._constants[k.QUANTUM_PX] = p.quantum_px
+        self._constants = record_array(k.CameraConstants)
+        c = self._optics = the_record(self._constants, k.CameraConstants)
+        c.focal_px = p.model.focal_px
+        c.width_px, c.height_px = p.model.width_px, p.model.height_px
+        c.max_range_m = p.max_range_m
+        c.min_sine = math.sin(p.min_depression_rad)
+        c.position_frd_m[:] = p.position_frd_m
+        c.pixel_noise_px = p.pixel_noise_px
+        c.size_noise = p.size_noise
+        c.quantum_px = p.quantum_px
         self._step_s = 1.0 / physics_rate_hz
         self._q_before: Array = np.zeros((2, 4))
         self._vehicle_before_ned_m: Array = np.zeros(3)
         self._before_us = -1
-        self._view_before: Array = np.zeros((len(targets), k.VIEW))
+        self._view_before = record_array(k.TargetSight, len(targets))
         self._no_noise: Array = np.zeros((len(targets), 3))
         self._vehicle_ned_m: Array = np.zeros(3)
-        self._view: Array = np.zeros((len(targets), k.VIEW))
+        self._view = record_array(k.TargetSight, len(targets))
         self._clutter = np.random.Generator(np.random.PCG64(seeds("camera")))
         self._generators = tuple(
             np.random.Generator(np.random.PCG64(seeds(f"camera_target_{index}")))
@@ -224,7 +225,7 @@ class Camera(Device[CameraFrame]):
     def zoom(self, zoom: float) -> None:
         p = self.parameters
         self._zoom = min(p.max_zoom, max(1.0, zoom))
-        self._focal_px = self._constants[k.FOCAL_PX] = p.model.focal_px * self._zoom
+        self._focal_px = self._optics.focal_px = p.model.focal_px * self._zoom
 
     @property
     def autofocus_m(self) -> float:
@@ -240,7 +241,7 @@ class Camera(Device[CameraFrame]):
         q_ned_from_frd, arm, q = truth[t.Q_NED_FROM_FRD], np.zeros(3), np.zeros(4)
         q_frd_from_mount = self._q_frd_from_mount if gimbal is None else gimbal.q_frd_from_gimbal
         multiply(q_ned_from_frd, q_frd_from_mount, q)
-        rotate(q_ned_from_frd, self._constants[k.POSITION_FRD_M], arm)
+        rotate(q_ned_from_frd, self._optics.position_frd_m, arm)
         north_m, east_m, down_m = self._home_frame.position_ned_m(truth)
         eye = (north_m + float(arm[0]), east_m + float(arm[1]), down_m + float(arm[2]))
         w, x, y, z = q.tolist()
@@ -363,25 +364,25 @@ class Camera(Device[CameraFrame]):
         )
         if not seen:
             return []
-        visible = np.flatnonzero(~np.isnan(view[:, k.SIZE_PX]))
+        visible = np.flatnonzero(~np.isnan(view["size_px"]))
         probability = self.parameters.detection.probability(
             SeenTargets(
-                size_px=view[visible, k.SIZE_PX],
-                range_m=view[visible, k.RANGE_M],
-                sine=view[visible, k.SINE],
+                size_px=view["size_px"][visible],
+                range_m=view["range_m"][visible],
+                sine=view["sine"][visible],
                 blur_px=self._blur_px(time_us)[visible],
-                edge_px=view[visible, k.EDGE_PX],
+                edge_px=view["edge_px"][visible],
                 covered=_covered(view[visible]),
                 tagged=targets.tagged[visible],
             )
         )
         found = []
         for i in visible[uniforms[visible] < probability].tolist():
-            u_px, v_px, size_rad = view[i, : k.SIZE_RAD + 1].tolist()
+            u_px, v_px, size_rad = view[["u_px", "v_px", "size_rad"]][i].item()
             tag, distance_m = int(targets.tag_ids[i]), 0.0
             if self.parameters.tag_range and tag != NO_TAG:
                 size_rad, distance_m = self._tag_range(
-                    float(view[i, k.SIZE_PX]), float(targets.sizes_m[i]), float(normals[i, 2])
+                    float(view["size_px"][i]), float(targets.sizes_m[i]), float(normals[i, 2])
                 )
             found.append(self._detection(time_us, u_px, v_px, size_rad, tag, distance_m))
         return found
@@ -410,10 +411,8 @@ class Camera(Device[CameraFrame]):
             self._no_noise,
             before,
         )
-        moved_px = np.hypot(
-            view[:, k.TRUE_U_PX] - before[:, k.TRUE_U_PX], view[:, k.TRUE_V_PX] - before[:, k.TRUE_V_PX]
-        )
-        blur_px: Array = np.where(np.isnan(before[:, k.SIZE_PX]), 0.0, moved_px)
+        moved_px = np.hypot(view["true_u_px"] - before["true_u_px"], view["true_v_px"] - before["true_v_px"])
+        blur_px: Array = np.where(np.isnan(before["size_px"]), 0.0, moved_px)
         return blur_px * (self.parameters.exposure_s / passed_s)
 
     def _tag_range(self, size_px: float, size_m: float, normal: float) -> tuple[float, float]:
@@ -449,12 +448,12 @@ class Camera(Device[CameraFrame]):
         return Detection(time_us, u_px, v_px, angle_x_rad, angle_y_rad, size_rad, target_id, distance_m)
 
 
-def _covered(view: Array) -> NDArray[np.bool_]:
-    """Which of the visible targets (n, VIEW) another one, which is nearer, overlaps in the picture."""
+def _covered(view: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Which of the visible targets (n,) another one, which is nearer, overlaps in the picture."""
     if len(view) < 2:
         return np.zeros(len(view), dtype=np.bool_)
-    u, v, size = view[:, k.TRUE_U_PX], view[:, k.TRUE_V_PX], view[:, k.SIZE_PX]
+    u, v, size = view["true_u_px"], view["true_v_px"], view["size_px"]
     apart_px = np.hypot(u[:, None] - u, v[:, None] - v)
-    nearer = view[None, :, k.RANGE_M] < view[:, None, k.RANGE_M]
+    nearer = view["range_m"][None, :] < view["range_m"][:, None]
     overlaps = nearer & (apart_px < 0.5 * (size[:, None] + size))
     return np.asarray(np.any(overlaps, axis=1), dtype=np.bool_)
