@@ -1,11 +1,11 @@
 """Which method is for which MAVLink number: decorators at the methods, and the tables that they make.
 
     class Gripper(Microservice):
-        @command(mavlink.MAV_CMD_DO_GRIPPER)
+        @command(dialect.MAV_CMD_DO_GRIPPER)
         def _grip(self, command: Command, source: Source) -> Result: ...
 
-        @receives(mavlink.MAVLink_heartbeat_message)
-        def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int): ...
+        @receives(dialect.MAVLink_heartbeat_message)
+        def _on_heartbeat(self, message: dialect.MAVLink_heartbeat_message, source: Source, time_us: int): ...
 
 A subclass that overrides a method keeps its numbers; one that declares a number for another method replaces
 the method of that number.

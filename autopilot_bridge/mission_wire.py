@@ -6,17 +6,17 @@ Source: MAVLink mission protocol, https://mavlink.io/en/services/mission.html.
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 
-GLOBAL_FRAMES: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
+GLOBAL_FRAMES: Final = frozenset((dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT))
 """Altitudes above mean sea level."""
 RELATIVE_FRAMES: Final = frozenset(
-    (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+    (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 )
 """Altitudes above home."""
 TERRAIN_FRAMES: Final = frozenset(
-    (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
+    (dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 )
 """Altitudes above the ground."""
 GEODETIC_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES | TERRAIN_FRAMES
@@ -32,15 +32,15 @@ def is_geodetic(item: MissionItem) -> bool:
 
 
 def item_from_message(
-    message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+    message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
 ) -> MissionItem:
     """The item in a MISSION_ITEM or MISSION_ITEM_INT, unchecked; unset coordinates become NaN."""
     x: float = message.x
     y: float = message.y
-    if isinstance(message, mavlink.MAVLink_mission_item_int_message):
+    if isinstance(message, dialect.MAVLink_mission_item_int_message):
         if message.frame in GEODETIC_FRAMES:
             x, y = (math.nan if value == UNSET_INT else value / _DEG_E7 for value in (x, y))
-        elif message.frame != mavlink.MAV_FRAME_MISSION:
+        elif message.frame != dialect.MAV_FRAME_MISSION:
             x, y = x / _LOCAL_E4, y / _LOCAL_E4
     return MissionItem(
         command=message.command,
@@ -65,7 +65,7 @@ def item_message(
     current: bool,
     as_int: bool = True,
     unset: int = UNSET_INT,
-) -> mavlink.MAVLink_mission_item_int_message | mavlink.MAVLink_mission_item_message:
+) -> dialect.MAVLink_mission_item_int_message | dialect.MAVLink_mission_item_message:
     """MISSION_ITEM_INT (degrees in 1e-7, local metres in 1e-4), or MISSION_ITEM, for one item.
 
     Args:
@@ -77,12 +77,12 @@ def item_message(
     head = (*target, seq, item.frame, item.command, int(current), int(item.autocontinue))
     parameters = (item.param1, item.param2, item.param3, item.param4)
     if not as_int:
-        return mavlink.MAVLink_mission_item_message(
+        return dialect.MAVLink_mission_item_message(
             *head, *parameters, item.x, item.y, item.z, int(mission_type)
         )
-    scale = _DEG_E7 if is_geodetic(item) else 1.0 if item.frame == mavlink.MAV_FRAME_MISSION else _LOCAL_E4
+    scale = _DEG_E7 if is_geodetic(item) else 1.0 if item.frame == dialect.MAV_FRAME_MISSION else _LOCAL_E4
     x, y = _scaled(item.x, scale, unset), _scaled(item.y, scale, unset)
-    return mavlink.MAVLink_mission_item_int_message(*head, *parameters, x, y, item.z, int(mission_type))
+    return dialect.MAVLink_mission_item_int_message(*head, *parameters, x, y, item.z, int(mission_type))
 
 
 def _scaled(value: float, scale: float, unset: int) -> int:

@@ -24,8 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links import Link, open_link, parse_address
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser, MAVLinkMessage, decode_as
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, MAVLinkMessage, decode_as, dialect
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
 from tests.clients.sitl_process import free_port
 from tests.telemetry.test_default_streams import (
@@ -66,9 +65,9 @@ class Listener:
                     continue
                 known = DEFINITIONS.get(frame.message_id)
                 self.counts[known.name if known else str(frame.message_id)] += 1
-                if frame.message_id == mavlink.MAVLINK_MSG_ID_ATTITUDE:
+                if frame.message_id == dialect.MAVLINK_MSG_ID_ATTITUDE:
                     self.boot_us, self.wall_s = (
-                        decode_as(frame, mavlink.MAVLink_attitude_message).time_boot_ms * 1000,
+                        decode_as(frame, dialect.MAVLink_attitude_message).time_boot_ms * 1000,
                         time.monotonic(),
                     )
 
@@ -85,7 +84,7 @@ def listen(listeners: list[Listener], seconds: float) -> None:
         if now_s >= beat_s:
             beat_s = now_s + 1.0
             for listener in listeners:
-                listener.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+                listener.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
         for listener in listeners:
             listener.poll()
         time.sleep(0.002)
@@ -133,7 +132,7 @@ def measure(flavour: str, seconds: float) -> bool:
         listen(listeners, 1.0)
         if flavour == "ardupilot":
             for listener in listeners:
-                listener.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+                listener.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
         listen(listeners, SETTLE_S[flavour])
         for listener in listeners:
             listener.counts.clear()

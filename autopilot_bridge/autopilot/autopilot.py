@@ -23,8 +23,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.firmware.external_mapping import connected
 from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.mavlink import Frame, decode
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import Frame, decode, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
@@ -53,7 +52,7 @@ if TYPE_CHECKING:  # its module imports scipy
 
 SLOW_RATE_HZ: Final = 50
 _TURNS: Final = 5  # iterations of the slow loop; microservices with `coarse_timers` are called in one of them
-_ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
+_ALWAYS_ANSWERED: Final = frozenset({dialect.MAVLINK_MSG_ID_TIMESYNC, dialect.MAVLINK_MSG_ID_PING})
 
 EntryT = TypeVar("EntryT")
 
@@ -385,7 +384,7 @@ class Autopilot:
 
     def _report_fixed(self, name: str) -> None:
         value = self.parameters.get(name)
-        self._texts.announce(mavlink.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
+        self._texts.announce(dialect.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
 
     def _lose_radio(self, failed: bool) -> None:
         self.commander.pilot.lose_signal(failed, self.commander.time_us)

@@ -7,7 +7,7 @@ from autopilot_bridge.commander.events import Armed, Event, HomeSet, ModeChanged
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.firmware.services import PAYLOAD_ROLE
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel, Source
 from autopilot_bridge.services.microservice import Microservice
@@ -100,7 +100,7 @@ class ChannelStreams(Microservice):
             line=channel.line,
         )
         channel.motion = self._motion
-        table.delay(mavlink.MAVLINK_MSG_ID_HEARTBEAT, max(time_us, heartbeat_us))
+        table.delay(dialect.MAVLINK_MSG_ID_HEARTBEAT, max(time_us, heartbeat_us))
         self._channels.append(channel)
         self.tables[channel.name] = table
         self.running = tuple(self.tables.values())
@@ -131,10 +131,10 @@ class ChannelStreams(Microservice):
             self._throttles[channel.name] = throttle
         return throttle
 
-    @receives(mavlink.MAVLink_radio_status_message, mavlink.MAVLink_radio_message)
+    @receives(dialect.MAVLink_radio_status_message, dialect.MAVLink_radio_message)
     def _on_radio_status(
         self,
-        message: mavlink.MAVLink_radio_status_message | mavlink.MAVLink_radio_message,
+        message: dialect.MAVLink_radio_status_message | dialect.MAVLink_radio_message,
         source: Source,
         time_us: int,
     ) -> None:
@@ -163,15 +163,15 @@ class ChannelStreams(Microservice):
         flavour, time_us = self._flavour, self._time_us
         match event:
             case ModeChanged() if flavour.heartbeat_on_mode_change:
-                self.push(mavlink.MAVLINK_MSG_ID_HEARTBEAT, time_us)
+                self.push(dialect.MAVLINK_MSG_ID_HEARTBEAT, time_us)
             case HomeSet():
                 self._push_position(time_us)
             case Armed() if flavour.services.position_pushed_at_arm:
                 self._push_position(time_us)
 
     def _push_position(self, time_us: int) -> None:
-        self.push(mavlink.MAVLINK_MSG_ID_HOME_POSITION, time_us)
-        self.push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, time_us)
+        self.push(dialect.MAVLINK_MSG_ID_HOME_POSITION, time_us)
+        self.push(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, time_us)
 
     def change(self, name: str, time_us: int) -> None:
         """A parameter has changed; if it sets the rates of a channel's streams, apply it."""

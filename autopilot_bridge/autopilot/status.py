@@ -5,17 +5,17 @@ from typing import Final
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
 from autopilot_bridge.firmware.flavour import Flavour, Identity, ModeDisplay
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.fields import fields
 from autopilot_bridge.telemetry.streams import Values
 
 MAVLINK_VERSION: Final = 3
 _AUTOPILOT_VERSION: Final = fields("AUTOPILOT_VERSION")
-PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-GEOFENCE: Final = mavlink.MAV_SYS_STATUS_GEOFENCE
-GPS: Final = mavlink.MAV_SYS_STATUS_SENSOR_GPS
-RECEIVER: Final = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+PREARM_CHECK: Final = dialect.MAV_SYS_STATUS_PREARM_CHECK
+GEOFENCE: Final = dialect.MAV_SYS_STATUS_GEOFENCE
+GPS: Final = dialect.MAV_SYS_STATUS_SENSOR_GPS
+RECEIVER: Final = dialect.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 
 
 class NavigationJudgement:
@@ -157,14 +157,14 @@ def _sensors(commander: Commander) -> tuple[tuple[int, bool], ...]:
     health = commander.situation.health
     charged = health.battery and commander.battery_level < BatteryLevel.LOW
     return (
-        (mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO, health.gyro),
-        (mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL, health.accelerometer),
-        (mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG, health.magnetometer),
-        (mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, health.barometer),
+        (dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO, health.gyro),
+        (dialect.MAV_SYS_STATUS_SENSOR_3D_ACCEL, health.accelerometer),
+        (dialect.MAV_SYS_STATUS_SENSOR_3D_MAG, health.magnetometer),
+        (dialect.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, health.barometer),
         (GPS, health.gps and health.position),
-        (mavlink.MAV_SYS_STATUS_AHRS, health.attitude),
-        (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY, charged),
-        (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, health.airspeed or not health.has_airspeed),
+        (dialect.MAV_SYS_STATUS_AHRS, health.attitude),
+        (dialect.MAV_SYS_STATUS_SENSOR_BATTERY, charged),
+        (dialect.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, health.airspeed or not health.has_airspeed),
     )
 
 

@@ -5,7 +5,7 @@ from typing import Final
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.flavour import Flavour
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
 from autopilot_bridge.services.microservice import Microservice
 
@@ -28,8 +28,8 @@ class StatusTextService(Microservice):
         self._greeted: set[str] = set()
         self._next_id = 1
 
-    @receives(mavlink.MAVLink_heartbeat_message)
-    def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_heartbeat_message)
+    def _on_heartbeat(self, message: dialect.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
         self._greeted.add(source.channel.name)
 
     def forget(self, channel: Channel) -> None:
@@ -69,13 +69,13 @@ class StatusTextService(Microservice):
         """One message, or the chunks of a long text: id and chunk_seq as in MAVLink's STATUSTEXT."""
         data = text.encode("ascii", "replace")[: CHUNK_BYTES * _MAX_CHUNKS]
         if len(data) <= CHUNK_BYTES:
-            return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
+            return [dialect.MAVLink_statustext_message(severity, data, 0, 0)]
         text_id = self._next_id
         self._next_id = 1 if text_id == _MAX_ID else text_id + 1
         chunks = [data[start : start + CHUNK_BYTES] for start in range(0, len(data), CHUNK_BYTES)]
         if len(chunks[-1]) == CHUNK_BYTES:
             chunks.append(b"")  # a last chunk ends with a zero
         return [
-            mavlink.MAVLink_statustext_message(severity, chunk, text_id, number)
+            dialect.MAVLink_statustext_message(severity, chunk, text_id, number)
             for number, chunk in enumerate(chunks)
         ]

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 
 E = TypeVar("E", bound=Enum)
 T = TypeVar("T")
@@ -24,7 +24,7 @@ def load_data(package: str, name: str) -> dict[str, Any]:
 
 def message_ids(names: Iterable[str]) -> tuple[int, ...]:
     """Ids of messages: "ATTITUDE"."""
-    return tuple(getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in names)
+    return tuple(getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in names)
 
 
 def message_rates(table: Mapping[str, float]) -> dict[int, float]:
@@ -34,7 +34,7 @@ def message_rates(table: Mapping[str, float]) -> dict[int, float]:
 
 def commands(names: Iterable[str]) -> frozenset[int]:
     """Numbers of commands and mission items: "NAV_WAYPOINT"."""
-    return frozenset(getattr(mavlink, f"MAV_CMD_{name}") for name in names)
+    return frozenset(getattr(dialect, f"MAV_CMD_{name}") for name in names)
 
 
 def modes(names: Iterable[str]) -> frozenset[FlightMode]:

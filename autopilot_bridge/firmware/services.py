@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import AddressRule
 from autopilot_bridge.services.commands.message_interval import IntervalPolicy
 from autopilot_bridge.services.files.card_layout import CardLayout
@@ -18,10 +18,10 @@ from autopilot_bridge.telemetry.line import FlowControl
 PAYLOAD_ROLE: Final = "payload"
 PAYLOAD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {
-        mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
-        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
-        mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0,
-        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+        dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+        dialect.MAVLINK_MSG_ID_ATTITUDE: 10.0,
+        dialect.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     }
 )
 """Messages sent to devices on the vehicle's own bus: its identity, position, attitude and time."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 
 COPTER_PARAMETERS: Final[Mapping[str, float]] = MappingProxyType(
@@ -20,21 +20,21 @@ PLANE_PARAMETERS: Final[Mapping[str, float]] = MappingProxyType({**COPTER_PARAME
 _ALL_CHECKS: Final = 1  # ARMING_CHECK
 _MISSION_CHECK: Final = 1 << 14
 _REQUIRED_ITEMS: Final = (  # by the bits of ARMING_MIS_ITEMS; bit 5 asks for a rally point
-    (1 << 0, mavlink.MAV_CMD_NAV_LAND, "land"),
-    (1 << 1, mavlink.MAV_CMD_NAV_VTOL_LAND, "vtol land"),
-    (1 << 2, mavlink.MAV_CMD_DO_LAND_START, "do land start"),
-    (1 << 3, mavlink.MAV_CMD_NAV_TAKEOFF, "takeoff"),
-    (1 << 4, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, "vtol takeoff"),
-    (1 << 6, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, "RTL"),
+    (1 << 0, dialect.MAV_CMD_NAV_LAND, "land"),
+    (1 << 1, dialect.MAV_CMD_NAV_VTOL_LAND, "vtol land"),
+    (1 << 2, dialect.MAV_CMD_DO_LAND_START, "do land start"),
+    (1 << 3, dialect.MAV_CMD_NAV_TAKEOFF, "takeoff"),
+    (1 << 4, dialect.MAV_CMD_NAV_VTOL_TAKEOFF, "vtol takeoff"),
+    (1 << 6, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, "RTL"),
 )
-_TAKEOFFS: Final = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
+_TAKEOFFS: Final = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
 _LANDING_SEQUENCES: Final = {
-    "DO_LAND_START": mavlink.MAV_CMD_DO_LAND_START,
-    "DO_RETURN_PATH_START": mavlink.MAV_CMD_DO_RETURN_PATH_START,
+    "DO_LAND_START": dialect.MAV_CMD_DO_LAND_START,
+    "DO_RETURN_PATH_START": dialect.MAV_CMD_DO_RETURN_PATH_START,
 }
-_BEFORE_TAKEOFF: Final = (mavlink.MAV_CMD_NAV_DELAY,)
+_BEFORE_TAKEOFF: Final = (dialect.MAV_CMD_NAV_DELAY,)
 """Items that are flown, and may precede a takeoff."""
-_LAST_FLOWN: Final = mavlink.MAV_CMD_NAV_LAST
+_LAST_FLOWN: Final = dialect.MAV_CMD_NAV_LAST
 """Commands up to this one are flown; later ones are executed on the way."""
 
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, is_geodetic
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -24,22 +24,22 @@ PARAMETERS: Final[Mapping[str, float]] = MappingProxyType({"MIS_TKO_LAND_REQ": 0
 """Parameters that the rules depend on, with the values that count where the vehicle does not have them."""
 
 VTOL_COMMANDS: Final = frozenset(
-    (mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_DO_VTOL_TRANSITION)
+    (dialect.MAV_CMD_NAV_VTOL_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_LAND, dialect.MAV_CMD_DO_VTOL_TRANSITION)
 )
-_TAKEOFFS: Final = frozenset((mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF))
-_LANDINGS: Final = frozenset((mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND))
+_TAKEOFFS: Final = frozenset((dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF))
+_LANDINGS: Final = frozenset((dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_VTOL_LAND))
 _PLACED: Final = frozenset(
     (
-        mavlink.MAV_CMD_NAV_WAYPOINT,
-        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-        mavlink.MAV_CMD_NAV_LOITER_TIME,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+        dialect.MAV_CMD_NAV_WAYPOINT,
+        dialect.MAV_CMD_NAV_LOITER_UNLIM,
+        dialect.MAV_CMD_NAV_LOITER_TIME,
+        dialect.MAV_CMD_NAV_LOITER_TO_ALT,
         *_TAKEOFFS,
         *_LANDINGS,
     )
 )
 """Items whose position PX4 reads."""
-_BEFORE_TAKEOFF: Final = frozenset((mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavlink.MAV_CMD_CONDITION_GATE))
+_BEFORE_TAKEOFF: Final = frozenset((dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_CONDITION_GATE))
 """Items that must not precede a takeoff, besides those with a position."""
 _LEAST_HEIGHT_M: Final = 1e-6
 _SLOPE_SLACK_RAD: Final = math.radians(0.1)
@@ -117,7 +117,7 @@ def _invalid_item(items: Sequence[MissionItem], landed: bool) -> str:
     """The problem of the first item that is invalid by itself; "": there is none. Unsupported commands are
     refused at the upload.
     """
-    if landed and items and items[0].command == mavlink.MAV_CMD_NAV_LAND:
+    if landed and items and items[0].command == dialect.MAV_CMD_NAV_LAND:
         return "starts with landing"
     return ""
 
@@ -166,7 +166,7 @@ def _aircraft_problems(
     approaches = (
         _approach_problem(before, land, rules, home_alt_m)
         for before, land in pairwise(items)
-        if land.command == mavlink.MAV_CMD_NAV_LAND
+        if land.command == dialect.MAV_CMD_NAV_LAND
     )
     problems += [problem for problem in approaches if problem][:1]
     return problems
@@ -176,7 +176,7 @@ def _sequence_problem(items: Sequence[MissionItem]) -> str:
     """The problem of DO_LAND_START and of what follows it; "": there is none."""
     start = landing = -1
     for seq, item in enumerate(items):
-        if item.command == mavlink.MAV_CMD_DO_LAND_START:
+        if item.command == dialect.MAV_CMD_DO_LAND_START:
             if start >= 0:
                 return "more than one land start commands"
             start = seq
@@ -184,7 +184,7 @@ def _sequence_problem(items: Sequence[MissionItem]) -> str:
             if seq == 0:
                 return "starts with landing"
             landing = seq
-        elif item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH and start >= 0:
+        elif item.command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH and start >= 0:
             return "land start item before RTL item is not possible"
     return "invalid land start" if start >= 0 and start >= landing else ""
 
@@ -202,12 +202,12 @@ def _approach_problem(
         return "the approach waypoint must be above the landing point"
     frame = LocalFrame(GeodeticPosition(lat_deg=land.x, lon_deg=land.y, alt_m=0.0))
     distance_m = math.hypot(*frame.ned_from_geodetic(entry.x, entry.y, 0.0)[:2])
-    if entry.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT:
+    if entry.command == dialect.MAV_CMD_NAV_LOITER_TO_ALT:
         radius_m = abs(entry.param2) if math.isfinite(entry.param2) else 0.0
         if distance_m <= radius_m:
             return "the landing point must be outside the orbit radius"
         distance_m = math.sqrt(distance_m**2 - radius_m**2)  # it leaves the circle along a tangent
-    elif entry.command != mavlink.MAV_CMD_NAV_WAYPOINT:
+    elif entry.command != dialect.MAV_CMD_NAV_WAYPOINT:
         return "unsupported landing approach entrance waypoint type. Only ORBIT_TO_ALT or WAYPOINT allowed"
     if descent_m > distance_m * math.tan(rules.landing_angle_rad + _SLOPE_SLACK_RAD):
         return (

@@ -10,8 +10,7 @@ from collections.abc import Callable
 from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives, streams
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.camera_scan import CameraScan, camera_scan_message
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_commands import CameraCommands
@@ -69,27 +68,27 @@ class CameraComponent(CameraActions):
 
     # inside
 
-    @streams(mavlink.MAVLink_camera_information_message)
+    @streams(dialect.MAVLink_camera_information_message)
     def _information(self, time_us: int) -> MAVLinkMessage:
         return information(self)
 
-    @streams(mavlink.MAVLink_camera_capture_status_message)
+    @streams(dialect.MAVLink_camera_capture_status_message)
     def _capture_status(self, time_us: int) -> MAVLinkMessage:
         return capture_status(self, time_us)
 
-    @streams(mavlink.MAVLink_storage_information_message)
+    @streams(dialect.MAVLink_storage_information_message)
     def _storage_information(self, time_us: int) -> MAVLinkMessage:
         return self.storage.message(self.time_ms)
 
-    @streams(mavlink.MAVLink_camera_fov_status_message)
+    @streams(dialect.MAVLink_camera_fov_status_message)
     def _fov_status(self, time_us: int) -> MAVLinkMessage:
         return fov_status(self, time_us)
 
-    @streams(mavlink.MAVLink_camera_tracking_image_status_message)
+    @streams(dialect.MAVLink_camera_tracking_image_status_message)
     def _tracking_image_status(self, time_us: int) -> MAVLinkMessage:
         return self.tracker.message()
 
-    @streams(mavlink.MAVLink_camera_tracking_geo_status_message)
+    @streams(dialect.MAVLink_camera_tracking_geo_status_message)
     def _tracking_geo_status(self, time_us: int) -> MAVLinkMessage:
         return tracking_geo_status(self, time_us)
 
@@ -97,7 +96,7 @@ class CameraComponent(CameraActions):
     def _follow_vehicle(self, message: Report, sender: Sender, time_us: int) -> None:
         if (
             self.vehicle.handle(message, sender, time_us)
-            and isinstance(message, mavlink.MAVLink_global_position_int_message)
+            and isinstance(message, dialect.MAVLink_global_position_int_message)
             and self.trigger.travelled(self.vehicle.velocity_ned_m_s, time_us)
         ):
             self.take_photo()

@@ -1,8 +1,7 @@
 """What commands make the camera component do: photos, videos, and the reports of them."""
 
 from autopilot_bridge.dispatch import streams
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.payload.camera_messages import capture_status, image_captured, photo_notes
 from autopilot_bridge.payload.camera_state import CameraState
 from autopilot_bridge.payload.camera_storage import VIDEO_MIB_S
@@ -60,9 +59,9 @@ class CameraActions(CameraState):
         """Send CAMERA_CAPTURE_STATUS."""
         self.send(capture_status(self, self._time_us))
 
-    @streams(mavlink.MAVLink_camera_settings_message)
+    @streams(dialect.MAVLink_camera_settings_message)
     def _settings(self, time_us: int) -> MAVLinkMessage:
-        return mavlink.MAVLink_camera_settings_message(
+        return dialect.MAVLink_camera_settings_message(
             time_boot_ms=self.time_ms,
             mode_id=self.mode,
             zoomLevel=self.lens.zoom_percent,

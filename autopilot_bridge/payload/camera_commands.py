@@ -5,26 +5,26 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from autopilot_bridge.dispatch import command, on_request
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_definition import CameraDefinition
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, STORAGE_ID
 from autopilot_bridge.payload.camera_video import STREAM_ID, VideoStream
 from autopilot_bridge.payload.component import CommandMessage, Sender, parameters, whole
 
-_ACCEPTED: Final = int(mavlink.MAV_RESULT_ACCEPTED)
-_DENIED: Final = int(mavlink.MAV_RESULT_DENIED)
-_FAILED: Final = int(mavlink.MAV_RESULT_FAILED)
-_REJECTED: Final = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-_UNSUPPORTED: Final = int(mavlink.MAV_RESULT_UNSUPPORTED)
-_MODES: Final = (mavlink.CAMERA_MODE_IMAGE, mavlink.CAMERA_MODE_VIDEO, mavlink.CAMERA_MODE_IMAGE_SURVEY)
+_ACCEPTED: Final = int(dialect.MAV_RESULT_ACCEPTED)
+_DENIED: Final = int(dialect.MAV_RESULT_DENIED)
+_FAILED: Final = int(dialect.MAV_RESULT_FAILED)
+_REJECTED: Final = int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+_UNSUPPORTED: Final = int(dialect.MAV_RESULT_UNSUPPORTED)
+_MODES: Final = (dialect.CAMERA_MODE_IMAGE, dialect.CAMERA_MODE_VIDEO, dialect.CAMERA_MODE_IMAGE_SURVEY)
 _REPEATED_US: Final = 3_000_000  # a single photo requested again within this time is the same photo
 _MAX_STATUS_HZ: Final = 50.0
 _OLD_REQUESTS: Final[Mapping[int, int]] = {
-    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION,
-    mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS,
-    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
-    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+    dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION: dialect.MAVLINK_MSG_ID_CAMERA_INFORMATION,
+    dialect.MAV_CMD_REQUEST_CAMERA_SETTINGS: dialect.MAVLINK_MSG_ID_CAMERA_SETTINGS,
+    dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
+    dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION: dialect.MAVLINK_MSG_ID_STORAGE_INFORMATION,
 }
 
 
@@ -38,7 +38,7 @@ class CameraCommands:
 
     # photos and videos
 
-    @command(mavlink.MAV_CMD_IMAGE_START_CAPTURE)
+    @command(dialect.MAV_CMD_IMAGE_START_CAPTURE)
     def _start_capture(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 camera, p2 interval s, p3 number of photos (0: unlimited), p4 sequence number of a single
         photo.
@@ -66,13 +66,13 @@ class CameraCommands:
         last = self._newest_single
         return last is not None and last[:2] == single[:2] and single[2] - last[2] < _REPEATED_US
 
-    @command(mavlink.MAV_CMD_IMAGE_STOP_CAPTURE)
+    @command(dialect.MAV_CMD_IMAGE_STOP_CAPTURE)
     def _stop_capture(self, message: CommandMessage, sender: Sender) -> int | None:
         self._camera.trigger.stop()
         self._camera.send_status()
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_VIDEO_START_CAPTURE)
+    @command(dialect.MAV_CMD_VIDEO_START_CAPTURE)
     def _start_video(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 stream (0: all), p2 rate of the status messages during the video, Hz."""
         stream, status_hz, *_ = parameters(message)
@@ -82,14 +82,14 @@ class CameraCommands:
             return _REJECTED
         return _ACCEPTED if self._camera.start_recording(status_hz) else _FAILED
 
-    @command(mavlink.MAV_CMD_VIDEO_STOP_CAPTURE)
+    @command(dialect.MAV_CMD_VIDEO_STOP_CAPTURE)
     def _stop_video(self, message: CommandMessage, sender: Sender) -> int | None:
         if whole(message.param1, -1) not in (0, STREAM_ID):
             return _DENIED
         self._camera.stop_recording()
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_TRIGGER_CONTROL)
+    @command(dialect.MAV_CMD_DO_TRIGGER_CONTROL)
     def _trigger_control(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 enable (1, 0, -1: unchanged), p2 reset the sequence (1), p3 pause (1, 0, -1: unchanged)."""
         enable, reset, pause = (whole(value, -1) for value in parameters(message)[:3])
@@ -104,7 +104,7 @@ class CameraCommands:
             self._newest_single = None
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST)
+    @command(dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST)
     def _trigger_distance(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 metres between photos (0: off, -1: unchanged), p3 one photo at once (1)."""
         distance_m, _, at_once, *_ = parameters(message)
@@ -114,7 +114,7 @@ class CameraCommands:
             self._camera.take_photo()
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL)
+    @command(dialect.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL)
     def _trigger_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 milliseconds between photos (0: off, -1: unchanged)."""
         if message.param1 == -1.0:
@@ -122,12 +122,12 @@ class CameraCommands:
         accepted = self._camera.trigger.set_cycle(1e-3 * message.param1, self._camera.time_us)
         return _ACCEPTED if accepted else _DENIED
 
-    @command(mavlink.MAV_CMD_DO_DIGICAM_CONTROL)
+    @command(dialect.MAV_CMD_DO_DIGICAM_CONTROL)
     def _digicam(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_DIGICAM_CONTROL: p3 zoom step, p4 focus lock, p5 shoot (1)."""
         values = parameters(message)
         step, shoot = values[2], whole(values[4], 0)
-        if math.isfinite(step) and step != 0.0 and self._camera.lens.zoom(mavlink.ZOOM_TYPE_STEP, step):
+        if math.isfinite(step) and step != 0.0 and self._camera.lens.zoom(dialect.ZOOM_TYPE_STEP, step):
             self._camera.move_lens()
         if shoot == 1 and not self._camera.take_photo():
             return _FAILED
@@ -135,7 +135,7 @@ class CameraCommands:
 
     # settings
 
-    @command(mavlink.MAV_CMD_SET_CAMERA_MODE)
+    @command(dialect.MAV_CMD_SET_CAMERA_MODE)
     def _set_mode(self, message: CommandMessage, sender: Sender) -> int | None:
         mode = whole(message.param2, -1)
         if mode not in _MODES:
@@ -145,12 +145,12 @@ class CameraCommands:
         self._definition.report("CAM_MODE")
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_SET_CAMERA_ZOOM)
+    @command(dialect.MAV_CMD_SET_CAMERA_ZOOM)
     def _zoom(self, message: CommandMessage, sender: Sender) -> int | None:
         lens = self._camera.lens
         return self._drive_lens(message, lens.zoom if lens.has_zoom else None)
 
-    @command(mavlink.MAV_CMD_SET_CAMERA_FOCUS)
+    @command(dialect.MAV_CMD_SET_CAMERA_FOCUS)
     def _focus(self, message: CommandMessage, sender: Sender) -> int | None:
         lens = self._camera.lens
         return self._drive_lens(message, lens.focus if lens.has_focus else None)
@@ -164,17 +164,17 @@ class CameraCommands:
         self._camera.move_lens()
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_RESET_CAMERA_SETTINGS)
+    @command(dialect.MAV_CMD_RESET_CAMERA_SETTINGS)
     def _reset(self, message: CommandMessage, sender: Sender) -> int | None:
         if whole(message.param1, 0) != 1:
             return _DENIED
-        self._camera.mode = int(mavlink.CAMERA_MODE_IMAGE)
+        self._camera.mode = int(dialect.CAMERA_MODE_IMAGE)
         self._camera.lens.reset()
         self._camera.photo_quality = PHOTO_QUALITY
         self._camera.send_settings()
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_STORAGE_FORMAT)
+    @command(dialect.MAV_CMD_STORAGE_FORMAT)
     def _format(self, message: CommandMessage, sender: Sender) -> int | None:
         """p1 storage, p2 format (1), p3 count photos from 0 again (1)."""
         camera = self._camera
@@ -190,11 +190,11 @@ class CameraCommands:
 
     # the stream
 
-    @command(mavlink.MAV_CMD_VIDEO_START_STREAMING)
+    @command(dialect.MAV_CMD_VIDEO_START_STREAMING)
     def _start_streaming(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._set_streaming(message.param1, True)
 
-    @command(mavlink.MAV_CMD_VIDEO_STOP_STREAMING)
+    @command(dialect.MAV_CMD_VIDEO_STOP_STREAMING)
     def _stop_streaming(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._set_streaming(message.param1, False)
 
@@ -205,11 +205,11 @@ class CameraCommands:
 
         return self._with_stream(number, switch)
 
-    @on_request(mavlink.MAVLink_video_stream_information_message)
+    @on_request(dialect.MAVLink_video_stream_information_message)
     def _send_stream(self, number: float) -> int:
         return self._with_stream(number, lambda stream, fov: self._camera.send(stream.information(fov)))
 
-    @on_request(mavlink.MAVLink_video_stream_status_message)
+    @on_request(dialect.MAVLink_video_stream_status_message)
     def _send_stream_status(self, number: float) -> int:
         def report(stream: VideoStream, fov_deg: float) -> None:
             # MAVSDK 4.1 requests only the status, but reads the address only from the information
@@ -230,12 +230,12 @@ class CameraCommands:
 
     # tracking
 
-    @command(mavlink.MAV_CMD_CAMERA_TRACK_POINT)
+    @command(dialect.MAV_CMD_CAMERA_TRACK_POINT)
     def _track_point(self, message: CommandMessage, sender: Sender) -> int | None:
         x, y, radius, *_ = parameters(message)
         return self._tracked(self._camera.tracker.follow_point(x, y, radius))
 
-    @command(mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE)
+    @command(dialect.MAV_CMD_CAMERA_TRACK_RECTANGLE)
     def _track_rectangle(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._tracked(self._camera.tracker.follow_rectangle(*parameters(message)[:4]))
 
@@ -243,7 +243,7 @@ class CameraCommands:
         self._camera.send(self._camera.tracker.message())
         return _ACCEPTED if tracks else _FAILED
 
-    @command(mavlink.MAV_CMD_CAMERA_STOP_TRACKING)
+    @command(dialect.MAV_CMD_CAMERA_STOP_TRACKING)
     def _stop_tracking(self, message: CommandMessage, sender: Sender) -> int | None:
         self._camera.tracker.stop()
         self._camera.send(self._camera.tracker.message())
@@ -251,11 +251,11 @@ class CameraCommands:
 
     # data requested again
 
-    @command(mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE)
+    @command(dialect.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE)
     def _old_photo(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_photo(message.param1)
 
-    @on_request(mavlink.MAVLink_camera_image_captured_message)
+    @on_request(dialect.MAVLink_camera_image_captured_message)
     def _send_photo(self, index: float) -> int:
         """CAMERA_IMAGE_CAPTURED of a photo by its index; -1: the newest."""
         storage, number = self._camera.storage, whole(index, -2)
@@ -265,7 +265,7 @@ class CameraCommands:
         self._camera.send(message)
         return _ACCEPTED
 
-    @on_request(mavlink.MAVLink_storage_information_message)
+    @on_request(dialect.MAVLink_storage_information_message)
     def _send_storage(self, number: float) -> int:
         if whole(number, -1) not in (0, STORAGE_ID):
             return _DENIED
@@ -277,10 +277,10 @@ class CameraCommands:
         """Commands that are older than REQUEST_MESSAGE."""
         return self._camera.request(_OLD_REQUESTS[message.command])
 
-    @command(mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION)
+    @command(dialect.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION)
     def _old_stream_information(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_stream(message.param1)
 
-    @command(mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS)
+    @command(dialect.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS)
     def _old_stream_status(self, message: CommandMessage, sender: Sender) -> int | None:
         return self._send_stream_status(message.param1)

@@ -11,8 +11,7 @@ from typing import Final
 from xml.etree import ElementTree
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.payload.camera_actions import CameraActions
 from autopilot_bridge.payload.camera_messages import DEFINITION_FILE, DEFINITION_VERSION
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY
@@ -22,9 +21,9 @@ from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.storage.generated import GeneratedStore
 
 _TICK_US: Final = 20_000
-_UINT8: Final = int(mavlink.MAV_PARAM_EXT_TYPE_UINT8)
-_ACCEPTED: Final = int(mavlink.PARAM_ACK_ACCEPTED)
-_UNKNOWN: Final = int(mavlink.PARAM_ACK_VALUE_UNSUPPORTED)
+_UINT8: Final = int(dialect.MAV_PARAM_EXT_TYPE_UINT8)
+_ACCEPTED: Final = int(dialect.PARAM_ACK_ACCEPTED)
+_UNKNOWN: Final = int(dialect.PARAM_ACK_VALUE_UNSUPPORTED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,22 +63,22 @@ class CameraDefinition:
         """Send a message of the file service (which uses this object as its channel)."""
         self._camera.send(message)
 
-    @receives(mavlink.MAVLink_file_transfer_protocol_message)
+    @receives(dialect.MAVLink_file_transfer_protocol_message)
     def _on_transfer(
-        self, message: mavlink.MAVLink_file_transfer_protocol_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_file_transfer_protocol_message, sender: Sender, time_us: int
     ) -> None:
         self._files.on_transfer(message, Source(self, *sender), time_us)
         self._next_tick_us = time_us
 
-    @receives(mavlink.MAVLink_param_ext_request_list_message)
+    @receives(dialect.MAVLink_param_ext_request_list_message)
     def _on_list(
-        self, message: mavlink.MAVLink_param_ext_request_list_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_param_ext_request_list_message, sender: Sender, time_us: int
     ) -> None:
         self._list = list(range(len(self.settings)))
 
-    @receives(mavlink.MAVLink_param_ext_request_read_message)
+    @receives(dialect.MAVLink_param_ext_request_read_message)
     def _on_read(
-        self, message: mavlink.MAVLink_param_ext_request_read_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_param_ext_request_read_message, sender: Sender, time_us: int
     ) -> None:
         index = message.param_index
         if index == -1:
@@ -102,8 +101,8 @@ class CameraDefinition:
     def _index(self, name: str) -> int:
         return next((i for i, setting in enumerate(self.settings) if setting.name == name), -1)
 
-    @receives(mavlink.MAVLink_param_ext_set_message)
-    def _on_set(self, message: mavlink.MAVLink_param_ext_set_message, sender: Sender, time_us: int) -> None:
+    @receives(dialect.MAVLink_param_ext_set_message)
+    def _on_set(self, message: dialect.MAVLink_param_ext_set_message, sender: Sender, time_us: int) -> None:
         index = self._index(message.param_id)
         value, result = -1, _UNKNOWN
         if index >= 0:
@@ -114,7 +113,7 @@ class CameraDefinition:
                 result = _ACCEPTED
             value = setting.get()
         self._camera.send(
-            mavlink.MAVLink_param_ext_ack_message(
+            dialect.MAVLink_param_ext_ack_message(
                 param_id=_text(message.param_id),
                 param_value=_bytes(max(0, value)),
                 param_type=_UINT8,
@@ -125,7 +124,7 @@ class CameraDefinition:
     def _send_setting(self, index: int) -> None:
         setting = self.settings[index]
         self._camera.send(
-            mavlink.MAVLink_param_ext_value_message(
+            dialect.MAVLink_param_ext_value_message(
                 param_id=setting.name.encode(),
                 param_value=_bytes(setting.get()),
                 param_type=_UINT8,
@@ -165,7 +164,7 @@ def _settings(camera: CameraActions) -> tuple[CameraSetting, ...]:
         camera.photo_quality = quality
 
     def set_autofocus(on: int) -> None:
-        kind = mavlink.FOCUS_TYPE_AUTO_CONTINUOUS if on else mavlink.FOCUS_TYPE_AUTO_SINGLE
+        kind = dialect.FOCUS_TYPE_AUTO_CONTINUOUS if on else dialect.FOCUS_TYPE_AUTO_SINGLE
         if camera.lens.focus(kind, math.nan):
             camera.send_settings()
 
@@ -173,7 +172,7 @@ def _settings(camera: CameraActions) -> tuple[CameraSetting, ...]:
         CameraSetting(
             name="CAM_MODE",
             description="Camera mode",
-            default=int(mavlink.CAMERA_MODE_IMAGE),
+            default=int(dialect.CAMERA_MODE_IMAGE),
             options=(("Photo", 0), ("Video", 1), ("Survey", 2)),
             get=lambda: camera.mode,
             set=set_mode,

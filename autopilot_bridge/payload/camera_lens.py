@@ -7,7 +7,7 @@ nearest distance (0) to infinity (100), linear in 1 / distance.
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from flightsim.payload import Camera
 
 _ZOOM_STEP: Final = 1.25
@@ -80,22 +80,22 @@ class CameraLens:
         if not (self.has_zoom and math.isfinite(value)):
             return False
         camera, longest = self._camera, self._camera.parameters.max_zoom
-        if kind == mavlink.ZOOM_TYPE_STEP:
+        if kind == dialect.ZOOM_TYPE_STEP:
             camera.zoom = camera.zoom * _ZOOM_STEP ** max(-20.0, min(20.0, value))
-        elif kind == mavlink.ZOOM_TYPE_CONTINUOUS:
+        elif kind == dialect.ZOOM_TYPE_CONTINUOUS:
             if abs(value) > 1.0:
                 return False
             self._zoom_rate = value
             return True
-        elif kind == mavlink.ZOOM_TYPE_RANGE:
+        elif kind == dialect.ZOOM_TYPE_RANGE:
             if not 0.0 <= value <= 100.0:
                 return False
             camera.zoom = 1.0 + 0.01 * value * (longest - 1.0)
-        elif kind == mavlink.ZOOM_TYPE_FOCAL_LENGTH:
+        elif kind == dialect.ZOOM_TYPE_FOCAL_LENGTH:
             if not 0.99 <= value / self._focal_mm <= 1.01 * longest:
                 return False
             camera.zoom = value / self._focal_mm
-        elif kind == mavlink.ZOOM_TYPE_HORIZONTAL_FOV:
+        elif kind == dialect.ZOOM_TYPE_HORIZONTAL_FOV:
             if not 0.0 < value < 180.0:
                 return False
             zoom = 0.5 * self._sensor_width_mm / math.tan(math.radians(0.5 * value)) / self._focal_mm
@@ -111,26 +111,26 @@ class CameraLens:
         """Execute SET_CAMERA_FOCUS; False: not accepted, and nothing changed."""
         if not self.has_focus:
             return False
-        if kind in (mavlink.FOCUS_TYPE_AUTO, mavlink.FOCUS_TYPE_AUTO_CONTINUOUS):
+        if kind in (dialect.FOCUS_TYPE_AUTO, dialect.FOCUS_TYPE_AUTO_CONTINUOUS):
             self._camera.focus_distance_m = None
-        elif kind == mavlink.FOCUS_TYPE_AUTO_SINGLE:
+        elif kind == dialect.FOCUS_TYPE_AUTO_SINGLE:
             self._camera.focus_distance_m = self._camera.autofocus_m
         elif not math.isfinite(value):
             return False
-        elif kind == mavlink.FOCUS_TYPE_STEP:
+        elif kind == dialect.FOCUS_TYPE_STEP:
             self._hold()
             self._set_focus(self.focus_percent + max(-20.0, min(20.0, value)) * _FOCUS_STEP_PERCENT)
-        elif kind == mavlink.FOCUS_TYPE_CONTINUOUS:
+        elif kind == dialect.FOCUS_TYPE_CONTINUOUS:
             if abs(value) > 1.0:
                 return False
             self._hold()
             self._focus_rate = value
             return True
-        elif kind == mavlink.FOCUS_TYPE_RANGE:
+        elif kind == dialect.FOCUS_TYPE_RANGE:
             if not 0.0 <= value <= 100.0:
                 return False
             self._set_focus(value)
-        elif kind == mavlink.FOCUS_TYPE_METERS:
+        elif kind == dialect.FOCUS_TYPE_METERS:
             if not value >= self._camera.parameters.min_focus_m:
                 return False
             self._camera.focus_distance_m = value

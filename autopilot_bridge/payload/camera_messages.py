@@ -3,8 +3,7 @@
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.camera_scan import detection_message
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.mavlink.wire_units import e7, mm, place_e7
@@ -28,20 +27,20 @@ def information(camera: CameraState) -> MAVLinkMessage:
     """CAMERA_INFORMATION."""
     model = camera.device.parameters.model
     flags = (
-        mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
-        | mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
-        | mavlink.CAMERA_CAP_FLAGS_HAS_MODES
-        | mavlink.CAMERA_CAP_FLAGS_HAS_IMAGE_SURVEY_MODE
-        | mavlink.CAMERA_CAP_FLAGS_CAN_CAPTURE_IMAGE_IN_VIDEO_MODE
-        | mavlink.CAMERA_CAP_FLAGS_CAN_CAPTURE_VIDEO_IN_IMAGE_MODE
-        | mavlink.CAMERA_CAP_FLAGS_HAS_TRACKING_POINT
-        | mavlink.CAMERA_CAP_FLAGS_HAS_TRACKING_RECTANGLE
-        | mavlink.CAMERA_CAP_FLAGS_HAS_TRACKING_GEO_STATUS
+        dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+        | dialect.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
+        | dialect.CAMERA_CAP_FLAGS_HAS_MODES
+        | dialect.CAMERA_CAP_FLAGS_HAS_IMAGE_SURVEY_MODE
+        | dialect.CAMERA_CAP_FLAGS_CAN_CAPTURE_IMAGE_IN_VIDEO_MODE
+        | dialect.CAMERA_CAP_FLAGS_CAN_CAPTURE_VIDEO_IN_IMAGE_MODE
+        | dialect.CAMERA_CAP_FLAGS_HAS_TRACKING_POINT
+        | dialect.CAMERA_CAP_FLAGS_HAS_TRACKING_RECTANGLE
+        | dialect.CAMERA_CAP_FLAGS_HAS_TRACKING_GEO_STATUS
     )
-    flags |= mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM if camera.lens.has_zoom else 0
-    flags |= mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS if camera.lens.has_focus else 0
-    flags |= mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if camera.stream is not None else 0
-    return mavlink.MAVLink_camera_information_message(
+    flags |= dialect.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM if camera.lens.has_zoom else 0
+    flags |= dialect.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS if camera.lens.has_focus else 0
+    flags |= dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if camera.stream is not None else 0
+    return dialect.MAVLink_camera_information_message(
         time_boot_ms=camera.time_ms,
         vendor_name=fixed_text("flightstack", 32),
         model_name=fixed_text("simulated camera", 32),
@@ -62,7 +61,7 @@ def information(camera: CameraState) -> MAVLinkMessage:
 def capture_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     """CAMERA_CAPTURE_STATUS; between two photos of a series the camera is idle with an interval set."""
     since_us = camera.recording_since_us
-    return mavlink.MAVLink_camera_capture_status_message(
+    return dialect.MAVLink_camera_capture_status_message(
         time_boot_ms=camera.time_ms,
         image_status=2 if camera.trigger.series else 0,
         video_status=1 if since_us is not None else 0,
@@ -75,12 +74,12 @@ def capture_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
 
 def image_captured(
     camera: CameraState, time_us: int, index: int, name: str
-) -> mavlink.MAVLink_camera_image_captured_message:
+) -> dialect.MAVLink_camera_image_captured_message:
     """CAMERA_IMAGE_CAPTURED: position from the autopilot, orientation as known to the camera."""
     here = camera.vehicle.located(time_us)
     q = camera.orientation
     relative_alt_m = camera.vehicle.relative_alt_m
-    return mavlink.MAVLink_camera_image_captured_message(
+    return dialect.MAVLink_camera_image_captured_message(
         time_boot_ms=camera.time_ms,
         time_utc=camera.vehicle.unix_us(time_us),
         camera_id=0,
@@ -121,7 +120,7 @@ def fov_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
     width_rad, height_rad = camera.lens.fov_rad
     lat_camera, lon_camera, alt_camera = _dege7(here)
     lat_image, lon_image, alt_image = _dege7(ground)
-    return mavlink.MAVLink_camera_fov_status_message(
+    return dialect.MAVLink_camera_fov_status_message(
         time_boot_ms=camera.time_ms,
         lat_camera=lat_camera,
         lon_camera=lon_camera,
@@ -150,7 +149,7 @@ def tracking_geo_status(camera: CameraState, time_us: int) -> MAVLinkMessage:
             heading_rad = math.atan2(east_m, north_m)
     lat, lon, _ = _dege7(place)
     nan = math.nan
-    return mavlink.MAVLink_camera_tracking_geo_status_message(
+    return dialect.MAVLink_camera_tracking_geo_status_message(
         tracking_status=tracker.status(),
         lat=0 if place is None else lat,
         lon=0 if place is None else lon,

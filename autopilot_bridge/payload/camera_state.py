@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENT
 from autopilot_bridge.payload.camera_lens import CameraLens
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, VIDEO_MIB_S, CameraStorage
@@ -44,13 +44,13 @@ class CameraState(Component[Camera]):
     """
 
     component_id = CAMERA_COMPONENT
-    mav_type = mavlink.MAV_TYPE_CAMERA
+    mav_type = dialect.MAV_TYPE_CAMERA
 
     def __init__(self, device: Camera, *, system_id: int, send: Callable[[bytes], None]) -> None:
         super().__init__(device, system_id=system_id, send=send)
         self.stream: VideoStream | None = None
         self.keeper: PictureKeeper | None = None
-        self.mode = int(mavlink.CAMERA_MODE_IMAGE)
+        self.mode = int(dialect.CAMERA_MODE_IMAGE)
         self.lens = CameraLens(device, sensor_width_mm=SENSOR_WIDTH_MM)
         self.storage = CameraStorage()
         self.tracker = CameraTracker(device.parameters.model)

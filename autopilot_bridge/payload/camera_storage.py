@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.payload.component import fixed_text
 
 CAPACITY_MIB: Final = 32_768.0
@@ -28,7 +27,7 @@ class CameraStorage:
 
     used_mib: float = 0.0
     images: int = 0
-    log: dict[int, mavlink.MAVLink_camera_image_captured_message] = field(default_factory=dict)
+    log: dict[int, dialect.MAVLink_camera_image_captured_message] = field(default_factory=dict)
 
     @property
     def available_mib(self) -> float:
@@ -40,7 +39,7 @@ class CameraStorage:
         """There is no space for another photo."""
         return self.available_mib < IMAGE_MIB
 
-    def add_photo(self, message: mavlink.MAVLink_camera_image_captured_message) -> None:
+    def add_photo(self, message: dialect.MAVLink_camera_image_captured_message) -> None:
         """Store a photo and its message."""
         self.used_mib += IMAGE_MIB
         self.log[message.image_index] = message
@@ -57,19 +56,19 @@ class CameraStorage:
 
     def message(self, time_ms: int) -> MAVLinkMessage:
         """STORAGE_INFORMATION."""
-        return mavlink.MAVLink_storage_information_message(
+        return dialect.MAVLink_storage_information_message(
             time_boot_ms=time_ms,
             storage_id=STORAGE_ID,
             storage_count=1,
-            status=mavlink.STORAGE_STATUS_READY,
+            status=dialect.STORAGE_STATUS_READY,
             total_capacity=CAPACITY_MIB,
             used_capacity=CAPACITY_MIB - self.available_mib,
             available_capacity=self.available_mib,
             read_speed=90.0,
             write_speed=60.0,
-            type=mavlink.STORAGE_TYPE_MICROSD,
+            type=dialect.STORAGE_TYPE_MICROSD,
             name=fixed_text("simulated card", 32),
-            storage_usage=mavlink.STORAGE_USAGE_FLAG_SET
-            | mavlink.STORAGE_USAGE_FLAG_PHOTO
-            | mavlink.STORAGE_USAGE_FLAG_VIDEO,
+            storage_usage=dialect.STORAGE_USAGE_FLAG_SET
+            | dialect.STORAGE_USAGE_FLAG_PHOTO
+            | dialect.STORAGE_USAGE_FLAG_VIDEO,
         )

@@ -7,8 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from flightsim.payload import CameraFrame, Detection, PinholeModel
 
 _COASTING_US: Final = 2_000_000
@@ -39,7 +38,7 @@ class CameraTracker:
 
     def __init__(self, model: PinholeModel) -> None:
         self._model = model
-        self.mode = int(mavlink.CAMERA_TRACKING_MODE_NONE)
+        self.mode = int(dialect.CAMERA_TRACKING_MODE_NONE)
         self.thing: TrackedThing | None = None
         self._frame: CameraFrame | None = None
         self._lost = False
@@ -47,7 +46,7 @@ class CameraTracker:
     def follow_point(self, x: float, y: float, radius: float) -> bool:
         """Track the detection at a point; False: there is none."""
         reach = radius if 0.0 < radius <= 1.0 else _REACH
-        return self._begin(mavlink.CAMERA_TRACKING_MODE_POINT, x, y, max(reach, _REACH))
+        return self._begin(dialect.CAMERA_TRACKING_MODE_POINT, x, y, max(reach, _REACH))
 
     def follow_rectangle(self, left: float, top: float, right: float, bottom: float) -> bool:
         """Track the detection in a rectangle; False: there is none."""
@@ -55,11 +54,11 @@ class CameraTracker:
             return False
         half = 0.5 * max(right - left, bottom - top, 2.0 * _LEAST_SIDE)
         middle = 0.5 * (left + right), 0.5 * (top + bottom)
-        return self._begin(mavlink.CAMERA_TRACKING_MODE_RECTANGLE, *middle, half)
+        return self._begin(dialect.CAMERA_TRACKING_MODE_RECTANGLE, *middle, half)
 
     def stop(self) -> None:
         """Stop tracking."""
-        self.mode = int(mavlink.CAMERA_TRACKING_MODE_NONE)
+        self.mode = int(dialect.CAMERA_TRACKING_MODE_NONE)
         self.thing = None
         self._lost = False
 
@@ -79,15 +78,15 @@ class CameraTracker:
     def status(self) -> int:
         """CAMERA_TRACKING_STATUS_FLAGS."""
         if self.thing is None:
-            lost = mavlink.CAMERA_TRACKING_STATUS_FLAGS_ERROR
-            return int(lost if self._lost else mavlink.CAMERA_TRACKING_STATUS_FLAGS_IDLE)
+            lost = dialect.CAMERA_TRACKING_STATUS_FLAGS_ERROR
+            return int(lost if self._lost else dialect.CAMERA_TRACKING_STATUS_FLAGS_IDLE)
         fresh = self._frame is not None and self.thing.time_us == self._frame.time_us
-        active = int(mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE)
-        return active if fresh else active | int(mavlink.CAMERA_TRACKING_STATUS_FLAGS_COASTING)
+        active = int(dialect.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE)
+        return active if fresh else active | int(dialect.CAMERA_TRACKING_STATUS_FLAGS_COASTING)
 
     def message(self) -> MAVLinkMessage:
         """CAMERA_TRACKING_IMAGE_STATUS."""
-        message = mavlink.MAVLink_camera_tracking_image_status_message(
+        message = dialect.MAVLink_camera_tracking_image_status_message(
             tracking_status=self.status(),
             tracking_mode=self.mode,
             target_data=0,
@@ -102,11 +101,11 @@ class CameraTracker:
         thing = self.thing
         if thing is None:
             return message
-        message.target_data = mavlink.CAMERA_TRACKING_TARGET_DATA_IN_STATUS
+        message.target_data = dialect.CAMERA_TRACKING_TARGET_DATA_IN_STATUS
         half = max(0.5 * thing.size, 0.5 * _LEAST_SIDE)
-        if self.mode == mavlink.CAMERA_TRACKING_MODE_POINT:
+        if self.mode == dialect.CAMERA_TRACKING_MODE_POINT:
             message.point_x, message.point_y, message.radius = thing.x, thing.y, half
-        elif self.mode == mavlink.CAMERA_TRACKING_MODE_RECTANGLE:
+        elif self.mode == dialect.CAMERA_TRACKING_MODE_RECTANGLE:
             half_height = half * self._model.width_px / self._model.height_px
             message.rec_top_x, message.rec_top_y = thing.x - half, thing.y - half_height
             message.rec_bottom_x, message.rec_bottom_y = thing.x + half, thing.y + half_height

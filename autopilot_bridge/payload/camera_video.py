@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.payload.component import fixed_text
 
 STREAM_ID = 1
@@ -30,24 +29,24 @@ class VideoStream:
 
     def information(self, fov_deg: float) -> MAVLinkMessage:
         """VIDEO_STREAM_INFORMATION."""
-        return mavlink.MAVLink_video_stream_information_message(
+        return dialect.MAVLink_video_stream_information_message(
             stream_id=STREAM_ID,
             count=1,
-            type=mavlink.VIDEO_STREAM_TYPE_RTSP,
+            type=dialect.VIDEO_STREAM_TYPE_RTSP,
             **self._picture(fov_deg),
             name=fixed_text("camera", 32),
             uri=fixed_text(self.uri, 160),
-            encoding=mavlink.VIDEO_STREAM_ENCODING_H264,
+            encoding=dialect.VIDEO_STREAM_ENCODING_H264,
         )
 
     def status(self, fov_deg: float) -> MAVLinkMessage:
         """VIDEO_STREAM_STATUS."""
-        return mavlink.MAVLink_video_stream_status_message(stream_id=STREAM_ID, **self._picture(fov_deg))
+        return dialect.MAVLink_video_stream_status_message(stream_id=STREAM_ID, **self._picture(fov_deg))
 
     def _picture(self, fov_deg: float) -> dict[str, Any]:
         """The common fields of both messages."""
         return {
-            "flags": int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0,
+            "flags": int(dialect.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0,
             "framerate": self.rate_hz,
             "resolution_h": self.width_px,
             "resolution_v": self.height_px,

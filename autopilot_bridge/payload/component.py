@@ -9,8 +9,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
 from autopilot_bridge.dispatch import BUILDERS, COMMANDS, ON_DEMAND, RECEIVERS, command, streams, table_of
-from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, decode
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import Frame, FrameEncoder, MAVLinkMessage, decode, dialect
 from flightsim.payload import Device
 
 DeviceT = TypeVar("DeviceT", bound=Device[Any])
@@ -18,7 +17,7 @@ DeviceT = TypeVar("DeviceT", bound=Device[Any])
 Sender = tuple[int, int]
 """System and component."""
 
-CommandMessage = mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message
+CommandMessage = dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message
 
 Builder = Callable[[int], MAVLinkMessage]
 """Makes a message of the present state (`@streams`); takes vehicle time, microseconds."""
@@ -56,7 +55,7 @@ class Component(Generic[DeviceT]):
     """
 
     component_id: ClassVar[int]
-    mav_type: ClassVar[int] = mavlink.MAV_TYPE_ONBOARD_CONTROLLER
+    mav_type: ClassVar[int] = dialect.MAV_TYPE_ONBOARD_CONTROLLER
     rates_hz: ClassVar[Mapping[int, float]] = MappingProxyType({})
 
     def __init__(self, device: DeviceT, *, system_id: int, send: Callable[[bytes], None]) -> None:
@@ -69,7 +68,7 @@ class Component(Generic[DeviceT]):
         self._commands: dict[int, CommandHandler] = {}
         self._receivers: dict[int, Receiver] = {}
         self._add_part(self)
-        self._default_rates_hz = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **self.rates_hz}
+        self._default_rates_hz = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **self.rates_hz}
         self._intervals_us = {m: round(1e6 / rate_hz) for m, rate_hz in self._default_rates_hz.items()}
         self._due_us = dict.fromkeys(self._intervals_us, _SECOND_US)
         self.next_us = _SECOND_US
@@ -128,7 +127,7 @@ class Component(Generic[DeviceT]):
         if frame.target_component not in (0, self.component_id):
             return
         sender = (frame.system_id, frame.component_id)
-        if frame.message_id in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
+        if frame.message_id in (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT):
             message = decode(frame)
             if isinstance(message, CommandMessage):
                 self._on_command(message, sender)
@@ -140,14 +139,14 @@ class Component(Generic[DeviceT]):
         addressed = message.target_component == self.component_id
         if handler is None:
             # an unknown command to all components is not answered
-            result = mavlink.MAV_RESULT_UNSUPPORTED if addressed else None
+            result = dialect.MAV_RESULT_UNSUPPORTED if addressed else None
         else:
             result = handler(message, sender)
-            if result not in (mavlink.MAV_RESULT_ACCEPTED, None) and not addressed:
+            if result not in (dialect.MAV_RESULT_ACCEPTED, None) and not addressed:
                 result = None
         if result is not None:
             self.send(
-                mavlink.MAVLink_command_ack_message(
+                dialect.MAVLink_command_ack_message(
                     command=message.command,
                     result=result,
                     progress=0,
@@ -157,7 +156,7 @@ class Component(Generic[DeviceT]):
                 )
             )
 
-    @command(mavlink.MAV_CMD_REQUEST_MESSAGE)
+    @command(dialect.MAV_CMD_REQUEST_MESSAGE)
     def _on_request_message(self, message: CommandMessage, sender: Sender) -> int | None:
         message_id = whole(message.param1, -1)
         answer = self._answers.get(message_id)
@@ -167,20 +166,20 @@ class Component(Generic[DeviceT]):
         """Send a message now; returns the MAV_RESULT for the request."""
         builder = self._builders.get(message_id)
         if builder is None:
-            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+            return int(dialect.MAV_RESULT_UNSUPPORTED)
         self.send(builder(self._time_us))
-        return int(mavlink.MAV_RESULT_ACCEPTED)
+        return int(dialect.MAV_RESULT_ACCEPTED)
 
-    @command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+    @command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL)
     def _on_set_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         message_id = whole(message.param1, -1)
         interval_us = message.param2
         if message_id not in self._builders:
-            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+            return int(dialect.MAV_RESULT_UNSUPPORTED)
         if not math.isfinite(interval_us) or interval_us < -1.0:
-            return int(mavlink.MAV_RESULT_DENIED)
-        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:  # clients detect the device by its heartbeat
-            return int(mavlink.MAV_RESULT_DENIED)
+            return int(dialect.MAV_RESULT_DENIED)
+        if message_id == dialect.MAVLINK_MSG_ID_HEARTBEAT:  # clients detect the device by its heartbeat
+            return int(dialect.MAV_RESULT_DENIED)
         if interval_us == -1.0:
             self._intervals_us.pop(message_id, None)
             self._due_us.pop(message_id, None)
@@ -188,37 +187,37 @@ class Component(Generic[DeviceT]):
             if interval_us == 0.0:
                 rate_hz = self._default_rates_hz.get(message_id)
                 if rate_hz is None:
-                    return int(mavlink.MAV_RESULT_DENIED)
+                    return int(dialect.MAV_RESULT_DENIED)
                 interval_us = 1e6 / rate_hz
             self._intervals_us[message_id] = max(round(interval_us), round(1e6 / MAX_RATE_HZ))
             self._due_us[message_id] = self._time_us
         self.next_us = min(self._due_us.values(), default=_NEVER_US)
-        return int(mavlink.MAV_RESULT_ACCEPTED)
+        return int(dialect.MAV_RESULT_ACCEPTED)
 
-    @command(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL)
+    @command(dialect.MAV_CMD_GET_MESSAGE_INTERVAL)
     def _on_get_interval(self, message: CommandMessage, sender: Sender) -> int | None:
         message_id = whole(message.param1, -1)
         if message_id not in self._builders:
-            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+            return int(dialect.MAV_RESULT_UNSUPPORTED)
         interval_us = min(self._intervals_us.get(message_id, -1), 0x7FFFFFFF)
-        self.send(mavlink.MAVLink_message_interval_message(message_id=message_id, interval_us=interval_us))
-        return int(mavlink.MAV_RESULT_ACCEPTED)
+        self.send(dialect.MAVLink_message_interval_message(message_id=message_id, interval_us=interval_us))
+        return int(dialect.MAV_RESULT_ACCEPTED)
 
-    @streams(mavlink.MAVLink_heartbeat_message)
+    @streams(dialect.MAVLink_heartbeat_message)
     def _heartbeat(self, time_us: int) -> MAVLinkMessage:
-        return mavlink.MAVLink_heartbeat_message(
+        return dialect.MAVLink_heartbeat_message(
             type=self.mav_type,
-            autopilot=mavlink.MAV_AUTOPILOT_INVALID,
+            autopilot=dialect.MAV_AUTOPILOT_INVALID,
             base_mode=0,
             custom_mode=0,
-            system_status=mavlink.MAV_STATE_ACTIVE,
+            system_status=dialect.MAV_STATE_ACTIVE,
             mavlink_version=3,
         )
 
 
 def parameters(message: CommandMessage) -> tuple[float, ...]:
     """The seven parameters of a command, as in a COMMAND_LONG."""
-    if isinstance(message, mavlink.MAVLink_command_long_message):
+    if isinstance(message, dialect.MAVLink_command_long_message):
         last = (message.param5, message.param6, message.param7)
     else:
         last = (float(message.x), float(message.y), message.z)

@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.dispatch import command, receives, streams
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.mavlink.wire_units import degrees
 from autopilot_bridge.payload.component import CommandMessage, Component, Sender, parameters, whole
@@ -30,10 +29,10 @@ from autopilot_bridge.payload.reported_vehicle import ReportedVehicle
 from flightsim.foundation.rotations import euler_from_quaternion
 from flightsim.payload import Gimbal, GimbalFlags
 
-_ACCEPTED: Final = int(mavlink.MAV_RESULT_ACCEPTED)
-_DENIED: Final = int(mavlink.MAV_RESULT_DENIED)
-_TEMPORARILY_REJECTED: Final = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-_UNSUPPORTED: Final = int(mavlink.MAV_RESULT_UNSUPPORTED)
+_ACCEPTED: Final = int(dialect.MAV_RESULT_ACCEPTED)
+_DENIED: Final = int(dialect.MAV_RESULT_DENIED)
+_TEMPORARILY_REJECTED: Final = int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+_UNSUPPORTED: Final = int(dialect.MAV_RESULT_UNSUPPORTED)
 _DEG: Final = math.radians(1.0)
 _ROI_INTERVAL_US: Final = 50_000
 _ROI_FLAGS: Final = (
@@ -55,11 +54,11 @@ class GimbalComponent(Component[Gimbal]):
     """
 
     component_id = GIMBAL_COMPONENT
-    mav_type = mavlink.MAV_TYPE_GIMBAL
+    mav_type = dialect.MAV_TYPE_GIMBAL
     rates_hz = MappingProxyType(
         {
-            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: 10.0,
-            mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: 1.0,
+            dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: 10.0,
+            dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: 1.0,
         }
     )
 
@@ -81,26 +80,26 @@ class GimbalComponent(Component[Gimbal]):
 
     # messages
 
-    @streams(mavlink.MAVLink_gimbal_device_attitude_status_message)
+    @streams(dialect.MAVLink_gimbal_device_attitude_status_message)
     def _attitude_status(self, time_us: int) -> MAVLinkMessage:
         return attitude_status(self.device)
 
-    @streams(mavlink.MAVLink_gimbal_manager_information_message)
+    @streams(dialect.MAVLink_gimbal_manager_information_message)
     def _manager_information(self, time_us: int) -> MAVLinkMessage:
         return manager_information(self.device, self.time_ms)
 
-    @streams(mavlink.MAVLink_gimbal_device_information_message)
+    @streams(dialect.MAVLink_gimbal_device_information_message)
     def _device_information(self, time_us: int) -> MAVLinkMessage:
         return device_information(self.device, self.time_ms)
 
-    @streams(mavlink.MAVLink_mount_orientation_message)
+    @streams(dialect.MAVLink_mount_orientation_message)
     def _mount_orientation(self, time_us: int) -> MAVLinkMessage:
         return mount_orientation(self.device, self.time_ms)
 
-    @streams(mavlink.MAVLink_gimbal_manager_status_message)
+    @streams(dialect.MAVLink_gimbal_manager_status_message)
     def _manager_status(self, time_us: int) -> MAVLinkMessage:
         control = self.control
-        return mavlink.MAVLink_gimbal_manager_status_message(
+        return dialect.MAVLink_gimbal_manager_status_message(
             time_boot_ms=self.time_ms,
             flags=status_flags(self.device),
             gimbal_device_id=GIMBAL_COMPONENT,
@@ -110,40 +109,40 @@ class GimbalComponent(Component[Gimbal]):
             secondary_control_compid=control.secondary[1],
         )
 
-    @receives(mavlink.MAVLink_global_position_int_message, mavlink.MAVLink_follow_target_message)
+    @receives(dialect.MAVLink_global_position_int_message, dialect.MAVLink_follow_target_message)
     def _follow_positions(
         self,
-        message: mavlink.MAVLink_global_position_int_message | mavlink.MAVLink_follow_target_message,
+        message: dialect.MAVLink_global_position_int_message | dialect.MAVLink_follow_target_message,
         sender: Sender,
         time_us: int,
     ) -> None:
         self._vehicle.handle(message, sender, time_us)
         self.aim.handle(message, sender, time_us)
 
-    @receives(mavlink.MAVLink_gimbal_device_set_attitude_message)
+    @receives(dialect.MAVLink_gimbal_device_set_attitude_message)
     def _on_device_attitude(
-        self, message: mavlink.MAVLink_gimbal_device_set_attitude_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_gimbal_device_set_attitude_message, sender: Sender, time_us: int
     ) -> None:
         if self.control.may_point(sender):
             self._set_attitude(message)
 
-    @receives(mavlink.MAVLink_gimbal_manager_set_attitude_message)
+    @receives(dialect.MAVLink_gimbal_manager_set_attitude_message)
     def _on_manager_attitude(
-        self, message: mavlink.MAVLink_gimbal_manager_set_attitude_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_gimbal_manager_set_attitude_message, sender: Sender, time_us: int
     ) -> None:
         if self._may_point(message.gimbal_device_id, sender):
             self._set_attitude(message)
 
-    @receives(mavlink.MAVLink_gimbal_manager_set_pitchyaw_message)
+    @receives(dialect.MAVLink_gimbal_manager_set_pitchyaw_message)
     def _on_manager_pitchyaw(
-        self, message: mavlink.MAVLink_gimbal_manager_set_pitchyaw_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_gimbal_manager_set_pitchyaw_message, sender: Sender, time_us: int
     ) -> None:
         if self._may_point(message.gimbal_device_id, sender):
             self._point(message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
 
-    @receives(mavlink.MAVLink_gimbal_manager_set_manual_control_message)
+    @receives(dialect.MAVLink_gimbal_manager_set_manual_control_message)
     def _on_manual_control(
-        self, message: mavlink.MAVLink_gimbal_manager_set_manual_control_message, sender: Sender, time_us: int
+        self, message: dialect.MAVLink_gimbal_manager_set_manual_control_message, sender: Sender, time_us: int
     ) -> None:
         if self._may_point(message.gimbal_device_id, sender):
             self._steer(message)
@@ -172,7 +171,7 @@ class GimbalComponent(Component[Gimbal]):
         self.aim.clear()
         return True
 
-    def _steer(self, message: mavlink.MAVLink_gimbal_manager_set_manual_control_message) -> None:
+    def _steer(self, message: dialect.MAVLink_gimbal_manager_set_manual_control_message) -> None:
         """GIMBAL_MANAGER_SET_MANUAL_CONTROL: -1..1 of a full angle or turn rate; NaN: not given."""
         rates = [_share(value) * _MANUAL_RATE_RAD_S for value in (message.pitch_rate, message.yaw_rate)]
         angles = [
@@ -182,8 +181,8 @@ class GimbalComponent(Component[Gimbal]):
 
     def _set_attitude(
         self,
-        message: mavlink.MAVLink_gimbal_device_set_attitude_message
-        | mavlink.MAVLink_gimbal_manager_set_attitude_message,
+        message: dialect.MAVLink_gimbal_device_set_attitude_message
+        | dialect.MAVLink_gimbal_manager_set_attitude_message,
     ) -> None:
         q = [float(value) for value in message.q]
         rates = (float(message.angular_velocity_y), float(message.angular_velocity_z))
@@ -200,7 +199,7 @@ class GimbalComponent(Component[Gimbal]):
 
     # commands
 
-    @command(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)
+    @command(dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)
     def _on_pitchyaw(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_GIMBAL_MANAGER_PITCHYAW: p1..p4 in degrees and deg/s, p5 flags, p7 device."""
         pitch, yaw, pitch_rate, yaw_rate, flags, _, device = parameters(message)
@@ -211,7 +210,7 @@ class GimbalComponent(Component[Gimbal]):
         angles = (pitch * _DEG, yaw * _DEG, pitch_rate * _DEG, yaw_rate * _DEG)
         return _ACCEPTED if self._point(max(0, whole(flags, 0)), *angles) else _DENIED
 
-    @command(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
+    @command(dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
     def _on_configure(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_GIMBAL_MANAGER_CONFIGURE: the components in control, p7 device."""
         values = parameters(message)
@@ -224,16 +223,16 @@ class GimbalComponent(Component[Gimbal]):
             self.send(self._manager_status(self._time_us))
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_ROI_LOCATION)
+    @command(dialect.MAV_CMD_DO_SET_ROI_LOCATION)
     def _on_roi_location(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_LOCATION: latitude, longitude, altitude."""
-        if isinstance(message, mavlink.MAVLink_command_int_message):
+        if isinstance(message, dialect.MAVLink_command_int_message):
             place = (degrees(message.x), degrees(message.y), message.z, message.frame)
         else:
-            place = (message.param5, message.param6, message.param7, mavlink.MAV_FRAME_GLOBAL)
+            place = (message.param5, message.param6, message.param7, dialect.MAV_FRAME_GLOBAL)
         return self._look_at(*place, sender)
 
-    @command(mavlink.MAV_CMD_DO_SET_ROI_SYSID)
+    @command(dialect.MAV_CMD_DO_SET_ROI_SYSID)
     def _on_roi_system(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI_SYSID: p1 the system."""
         system_id = whole(message.param1, 0)
@@ -242,7 +241,7 @@ class GimbalComponent(Component[Gimbal]):
         self.aim.follow(system_id)
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_ROI_NONE)
+    @command(dialect.MAV_CMD_DO_SET_ROI_NONE)
     def _on_roi_none(self, message: CommandMessage, sender: Sender) -> int | None:
         if not self.control.may_point(sender):
             return _DENIED
@@ -250,15 +249,15 @@ class GimbalComponent(Component[Gimbal]):
         self.device.command()
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_ROI)
+    @command(dialect.MAV_CMD_DO_SET_ROI)
     def _on_old_roi(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_SET_ROI: p1 MAV_ROI; targets at waypoints are left to the autopilot, which has the mission."""
         match whole(message.param1, -1):
-            case mavlink.MAV_ROI_NONE:
+            case dialect.MAV_ROI_NONE:
                 return self._on_roi_none(message, sender)
-            case mavlink.MAV_ROI_LOCATION:
+            case dialect.MAV_ROI_LOCATION:
                 return self._on_roi_location(message, sender)
-            case mavlink.MAV_ROI_TARGET:
+            case dialect.MAV_ROI_TARGET:
                 return _UNSUPPORTED
         return _DENIED
 
@@ -273,42 +272,42 @@ class GimbalComponent(Component[Gimbal]):
         self._next_roi_us = self._time_us
         return _ACCEPTED if looks else _DENIED
 
-    @command(mavlink.MAV_CMD_DO_MOUNT_CONFIGURE)
+    @command(dialect.MAV_CMD_DO_MOUNT_CONFIGURE)
     def _on_mount_configure(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_MOUNT_CONFIGURE: p1 MAV_MOUNT_MODE."""
         if not self.control.may_point(sender):
             return _DENIED
         match whole(message.param1, -1):
-            case mavlink.MAV_MOUNT_MODE_RETRACT:
+            case dialect.MAV_MOUNT_MODE_RETRACT:
                 self._point(int(GimbalFlags.RETRACT), _NAN, _NAN, _NAN, _NAN)
-            case mavlink.MAV_MOUNT_MODE_NEUTRAL:
+            case dialect.MAV_MOUNT_MODE_NEUTRAL:
                 self._point(int(GimbalFlags.NEUTRAL), 0.0, 0.0, _NAN, _NAN)
-            case mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING | mavlink.MAV_MOUNT_MODE_GPS_POINT:
+            case dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING | dialect.MAV_MOUNT_MODE_GPS_POINT:
                 pass  # DO_MOUNT_CONTROL gives the direction
             case _:
                 return _UNSUPPORTED
         return _ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_MOUNT_CONTROL)
+    @command(dialect.MAV_CMD_DO_MOUNT_CONTROL)
     def _on_mount_control(self, message: CommandMessage, sender: Sender) -> int | None:
         """DO_MOUNT_CONTROL: p1 pitch, p2 roll, p3 yaw, degrees, or p4..p6 a position; p7 MAV_MOUNT_MODE."""
         pitch, roll, yaw, alt_m, lat_deg, lon_deg, mode = parameters(message)
         if not self.control.may_point(sender):
             return _DENIED
         match whole(mode, -1):
-            case mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING:
+            case dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
                 leans = math.isfinite(roll) and abs(roll) <= 180.0
                 turned = self._point(
                     _LEVEL, pitch * _DEG, yaw * _DEG, _NAN, _NAN, roll * _DEG if leans else 0.0
                 )
                 return _ACCEPTED if turned else _DENIED
-            case mavlink.MAV_MOUNT_MODE_GPS_POINT:
-                if isinstance(message, mavlink.MAVLink_command_int_message):
+            case dialect.MAV_MOUNT_MODE_GPS_POINT:
+                if isinstance(message, dialect.MAVLink_command_int_message):
                     lat_deg, lon_deg = degrees(lat_deg), degrees(lon_deg)
-                return self._look_at(lat_deg, lon_deg, alt_m, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, sender)
-            case mavlink.MAV_MOUNT_MODE_RETRACT:
+                return self._look_at(lat_deg, lon_deg, alt_m, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, sender)
+            case dialect.MAV_MOUNT_MODE_RETRACT:
                 self._point(int(GimbalFlags.RETRACT), _NAN, _NAN, _NAN, _NAN)
-            case mavlink.MAV_MOUNT_MODE_NEUTRAL:
+            case dialect.MAV_MOUNT_MODE_NEUTRAL:
                 self._point(int(GimbalFlags.NEUTRAL), 0.0, 0.0, _NAN, _NAN)
             case _:
                 return _UNSUPPORTED

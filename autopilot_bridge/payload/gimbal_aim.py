@@ -3,8 +3,7 @@
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.wire_units import degrees, metres, velocity_of
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
 from autopilot_bridge.payload.reported_vehicle import STALE_US, ReportedVehicle
@@ -63,10 +62,10 @@ class GimbalAim:
         if sender[0] != self.system_id or not self.system_id:
             return
         match message:
-            case mavlink.MAVLink_global_position_int_message():
+            case dialect.MAVLink_global_position_int_message():
                 alt_m = metres(message.alt)
                 velocity = velocity_of(message)
-            case mavlink.MAVLink_follow_target_message() if message.est_capabilities & _HAS_POSITION:
+            case dialect.MAVLink_follow_target_message() if message.est_capabilities & _HAS_POSITION:
                 alt_m = float(message.alt)
                 moves = message.est_capabilities & _HAS_VELOCITY
                 north, east, down = message.vel if moves else (0.0, 0.0, 0.0)

@@ -3,31 +3,30 @@
 import math
 from typing import Any, Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from autopilot_bridge.payload.component import fixed_text
 from flightsim.foundation.vectors import euler_of, yaw_of
 from flightsim.payload import Gimbal, GimbalFlags
 
 _CAPABILITIES: Final = int(
-    mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_RETRACT
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_NEUTRAL
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_FOLLOW
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_LOCK
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_FOLLOW
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME
+    dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_RETRACT
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_NEUTRAL
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_FOLLOW
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_LOCK
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_FOLLOW
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME
 )
 _ROLL_CAPABILITIES: Final = int(
-    mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_LOCK
-    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_FOLLOW
+    dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_LOCK
+    | dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_FOLLOW
 )
-_ENDLESS: Final = int(mavlink.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_INFINITE_YAW)
-_POINTS_AT_PLACE: Final = int(mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
+_ENDLESS: Final = int(dialect.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_INFINITE_YAW)
+_POINTS_AT_PLACE: Final = int(dialect.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
 
 
 def status_flags(gimbal: Gimbal) -> int:
@@ -35,7 +34,7 @@ def status_flags(gimbal: Gimbal) -> int:
     flags = int(gimbal.flags) & ~int(GimbalFlags.YAW_IN_VEHICLE_FRAME | GimbalFlags.YAW_IN_EARTH_FRAME)
     locked = flags & GimbalFlags.YAW_LOCK
     frame = GimbalFlags.YAW_IN_EARTH_FRAME if locked else GimbalFlags.YAW_IN_VEHICLE_FRAME
-    return flags | int(frame) | int(mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
+    return flags | int(frame) | int(dialect.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
 
 
 def attitude_status(gimbal: Gimbal) -> MAVLinkMessage:
@@ -45,10 +44,10 @@ def attitude_status(gimbal: Gimbal) -> MAVLinkMessage:
     earth, vehicle = gimbal.measured_q_ned_from_gimbal, gimbal.measured_q_heading_from_gimbal
     delta_yaw = math.remainder(yaw_of(earth.tolist()) - yaw_of(vehicle.tolist()), math.tau)
     rates = gimbal.measured_rates_rad_s.tolist()
-    failure = mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT if gimbal.limits_reached[1] else 0
-    failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT if gimbal.limits_reached[2] else 0
-    failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT if gimbal.limits_reached[0] else 0
-    return mavlink.MAVLink_gimbal_device_attitude_status_message(
+    failure = dialect.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT if gimbal.limits_reached[1] else 0
+    failure |= dialect.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT if gimbal.limits_reached[2] else 0
+    failure |= dialect.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT if gimbal.limits_reached[0] else 0
+    return dialect.MAVLink_gimbal_device_attitude_status_message(
         target_system=0,
         target_component=0,
         time_boot_ms=(max(0, gimbal.time_us) // 1000) & 0xFFFFFFFF,
@@ -67,7 +66,7 @@ def attitude_status(gimbal: Gimbal) -> MAVLinkMessage:
 def mount_orientation(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """MOUNT_ORIENTATION, of the protocol's first version: roll and pitch against the horizon, degrees."""
     roll, pitch, yaw = euler_of(gimbal.measured_q_heading_from_gimbal.tolist())
-    return mavlink.MAVLink_mount_orientation_message(
+    return dialect.MAVLink_mount_orientation_message(
         time_boot_ms=time_ms,
         roll=math.degrees(roll),
         pitch=math.degrees(pitch),
@@ -79,14 +78,14 @@ def mount_orientation(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
 def manager_information(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """GIMBAL_MANAGER_INFORMATION."""
     capabilities = _device_capabilities(gimbal) | _POINTS_AT_PLACE
-    return mavlink.MAVLink_gimbal_manager_information_message(
+    return dialect.MAVLink_gimbal_manager_information_message(
         time_boot_ms=time_ms, cap_flags=capabilities, gimbal_device_id=GIMBAL_COMPONENT, **_limits(gimbal)
     )
 
 
 def device_information(gimbal: Gimbal, time_ms: int) -> MAVLinkMessage:
     """GIMBAL_DEVICE_INFORMATION."""
-    return mavlink.MAVLink_gimbal_device_information_message(
+    return dialect.MAVLink_gimbal_device_information_message(
         time_boot_ms=time_ms,
         vendor_name=fixed_text("flightstack", 32),
         model_name=fixed_text("simulated gimbal", 32),

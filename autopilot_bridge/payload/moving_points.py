@@ -2,7 +2,7 @@
 (`autopilot_bridge.mavlink.moving_points`, docs/mavlink/moving_points.md).
 """
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import MOVING_POINT_COMPONENT
 from autopilot_bridge.mavlink.moving_points import moving_points_messages
 from autopilot_bridge.payload.component import Component
@@ -13,7 +13,7 @@ class MovingPointComponent(Component[MovingPointCamera]):
     """Sends every scan when it is delivered, with the standard deviation that the camera states."""
 
     component_id = MOVING_POINT_COMPONENT
-    mav_type = mavlink.MAV_TYPE_CAMERA
+    mav_type = dialect.MAV_TYPE_CAMERA
 
     def update(self, reading: MovingPointScan) -> None:
         """Send a scan that was delivered on this step."""

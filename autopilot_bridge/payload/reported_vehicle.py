@@ -3,18 +3,17 @@
 import math
 from typing import Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.wire_units import heading_of, metres, place_of, velocity_of
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.vectors import Quaternion, from_euler
 
 Report = (
-    mavlink.MAVLink_global_position_int_message
-    | mavlink.MAVLink_attitude_message
-    | mavlink.MAVLink_system_time_message
-    | mavlink.MAVLink_heartbeat_message
+    dialect.MAVLink_global_position_int_message
+    | dialect.MAVLink_attitude_message
+    | dialect.MAVLink_system_time_message
+    | dialect.MAVLink_heartbeat_message
 )
 """The messages that are used."""
 STALE_US: Final = 3_000_000
@@ -48,18 +47,18 @@ class ReportedVehicle:
         if sender != (self._system_id, AUTOPILOT_COMPONENT):
             return False
         match message:
-            case mavlink.MAVLink_global_position_int_message():
+            case dialect.MAVLink_global_position_int_message():
                 return self._note_position(message, time_us)
-            case mavlink.MAVLink_attitude_message():
+            case dialect.MAVLink_attitude_message():
                 if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
                     return False
                 self.q_ned_from_frd = from_euler(message.roll, message.pitch, message.yaw)
-            case mavlink.MAVLink_system_time_message():
+            case dialect.MAVLink_system_time_message():
                 if message.time_unix_usec == 0:
                     return False
                 self._unix_minus_boot_us = message.time_unix_usec - time_us
-            case mavlink.MAVLink_heartbeat_message():
-                self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+            case dialect.MAVLink_heartbeat_message():
+                self.armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
             case _:
                 return False
         return True
@@ -77,7 +76,7 @@ class ReportedVehicle:
         """Unix time, microseconds; 0: not known."""
         return 0 if self._unix_minus_boot_us is None else time_us + self._unix_minus_boot_us
 
-    def _note_position(self, message: mavlink.MAVLink_global_position_int_message, time_us: int) -> bool:
+    def _note_position(self, message: dialect.MAVLink_global_position_int_message, time_us: int) -> bool:
         place = place_of(message)
         if place is None or message.lat == 0 == message.lon:
             return False

@@ -7,14 +7,14 @@ In single precision a field of 50,000 nT is reported to 0.004 nT.
 from struct import Struct
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import SURVEY_MAGNETOMETER_COMPONENT
 from autopilot_bridge.payload.component import Component, fixed_text
 from flightsim.payload import MagneticReading, SurveyMagnetometer
 
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 _NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
-_MESSAGE_ID: Final = int(mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT)
+_MESSAGE_ID: Final = int(dialect.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT)
 _pack: Final = Struct("<If10s").pack
 
 

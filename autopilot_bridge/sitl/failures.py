@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.sitl.received_units import RECEIVED_UNITS
 from autopilot_bridge.sitl.simulator_parameters import SimulatorParameters
@@ -25,10 +25,10 @@ from flightsim.sensors.faults import UnsupportedFaultError
 from flightsim.vehicle import Vehicle
 from flightsim.world_spec import FaultSpec, FaultUnit
 
-_OK: Final = mavlink.FAILURE_TYPE_OK
-_OFF: Final = mavlink.FAILURE_TYPE_OFF
-_STUCK: Final = mavlink.FAILURE_TYPE_STUCK
-_WRONG: Final = mavlink.FAILURE_TYPE_WRONG
+_OK: Final = dialect.FAILURE_TYPE_OK
+_OFF: Final = dialect.FAILURE_TYPE_OFF
+_STUCK: Final = dialect.FAILURE_TYPE_STUCK
+_WRONG: Final = dialect.FAILURE_TYPE_WRONG
 _SERVOS: Final = (Role.AILERON, Role.ELEVATOR, Role.THROTTLE, Role.RUDDER, Role.FLAPS)
 """Servo instances from 1, in ArduPilot's channel order."""
 
@@ -37,7 +37,7 @@ _EFFECTIVENESS: Final = {_OK: 1.0, _OFF: 0.0, _WRONG: 0.5}
 
 NEVER_US: Final = 1 << 62
 
-_RECEIVED_WITHOUT_SIGNAL: Final = frozenset({mavlink.MAV_CMD_INJECT_FAILURE})
+_RECEIVED_WITHOUT_SIGNAL: Final = frozenset({dialect.MAV_CMD_INJECT_FAILURE})
 
 
 class FailureInjector:
@@ -58,10 +58,10 @@ class FailureInjector:
         self._lose_radio: Callable[[bool], None] | None = None
         self._parameters = SimulatorParameters(vehicle, sensors, self.fail_radio, self.weaken_motors)
         self._others: Mapping[int, Callable[[int, int], bool]] = {
-            mavlink.FAILURE_UNIT_SYSTEM_MOTOR: self._motor,
-            mavlink.FAILURE_UNIT_SYSTEM_SERVO: self._servo,
-            mavlink.FAILURE_UNIT_SYSTEM_RC_SIGNAL: self._radio,
-            mavlink.FAILURE_UNIT_SYSTEM_MAVLINK_SIGNAL: self._link,
+            dialect.FAILURE_UNIT_SYSTEM_MOTOR: self._motor,
+            dialect.FAILURE_UNIT_SYSTEM_SERVO: self._servo,
+            dialect.FAILURE_UNIT_SYSTEM_RC_SIGNAL: self._radio,
+            dialect.FAILURE_UNIT_SYSTEM_MAVLINK_SIGNAL: self._link,
         }
         self._entries: dict[int, FaultPoint] = {
             int(unit.target.unit): sensors.add_elsewhere(unit.target, size=unit.size, rate_hz=unit.rate_hz)

@@ -22,8 +22,8 @@ from autopilot_bridge.mavlink import (
     SigningKey,
     SigningState,
     decode_as,
+    dialect,
 )
-from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.signing import DAY, INTERNAL, MINUTE, RADIO, REQUIRED, TRUSTED, UNSIGNED_TOO
 
@@ -207,7 +207,7 @@ class VehicleSigning:
         Returns:
             A text for the sender; None when the message was addressed to another system or component.
         """
-        message = decode_as(frame, mavlink.MAVLink_setup_signing_message)
+        message = decode_as(frame, dialect.MAVLink_setup_signing_message)
         if message.target_system != self._system_id or message.target_component not in (
             0,
             AUTOPILOT_COMPONENT,
@@ -236,8 +236,8 @@ class VehicleSigning:
         return _NOT_STORED if store is not None and store.failure else ""
 
 
-def answer_to_key(text: str) -> mavlink.MAVLink_statustext_message:
+def answer_to_key(text: str) -> dialect.MAVLink_statustext_message:
     """The STATUSTEXT for the client that sent a key."""
     good = text in (_KEY_TAKEN, _KEY_REMOVED)
-    severity = mavlink.MAV_SEVERITY_INFO if good else mavlink.MAV_SEVERITY_ERROR
-    return mavlink.MAVLink_statustext_message(severity, text.encode())
+    severity = dialect.MAV_SEVERITY_INFO if good else dialect.MAV_SEVERITY_ERROR
+    return dialect.MAVLink_statustext_message(severity, text.encode())

@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink import FrameEncoder
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mavlink.wire_units import e7, mm
@@ -27,7 +26,7 @@ TARGET_SYSTEM: Final = 251
 MAX_TARGETS: Final = 250
 _STATIC_EVERY: Final = 5
 TRUTH_RATE_HZ: Final = 50
-_MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+_MESSAGE_ID: Final = dialect.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 _Q: Final[int] = t.Q_NED_FROM_FRD.start
 _RATES: Final[int] = t.RATES_FRD_RAD_S.start
 _VEL: Final[int] = t.VEL_NED_M_S.start
@@ -84,7 +83,7 @@ class TruthEncoder:
     def encode_text(self, text: str) -> bytes:
         """A STATUSTEXT of the simulator, for users; severity critical."""
         return self._encoder.encode(
-            mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_CRITICAL, text[:50].encode("ascii"))
+            dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_CRITICAL, text[:50].encode("ascii"))
         )
 
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.mavlink import FrameEncoder
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.navigation import NavigationFilter
@@ -216,8 +215,8 @@ class MotionMessages:
         self._bytes = self._record.view(np.uint8).data
         row = self._record[0]
         row["highres_imu__fields_updated"] = _HIGHRES_FIELDS_UPDATED
-        row["odometry__frame_id"] = row["odometry__child_frame_id"] = mavlink.MAV_FRAME_LOCAL_NED
-        row["odometry__estimator_type"] = mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT
+        row["odometry__frame_id"] = row["odometry__child_frame_id"] = dialect.MAV_FRAME_LOCAL_NED
+        row["odometry__estimator_type"] = dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT
         row["odometry__pose_covariance"] = row["odometry__velocity_covariance"] = math.nan
         self._slices = {
             name: slice(first, first + size)

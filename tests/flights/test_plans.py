@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from tests.flights.flight import FLAVOURS, SYSTEM_ID, Flight
 from tests.flights.plans import FENCE, MISSION, RALLY, at, do, download, geodetic, square, upload
@@ -31,7 +31,7 @@ def test_all_three_plans_as_a_ground_station_sends_and_reads_them(flavour: str, 
     mission = [
         at(flight, 22, 5.0, 5.0, 10.0),
         at(flight, 16, 30.0, 0.0, 12.0),
-        do(m.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        do(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH),
     ]
     fence = [*square(flight, 80.0), at(flight, 5004, 20.0, 20.0, 0.0, 5.0, frame=0)]
     rally = [at(flight, 5100, 15.0, -15.0, 20.0, frame=3), at(flight, 5100, -15.0, 15.0, 20.0, frame=3)]
@@ -46,11 +46,11 @@ def test_all_three_plans_as_a_ground_station_sends_and_reads_them(flavour: str, 
         tolerance = 40 if floats else 0  # single precision
         assert all(abs(each.x - item[6]) <= tolerance for each, item in placed)
     if flavour == "ardupilot":
-        flight.command(m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_FENCE_STATUS)
+        flight.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_FENCE_STATUS)
         values = [flight.vehicle.autopilot.parameters.get(f"{name}_TOTAL") for name in ("FENCE", "RALLY")]
         assert values == [5, 2]
     for kind in (MISSION, FENCE, RALLY):
-        flight.send(m.MAVLink_mission_clear_all_message(SYSTEM_ID, 1, kind))
+        flight.send(dialect.MAVLink_mission_clear_all_message(SYSTEM_ID, 1, kind))
     flight.fly(0.5)
     assert not download(flight, RALLY) and not download(flight, FENCE)
 
@@ -79,14 +79,14 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
     flight.take_off(15.0)
     plan = [
         at(flight, 16, 3.0, 0.0, 15.0),
-        do(m.MAV_CMD_DO_MOUNT_CONTROL, -60.0, 0.0, 0.0, 0.0, z=2.0),
-        do(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 1.0),  # one
+        do(dialect.MAV_CMD_DO_MOUNT_CONTROL, -60.0, 0.0, 0.0, 0.0, z=2.0),
+        do(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 1.0),  # one
         at(flight, 16, 8.0, 0.0, 15.0),
-        do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 5.0),
+        do(dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 5.0),
         at(flight, 16, 40.0, 0.0, 15.0),
-        do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
-        do(m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, 0.0, NAN, NAN, x=12),
-        do(m.MAV_CMD_DO_DIGICAM_CONTROL, x=1),  # one more
+        do(dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
+        do(dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, 0.0, NAN, NAN, x=12),
+        do(dialect.MAV_CMD_DO_DIGICAM_CONTROL, x=1),  # one more
         at(flight, 16, 46.0, 0.0, 15.0),
     ]
     assert upload(flight, plan) == 0, flight.texts
@@ -122,7 +122,7 @@ def test_the_fence_sends_the_vehicle_to_a_rally_point(flavour: str) -> None:
     assert upload(flight, square(flight, 45.0), FENCE) == 0
     assert upload(flight, [at(flight, 5100, 20.0, 25.0, 0.0, frame=3)], RALLY) == 0
     flight.take_off(10.0)
-    flight.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, m.MAVLINK_MSG_ID_FENCE_STATUS, 2e5)
+    flight.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_FENCE_STATUS, 2e5)
     flight.fly(0.5)
     flight.repeat(10.0, lambda _: flight.position_setpoint(velocity_ned_m_s=(5.0, 0.0, 0.0)))
     flight.fly(1.0)
@@ -138,8 +138,8 @@ def test_the_fence_sends_the_vehicle_to_a_rally_point(flavour: str) -> None:
         assert flight.text_time("Polygon fence breached") < math.inf
         assert (status.breach_status, status.breach_count, status.breach_type) == (1, 1, 3)
         bits = flight.newest["SYS_STATUS"]
-        assert bits.onboard_control_sensors_enabled & m.MAV_SYS_STATUS_GEOFENCE
-        assert not bits.onboard_control_sensors_health & m.MAV_SYS_STATUS_GEOFENCE
+        assert bits.onboard_control_sensors_enabled & dialect.MAV_SYS_STATUS_GEOFENCE
+        assert not bits.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_GEOFENCE
     flight.wait_disarmed(90.0)
     assert away_m(flight, 20.0, 25.0) < 1.5
 
@@ -149,9 +149,9 @@ def test_px4_does_not_fly_missions_that_leave_the_fence() -> None:
     flight.get_ready()
     assert upload(flight, square(flight, 50.0), FENCE) == 0
     assert upload(flight, [at(flight, 22, 0.0, 0.0, 10.0), at(flight, 16, 80.0, 0.0, 10.0)]) == 0
-    assert flight.result(m.MAV_CMD_MISSION_START) == 2
+    assert flight.result(dialect.MAV_CMD_MISSION_START) == 2
     assert upload(flight, [at(flight, 22, 0.0, 0.0, 10.0), at(flight, 16, 40.0, 0.0, 10.0)]) == 0
-    assert flight.result(m.MAV_CMD_MISSION_START) == 0
+    assert flight.result(dialect.MAV_CMD_MISSION_START) == 0
 
 
 def test_items_that_are_commands_are_carried_out() -> None:
@@ -160,9 +160,9 @@ def test_items_that_are_commands_are_carried_out() -> None:
     flight.take_off(8.0)
     plan = [
         at(flight, 16, 2.0, 0.0, 8.0),
-        do(m.MAV_CMD_DO_FENCE_ENABLE, 1.0),
-        do(m.MAV_CMD_DO_SET_SERVO, 9.0, 1600.0),
-        do(m.MAV_CMD_DO_GRIPPER, 1.0, 0.0),
+        do(dialect.MAV_CMD_DO_FENCE_ENABLE, 1.0),
+        do(dialect.MAV_CMD_DO_SET_SERVO, 9.0, 1600.0),
+        do(dialect.MAV_CMD_DO_GRIPPER, 1.0, 0.0),
     ]
     assert upload(flight, [*plan, at(flight, 16, 4.0, 0.0, 8.0)]) == 0
     start_mission(flight)

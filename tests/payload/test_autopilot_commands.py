@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.sitl import Sitl
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
@@ -37,12 +36,12 @@ class Talk:
         """The results that the autopilot acknowledges with."""
         before = len(self.frames)
         params = (*values, *(0.0,) * (7 - len(values)))
-        message = m.MAVLink_command_long_message(1, 1, number, 0, *params)
+        message = dialect.MAVLink_command_long_message(1, 1, number, 0, *params)
         self.link.send(self.encoders[sender].encode(message))
         self.run(0.2)
         return [
             ack.result
-            for ack in map(decode, self.of(m.MAVLINK_MSG_ID_COMMAND_ACK, 1, since=before))
+            for ack in map(decode, self.of(dialect.MAVLINK_MSG_ID_COMMAND_ACK, 1, since=before))
             if ack.command == number and (ack.target_system, ack.target_component) == sender
         ]
 
@@ -54,7 +53,9 @@ class Talk:
         ]
 
     def pitch_deg(self) -> float:
-        w, x, y, z = decode(self.of(m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS, GIMBAL_COMPONENT)[-1]).q
+        w, x, y, z = decode(
+            self.of(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS, GIMBAL_COMPONENT)[-1]
+        ).q
         return math.degrees(math.asin(2.0 * (w * y - z * x)))
 
 
@@ -64,47 +65,52 @@ def talk(request) -> Talk:
 
 
 def test_gimbal_commands_to_the_autopilot_move_the_gimbal(talk):
-    pitchyaw, mount = m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, m.MAV_CMD_DO_MOUNT_CONTROL
-    assert talk.command(pitchyaw, -40.0, 0.0, math.nan, math.nan, 12.0) == [m.MAV_RESULT_ACCEPTED]
+    pitchyaw, mount = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, dialect.MAV_CMD_DO_MOUNT_CONTROL
+    assert talk.command(pitchyaw, -40.0, 0.0, math.nan, math.nan, 12.0) == [dialect.MAV_RESULT_ACCEPTED]
     talk.run(3.0)
     assert talk.pitch_deg() == pytest.approx(-40.0, abs=1.0)
-    mode = float(m.MAV_MOUNT_MODE_MAVLINK_TARGETING)
-    assert talk.command(mount, -20.0, 0.0, 0.0, 0.0, 0.0, 0.0, mode) == [m.MAV_RESULT_ACCEPTED]
+    mode = float(dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING)
+    assert talk.command(mount, -20.0, 0.0, 0.0, 0.0, 0.0, 0.0, mode) == [dialect.MAV_RESULT_ACCEPTED]
     talk.run(3.0)
     assert talk.pitch_deg() == pytest.approx(-20.0, abs=1.0)
 
 
 def test_control_by_the_autopilot_is_the_clients_own(talk):
-    configure, pitchyaw = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-    assert talk.command(configure, -2.0, -2.0, -1.0, -1.0) == [m.MAV_RESULT_ACCEPTED]
-    status = decode(talk.of(m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS, GIMBAL_COMPONENT)[-1])
+    configure, pitchyaw = (
+        dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+        dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+    )
+    assert talk.command(configure, -2.0, -2.0, -1.0, -1.0) == [dialect.MAV_RESULT_ACCEPTED]
+    status = decode(talk.of(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS, GIMBAL_COMPONENT)[-1])
     assert (status.primary_control_sysid, status.primary_control_compid) == GCS
-    assert talk.command(pitchyaw, -30.0, sender=OTHER) == [m.MAV_RESULT_DENIED]
-    assert talk.command(pitchyaw, -30.0) == [m.MAV_RESULT_ACCEPTED]
-    assert talk.command(configure, -3.0, -3.0, -1.0, -1.0, sender=OTHER) == [m.MAV_RESULT_ACCEPTED]
-    assert talk.command(pitchyaw, -10.0, sender=OTHER) == [m.MAV_RESULT_DENIED]
-    assert talk.command(configure, -3.0, -3.0, -1.0, -1.0) == [m.MAV_RESULT_ACCEPTED]
-    assert talk.command(pitchyaw, -10.0, sender=OTHER) == [m.MAV_RESULT_ACCEPTED]
+    assert talk.command(pitchyaw, -30.0, sender=OTHER) == [dialect.MAV_RESULT_DENIED]
+    assert talk.command(pitchyaw, -30.0) == [dialect.MAV_RESULT_ACCEPTED]
+    assert talk.command(configure, -3.0, -3.0, -1.0, -1.0, sender=OTHER) == [dialect.MAV_RESULT_ACCEPTED]
+    assert talk.command(pitchyaw, -10.0, sender=OTHER) == [dialect.MAV_RESULT_DENIED]
+    assert talk.command(configure, -3.0, -3.0, -1.0, -1.0) == [dialect.MAV_RESULT_ACCEPTED]
+    assert talk.command(pitchyaw, -10.0, sender=OTHER) == [dialect.MAV_RESULT_ACCEPTED]
 
 
 def test_the_shutter_is_released_through_the_autopilot(talk):
-    digicam = talk.command(m.MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0, 0.0, 1.0)
-    assert digicam == [m.MAV_RESULT_ACCEPTED]
-    assert len(talk.of(m.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, CAMERA_COMPONENT)) == 1
-    started = talk.command(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
+    digicam = talk.command(dialect.MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0, 0.0, 1.0)
+    assert digicam == [dialect.MAV_RESULT_ACCEPTED]
+    assert len(talk.of(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, CAMERA_COMPONENT)) == 1
+    started = talk.command(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
     # PX4 leaves cameras with an id of their own to their clients (docs/firmware/px4.md, section 7)
     px4 = talk.sitl.vehicles[0].specification.autopilot == "px4"
-    assert started == [m.MAV_RESULT_UNSUPPORTED if px4 else m.MAV_RESULT_ACCEPTED]
+    assert started == [dialect.MAV_RESULT_UNSUPPORTED if px4 else dialect.MAV_RESULT_ACCEPTED]
 
 
-@pytest.mark.parametrize(("flavour", "answer"), [("px4", []), ("ardupilot", [m.MAV_RESULT_UNSUPPORTED])])
+@pytest.mark.parametrize(
+    ("flavour", "answer"), [("px4", []), ("ardupilot", [dialect.MAV_RESULT_UNSUPPORTED])]
+)
 def test_without_devices_no_device_executes_it(flavour, answer):
     talk = Talk(flavour, NOTHING)
     for number in (
-        m.MAV_CMD_DO_DIGICAM_CONTROL,
-        m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-        m.MAV_CMD_DO_MOUNT_CONTROL,
-        m.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        dialect.MAV_CMD_DO_DIGICAM_CONTROL,
+        dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        dialect.MAV_CMD_DO_MOUNT_CONTROL,
+        dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
     ):
         assert talk.command(number) == answer
-    assert talk.command(m.MAV_CMD_DO_SET_ROI_NONE) == [m.MAV_RESULT_ACCEPTED]
+    assert talk.command(dialect.MAV_CMD_DO_SET_ROI_NONE) == [dialect.MAV_RESULT_ACCEPTED]

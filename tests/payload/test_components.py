@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.payload import (
     CAMERA_COMPONENT,
     GIMBAL_COMPONENT,
@@ -94,8 +93,8 @@ class World:
     def command(self, component: int, command: int, *values: float, sender=(255, 190)) -> int | None:
         before = len(self.frames)
         params = (*values, *(0.0,) * (7 - len(values)))
-        self.deliver(m.MAVLink_command_long_message(SYSTEM, component, command, 0, *params), sender)
-        acks = [decode(f) for f in self.frames[before:] if f.message_id == m.MAVLINK_MSG_ID_COMMAND_ACK]
+        self.deliver(dialect.MAVLink_command_long_message(SYSTEM, component, command, 0, *params), sender)
+        acks = [decode(f) for f in self.frames[before:] if f.message_id == dialect.MAVLINK_MSG_ID_COMMAND_ACK]
         assert len(acks) <= 1
         if not acks:
             return None
@@ -111,7 +110,10 @@ class World:
         ]
 
     def request(self, component: int, message_id: int):
-        assert self.command(component, m.MAV_CMD_REQUEST_MESSAGE, message_id) == m.MAV_RESULT_ACCEPTED
+        assert (
+            self.command(component, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
+            == dialect.MAV_RESULT_ACCEPTED
+        )
         return self.messages(message_id, component)[-1]
 
 
@@ -122,11 +124,11 @@ def world() -> World:
 
 def pointing(world: World) -> SimpleNamespace:
     """Pitch, yaw (deg) by the newest attitude status, and what its yaw refers to."""
-    status = world.messages(m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)[-1]
+    status = world.messages(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)[-1]
     return SimpleNamespace(
         pitch=math.degrees(pitch_rad(status.q)),
         yaw=math.degrees(yaw_rad(status.q)),
-        in_earth=bool(status.flags & m.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME),
+        in_earth=bool(status.flags & dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME),
         delta=math.degrees(status.delta_yaw),
     )
 
@@ -140,19 +142,21 @@ def test_heartbeats_streams_and_ids(world):
         (SYSTEM, SURVEY_MAGNETOMETER_COMPONENT),
     }
     for component, mav_type in [
-        (CAMERA_COMPONENT, m.MAV_TYPE_CAMERA),
-        (GIMBAL_COMPONENT, m.MAV_TYPE_GIMBAL),
-        (SURVEY_MAGNETOMETER_COMPONENT, m.MAV_TYPE_ONBOARD_CONTROLLER),
+        (CAMERA_COMPONENT, dialect.MAV_TYPE_CAMERA),
+        (GIMBAL_COMPONENT, dialect.MAV_TYPE_GIMBAL),
+        (SURVEY_MAGNETOMETER_COMPONENT, dialect.MAV_TYPE_ONBOARD_CONTROLLER),
     ]:
-        beats = world.messages(m.MAVLINK_MSG_ID_HEARTBEAT, component)
+        beats = world.messages(dialect.MAVLINK_MSG_ID_HEARTBEAT, component)
         assert len(beats) == 10
-        assert {(b.type, b.autopilot) for b in beats} == {(mav_type, m.MAV_AUTOPILOT_INVALID)}
-    assert len(world.messages(m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)) == pytest.approx(91, abs=1)
+        assert {(b.type, b.autopilot) for b in beats} == {(mav_type, dialect.MAV_AUTOPILOT_INVALID)}
+    assert len(world.messages(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)) == pytest.approx(
+        91, abs=1
+    )
 
 
 def test_field_readings_are_named_values(world):
     world.run(5.0)
-    readings = world.messages(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, SURVEY_MAGNETOMETER_COMPONENT)
+    readings = world.messages(dialect.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, SURVEY_MAGNETOMETER_COMPONENT)
     assert len(readings) == 50
     assert {r.name for r in readings} == {"MAG_NT"}
     assert np.mean([r.value for r in readings]) == pytest.approx(48_000.0, abs=2.0)
@@ -161,13 +165,15 @@ def test_field_readings_are_named_values(world):
 
 def test_gimbal_points_and_camera_tells_where_the_target_is(world):
     assert (
-        world.command(GIMBAL_COMPONENT, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -45.0, 90.0, math.nan, math.nan)
-        == m.MAV_RESULT_ACCEPTED
+        world.command(
+            GIMBAL_COMPONENT, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -45.0, 90.0, math.nan, math.nan
+        )
+        == dialect.MAV_RESULT_ACCEPTED
     )
     world.run(4.0)
     look = pointing(world)
     assert (look.pitch, look.yaw) == pytest.approx((-45.0, 90.0), abs=1.0)
-    detections = world.messages(m.MAVLINK_MSG_ID_LANDING_TARGET, CAMERA_COMPONENT)
+    detections = world.messages(dialect.MAVLINK_MSG_ID_LANDING_TARGET, CAMERA_COMPONENT)
     assert len(detections) > 15
     newest = detections[-1]
     assert newest.target_num == 3
@@ -177,9 +183,9 @@ def test_gimbal_points_and_camera_tells_where_the_target_is(world):
 
 def test_locked_yaw_is_from_north_and_followed_yaw_from_the_nose():
     world = World(heading_rad=math.radians(60.0))
-    flags = m.GIMBAL_MANAGER_FLAGS_YAW_LOCK | m.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
+    flags = dialect.GIMBAL_MANAGER_FLAGS_YAW_LOCK | dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
     world.deliver(
-        m.MAVLink_gimbal_manager_set_pitchyaw_message(
+        dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
             SYSTEM, GIMBAL_COMPONENT, flags, 0, math.radians(-20.0), math.radians(100.0), math.nan, math.nan
         )
     )
@@ -189,8 +195,15 @@ def test_locked_yaw_is_from_north_and_followed_yaw_from_the_nose():
     assert (look.pitch, look.yaw) == pytest.approx((-20.0, 100.0), abs=4.0)
     assert look.delta == pytest.approx(60.0, abs=4.0)
     world.deliver(
-        m.MAVLink_gimbal_manager_set_pitchyaw_message(
-            SYSTEM, GIMBAL_COMPONENT, m.GIMBAL_MANAGER_FLAGS_PITCH_LOCK, 0, 0.0, math.radians(30.0), 0.0, 0.0
+        dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
+            SYSTEM,
+            GIMBAL_COMPONENT,
+            dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK,
+            0,
+            0.0,
+            math.radians(30.0),
+            0.0,
+            0.0,
         )
     )
     world.run(3.0)
@@ -202,7 +215,7 @@ def test_locked_yaw_is_from_north_and_followed_yaw_from_the_nose():
 def test_rates_turn_the_gimbal(world):
     world.run(2.0)
     world.deliver(
-        m.MAVLink_gimbal_manager_set_pitchyaw_message(
+        dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
             SYSTEM, GIMBAL_COMPONENT, 0, 0, math.nan, math.nan, 0.0, math.radians(10.0)
         )
     )
@@ -212,7 +225,7 @@ def test_rates_turn_the_gimbal(world):
 
 def test_sticks_steer_the_gimbal_by_what_they_give(world):
     world.run(2.0)
-    steer = m.MAVLink_gimbal_manager_set_manual_control_message
+    steer = dialect.MAVLink_gimbal_manager_set_manual_control_message
     unset = math.nan
     world.deliver(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, -0.5, unset, unset, unset))
     world.run(3.0)
@@ -225,38 +238,49 @@ def test_sticks_steer_the_gimbal_by_what_they_give(world):
 
 def test_who_has_control_points_and_others_do_not(world):
     world.run(2.0)
-    configure = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-    assert world.command(GIMBAL_COMPONENT, configure, 255, 190, -1, -1) == m.MAV_RESULT_ACCEPTED
+    configure = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+    assert world.command(GIMBAL_COMPONENT, configure, 255, 190, -1, -1) == dialect.MAV_RESULT_ACCEPTED
     other = (1, 191)
-    pitchyaw = m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-    assert world.command(GIMBAL_COMPONENT, pitchyaw, -60.0, sender=other) == m.MAV_RESULT_DENIED
+    pitchyaw = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -60.0, sender=other) == dialect.MAV_RESULT_DENIED
     world.deliver(
-        m.MAVLink_gimbal_manager_set_pitchyaw_message(SYSTEM, GIMBAL_COMPONENT, 0, 0, -1.0, 0.0, 0.0, 0.0),
+        dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
+            SYSTEM, GIMBAL_COMPONENT, 0, 0, -1.0, 0.0, 0.0, 0.0
+        ),
         sender=other,
     )
     world.run(2.0)
     assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)
-    status = world.messages(m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)[-1]
+    status = world.messages(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)[-1]
     assert (status.primary_control_sysid, status.primary_control_compid) == (255, 190)
-    assert world.command(GIMBAL_COMPONENT, configure, -2, -2, -1, -1, sender=other) == m.MAV_RESULT_ACCEPTED
-    assert world.command(GIMBAL_COMPONENT, pitchyaw, -30.0, sender=other) == m.MAV_RESULT_ACCEPTED
-    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == m.MAV_RESULT_DENIED
-    assert world.command(GIMBAL_COMPONENT, configure, -3, -3, -1, -1) == m.MAV_RESULT_ACCEPTED  # not its own
-    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == m.MAV_RESULT_DENIED
-    assert world.command(GIMBAL_COMPONENT, configure, -3, -3, -1, -1, sender=other) == m.MAV_RESULT_ACCEPTED
-    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == m.MAV_RESULT_ACCEPTED
+    assert (
+        world.command(GIMBAL_COMPONENT, configure, -2, -2, -1, -1, sender=other)
+        == dialect.MAV_RESULT_ACCEPTED
+    )
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -30.0, sender=other) == dialect.MAV_RESULT_ACCEPTED
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == dialect.MAV_RESULT_DENIED
+    assert (
+        world.command(GIMBAL_COMPONENT, configure, -3, -3, -1, -1) == dialect.MAV_RESULT_ACCEPTED
+    )  # not its own
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == dialect.MAV_RESULT_DENIED
+    assert (
+        world.command(GIMBAL_COMPONENT, configure, -3, -3, -1, -1, sender=other)
+        == dialect.MAV_RESULT_ACCEPTED
+    )
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == dialect.MAV_RESULT_ACCEPTED
 
 
 def test_region_of_interest_is_looked_at(world):
-    roi = m.MAVLink_command_int_message(
-        SYSTEM, GIMBAL_COMPONENT, m.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, m.MAV_CMD_DO_SET_ROI_LOCATION, 0, 0,
+    roi = dialect.MAVLink_command_int_message(
+        SYSTEM, GIMBAL_COMPONENT,
+        dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, dialect.MAV_CMD_DO_SET_ROI_LOCATION, 0, 0,
         0.0, 0.0, 0.0, 0.0, round((HOME.lat_deg + 100.0 / 111_180.0) * 1e7), round(HOME.lon_deg * 1e7), 0.0,
     )  # fmt: skip
     world.run(1.0)
     world.deliver(roi)
-    acks = world.messages(m.MAVLINK_MSG_ID_COMMAND_ACK)
-    assert acks[-1].result == m.MAV_RESULT_TEMPORARILY_REJECTED  # it doesn't know where it is
-    position = m.MAVLink_global_position_int_message(
+    acks = world.messages(dialect.MAVLINK_MSG_ID_COMMAND_ACK)
+    assert acks[-1].result == dialect.MAV_RESULT_TEMPORARILY_REJECTED  # it doesn't know where it is
+    position = dialect.MAVLink_global_position_int_message(
         0, round(HOME.lat_deg * 1e7), round(HOME.lon_deg * 1e7), 580_000, 100_000, 0, 0, 0, 0
     )
     world.deliver(position, sender=(SYSTEM, 1))
@@ -264,87 +288,87 @@ def test_region_of_interest_is_looked_at(world):
     world.run(3.0)
     look = pointing(world)
     assert (look.pitch, look.yaw) == pytest.approx((-45.0, 0.0), abs=4.0)
-    assert world.command(GIMBAL_COMPONENT, m.MAV_CMD_DO_SET_ROI_NONE) == m.MAV_RESULT_ACCEPTED
+    assert world.command(GIMBAL_COMPONENT, dialect.MAV_CMD_DO_SET_ROI_NONE) == dialect.MAV_RESULT_ACCEPTED
     world.run(2.0)
     assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)
 
 
 def test_informations_tell_the_devices(world):
-    manager = world.request(GIMBAL_COMPONENT, m.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
+    manager = world.request(GIMBAL_COMPONENT, dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
     limits = GimbalParameters()
     assert (manager.pitch_min, manager.pitch_max) == pytest.approx(
         (limits.pitch_min_rad, limits.pitch_max_rad)
     )
     assert manager.gimbal_device_id == GIMBAL_COMPONENT
-    world.request(GIMBAL_COMPONENT, m.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION)
-    camera = world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_INFORMATION)
+    world.request(GIMBAL_COMPONENT, dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION)
+    camera = world.request(CAMERA_COMPONENT, dialect.MAVLINK_MSG_ID_CAMERA_INFORMATION)
     fov = 2.0 * math.atan(0.5 * camera.sensor_size_h / camera.focal_length)
     assert fov == pytest.approx(CameraParameters().model.horizontal_fov_rad)
     assert (camera.resolution_h, camera.resolution_v) == (1280, 720)
     assert camera.gimbal_device_id == GIMBAL_COMPONENT
     for message_id in (
-        m.MAVLINK_MSG_ID_CAMERA_SETTINGS,
-        m.MAVLINK_MSG_ID_STORAGE_INFORMATION,
-        m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
+        dialect.MAVLINK_MSG_ID_CAMERA_SETTINGS,
+        dialect.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+        dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
     ):
         world.request(CAMERA_COMPONENT, message_id)
 
 
 def test_photos_are_counted(world):
-    start = m.MAV_CMD_IMAGE_START_CAPTURE
-    assert world.command(CAMERA_COMPONENT, start, 0, 0, 1) == m.MAV_RESULT_ACCEPTED
+    start = dialect.MAV_CMD_IMAGE_START_CAPTURE
+    assert world.command(CAMERA_COMPONENT, start, 0, 0, 1) == dialect.MAV_RESULT_ACCEPTED
     world.run(0.1)
-    assert world.command(CAMERA_COMPONENT, start, 0, 0.5, 0) == m.MAV_RESULT_ACCEPTED
+    assert world.command(CAMERA_COMPONENT, start, 0, 0.5, 0) == dialect.MAV_RESULT_ACCEPTED
     world.run(1.9)
-    assert world.command(CAMERA_COMPONENT, m.MAV_CMD_IMAGE_STOP_CAPTURE) == m.MAV_RESULT_ACCEPTED
+    assert world.command(CAMERA_COMPONENT, dialect.MAV_CMD_IMAGE_STOP_CAPTURE) == dialect.MAV_RESULT_ACCEPTED
     world.run(2.0)
-    captured = world.messages(m.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+    captured = world.messages(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
     assert [c.image_index for c in captured] == list(range(5))
-    assert world.request(CAMERA_COMPONENT, m.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS).image_count == 5
-    assert world.command(CAMERA_COMPONENT, start, 0, 0.0, 0) == m.MAV_RESULT_DENIED
-    assert world.command(CAMERA_COMPONENT, start, 0, math.nan, 3) == m.MAV_RESULT_DENIED
+    assert world.request(CAMERA_COMPONENT, dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS).image_count == 5
+    assert world.command(CAMERA_COMPONENT, start, 0, 0.0, 0) == dialect.MAV_RESULT_DENIED
+    assert world.command(CAMERA_COMPONENT, start, 0, math.nan, 3) == dialect.MAV_RESULT_DENIED
 
 
 def test_intervals_can_be_set_and_read(world):
-    attitude = m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
+    attitude = dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
     world.run(2.0)
-    assert world.command(GIMBAL_COMPONENT, m.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, 40_000) == 0
+    assert world.command(GIMBAL_COMPONENT, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, 40_000) == 0
     before = len(world.messages(attitude))
     world.run(2.0)
     assert len(world.messages(attitude)) - before == pytest.approx(50, abs=1)
-    assert world.command(GIMBAL_COMPONENT, m.MAV_CMD_GET_MESSAGE_INTERVAL, attitude) == 0
-    assert world.messages(m.MAVLINK_MSG_ID_MESSAGE_INTERVAL)[-1].interval_us == 40_000
-    assert world.command(GIMBAL_COMPONENT, m.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, -1) == 0
+    assert world.command(GIMBAL_COMPONENT, dialect.MAV_CMD_GET_MESSAGE_INTERVAL, attitude) == 0
+    assert world.messages(dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL)[-1].interval_us == 40_000
+    assert world.command(GIMBAL_COMPONENT, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, -1) == 0
     before = len(world.messages(attitude))
     world.run(2.0)
     assert len(world.messages(attitude)) == before
-    unknown = world.command(GIMBAL_COMPONENT, m.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 40_000)
-    assert unknown == m.MAV_RESULT_UNSUPPORTED
+    unknown = world.command(GIMBAL_COMPONENT, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 40_000)
+    assert unknown == dialect.MAV_RESULT_UNSUPPORTED
 
 
 def test_a_listener_may_answer_a_stream_at_once():
     """On a memory link the answer arrives while the streams of this step are still being sent."""
     world = World()
-    attitude = m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
+    attitude = dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
     take = world._take
 
     def answer(data: bytes) -> None:
         take(data)
         newest = world.frames[-1]
-        if newest.message_id == m.MAVLINK_MSG_ID_HEARTBEAT and newest.component_id == GIMBAL_COMPONENT:
-            world.command(GIMBAL_COMPONENT, m.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, -1)
+        if newest.message_id == dialect.MAVLINK_MSG_ID_HEARTBEAT and newest.component_id == GIMBAL_COMPONENT:
+            world.command(GIMBAL_COMPONENT, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, -1)
 
     world.station = PayloadStation(world.payload, system_id=SYSTEM, send=answer)
     world.run(3.0)
     assert len(world.messages(attitude)) == 0
-    assert len(world.messages(m.MAVLINK_MSG_ID_HEARTBEAT, GIMBAL_COMPONENT)) == 3
+    assert len(world.messages(dialect.MAVLINK_MSG_ID_HEARTBEAT, GIMBAL_COMPONENT)) == 3
 
 
 def test_commands_for_others_and_to_all(world):
-    assert world.command(GIMBAL_COMPONENT, 31999) == m.MAV_RESULT_UNSUPPORTED
+    assert world.command(GIMBAL_COMPONENT, 31999) == dialect.MAV_RESULT_UNSUPPORTED
     assert world.command(0, 31999) is None
-    assert world.command(1, m.MAV_CMD_REQUEST_MESSAGE, 280) is None
-    assert world.command(0, m.MAV_CMD_REQUEST_MESSAGE, 280) == m.MAV_RESULT_ACCEPTED
+    assert world.command(1, dialect.MAV_CMD_REQUEST_MESSAGE, 280) is None
+    assert world.command(0, dialect.MAV_CMD_REQUEST_MESSAGE, 280) == dialect.MAV_RESULT_ACCEPTED
 
 
 def test_garbage_is_dropped_and_counted(world):
@@ -353,7 +377,7 @@ def test_garbage_is_dropped_and_counted(world):
     counters = world.station.parser.counters
     assert counters.bytes_junk + world.station.parser.pending_bytes >= 19_000
     world.run(1.5)
-    assert world.messages(m.MAVLINK_MSG_ID_HEARTBEAT, GIMBAL_COMPONENT)
+    assert world.messages(dialect.MAVLINK_MSG_ID_HEARTBEAT, GIMBAL_COMPONENT)
 
 
 EXTREME = st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0, 1e38, -1e38, 1e9, 2.0**31, 154.0, 285.0])
@@ -369,19 +393,19 @@ SHARED = World()
 )
 def test_extreme_values_never_raise(component, command, values, flags):
     world = SHARED
-    world.deliver(m.MAVLink_command_long_message(SYSTEM, component, command, 0, *values))
+    world.deliver(dialect.MAVLink_command_long_message(SYSTEM, component, command, 0, *values))
     world.deliver(
-        m.MAVLink_command_int_message(
+        dialect.MAVLink_command_int_message(
             SYSTEM, component, 6, command, 0, 0, *values[:4], 2**31 - 1, -(2**31), values[6]
         )
     )
     for kind in (
-        m.MAVLink_gimbal_manager_set_pitchyaw_message,
-        m.MAVLink_gimbal_manager_set_manual_control_message,
+        dialect.MAVLink_gimbal_manager_set_pitchyaw_message,
+        dialect.MAVLink_gimbal_manager_set_manual_control_message,
     ):
         world.deliver(kind(SYSTEM, GIMBAL_COMPONENT, flags, 0, *values[:4]))
     world.deliver(
-        m.MAVLink_gimbal_manager_set_attitude_message(
+        dialect.MAVLink_gimbal_manager_set_attitude_message(
             SYSTEM, GIMBAL_COMPONENT, flags, 0, values[:4], *values[4:7]
         )
     )

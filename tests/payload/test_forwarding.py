@@ -8,7 +8,7 @@ import pytest
 from autopilot_bridge.commander.events import ItemCommanded, ModeChanged
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.context import RoiMode
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command
@@ -20,9 +20,13 @@ from tests.services.parts_rig import parts_of, service_of
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 CAMERA, GIMBAL = 100, 154
-CONFIGURE, PITCHYAW = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-LOCATION, ROI, NO_ROI = (m.MAV_CMD_DO_SET_ROI_LOCATION, m.MAV_CMD_DO_SET_ROI, m.MAV_CMD_DO_SET_ROI_NONE)
-NEXT_WAYPOINT = m.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
+CONFIGURE, PITCHYAW = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+LOCATION, ROI, NO_ROI = (
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+    dialect.MAV_CMD_DO_SET_ROI,
+    dialect.MAV_CMD_DO_SET_ROI_NONE,
+)
+NEXT_WAYPOINT = dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
 LAT, LON = 47.3986, 8.5456  # some 95 m north of the vehicle
 
 
@@ -50,11 +54,11 @@ class Talk:
             self.heartbeat(1, component)
 
     def heartbeat(self, system: int, component: int) -> None:
-        message = m.MAVLink_heartbeat_message(m.MAV_TYPE_CAMERA, 8, 0, 0, 4, 3)
+        message = dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_CAMERA, 8, 0, 0, 4, 3)
         deliver(message, Source(Channel(), system, component), self.rig.time_us, self.service)
 
     def controlled_by(self, primary: tuple[int, int], secondary: tuple[int, int] = (0, 0)) -> None:
-        message = m.MAVLink_gimbal_manager_status_message(0, 0, 1, *primary, *secondary)
+        message = dialect.MAVLink_gimbal_manager_status_message(0, 0, 1, *primary, *secondary)
         deliver(message, Source(Channel(), 1, GIMBAL), self.rig.time_us, self.service)
 
     def ask(
@@ -80,7 +84,7 @@ class Talk:
 
 def test_a_command_is_forwarded_with_all_its_parameters() -> None:
     talk = Talk("px4", CAMERA)
-    number = m.MAV_CMD_DO_DIGICAM_CONTROL
+    number = dialect.MAV_CMD_DO_DIGICAM_CONTROL
     assert talk.ask(number, 1.0, 2.0, 3.0, 4.0, x=5.0, y=6.0, z=7.0) == ACCEPTED
     assert talk.sent == [(CAMERA, number, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)]
     assert talk.ask(number, 1.0, 2.0, 3.0, 4.0, x=LAT, y=-LON, z=7.0, frame=6) == ACCEPTED
@@ -92,7 +96,7 @@ def test_a_command_is_forwarded_with_all_its_parameters() -> None:
 )
 def test_a_place_that_does_not_fit_is_limited(degrees: float, e7: int) -> None:
     talk = Talk("px4", CAMERA)
-    talk.ask(m.MAV_CMD_DO_DIGICAM_CONTROL, x=degrees, y=degrees, frame=6)
+    talk.ask(dialect.MAV_CMD_DO_DIGICAM_CONTROL, x=degrees, y=degrees, frame=6)
     assert talk.sent[0][7:9] == (e7, e7)
 
 
@@ -103,7 +107,7 @@ def test_a_device_is_present_for_5_seconds_after_its_heartbeat(
 ) -> None:
     talk = Talk(flavour, CAMERA, GIMBAL)
     talk.rig.run(after_s)
-    for number in (m.MAV_CMD_DO_DIGICAM_CONTROL, PITCHYAW):
+    for number in (dialect.MAV_CMD_DO_DIGICAM_CONTROL, PITCHYAW):
         assert talk.ask(number) == (ACCEPTED if present else absent)
         assert bool(talk.sent) == present
 
@@ -112,7 +116,7 @@ def test_a_device_is_present_for_5_seconds_after_its_heartbeat(
 def test_the_heartbeat_of_another_device_is_not_the_cameras(system: int, component: int) -> None:
     talk = Talk("px4")
     talk.heartbeat(system, component)
-    assert talk.ask(m.MAV_CMD_DO_DIGICAM_CONTROL) is None
+    assert talk.ask(dialect.MAV_CMD_DO_DIGICAM_CONTROL) is None
 
 
 @pytest.mark.parametrize(
@@ -180,9 +184,9 @@ def test_a_region_of_interest_is_a_place_on_earth(
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_another_vehicle_is_a_region_of_interest_of_the_gimbal_alone(flavour: str) -> None:
-    assert Talk(flavour).ask(m.MAV_CMD_DO_SET_ROI_SYSID, 2.0, x=math.nan) == ACCEPTED
+    assert Talk(flavour).ask(dialect.MAV_CMD_DO_SET_ROI_SYSID, 2.0, x=math.nan) == ACCEPTED
     talk = Talk(flavour, GIMBAL)
-    assert talk.ask(m.MAV_CMD_DO_SET_ROI_SYSID, 2.0, x=math.nan) == ACCEPTED and len(talk.sent) == 1
+    assert talk.ask(dialect.MAV_CMD_DO_SET_ROI_SYSID, 2.0, x=math.nan) == ACCEPTED and len(talk.sent) == 1
 
 
 def nose(flavour: str, *commands: tuple[Any, ...], **changed: Any) -> Any:
@@ -297,7 +301,7 @@ def item(command: int, *first: float, **more: Any) -> MissionItem:
     return MissionItem(command=command, **{"param1": p1, "param2": p2, "param3": p3, "param4": p4, **more})
 
 
-WAYPOINT = item(m.MAV_CMD_NAV_WAYPOINT, x=LAT, y=LON, z=20.0)
+WAYPOINT = item(dialect.MAV_CMD_NAV_WAYPOINT, x=LAT, y=LON, z=20.0)
 TAKEN = (GIMBAL, CONFIGURE, 1, 1, -1, -1, 0, 0, 0)  # by the autopilot, component 1
 GIVEN_UP = (GIMBAL, CONFIGURE, -3, -3, -1, -1, 0, 0, 0)
 
@@ -309,7 +313,7 @@ def same(sent: list[tuple[Any, ...]], *wanted: tuple[Any, ...]) -> bool:
 
 
 def test_a_camera_item_goes_to_the_camera() -> None:
-    number = m.MAV_CMD_IMAGE_START_CAPTURE
+    number = dialect.MAV_CMD_IMAGE_START_CAPTURE
     mission = Mission(item(number, 1.0, 2.0, 3.0, 4.0, x=5.0, y=6.0, z=7.0))
     assert same(mission.due(0), (CAMERA, number, 1, 2, 3, 4, 5, 6, 7))
     assert mission.end() == []  # the gimbal was not taken
@@ -333,20 +337,20 @@ def test_an_item_that_was_removed_meanwhile_is_not_executed(index: int) -> None:
 
 
 NAN = math.nan
-LEVEL = m.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | m.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
+LEVEL = dialect.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
 
 
 @pytest.mark.parametrize(
     ("mount", "sent"),
     [
-        (item(m.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=2.0), (-20, 40, NAN, NAN, LEVEL, 0, 0)),
-        (item(m.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=0.0), (NAN, NAN, NAN, NAN, 1, 0, 0)),
-        (item(m.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=1.0), (NAN, NAN, NAN, NAN, 2, 0, 0)),
-        (item(m.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=3.0), None),
-        (item(m.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=NAN), None),
-        (item(m.MAV_CMD_DO_MOUNT_CONFIGURE, 0.0, z=2.0), (NAN, NAN, NAN, NAN, 1, 0, 0)),
-        (item(m.MAV_CMD_DO_MOUNT_CONFIGURE, 1.0, z=2.0), (NAN, NAN, NAN, NAN, 2, 0, 0)),
-        (item(m.MAV_CMD_DO_MOUNT_CONFIGURE, 2.0, z=0.0), None),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=2.0), (-20, 40, NAN, NAN, LEVEL, 0, 0)),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=0.0), (NAN, NAN, NAN, NAN, 1, 0, 0)),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=1.0), (NAN, NAN, NAN, NAN, 2, 0, 0)),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=3.0), None),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONTROL, -20.0, 5.0, 40.0, z=NAN), None),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONFIGURE, 0.0, z=2.0), (NAN, NAN, NAN, NAN, 1, 0, 0)),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONFIGURE, 1.0, z=2.0), (NAN, NAN, NAN, NAN, 2, 0, 0)),
+        (item(dialect.MAV_CMD_DO_MOUNT_CONFIGURE, 2.0, z=0.0), None),
     ],
 )
 def test_mount_items_become_gimbal_commands(mount: MissionItem, sent: tuple[float, ...] | None) -> None:
@@ -383,12 +387,12 @@ ENDED = (GIMBAL, NO_ROI, 0, 0, 0, 0, 0, 0, 0)
         (item(ROI, 2.0, NAN), ENDED),
         (item(ROI, 3.0, x=47.1, y=8.1, z=3.0), look(47.1, 8.1, 3.0)),
         (item(ROI, NAN, x=47.1, y=8.1, z=3.0), look(47.1, 8.1, 3.0)),
-        (item(m.MAV_CMD_NAV_ROI, 1.0), look(LAT + 0.01, LON, 20.0)),
+        (item(dialect.MAV_CMD_NAV_ROI, 1.0), look(LAT + 0.01, LON, 20.0)),
         (item(LOCATION, 1.0, x=47.1, y=8.1, z=3.0), look(47.1, 8.1, 3.0)),  # param1 has no kind here
     ],
 )
 def test_a_region_of_interest_goes_to_the_gimbal(roi: MissionItem, sent: tuple[Any, ...]) -> None:
-    last = item(m.MAV_CMD_NAV_WAYPOINT, x=LAT + 0.01, y=LON, z=20.0)
+    last = item(dialect.MAV_CMD_NAV_WAYPOINT, x=LAT + 0.01, y=LON, z=20.0)
     assert same(Mission(WAYPOINT, roi, last).due(1), TAKEN, sent)
 
 
@@ -397,7 +401,7 @@ def test_no_waypoint_follows_the_last_item() -> None:
 
 
 def test_all_other_items_are_executed_as_commands() -> None:
-    number = m.MAV_CMD_DO_CHANGE_SPEED
+    number = dialect.MAV_CMD_DO_CHANGE_SPEED
     mission = Mission(item(number, 1, 2, 3, 4, x=5.0, y=6.0, z=7.0, frame=2), item(number, x=LAT, frame=0))
     assert mission.due(0) == mission.due(1) == []
     assert mission.executed == [

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from autopilot_bridge.mavlink import FrameParser
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import FrameParser, dialect
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, CameraComponent, GimbalComponent
 from autopilot_bridge.payload.camera_video import VideoStream
 from flightsim.payload import Camera, Gimbal
@@ -38,22 +37,25 @@ def still_works(world: World) -> None:
     camera, gimbal = world.station.get(CameraComponent), world.station.get(GimbalComponent)
     assert len(camera.storage.log) <= 20_000
     assert math.isfinite(world.payload.get(Camera).zoom) and 1.0 <= world.payload.get(Camera).zoom <= 6.0
-    control = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-    assert world.command(GIMBAL_COMPONENT, control, 255, 190, 0, 0) == m.MAV_RESULT_ACCEPTED
+    control = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+    assert world.command(GIMBAL_COMPONENT, control, 255, 190, 0, 0) == dialect.MAV_RESULT_ACCEPTED
     assert gimbal.control.primary == (255, 190)
-    pitchyaw = m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+    pitchyaw = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
     assert world.command(GIMBAL_COMPONENT, pitchyaw, -30.0, 0.0, math.nan, math.nan, 12) == 0
-    world.command(CAMERA_COMPONENT, m.MAV_CMD_VIDEO_STOP_CAPTURE)
-    world.command(CAMERA_COMPONENT, m.MAV_CMD_IMAGE_STOP_CAPTURE)
-    for number in (m.MAV_CMD_STORAGE_FORMAT, m.MAV_CMD_RESET_CAMERA_SETTINGS):
-        assert world.command(CAMERA_COMPONENT, number, 1, 1, 1) == m.MAV_RESULT_ACCEPTED
-    assert world.command(CAMERA_COMPONENT, m.MAV_CMD_IMAGE_START_CAPTURE, 0, 0, 1) == m.MAV_RESULT_ACCEPTED
+    world.command(CAMERA_COMPONENT, dialect.MAV_CMD_VIDEO_STOP_CAPTURE)
+    world.command(CAMERA_COMPONENT, dialect.MAV_CMD_IMAGE_STOP_CAPTURE)
+    for number in (dialect.MAV_CMD_STORAGE_FORMAT, dialect.MAV_CMD_RESET_CAMERA_SETTINGS):
+        assert world.command(CAMERA_COMPONENT, number, 1, 1, 1) == dialect.MAV_RESULT_ACCEPTED
+    assert (
+        world.command(CAMERA_COMPONENT, dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 0, 1)
+        == dialect.MAV_RESULT_ACCEPTED
+    )
     world.run(3.0)
     q = world.payload.get(Gimbal).measured_q_heading_from_gimbal
     assert all(map(math.isfinite, q))
     w, x, y, z = q
     assert math.degrees(math.asin(2.0 * (w * y - z * x))) == pytest.approx(-30.0, abs=1.5)
-    beats = [f for f in world.frames if f.message_id == m.MAVLINK_MSG_ID_HEARTBEAT]
+    beats = [f for f in world.frames if f.message_id == dialect.MAVLINK_MSG_ID_HEARTBEAT]
     assert len(beats) == 3 * 3
 
 

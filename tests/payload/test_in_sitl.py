@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, SURVEY_MAGNETOMETER_COMPONENT
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
@@ -45,21 +44,23 @@ def test_components_are_received_and_can_be_spoken_to_over_the_vehicles_link(fla
     received, also = frames_after(sitl, 3.0, client, other)
     for frames in (received, also):
         assert {f.component_id for f in frames if f.system_id == 4} == {1, CAMERA_COMPONENT, GIMBAL_COMPONENT}
-    command = m.MAVLink_command_long_message(
+    command = dialect.MAVLink_command_long_message(
         4,
         GIMBAL_COMPONENT,
-        m.MAV_CMD_REQUEST_MESSAGE,
+        dialect.MAV_CMD_REQUEST_MESSAGE,
         0,
-        m.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
+        dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
         *(0.0,) * 6,
     )
     client.send(FrameEncoder(255, 190).encode(command))
     (received,) = frames_after(sitl, 0.2, client)
     answers = [f.message_id for f in received if f.component_id == GIMBAL_COMPONENT]
-    assert m.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION in answers
-    assert m.MAVLINK_MSG_ID_COMMAND_ACK in answers
+    assert dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION in answers
+    assert dialect.MAVLINK_MSG_ID_COMMAND_ACK in answers
     acks = [
-        decode(f) for f in received if f.message_id == m.MAVLINK_MSG_ID_COMMAND_ACK and f.component_id == 1
+        decode(f)
+        for f in received
+        if f.message_id == dialect.MAVLINK_MSG_ID_COMMAND_ACK and f.component_id == 1
     ]
     assert acks == []  # not the autopilot's business
 
@@ -111,7 +112,7 @@ def test_payload_changes_nothing_of_the_autopilots_own_telemetry():
         link = sitl.connect(0)
         link.send(
             FrameEncoder(255, 190).encode(
-                m.MAVLink_param_set_message(1, 1, b"SR0_EXTRA1", 10.0, m.MAV_PARAM_TYPE_REAL32)
+                dialect.MAVLink_param_set_message(1, 1, b"SR0_EXTRA1", 10.0, dialect.MAV_PARAM_TYPE_REAL32)
             )
         )
         (received,) = frames_after(sitl, 3.0, link)

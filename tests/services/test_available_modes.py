@@ -2,20 +2,22 @@
 
 import pytest
 
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.commands.available_modes import AvailableModes, ListedMode
 from tests.services.command_rig import Channel
 
 MODES = (
-    ListedMode(65_536, "Manual", 0, m.MAV_MODE_PROPERTY_ADVANCED),
-    ListedMode(84_148_224, "", m.MAV_STANDARD_MODE_SAFE_RECOVERY, m.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE),
+    ListedMode(65_536, "Manual", 0, dialect.MAV_MODE_PROPERTY_ADVANCED),
+    ListedMode(
+        84_148_224, "", dialect.MAV_STANDARD_MODE_SAFE_RECOVERY, dialect.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+    ),
     ListedMode(50_593_792, "Hold", 0, 0),
 )
 
 
 def requested(index: float) -> list[tuple[int, int, int, int, int, str]]:
     channel = Channel()
-    AvailableModes(MODES).on_demand[m.MAVLINK_MSG_ID_AVAILABLE_MODES](channel, index)
+    AvailableModes(MODES).on_demand[dialect.MAVLINK_MSG_ID_AVAILABLE_MODES](channel, index)
     return [
         (
             sent.number_modes,
@@ -30,8 +32,15 @@ def requested(index: float) -> list[tuple[int, int, int, int, int, str]]:
 
 
 ALL = [
-    (3, 1, 0, 65_536, m.MAV_MODE_PROPERTY_ADVANCED, "Manual"),
-    (3, 2, m.MAV_STANDARD_MODE_SAFE_RECOVERY, 84_148_224, m.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE, ""),
+    (3, 1, 0, 65_536, dialect.MAV_MODE_PROPERTY_ADVANCED, "Manual"),
+    (
+        3,
+        2,
+        dialect.MAV_STANDARD_MODE_SAFE_RECOVERY,
+        84_148_224,
+        dialect.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE,
+        "",
+    ),
     (3, 3, 0, 50_593_792, 0, "Hold"),
 ]
 

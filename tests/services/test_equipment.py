@@ -6,7 +6,7 @@ import pytest
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.firmware.ardupilot.calibration import ArdupilotCalibration, CompassCalibration
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command
@@ -18,15 +18,15 @@ from tests.services.test_device_services import Vehicle
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NAN = float("nan")
 TEST, GRIPPER, MOTOR, SWITCH = (
-    m.MAV_CMD_ACTUATOR_TEST,
-    m.MAV_CMD_DO_GRIPPER,
-    m.MAV_CMD_DO_MOTOR_TEST,
-    m.MAV_CMD_DO_AUX_FUNCTION,
+    dialect.MAV_CMD_ACTUATOR_TEST,
+    dialect.MAV_CMD_DO_GRIPPER,
+    dialect.MAV_CMD_DO_MOTOR_TEST,
+    dialect.MAV_CMD_DO_AUX_FUNCTION,
 )
 RELAY, REPEAT_RELAY, REPEAT_SERVO = (
-    m.MAV_CMD_DO_SET_RELAY,
-    m.MAV_CMD_DO_REPEAT_RELAY,
-    m.MAV_CMD_DO_REPEAT_SERVO,
+    dialect.MAV_CMD_DO_SET_RELAY,
+    dialect.MAV_CMD_DO_REPEAT_RELAY,
+    dialect.MAV_CMD_DO_REPEAT_SERVO,
 )
 
 
@@ -66,11 +66,11 @@ def test_px4s_gripper_takes_its_time(parameter_s: float, takes_s: float) -> None
     assert vehicle.long(GRIPPER, 1, 0) == []
     if takes_s:
         vehicle.run(takes_s - 0.02)
-        assert not vehicle.sent(m.MAVLink_command_ack_message)
+        assert not vehicle.sent(dialect.MAVLink_command_ack_message)
         vehicle.run(0.02)
     else:
         vehicle.run(0.02)
-    (ack,) = vehicle.sent(m.MAVLink_command_ack_message)
+    (ack,) = vehicle.sent(dialect.MAVLink_command_ack_message)
     assert (ack.command, ack.result, ack.progress, ack.result_param2) == (GRIPPER, ACCEPTED, 0, 0)
     assert (ack.target_system, ack.target_component) == (255, 190)
     assert vehicle.long(GRIPPER, 1, 1) == []  # done: the next one begins
@@ -81,14 +81,14 @@ def test_px4_acknowledges_grippers_of_two_clients_in_the_order_in_which_they_end
     vehicle = Vehicle("px4", PD_GRIPPER_TYPE=0, PD_GRIPPER_TO=5.0)
     assert vehicle.long(GRIPPER, 1, 0) == []
     vehicle.rig.store.set("PD_GRIPPER_TO", 1.0)
-    again = m.MAVLink_command_long_message(1, 1, GRIPPER, 0, 1, 1, 0, 0, 0, 0, 0)
+    again = dialect.MAVLink_command_long_message(1, 1, GRIPPER, 0, 1, 1, 0, 0, 0, 0, 0)
     other = vehicle.rig.source._replace(component_id=25)
     assert deliver(again, other, vehicle.rig.time_us, vehicle.rig.commands)
     vehicle.run(1.1)
-    (ack,) = vehicle.sent(m.MAVLink_command_ack_message)
+    (ack,) = vehicle.sent(dialect.MAVLink_command_ack_message)
     assert ack.target_component == 25
     vehicle.run(4.0)
-    assert [ack.target_component for ack in vehicle.sent(m.MAVLink_command_ack_message)][-1] == 190
+    assert [ack.target_component for ack in vehicle.sent(dialect.MAVLink_command_ack_message)][-1] == 190
 
 
 @pytest.mark.parametrize(("kind", "action"), [(-1, 0), (0, 2), (0, -1), (0, NAN)])
@@ -244,10 +244,10 @@ class Dialogue:
         return self.service.commands[number](command, self.rig.source)
 
     def calibrate(self, **parameters: float) -> Any:
-        return self.ask(m.MAV_CMD_PREFLIGHT_CALIBRATION, **parameters)
+        return self.ask(dialect.MAV_CMD_PREFLIGHT_CALIBRATION, **parameters)
 
     def in_position(self, position: float) -> Any:
-        return self.ask(m.MAV_CMD_ACCELCAL_VEHICLE_POS, position)
+        return self.ask(dialect.MAV_CMD_ACCELCAL_VEHICLE_POS, position)
 
     def run(self, seconds: float) -> list[tuple[float, float]]:
         """(time s to the hundredth, position) of every request that is sent."""
@@ -257,7 +257,7 @@ class Dialogue:
             self.rig.tick()
             self.service.tick(self.rig.time_us)
             for message in self.rig.channel.sent:
-                assert message.command == m.MAV_CMD_ACCELCAL_VEHICLE_POS
+                assert message.command == dialect.MAV_CMD_ACCELCAL_VEHICLE_POS
                 requested.append((round((self.rig.time_us - self.start_us) * 1e-6, 2), message.param1))
         return requested
 
@@ -285,18 +285,23 @@ def test_a_calibration_without_an_answer_fails_after_five_minutes() -> None:
     dialogue.run(1.5)
     assert {position for _, position in dialogue.run(299.98)} == {2}
     assert dialogue.rig.commander.situation.calibrating
-    assert dialogue.run(0.02)[0][1] == m.ACCELCAL_VEHICLE_POS_FAILED
+    assert dialogue.run(0.02)[0][1] == dialect.ACCELCAL_VEHICLE_POS_FAILED
     assert dialogue.texts[-1] == "Calibration FAILED" and not dialogue.rig.commander.situation.calibrating
     assert dialogue.run(2.0) == []
 
 
 @pytest.mark.parametrize(
     ("number", "confirms"),
-    [(0, True), (m.MAV_CMD_ACCELCAL_VEHICLE_POS, True), (1, False), (m.MAV_CMD_DO_GRIPPER, False)],
+    [
+        (0, True),
+        (dialect.MAV_CMD_ACCELCAL_VEHICLE_POS, True),
+        (1, False),
+        (dialect.MAV_CMD_DO_GRIPPER, False),
+    ],
 )
 def test_an_old_ground_station_confirms_with_an_acknowledgement(number: int, confirms: bool) -> None:
     dialogue = Dialogue()
-    ack = m.MAVLink_command_ack_message(number, 0)
+    ack = dialect.MAVLink_command_ack_message(number, 0)
     deliver(
         ack, Source(Channel(), 255, 190), dialogue.rig.time_us, dialogue.service
     )  # nothing is requested yet
@@ -382,7 +387,7 @@ class Compass:
 
 def test_the_compass_is_calibrated_in_twenty_seconds_with_two_messages_in_each() -> None:
     compass = Compass(COMPASS_OFS_X=5.0, COMPASS_OFS_Y=-6.0, COMPASS_OFS_Z=7.0)
-    assert compass.ask(m.MAV_CMD_DO_START_MAG_CAL, p4=1.0) == ACCEPTED
+    assert compass.ask(dialect.MAV_CMD_DO_START_MAG_CAL, p4=1.0) == ACCEPTED
     assert compass.run(0.98) == []
     messages = compass.run(21.0)
     progress = [(at, one) for at, one in messages if one.get_type() == "MAG_CAL_PROGRESS"]
@@ -397,33 +402,33 @@ def test_the_compass_is_calibrated_in_twenty_seconds_with_two_messages_in_each()
     reports = [(at, one) for at, one in messages if one.get_type() == "MAG_CAL_REPORT"]
     assert [at for at, _ in reports] == pytest.approx([20.02])
     ((_, report),) = reports
-    assert (report.compass_id, report.cal_mask, report.cal_status) == (0, 1, m.MAG_CAL_SUCCESS)
+    assert (report.compass_id, report.cal_mask, report.cal_status) == (0, 1, dialect.MAG_CAL_SUCCESS)
     assert (report.ofs_x, report.ofs_y, report.ofs_z) == (5.0, -6.0, 7.0)
     assert report.autosaved == 0 and 0.0 < report.fitness < 0.01
     assert [round(at, 2) for at, _ in compass.run(2.04)] == [0.02, 1.02, 2.02]  # repeated each second
-    assert compass.ask(m.MAV_CMD_DO_ACCEPT_MAG_CAL, 1.0) == ACCEPTED
+    assert compass.ask(dialect.MAV_CMD_DO_ACCEPT_MAG_CAL, 1.0) == ACCEPTED
     assert compass.run(2.0) == []
 
 
 def test_a_saved_calibration_is_reported_once() -> None:
     compass = Compass()
-    assert compass.ask(m.MAV_CMD_DO_START_MAG_CAL, 1.0, p3=1.0) == ACCEPTED
+    assert compass.ask(dialect.MAV_CMD_DO_START_MAG_CAL, 1.0, p3=1.0) == ACCEPTED
     (report,) = [one for _, one in compass.run(25.0) if one.get_type() == "MAG_CAL_REPORT"]
     assert report.autosaved == 1
-    assert compass.ask(m.MAV_CMD_DO_ACCEPT_MAG_CAL) == FAILED
+    assert compass.ask(dialect.MAV_CMD_DO_ACCEPT_MAG_CAL) == FAILED
 
 
 def test_a_compass_that_fails_or_a_cancelled_calibration() -> None:
     compass = Compass()
-    compass.ask(m.MAV_CMD_DO_START_MAG_CAL)
+    compass.ask(dialect.MAV_CMD_DO_START_MAG_CAL)
     compass.run(1.0)
     assert compass.rig.commander.situation.calibrating
     compass.rig.sensors_on = False
-    assert compass.run(2.0)[-1][1].cal_status == m.MAG_CAL_FAILED
+    assert compass.run(2.0)[-1][1].cal_status == dialect.MAG_CAL_FAILED
     assert not compass.rig.commander.situation.calibrating
-    assert compass.ask(m.MAV_CMD_DO_ACCEPT_MAG_CAL) == FAILED
-    assert compass.ask(m.MAV_CMD_DO_START_MAG_CAL) == FAILED
-    assert compass.ask(m.MAV_CMD_DO_CANCEL_MAG_CAL) == ACCEPTED and compass.run(2.0) == []
+    assert compass.ask(dialect.MAV_CMD_DO_ACCEPT_MAG_CAL) == FAILED
+    assert compass.ask(dialect.MAV_CMD_DO_START_MAG_CAL) == FAILED
+    assert compass.ask(dialect.MAV_CMD_DO_CANCEL_MAG_CAL) == ACCEPTED and compass.run(2.0) == []
 
 
 @pytest.mark.parametrize(
@@ -431,10 +436,10 @@ def test_a_compass_that_fails_or_a_cancelled_calibration() -> None:
 )
 def test_the_delay_of_a_compass_calibration(p1: float, p4: float, first_s: float) -> None:
     compass = Compass()
-    assert compass.ask(m.MAV_CMD_DO_START_MAG_CAL, p1, p4=p4) == ACCEPTED
+    assert compass.ask(dialect.MAV_CMD_DO_START_MAG_CAL, p1, p4=p4) == ACCEPTED
     assert compass.run(4.0)[0][0] == pytest.approx(first_s)
 
 
 @pytest.mark.parametrize("mask", [2.0, 3.0, -1.0])
 def test_there_is_one_compass(mask: float) -> None:
-    assert Compass().ask(m.MAV_CMD_DO_START_MAG_CAL, mask) == FAILED
+    assert Compass().ask(dialect.MAV_CMD_DO_START_MAG_CAL, mask) == FAILED

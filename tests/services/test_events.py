@@ -16,7 +16,7 @@ from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.px4 import texts as px4_texts
 from autopilot_bridge.firmware.px4.component_metadata import GENERAL, ComponentMetadataService
 from autopilot_bridge.firmware.px4.event_service import KEPT, EventService
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.files.ftp_protocol import crc32
@@ -42,7 +42,7 @@ class Rig(ServiceRig):
 
     def request(self, first: int, last: int) -> list[Any]:
         assert deliver(
-            mavlink.MAVLink_request_event_message(1, 1, first, last),
+            dialect.MAVLink_request_event_message(1, 1, first, last),
             Source(self.link, 255, 190),
             0,
             self.service,
@@ -71,7 +71,7 @@ def test_sequence_wraps_and_lost_events_can_be_requested() -> None:
     sent = rig.sent()
     numbers = [message.sequence for message in sent]
     assert 65535 in numbers and numbers[numbers.index(65535) + 1] == 0
-    assert rig.service.builders[mavlink.MAVLink_current_event_sequence_message.id]() == (numbers[-1], 0)
+    assert rig.service.builders[dialect.MAVLink_current_event_sequence_message.id]() == (numbers[-1], 0)
     again = rig.request(numbers[-3], numbers[-1])
     assert again == sent[-3:]
     (error,) = rig.request(numbers[0], numbers[0])
@@ -95,7 +95,7 @@ def test_refused_arming_brings_the_reasons() -> None:
     rig = Rig()
     rig.commander.situation.ready = False
     rig.service.follow(events.ArmingDenied(time_us=0, mode=FlightMode.HOLD, reasons=(Reason.BOOTING,)))
-    ids = [message.id for message in rig.sent() if isinstance(message, mavlink.MAVLink_event_message)]
+    ids = [message.id for message in rig.sent() if isinstance(message, dialect.MAVLink_event_message)]
     assert ids[0] == px4_events.KINDS[1].event_id  # the text's
     assert ids[1] == px4_events.ARMING_SUMMARY.event_id
     assert px4_events.CHECKS[Reason.BOOTING].event_id in ids[2:-1]
@@ -111,7 +111,7 @@ def test_report_comes_to_a_station_that_is_received_and_to_who_asks() -> None:
     assert [message.arguments for message in rig.sent()] == [message.arguments for message in first]
     rig.service.tick(30_000_000)
     assert rig.sent() == []
-    requested = Command(mavlink.MAV_CMD_RUN_PREARM_CHECKS, *(0.0,) * 7, None)
+    requested = Command(dialect.MAV_CMD_RUN_PREARM_CHECKS, *(0.0,) * 7, None)
     assert rig.service.commands[requested.id](requested, Source(rig.link, 255, 190)) is Result.ACCEPTED
     reported = [message.id for message in rig.sent()]
     assert not rig.commander.arming_reasons and px4_events.HEALTH_SUMMARY.event_id in reported

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from autopilot_bridge.firmware.ardupilot.gps_input import GpsInputService
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from flightsim import interface as i
 from tests.services.command_rig import ServiceRig
 from tests.services.dispatch import deliver
@@ -54,7 +54,7 @@ def gps_input(ignore: int = 0, **fields: Any) -> Any:
         "vert_accuracy": 1.75,
         "satellites_visible": 13,
     }
-    return mavlink.MAVLink_gps_input_message(**{**values, **fields})
+    return dialect.MAVLink_gps_input_message(**{**values, **fields})
 
 
 def hil_gps(**fields: Any) -> Any:
@@ -73,7 +73,7 @@ def hil_gps(**fields: Any) -> Any:
         "cog": 0,
         "satellites_visible": 13,
     }
-    return mavlink.MAVLink_hil_gps_message(**{**values, **fields})
+    return dialect.MAVLink_hil_gps_message(**{**values, **fields})
 
 
 def test_gps_input_has_floats_in_si_units() -> None:
@@ -98,14 +98,14 @@ def test_hil_gps_has_integers_and_no_accuracies() -> None:
 @pytest.mark.parametrize(
     ("flag", "changed"),
     [
-        (mavlink.GPS_INPUT_IGNORE_FLAG_ALT, {i.GPS_ALT_M: 0.0}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, {i.GPS_HDOP: 99.99}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, {i.GPS_VDOP: 99.99}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ, {3: math.nan, 4: math.nan, 5: math.nan}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT, {5: math.nan}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, {i.GPS_SPEED_ACCURACY_M_S: 0.3}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, {i.GPS_EPH_M: 0.75}),
-        (mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, {i.GPS_EPV_M: 1.25}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_ALT, {i.GPS_ALT_M: 0.0}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_HDOP, {i.GPS_HDOP: 99.99}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_VDOP, {i.GPS_VDOP: 99.99}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ, {3: math.nan, 4: math.nan, 5: math.nan}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_VEL_VERT, {5: math.nan}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, {i.GPS_SPEED_ACCURACY_M_S: 0.3}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, {i.GPS_EPH_M: 0.75}),
+        (dialect.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, {i.GPS_EPV_M: 1.25}),
     ],
 )
 def test_an_ignored_field_is_unknown_and_changes_no_other(flag: int, changed: dict[int, float]) -> None:
@@ -138,10 +138,10 @@ def test_unknown_accuracies_and_satellites() -> None:
         (gps_input(vn=400.0), False),
         (gps_input(ve=-400.0), False),
         (gps_input(vd=math.nan), False),
-        (gps_input(mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT, vd=400.0), True),
-        (gps_input(mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT, ve=400.0), False),
-        (gps_input(mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ, vn=400.0, ve=400.0, vd=400.0), True),
-        (gps_input(mavlink.GPS_INPUT_IGNORE_FLAG_ALT, alt=1e9), True),
+        (gps_input(dialect.GPS_INPUT_IGNORE_FLAG_VEL_VERT, vd=400.0), True),
+        (gps_input(dialect.GPS_INPUT_IGNORE_FLAG_VEL_VERT, ve=400.0), False),
+        (gps_input(dialect.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ, vn=400.0, ve=400.0, vd=400.0), True),
+        (gps_input(dialect.GPS_INPUT_IGNORE_FLAG_ALT, alt=1e9), True),
         (hil_gps(alt=99_999_000), True),
         (hil_gps(alt=100_000_000), False),
     ],

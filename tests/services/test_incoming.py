@@ -15,8 +15,7 @@ from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.flight.obstacles import SECTORS, ObstacleMap
 from autopilot_bridge.flight.target_motion import TargetMotion
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.external import (
     POSITION_M,
@@ -42,19 +41,19 @@ _CAMERA = Source(None, 1, 100)  # type: ignore[arg-type]
 _ELSEWHERE = Source(None, 1, 197)  # type: ignore[arg-type]
 
 TAKEN_IN = (
-    m.MAVLINK_MSG_ID_ODOMETRY,
-    m.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
-    m.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE,
-    m.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE,
-    m.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE,
-    m.MAVLINK_MSG_ID_ATT_POS_MOCAP,
-    m.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN,
-    m.MAVLINK_MSG_ID_FOLLOW_TARGET,
-    m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-    m.MAVLINK_MSG_ID_LANDING_TARGET,
-    m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
-    m.MAVLINK_MSG_ID_OBSTACLE_DISTANCE,
-    m.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+    dialect.MAVLINK_MSG_ID_ODOMETRY,
+    dialect.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
+    dialect.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE,
+    dialect.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE,
+    dialect.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE,
+    dialect.MAVLINK_MSG_ID_ATT_POS_MOCAP,
+    dialect.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN,
+    dialect.MAVLINK_MSG_ID_FOLLOW_TARGET,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    dialect.MAVLINK_MSG_ID_LANDING_TARGET,
+    dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
+    dialect.MAVLINK_MSG_ID_OBSTACLE_DISTANCE,
+    dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR,
 )
 ALL_ON: dict[str, dict[str, float]] = {
     "px4": {"EKF2_EV_CTRL": 15, "CP_DIST": 2.0},
@@ -95,7 +94,7 @@ def odometry_service(flavour: str, parameters: dict[str, float]) -> tuple[Extern
 
 
 def odometry(frame: int, child: int, *, q: tuple[float, ...], stamp_us: int = 0) -> Any:
-    return m.MAVLink_odometry_message(
+    return dialect.MAVLink_odometry_message(
         stamp_us, frame, child, 1.0, 2.0, 3.0, q, 4.0, 5.0, 6.0, 0.0, 0.0, 0.0, _UNKNOWN, _UNKNOWN, 7, 0, 80
     )
 
@@ -109,15 +108,15 @@ def _euler(roll: float, pitch: float, yaw: float) -> Any:
 @pytest.mark.parametrize(
     ("frame", "kind", "position"),
     [
-        (m.MAV_FRAME_LOCAL_NED, ExternalFrame.NED, (1.0, 2.0, 3.0)),
-        (m.MAV_FRAME_LOCAL_ENU, ExternalFrame.NED, (2.0, 1.0, -3.0)),
-        (m.MAV_FRAME_LOCAL_FRD, ExternalFrame.LOCAL_FRD, (1.0, 2.0, 3.0)),
-        (m.MAV_FRAME_LOCAL_FLU, ExternalFrame.LOCAL_FRD, (1.0, -2.0, -3.0)),
+        (dialect.MAV_FRAME_LOCAL_NED, ExternalFrame.NED, (1.0, 2.0, 3.0)),
+        (dialect.MAV_FRAME_LOCAL_ENU, ExternalFrame.NED, (2.0, 1.0, -3.0)),
+        (dialect.MAV_FRAME_LOCAL_FRD, ExternalFrame.LOCAL_FRD, (1.0, 2.0, 3.0)),
+        (dialect.MAV_FRAME_LOCAL_FLU, ExternalFrame.LOCAL_FRD, (1.0, -2.0, -3.0)),
     ],
 )
 def test_px4_takes_four_frames(frame: int, kind: ExternalFrame, position: tuple[float, ...]) -> None:
     service, noted = odometry_service("px4", {})
-    message = odometry(frame, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0), stamp_us=900_000)
+    message = odometry(frame, dialect.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0), stamp_us=900_000)
     assert deliver(message, _ELSEWHERE, 1_000_000, service)
     (sample,) = noted.samples
     assert sample.frame is kind and tuple(sample.values[POSITION_M]) == position
@@ -130,7 +129,9 @@ def test_an_attitude_in_ros_axes_is_the_same_attitude() -> None:
     """East-north-up from forward-left-up: heading 30 degrees east of north is 60 degrees from east."""
     service, noted = odometry_service("px4", {})
     q = _euler(0.1, -0.2, math.radians(60.0))
-    deliver(odometry(m.MAV_FRAME_LOCAL_ENU, m.MAV_FRAME_BODY_FRD, q=tuple(q)), _ELSEWHERE, 0, service)
+    deliver(
+        odometry(dialect.MAV_FRAME_LOCAL_ENU, dialect.MAV_FRAME_BODY_FRD, q=tuple(q)), _ELSEWHERE, 0, service
+    )
     wanted = _euler(0.1, 0.2, math.radians(30.0))
     found = noted.samples[0].values[Q_LOCAL_FROM_FRD]
     np.testing.assert_allclose(
@@ -139,12 +140,12 @@ def test_an_attitude_in_ros_axes_is_the_same_attitude() -> None:
 
 
 def test_ardupilot_takes_one_frame_and_only_with_viso_type() -> None:
-    taken = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
+    taken = odometry(dialect.MAV_FRAME_LOCAL_FRD, dialect.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
     off, noted = odometry_service("ardupilot", {})
     assert deliver(taken, _ELSEWHERE, 0, off) and not noted.samples
     on, noted = odometry_service("ardupilot", {"VISO_TYPE": 1})
-    for frame in (m.MAV_FRAME_LOCAL_NED, m.MAV_FRAME_LOCAL_ENU, 99):
-        deliver(odometry(frame, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0)), _ELSEWHERE, 0, on)
+    for frame in (dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_LOCAL_ENU, 99):
+        deliver(odometry(frame, dialect.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0)), _ELSEWHERE, 0, on)
     assert not noted.samples and on.wrong_frames == 3
     deliver(taken, _ELSEWHERE, 0, on)
     assert noted.samples[0].frame is ExternalFrame.NED
@@ -155,14 +156,16 @@ def test_ardupilot_takes_one_frame_and_only_with_viso_type() -> None:
 
 def test_the_telemetry_of_another_vehicle_is_not_odometry_of_this_one() -> None:
     service, noted = odometry_service("px4", {})
-    message = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
+    message = odometry(dialect.MAV_FRAME_LOCAL_FRD, dialect.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
     assert deliver(message, Source(None, 2, 1), 0, service) and not noted.samples  # type: ignore[arg-type]
 
 
 def test_a_time_stamp_of_another_clock_is_not_used() -> None:
     service, noted = odometry_service("px4", {})
     for stamp in (0, 1_700_000_000_000_000, 4_400_000, 5_100_000):
-        message = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1, 0, 0, 0), stamp_us=stamp)
+        message = odometry(
+            dialect.MAV_FRAME_LOCAL_FRD, dialect.MAV_FRAME_BODY_FRD, q=(1, 0, 0, 0), stamp_us=stamp
+        )
         deliver(message, _ELSEWHERE, 5_000_000, service)
     assert [sample.time_us for sample in noted.samples] == [5_000_000] * 4
 
@@ -195,7 +198,7 @@ def test_no_content_upsets_the_vehicle(
     vehicle: Any, message_id: int, payload: bytes, floats: list[float], sender: tuple[int, int]
 ) -> None:
     sitl, link = vehicle
-    size = m.mavlink_map[message_id].unpacker.size
+    size = dialect.mavlink_map[message_id].unpacker.size
     raw = (payload + b"".join(struct.pack("<f", value) for value in floats)).ljust(size, b"\0")[:size]
     link.send(on_the_wire(message_id, raw, sender))
     for _ in range(10):
@@ -208,14 +211,14 @@ def on_the_wire(message_id: int, payload: bytes, sender: tuple[int, int]) -> byt
     """A MAVLink 2 frame of any payload."""
     head = struct.pack("<BBBBBB", len(payload), 0, 0, 0, *sender) + message_id.to_bytes(3, "little")
     crc = x25crc(head + payload)
-    crc.accumulate(bytes((m.mavlink_map[message_id].crc_extra,)))
+    crc.accumulate(bytes((dialect.mavlink_map[message_id].crc_extra,)))
     return b"\xfd" + head + payload + struct.pack("<H", crc.crc)
 
 
 def test_what_is_fuzzed_is_understood() -> None:
-    message = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
+    message = odometry(dialect.MAV_FRAME_LOCAL_FRD, dialect.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
     (frame,) = FrameParser().feed(FrameEncoder(255, 190).encode(message))
-    size = m.mavlink_map[message.get_msgId()].unpacker.size
+    size = dialect.mavlink_map[message.get_msgId()].unpacker.size
     wire = on_the_wire(message.get_msgId(), bytes(frame.payload).ljust(size, b"\0"), (255, 190))
     (parsed,) = FrameParser().feed(wire)
     assert decode(parsed).get_type() == "ODOMETRY" and decode(parsed).vz == 6.0
@@ -252,7 +255,9 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
     line = np.array((2.0, 1.0, 10.0))
     if by_gimbal:  # stabilised, looking straight down, turning with the vehicle
         gimbal_q = _euler(0.0, -0.5 * math.pi, 0.0)
-        status = m.MAVLink_gimbal_device_attitude_status_message(0, 0, 1000, 0, gimbal_q, 0.0, 0.0, 0.0, 0)
+        status = dialect.MAVLink_gimbal_device_attitude_status_message(
+            0, 0, 1000, 0, gimbal_q, 0.0, 0.0, 0.0, 0
+        )
         deliver(status, Source(None, 1, 154), 1_000_000, service)  # type: ignore[arg-type]
         heading = _euler(0.0, 0.0, attitude[2])
         seen = rotation_matrix(gimbal_q).T @ rotation_matrix(heading).T @ line
@@ -260,8 +265,8 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
     else:
         seen = rotation_matrix(q).T @ line
         right, down = seen[1] / seen[2], -seen[0] / seen[2]
-    message = m.MAVLink_landing_target_message(
-        1_000_000, 0, m.MAV_FRAME_BODY_FRD, math.atan(right), math.atan(down), 0.0, 0.0, 0.0
+    message = dialect.MAVLink_landing_target_message(
+        1_000_000, 0, dialect.MAV_FRAME_BODY_FRD, math.atan(right), math.atan(down), 0.0, 0.0, 0.0
     )
     assert deliver(message, _CAMERA if by_gimbal else _ELSEWHERE, 1_000_000, service)
     track = autopilot.context.surroundings.landing_target

@@ -5,26 +5,33 @@ from typing import Any
 
 import pytest
 
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.services.plans import rules
 
 NAN, INF = math.nan, math.inf
-OK = m.MAV_MISSION_ACCEPTED
+OK = dialect.MAV_MISSION_ACCEPTED
 PARAM1, PARAM2, PARAM3, PARAM4 = (
-    m.MAV_MISSION_INVALID_PARAM1,
-    m.MAV_MISSION_INVALID_PARAM2,
-    m.MAV_MISSION_INVALID_PARAM3,
-    m.MAV_MISSION_INVALID_PARAM4,
+    dialect.MAV_MISSION_INVALID_PARAM1,
+    dialect.MAV_MISSION_INVALID_PARAM2,
+    dialect.MAV_MISSION_INVALID_PARAM3,
+    dialect.MAV_MISSION_INVALID_PARAM4,
 )
-X, Y, Z = m.MAV_MISSION_INVALID_PARAM5_X, m.MAV_MISSION_INVALID_PARAM6_Y, m.MAV_MISSION_INVALID_PARAM7
-UNSUPPORTED, FRAME = m.MAV_MISSION_UNSUPPORTED, m.MAV_MISSION_UNSUPPORTED_FRAME
-INSIDE, OUTSIDE = (m.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, m.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
-CIRCLES = (m.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, m.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
+X, Y, Z = (
+    dialect.MAV_MISSION_INVALID_PARAM5_X,
+    dialect.MAV_MISSION_INVALID_PARAM6_Y,
+    dialect.MAV_MISSION_INVALID_PARAM7,
+)
+UNSUPPORTED, FRAME = dialect.MAV_MISSION_UNSUPPORTED, dialect.MAV_MISSION_UNSUPPORTED_FRAME
+INSIDE, OUTSIDE = (
+    dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+)
+CIRCLES = (dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, dialect.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
 
 
 def item(command: int, **values: Any) -> MissionItem:
-    return MissionItem(command=command, **{"frame": m.MAV_FRAME_GLOBAL_RELATIVE_ALT, **values})
+    return MissionItem(command=command, **{"frame": dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, **values})
 
 
 @pytest.mark.parametrize(
@@ -45,21 +52,21 @@ def item(command: int, **values: Any) -> MissionItem:
     ],
 )
 def test_a_position_is_on_earth(changed: dict[str, float], result: int) -> None:
-    waypoint = item(m.MAV_CMD_NAV_WAYPOINT, **changed)
+    waypoint = item(dialect.MAV_CMD_NAV_WAYPOINT, **changed)
     assert rules.check_position(waypoint) == result
 
 
 @pytest.mark.parametrize(
     ("command", "here"),
     [
-        (m.MAV_CMD_NAV_TAKEOFF, True),
-        (m.MAV_CMD_NAV_LAND, True),
-        (m.MAV_CMD_NAV_LOITER_UNLIM, True),
-        (m.MAV_CMD_NAV_LOITER_TIME, True),
-        (m.MAV_CMD_NAV_LOITER_TURNS, True),
-        (m.MAV_CMD_NAV_LOITER_TO_ALT, True),
-        (m.MAV_CMD_NAV_WAYPOINT, False),
-        (m.MAV_CMD_NAV_SPLINE_WAYPOINT, False),
+        (dialect.MAV_CMD_NAV_TAKEOFF, True),
+        (dialect.MAV_CMD_NAV_LAND, True),
+        (dialect.MAV_CMD_NAV_LOITER_UNLIM, True),
+        (dialect.MAV_CMD_NAV_LOITER_TIME, True),
+        (dialect.MAV_CMD_NAV_LOITER_TURNS, True),
+        (dialect.MAV_CMD_NAV_LOITER_TO_ALT, True),
+        (dialect.MAV_CMD_NAV_WAYPOINT, False),
+        (dialect.MAV_CMD_NAV_SPLINE_WAYPOINT, False),
     ],
 )
 def test_a_position_that_is_not_set_means_here_for_some_commands(command: int, here: bool) -> None:
@@ -73,11 +80,11 @@ def test_a_position_that_is_not_set_means_here_for_some_commands(command: int, h
 def test_parameters_are_finite_or_not_set_where_that_is_allowed(
     place: int, result: int, value: float
 ) -> None:
-    spoiled = item(m.MAV_CMD_NAV_WAYPOINT, **{f"param{place}": value})
+    spoiled = item(dialect.MAV_CMD_NAV_WAYPOINT, **{f"param{place}": value})
     assert rules.check_params(spoiled, nan_allowed=(False,) * 4) == result
     allowed: Any = tuple(k == place for k in range(1, 5))
     assert rules.check_params(spoiled, nan_allowed=allowed) == (OK if math.isnan(value) else result)
-    assert rules.check_params(item(m.MAV_CMD_NAV_WAYPOINT), nan_allowed=(False,) * 4) == OK
+    assert rules.check_params(item(dialect.MAV_CMD_NAV_WAYPOINT), nan_allowed=(False,) * 4) == OK
 
 
 @pytest.mark.parametrize(
@@ -99,36 +106,36 @@ def test_parameters_are_finite_or_not_set_where_that_is_allowed(
     ],
 )
 def test_a_jump_goes_to_another_item(target: float, repeats: float, result: int) -> None:
-    jump = item(m.MAV_CMD_DO_JUMP, param1=target, param2=repeats)
+    jump = item(dialect.MAV_CMD_DO_JUMP, param1=target, param2=repeats)
     assert rules.check_special(jump, 3, 10) == result
 
 
 @pytest.mark.parametrize(
     ("command", "place", "value", "result"),
     [
-        (m.MAV_CMD_DO_JUMP_TAG, 2, -1, OK),
-        (m.MAV_CMD_DO_JUMP_TAG, 2, 65_535, OK),
-        (m.MAV_CMD_DO_JUMP_TAG, 2, -2, PARAM2),
-        (m.MAV_CMD_DO_JUMP_TAG, 2, 65_536, PARAM2),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, 0, OK),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, 7.5, OK),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, -1, OK),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, -2, OK),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, -0.5, PARAM2),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, -3, PARAM2),
-        (m.MAV_CMD_DO_CHANGE_SPEED, 2, NAN, PARAM2),
+        (dialect.MAV_CMD_DO_JUMP_TAG, 2, -1, OK),
+        (dialect.MAV_CMD_DO_JUMP_TAG, 2, 65_535, OK),
+        (dialect.MAV_CMD_DO_JUMP_TAG, 2, -2, PARAM2),
+        (dialect.MAV_CMD_DO_JUMP_TAG, 2, 65_536, PARAM2),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, 0, OK),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, 7.5, OK),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, -1, OK),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, -2, OK),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, -0.5, PARAM2),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, -3, PARAM2),
+        (dialect.MAV_CMD_DO_CHANGE_SPEED, 2, NAN, PARAM2),
         *(
             (command, 1, value, PARAM1 if value < 0.0 else OK)
             for command in (
-                m.MAV_CMD_NAV_WAYPOINT,
-                m.MAV_CMD_NAV_SPLINE_WAYPOINT,
-                m.MAV_CMD_NAV_LOITER_TIME,
-                m.MAV_CMD_CONDITION_DELAY,
-                m.MAV_CMD_CONDITION_DISTANCE,
+                dialect.MAV_CMD_NAV_WAYPOINT,
+                dialect.MAV_CMD_NAV_SPLINE_WAYPOINT,
+                dialect.MAV_CMD_NAV_LOITER_TIME,
+                dialect.MAV_CMD_CONDITION_DELAY,
+                dialect.MAV_CMD_CONDITION_DISTANCE,
             )
             for value in (-0.1, 0.0, 5.0)
         ),
-        (m.MAV_CMD_NAV_LAND, 1, -5, OK),
+        (dialect.MAV_CMD_NAV_LAND, 1, -5, OK),
     ],
 )
 def test_impossible_speeds_and_delays(command: int, place: int, value: float, result: int) -> None:
@@ -153,7 +160,7 @@ def test_impossible_speeds_and_delays(command: int, place: int, value: float, re
         ({"z": NAN}, OK),
         ({"param2": INF}, PARAM2),
         ({"param4": NAN}, OK),
-        ({"frame": m.MAV_FRAME_LOCAL_NED}, FRAME),
+        ({"frame": dialect.MAV_FRAME_LOCAL_NED}, FRAME),
     ],
 )
 def test_corners_of_a_fence(command: int, changed: dict[str, Any], result: int) -> None:
@@ -179,20 +186,20 @@ def test_circles_of_a_fence(command: int, radius_m: float, result: int, with_emp
 
 
 def test_a_fence_and_a_rally_plan_hold_their_own_commands() -> None:
-    assert rules.check_fence(item(m.MAV_CMD_NAV_FENCE_RETURN_POINT)) == OK
-    assert rules.check_fence(item(m.MAV_CMD_NAV_WAYPOINT)) == UNSUPPORTED
-    rally = item(m.MAV_CMD_NAV_RALLY_POINT, z=30.0)
+    assert rules.check_fence(item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT)) == OK
+    assert rules.check_fence(item(dialect.MAV_CMD_NAV_WAYPOINT)) == UNSUPPORTED
+    rally = item(dialect.MAV_CMD_NAV_RALLY_POINT, z=30.0)
     assert rules.check_rally(rally) == OK
-    assert rules.check_rally(item(m.MAV_CMD_NAV_WAYPOINT)) == UNSUPPORTED
+    assert rules.check_rally(item(dialect.MAV_CMD_NAV_WAYPOINT)) == UNSUPPORTED
     for changed, result in (
-        ({"frame": m.MAV_FRAME_LOCAL_NED}, FRAME),
+        ({"frame": dialect.MAV_FRAME_LOCAL_NED}, FRAME),
         ({"x": 91.0}, X),
         ({"y": 181.0}, Y),
         ({"z": 83_001.0}, Z),
         ({"param3": INF}, PARAM3),
         ({"param3": NAN}, OK),
     ):
-        assert rules.check_rally(item(m.MAV_CMD_NAV_RALLY_POINT, **changed)) == result
+        assert rules.check_rally(item(dialect.MAV_CMD_NAV_RALLY_POINT, **changed)) == result
 
 
 def corners(

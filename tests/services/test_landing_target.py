@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs.landing_target import LandingTargetService
@@ -65,10 +65,10 @@ class Vehicle:
         return self.track.taken[-1] if self.track.taken else None
 
     def point(self, q: Array, *, in_earth: bool, age_us: int = 0, source: Source = GIMBAL) -> None:
-        flags = m.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME if in_earth else 0
+        flags = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME if in_earth else 0
         time_ms = (NOW_US - age_us) // 1000
         deliver(
-            m.MAVLink_gimbal_device_attitude_status_message(0, 0, time_ms, flags, q, 0.0, 0.0, 0.0, 0),
+            dialect.MAVLink_gimbal_device_attitude_status_message(0, 0, time_ms, flags, q, 0.0, 0.0, 0.0, 0),
             source,
             NOW_US,
             self.service,
@@ -76,11 +76,11 @@ class Vehicle:
 
 
 def angles(x: float = 0.0, y: float = 0.0, distance: float = 0.0, stamp_us: int = 0) -> Any:
-    return m.MAVLink_landing_target_message(stamp_us, 0, 8, x, y, distance, 0.0, 0.0)
+    return dialect.MAVLink_landing_target_message(stamp_us, 0, 8, x, y, distance, 0.0, 0.0)
 
 
 def place(frame: int, *offset: float, valid: int = 1) -> Any:
-    return m.MAVLink_landing_target_message(
+    return dialect.MAVLink_landing_target_message(
         0, 0, frame, 0.1, 0.1, 0.0, 0.0, 0.0, *offset, (1.0, 0.0, 0.0, 0.0), 0, valid
     )
 
@@ -91,9 +91,9 @@ OFFSET = (1.5, -2.5, 11.0)
 @pytest.mark.parametrize(
     ("frame", "from_vehicle", "rotation"),
     [
-        (m.MAV_FRAME_LOCAL_NED, False, np.eye(3)),
-        (m.MAV_FRAME_BODY_FRD, True, rotation_matrix(attitude(0.2, -0.15, 2.0))),
-        (m.MAV_FRAME_LOCAL_FRD, True, rotation_matrix(attitude(0.0, 0.0, 2.0))),
+        (dialect.MAV_FRAME_LOCAL_NED, False, np.eye(3)),
+        (dialect.MAV_FRAME_BODY_FRD, True, rotation_matrix(attitude(0.2, -0.15, 2.0))),
+        (dialect.MAV_FRAME_LOCAL_FRD, True, rotation_matrix(attitude(0.0, 0.0, 2.0))),
     ],
 )
 def test_positions_by_frame(frame: int, from_vehicle: bool, rotation: Array) -> None:
@@ -104,7 +104,9 @@ def test_positions_by_frame(frame: int, from_vehicle: bool, rotation: Array) -> 
     assert (time_us, sigma_m) == (NOW_US, 0.05)
 
 
-@pytest.mark.parametrize("frame", [m.MAV_FRAME_GLOBAL, m.MAV_FRAME_LOCAL_ENU, m.MAV_FRAME_BODY_NED])
+@pytest.mark.parametrize(
+    "frame", [dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_LOCAL_ENU, dialect.MAV_FRAME_BODY_NED]
+)
 def test_other_frames_are_refused(frame: int) -> None:
     vehicle = Vehicle()
     assert vehicle.take(place(frame, *OFFSET)) is None
@@ -118,7 +120,7 @@ def test_other_frames_are_refused(frame: int) -> None:
 def test_positions_out_of_range_are_refused(axis: int, value: float, taken: bool) -> None:
     offset = list(OFFSET)
     offset[axis] = value
-    assert (Vehicle().take(place(m.MAV_FRAME_LOCAL_NED, *offset)) is not None) is taken
+    assert (Vehicle().take(place(dialect.MAV_FRAME_LOCAL_NED, *offset)) is not None) is taken
 
 
 @pytest.mark.parametrize("distance", [0.0, 9.0, 199.0, 201.0, -1.0])
@@ -235,5 +237,5 @@ def test_without_a_position_nothing_is_taken() -> None:
     vehicle = Vehicle()
     vehicle.context.health.position_horizontal_absolute = False
     vehicle.context.health.position_horizontal_relative = False
-    assert vehicle.take(place(m.MAV_FRAME_LOCAL_NED, *OFFSET)) is None
+    assert vehicle.take(place(dialect.MAV_FRAME_LOCAL_NED, *OFFSET)) is None
     assert vehicle.service.refused == 1

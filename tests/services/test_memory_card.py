@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from autopilot_bridge.commander.events import RebootRequested
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.commands.power import PowerService
@@ -45,8 +45,8 @@ class Power:
         self.service.tick(START_US)
 
     def ask(self, p1: float, p6: float = 0.0) -> Any:
-        handler = self.service.commands[m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN]
-        return handler(command(m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, p1, p6), self.rig.source)
+        handler = self.service.commands[dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN]
+        return handler(command(dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, p1, p6), self.rig.source)
 
 
 @pytest.mark.parametrize(
@@ -164,8 +164,8 @@ class Storage:
         return any(NAME[self.flavour] in line and f"{self.value:g}" in line for line in text.split("\n"))
 
     def ask(self, p1: float) -> Any:
-        handler = self.service.commands[m.MAV_CMD_PREFLIGHT_STORAGE]
-        return handler(command(m.MAV_CMD_PREFLIGHT_STORAGE, p1), self.rig.source)
+        handler = self.service.commands[dialect.MAV_CMD_PREFLIGHT_STORAGE]
+        return handler(command(dialect.MAV_CMD_PREFLIGHT_STORAGE, p1), self.rig.source)
 
 
 @pytest.mark.parametrize(("flavour", "delay_us"), [("px4", 300_000), ("ardupilot", 0)])
@@ -401,11 +401,11 @@ def client(component: int = 190) -> Source:
 
 
 def list_of(start: int = 0, end: int = 65535) -> Any:
-    return m.MAVLink_log_request_list_message(1, 1, start, end)
+    return dialect.MAVLink_log_request_list_message(1, 1, start, end)
 
 
 def data_of(log: int, offset: int, count: int) -> Any:
-    return m.MAVLink_log_request_data_message(1, 1, log, offset, count)
+    return dialect.MAVLink_log_request_data_message(1, 1, log, offset, count)
 
 
 def received(source: Source) -> list[Any]:
@@ -434,7 +434,7 @@ def test_every_entry_of_the_log_list(flavour: str, first: int) -> None:
 
 def test_an_empty_card_has_one_entry_of_zeros() -> None:
     transfer, asker = Transfer(), client()
-    transfer.ask(m.MAVLink_log_erase_message(1, 1), asker)
+    transfer.ask(dialect.MAVLink_log_erase_message(1, 1), asker)
     transfer.ask(list_of(), asker)
     transfer.tick()
     (entry,) = received(asker)
@@ -487,7 +487,7 @@ def test_another_log_ends_the_download_of_the_first() -> None:
     transfer.tick()
     assert data(asker) == []
     transfer.ask(data_of(0, 0, 90), asker)
-    transfer.ask(m.MAVLink_log_request_end_message(1, 1), asker)
+    transfer.ask(dialect.MAVLink_log_request_end_message(1, 1), asker)
     transfer.tick()
     assert data(asker) == []
     transfer.ask(data_of(0, 0, 90), asker)  # the download that was ended begins anew
@@ -544,7 +544,7 @@ def test_ardupilot_sends_no_logs_while_armed() -> None:
     for _ in range(2):
         transfer.ask(list_of(), asker)
     (refusal,) = received(asker)
-    assert (refusal.severity, refusal.text) == (m.MAV_SEVERITY_ERROR, "Disarm for log download")
+    assert (refusal.severity, refusal.text) == (dialect.MAV_SEVERITY_ERROR, "Disarm for log download")
     transfer.armed = False
     transfer.tick()  # the running download continues
     assert [at for _, at, _ in data(asker)] == [0, 90]

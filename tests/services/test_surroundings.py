@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.flight.obstacles import SECTORS
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.external import (
     POSITION_M,
@@ -61,7 +61,7 @@ class Follower:
         """GLOBAL_POSITION_INT, 12 m over its home, at a velocity of (1.5, -2.5, 0.25) m/s."""
         lat, lon = self.place(north_m, east_m)
         lat, lon = at.get("lat", lat), at.get("lon", lon)
-        return m.MAVLink_global_position_int_message(
+        return dialect.MAVLink_global_position_int_message(
             0, lat, lon, round(alt_m * 1e3), 12_000, 150, -250, 25, 65535
         )
 
@@ -81,7 +81,7 @@ class Follower:
             "position_cov": (0.0,) * 3,
             "custom_state": 0,
         }
-        return m.MAVLink_follow_target_message(**{**values, **changed})
+        return dialect.MAVLink_follow_target_message(**{**values, **changed})
 
 
 def test_the_position_of_another_autopilot_is_the_target() -> None:
@@ -254,9 +254,9 @@ def distances(*values_cm: int, **changed: Any) -> Any:
         "max_distance": 1000,
         "increment_f": 0.0,
         "angle_offset": 0.0,
-        "frame": m.MAV_FRAME_BODY_FRD,
+        "frame": dialect.MAV_FRAME_BODY_FRD,
     }
-    return m.MAVLink_obstacle_distance_message(**{**fields, **changed})
+    return dialect.MAVLink_obstacle_distance_message(**{**fields, **changed})
 
 
 def beam(current_cm: int = 250, orientation: int = 0, **changed: Any) -> Any:
@@ -271,7 +271,7 @@ def beam(current_cm: int = 250, orientation: int = 0, **changed: Any) -> Any:
         "orientation": orientation,
         "covariance": 0,
     }
-    return m.MAVLink_distance_sensor_message(**{**fields, **changed})
+    return dialect.MAVLink_distance_sensor_message(**{**fields, **changed})
 
 
 def test_distances_are_in_centimetres_clockwise_from_the_nose() -> None:
@@ -288,8 +288,8 @@ def test_distances_are_in_centimetres_clockwise_from_the_nose() -> None:
         ({"increment_f": -5.0}, {0, 71}),
         ({"increment": 10}, {71, 0, 1, 2, 3}),
         ({"increment": 10, "increment_f": 5.0}, {0, 1}),
-        ({"frame": m.MAV_FRAME_GLOBAL}, {54, 55}),  # from north; the nose points east
-        ({"frame": m.MAV_FRAME_LOCAL_NED}, {54, 55}),
+        ({"frame": dialect.MAV_FRAME_GLOBAL}, {54, 55}),  # from north; the nose points east
+        ({"frame": dialect.MAV_FRAME_LOCAL_NED}, {54, 55}),
         ({"angle_offset": 720.0}, {0, 1}),
         ({"angle_offset": -720.0}, {0, 1}),
         ({"increment_f": 360.0}, set(range(72))),
@@ -306,7 +306,7 @@ def test_the_directions_of_an_obstacle_distance(changed: dict[str, Any], sectors
 @pytest.mark.parametrize(
     "changed",
     [
-        {"frame": m.MAV_FRAME_LOCAL_ENU},
+        {"frame": dialect.MAV_FRAME_LOCAL_ENU},
         {"increment": 0},
         {"increment_f": 0.49},
         {"increment_f": 360.5},
@@ -350,7 +350,7 @@ def test_the_field_of_view_of_a_distance_sensor(fov_rad: float, sectors: int) ->
         (beam(999), 9.99),
         (beam(1000), math.inf),
         (beam(orientation=8), None),
-        (beam(orientation=m.MAV_SENSOR_ROTATION_PITCH_270), None),
+        (beam(orientation=dialect.MAV_SENSOR_ROTATION_PITCH_270), None),
     ],
 )
 def test_the_range_of_a_distance_sensor(message: Any, distance_m: float | None) -> None:
@@ -409,9 +409,9 @@ COVARIANCE = tuple(1.0 + k for k in range(21))
 UNKNOWN = (math.nan, *COVARIANCE[1:])
 LEVEL_EAST = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 POSES = (
-    m.MAVLink_vision_position_estimate_message,
-    m.MAVLink_global_vision_position_estimate_message,
-    m.MAVLink_vicon_position_estimate_message,
+    dialect.MAVLink_vision_position_estimate_message,
+    dialect.MAVLink_global_vision_position_estimate_message,
+    dialect.MAVLink_vicon_position_estimate_message,
 )
 
 
@@ -437,14 +437,16 @@ def test_a_first_element_that_is_nan_means_no_covariance(kind: Any) -> None:
 
 @pytest.mark.parametrize(("angle_rad", "known"), [(99.0, True), (-100.0, False), (math.nan, False)])
 def test_a_pose_with_an_impossible_angle_has_no_attitude(angle_rad: float, known: bool) -> None:
-    message = m.MAVLink_vision_position_estimate_message(0, 1.0, 2.0, 3.0, 0.0, angle_rad, 0.0, COVARIANCE, 5)
+    message = dialect.MAVLink_vision_position_estimate_message(
+        0, 1.0, 2.0, 3.0, 0.0, angle_rad, 0.0, COVARIANCE, 5
+    )
     sample = Odometry("px4").sample(message)
     assert bool(np.isfinite(sample.values[Q_LOCAL_FROM_FRD]).all()) == known
     assert tuple(sample.values[POSITION_M]) == (1.0, 2.0, 3.0) and sample.reset_counter == 5
 
 
 def test_motion_capture_has_a_quaternion() -> None:
-    message = m.MAVLink_att_pos_mocap_message(NOW_US - 40_000, LEVEL_EAST, 1.0, -2.0, 3.0, COVARIANCE)
+    message = dialect.MAVLink_att_pos_mocap_message(NOW_US - 40_000, LEVEL_EAST, 1.0, -2.0, 3.0, COVARIANCE)
     sample = Odometry("px4").sample(message)
     assert tuple(sample.values[POSITION_M]) == (1.0, -2.0, 3.0)
     assert sample.values[Q_LOCAL_FROM_FRD] == pytest.approx(LEVEL_EAST)
@@ -453,7 +455,7 @@ def test_motion_capture_has_a_quaternion() -> None:
 
 
 def test_a_speed_estimate_has_a_velocity_only() -> None:
-    message = m.MAVLink_vision_speed_estimate_message(
+    message = dialect.MAVLink_vision_speed_estimate_message(
         NOW_US - 50_000, 1.0, -2.0, 3.0, tuple(1.0 + k for k in range(9)), 6
     )
     sample = Odometry(VISO_TYPE=1).sample(message)
@@ -467,19 +469,33 @@ def test_a_speed_estimate_has_a_velocity_only() -> None:
 @pytest.mark.parametrize(
     ("child", "frame", "velocity"),
     [
-        (m.MAV_FRAME_LOCAL_NED, ExternalFrame.NED, (4.0, 5.0, 6.0)),
-        (m.MAV_FRAME_LOCAL_ENU, ExternalFrame.NED, (5.0, 4.0, -6.0)),
-        (m.MAV_FRAME_LOCAL_FRD, ExternalFrame.LOCAL_FRD, (4.0, 5.0, 6.0)),
-        (m.MAV_FRAME_LOCAL_FLU, ExternalFrame.LOCAL_FRD, (4.0, -5.0, -6.0)),
-        (m.MAV_FRAME_BODY_NED, ExternalFrame.BODY_FRD, (4.0, 5.0, 6.0)),
-        (m.MAV_FRAME_BODY_OFFSET_NED, ExternalFrame.BODY_FRD, (4.0, 5.0, 6.0)),
+        (dialect.MAV_FRAME_LOCAL_NED, ExternalFrame.NED, (4.0, 5.0, 6.0)),
+        (dialect.MAV_FRAME_LOCAL_ENU, ExternalFrame.NED, (5.0, 4.0, -6.0)),
+        (dialect.MAV_FRAME_LOCAL_FRD, ExternalFrame.LOCAL_FRD, (4.0, 5.0, 6.0)),
+        (dialect.MAV_FRAME_LOCAL_FLU, ExternalFrame.LOCAL_FRD, (4.0, -5.0, -6.0)),
+        (dialect.MAV_FRAME_BODY_NED, ExternalFrame.BODY_FRD, (4.0, 5.0, 6.0)),
+        (dialect.MAV_FRAME_BODY_OFFSET_NED, ExternalFrame.BODY_FRD, (4.0, 5.0, 6.0)),
     ],
 )
 def test_odometry_has_the_velocity_in_a_frame_of_its_own(
     child: int, frame: ExternalFrame, velocity: tuple[float, ...]
 ) -> None:
-    message = m.MAVLink_odometry_message(
-        NOW_US, m.MAV_FRAME_LOCAL_NED, child, 1, 2, 3, LEVEL_EAST, 4, 5, 6, 0, 0, 0, COVARIANCE, COVARIANCE
+    message = dialect.MAVLink_odometry_message(
+        NOW_US,
+        dialect.MAV_FRAME_LOCAL_NED,
+        child,
+        1,
+        2,
+        3,
+        LEVEL_EAST,
+        4,
+        5,
+        6,
+        0,
+        0,
+        0,
+        COVARIANCE,
+        COVARIANCE,
     )
     sample = Odometry("px4").sample(message)
     assert sample.velocity_frame is frame and tuple(sample.values[VELOCITY_M_S]) == velocity
@@ -497,7 +513,7 @@ def test_px4_does_not_use_the_poses_of_other_messages() -> None:
 def origin_message(
     lat_e7: int = 473977400, lon_e7: int = -85455900, *, alt_mm: int = 1, system: int = 1
 ) -> Any:
-    return m.MAVLink_set_gps_global_origin_message(system, lat_e7, lon_e7, alt_mm)
+    return dialect.MAVLink_set_gps_global_origin_message(system, lat_e7, lon_e7, alt_mm)
 
 
 def test_the_origin_is_set_once_and_reported() -> None:

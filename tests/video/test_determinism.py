@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from autopilot_bridge.mavlink import FrameEncoder
-from autopilot_bridge.mavlink import dialect as m
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.payload import CameraComponent
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.video import VideoParameters
@@ -49,14 +48,14 @@ def flight(tmp_path: Path | None, *, look: bool) -> bytes:
 
     def order(command: int, *values: float) -> None:
         params = (*values, *(0.0,) * (7 - len(values)))
-        link.send(client.encode(m.MAVLink_command_long_message(1, 100, command, 0, *params)))
+        link.send(client.encode(dialect.MAVLink_command_long_message(1, 100, command, 0, *params)))
 
     for step in range(1000):
         sitl.advance()
         if step == 300:
-            order(m.MAV_CMD_IMAGE_START_CAPTURE, 0, 0.3, 5)
+            order(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 0.3, 5)
         if step == 600:
-            order(m.MAV_CMD_VIDEO_START_CAPTURE)
+            order(dialect.MAV_CMD_VIDEO_START_CAPTURE)
         if look and step % 7 == 0:
             camera.device.view(sitl.time_us)
     if service is not None:

@@ -16,23 +16,23 @@ from typing import Final
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, flags, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
-_NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
-_INFO: Final = mavlink.MAV_SEVERITY_INFO
+_CRITICAL: Final = dialect.MAV_SEVERITY_CRITICAL
+_NOTICE: Final = dialect.MAV_SEVERITY_NOTICE
+_INFO: Final = dialect.MAV_SEVERITY_INFO
 _POSITIONS: Final = (
-    (mavlink.ACCELCAL_VEHICLE_POS_LEVEL, "level"),
-    (mavlink.ACCELCAL_VEHICLE_POS_LEFT, "on its LEFT side"),
-    (mavlink.ACCELCAL_VEHICLE_POS_RIGHT, "on its RIGHT side"),
-    (mavlink.ACCELCAL_VEHICLE_POS_NOSEDOWN, "nose DOWN"),
-    (mavlink.ACCELCAL_VEHICLE_POS_NOSEUP, "nose UP"),
-    (mavlink.ACCELCAL_VEHICLE_POS_BACK, "on its BACK"),
+    (dialect.ACCELCAL_VEHICLE_POS_LEVEL, "level"),
+    (dialect.ACCELCAL_VEHICLE_POS_LEFT, "on its LEFT side"),
+    (dialect.ACCELCAL_VEHICLE_POS_RIGHT, "on its RIGHT side"),
+    (dialect.ACCELCAL_VEHICLE_POS_NOSEDOWN, "nose DOWN"),
+    (dialect.ACCELCAL_VEHICLE_POS_NOSEUP, "nose UP"),
+    (dialect.ACCELCAL_VEHICLE_POS_BACK, "on its BACK"),
 )
 _MEASURE_US: Final = 1_500_000
 _REPEAT_US: Final = 1_000_000
@@ -55,12 +55,12 @@ class ArdupilotCalibration(Microservice):
         self._requested_us = 0
         self._begun_us = 0
 
-    @receives(mavlink.MAVLink_command_ack_message)
+    @receives(dialect.MAVLink_command_ack_message)
     def _on_acknowledgement(
-        self, message: mavlink.MAVLink_command_ack_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_command_ack_message, source: Source, time_us: int
     ) -> None:
         waiting = self._position is not None and self._measured_us is None
-        if waiting and message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS):
+        if waiting and message.command in (0, dialect.MAV_CMD_ACCELCAL_VEHICLE_POS):
             self._measure()
 
     def tick(self, time_us: int) -> None:
@@ -68,16 +68,16 @@ class ArdupilotCalibration(Microservice):
         if self._position is None:
             return
         if not self._commander.situation.health.accelerometer:
-            return self._end(mavlink.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
+            return self._end(dialect.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
         if self._measured_us is not None:
             if time_us >= self._measured_us:
                 self._ask(self._position + 1)
         elif time_us - self._begun_us >= _PATIENCE_US:
-            self._end(mavlink.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
+            self._end(dialect.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
         elif time_us - self._requested_us >= _REPEAT_US:
             self._send(_POSITIONS[self._position][0])
 
-    @command(mavlink.MAV_CMD_PREFLIGHT_CALIBRATION)
+    @command(dialect.MAV_CMD_PREFLIGHT_CALIBRATION)
     def _calibrate(self, command: Command, source: Source) -> Result:
         if self._commander.armed:
             self._parts.announce(_NOTICE, "Disarm to allow calibration")
@@ -124,7 +124,7 @@ class ArdupilotCalibration(Microservice):
 
     # the accelerometer, one position after the other
 
-    @command(mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS)
+    @command(dialect.MAV_CMD_ACCELCAL_VEHICLE_POS)
     def _vehicle_position(self, command: Command, source: Source) -> Result:
         """ACCELCAL_VEHICLE_POS: the vehicle is in the requested position."""
         if self._position is None or self._measured_us is not None:
@@ -139,7 +139,7 @@ class ArdupilotCalibration(Microservice):
 
     def _ask(self, index: int) -> None:
         if index == len(_POSITIONS):
-            return self._end(mavlink.ACCELCAL_VEHICLE_POS_SUCCESS, "Calibration successful")
+            return self._end(dialect.ACCELCAL_VEHICLE_POS_SUCCESS, "Calibration successful")
         position, words = _POSITIONS[index]
         self._position, self._measured_us = index, None
         self._begun_us = self._commander.time_us
@@ -151,8 +151,8 @@ class ArdupilotCalibration(Microservice):
         self._requested_us = self._commander.time_us
         send_to_all(
             self._parts.broadcast,
-            mavlink.MAVLink_command_long_message(
-                0, 0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS, 0, float(position), *(0.0,) * 6
+            dialect.MAVLink_command_long_message(
+                0, 0, dialect.MAV_CMD_ACCELCAL_VEHICLE_POS, 0, float(position), *(0.0,) * 6
             ),
         )
 
@@ -197,15 +197,15 @@ class CompassCalibration(Microservice):
         assert self._start_us is not None
         self._next_us = time_us + _PROGRESS_US
         if not self._commander.situation.health.magnetometer:
-            return self._finish(mavlink.MAG_CAL_FAILED)
+            return self._finish(dialect.MAG_CAL_FAILED)
         self._strengths.append(math.hypot(*self._parts.readings.magnetometer.values.tolist()))
         done = (time_us - self._start_us) / _TURNING_US
         if done >= 1.0:
-            return self._finish(mavlink.MAG_CAL_SUCCESS)
+            return self._finish(dialect.MAG_CAL_SUCCESS)
         if done >= 0.0:
             self._progress(done)
 
-    @command(mavlink.MAV_CMD_DO_START_MAG_CAL)
+    @command(dialect.MAV_CMD_DO_START_MAG_CAL)
     def _start(self, command: Command, source: Source) -> Result:
         """DO_START_MAG_CAL: p1 compasses (0: all), p3 autosave, p4 delay in seconds."""
         if self._commander.armed:
@@ -222,20 +222,20 @@ class CompassCalibration(Microservice):
         self._commander.situation.calibrating = True
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_ACCEPT_MAG_CAL)
+    @command(dialect.MAV_CMD_DO_ACCEPT_MAG_CAL)
     def _accept(self, command: Command, source: Source) -> Result:
-        if self._finished != mavlink.MAG_CAL_SUCCESS or flags(command.p1) not in (0, _MASK):
+        if self._finished != dialect.MAG_CAL_SUCCESS or flags(command.p1) not in (0, _MASK):
             return Result.FAILED
         self._finished = None
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_CANCEL_MAG_CAL)
+    @command(dialect.MAV_CMD_DO_CANCEL_MAG_CAL)
     def _cancel(self, command: Command, source: Source) -> Result:
         self._start_us = self._finished = None
         self._commander.situation.calibrating = False
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_FIXED_MAG_CAL_YAW)
+    @command(dialect.MAV_CMD_FIXED_MAG_CAL_YAW)
     def _known_heading(self, command: Command, source: Source) -> Result:
         """FIXED_MAG_CAL_YAW: the heading is known, so the vehicle need not be turned."""
         return Result.FAILED if self._commander.armed else Result.ACCEPTED
@@ -250,12 +250,12 @@ class CompassCalibration(Microservice):
             self._finished = None
 
     def _progress(self, done: float) -> None:
-        step = mavlink.MAG_CAL_RUNNING_STEP_ONE if done < _FIRST_STEP else mavlink.MAG_CAL_RUNNING_STEP_TWO
+        step = dialect.MAG_CAL_RUNNING_STEP_ONE if done < _FIRST_STEP else dialect.MAG_CAL_RUNNING_STEP_TWO
         seen = (1 << math.floor(done * _SECTIONS)) - 1
         field = self._parts.readings.magnetometer.values.tolist()
         send_to_all(
             self._parts.broadcast,
-            mavlink.MAVLink_mag_cal_progress_message(
+            dialect.MAVLink_mag_cal_progress_message(
                 _COMPASS,
                 _MASK,
                 step,
@@ -273,10 +273,10 @@ class CompassCalibration(Microservice):
         variance = sum((value - mean) ** 2 for value in self._strengths) / count if count else 0.0
         parameters = self._parts.parameters
         offsets = [parameters.get(f"COMPASS_OFS_{axis}") for axis in "XYZ"]
-        saved = int(self._autosave and status == mavlink.MAG_CAL_SUCCESS)
+        saved = int(self._autosave and status == dialect.MAG_CAL_SUCCESS)
         send_to_all(
             self._parts.broadcast,
-            mavlink.MAVLink_mag_cal_report_message(
+            dialect.MAVLink_mag_cal_report_message(
                 _COMPASS,
                 _MASK,
                 status,

@@ -8,7 +8,7 @@ from autopilot_bridge.commander.events import ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command, receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import FORCE_NUMBER, Command, flags, on_earth, whole
@@ -17,7 +17,7 @@ from autopilot_bridge.services.commands.handlers import CommandHandlers
 _CUSTOM_MODE_FLAG = 1
 _SERVO_CHANNELS = 32
 _FIRST_FREE_SERVO = 5  # 1 to 4 are motors or surfaces
-_WARNING = mavlink.MAV_SEVERITY_WARNING
+_WARNING = dialect.MAV_SEVERITY_WARNING
 
 
 class ArduPilotCommands(CommandHandlers):
@@ -34,14 +34,14 @@ class ArduPilotCommands(CommandHandlers):
     def commanded_mode(self, number: int) -> FlightMode | None:
         """The mode of a custom_mode number; None where a client can't select it."""
 
-    @receives(mavlink.MAVLink_set_mode_message)
+    @receives(dialect.MAVLink_set_mode_message)
     def set_mode_message(
-        self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_mode_message, source: Source, time_us: int
     ) -> None:
         """SET_MODE: works, never acknowledged."""
         self._set_mode(message.base_mode, message.custom_mode)
 
-    @command(mavlink.MAV_CMD_DO_SET_MODE)
+    @command(dialect.MAV_CMD_DO_SET_MODE)
     def set_mode(self, command: Command, source: Source) -> Result:
         """DO_SET_MODE: p1 base mode, p2 mode number."""
         return self._set_mode(flags(command.p1), flags(command.p2))
@@ -68,7 +68,7 @@ class ArduPilotCommands(CommandHandlers):
         """COMPONENT_ARM_DISARM: p2 holds the number that overrides the checks."""
         return command.p2 == FORCE_NUMBER
 
-    @command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+    @command(dialect.MAV_CMD_COMPONENT_ARM_DISARM)
     def arm_disarm(self, command: Command, source: Source) -> Result:
         """COMPONENT_ARM_DISARM: p1 exactly 1 or 0."""
         forced = self.is_forced(command)
@@ -78,12 +78,12 @@ class ArduPilotCommands(CommandHandlers):
             return self.commander.disarm(forced=forced).result
         return Result.UNSUPPORTED
 
-    @command(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
+    @command(dialect.MAV_CMD_NAV_LOITER_UNLIM)
     def loiter(self, command: Command, source: Source) -> Result:
         """NAV_LOITER_UNLIM: mode LOITER."""
         return self.commander.set_mode(FlightMode.HOLD).result
 
-    @command(mavlink.MAV_CMD_DO_REPOSITION)
+    @command(dialect.MAV_CMD_DO_REPOSITION)
     def reposition(self, command: Command, source: Source) -> Result:
         """DO_REPOSITION, COMMAND_INT only: p2 bit 0 changes to GUIDED."""
         if not command.is_int:
@@ -94,7 +94,7 @@ class ArduPilotCommands(CommandHandlers):
         unset = not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z))
         if unset or not on_earth(command):
             return Result.DENIED
-        change = flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+        change = flags(command.p2) & dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if not change and self.commander.mode is not FlightMode.GUIDED:
             return self.reposition_denied
         north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
@@ -111,19 +111,19 @@ class ArduPilotCommands(CommandHandlers):
         """Radius of DO_REPOSITION's circle, positive clockwise; NaN: there is none."""
         return math.nan
 
-    @command(mavlink.MAV_CMD_DO_CHANGE_SPEED)
+    @command(dialect.MAV_CMD_DO_CHANGE_SPEED)
     @abstractmethod
     def change_speed(self, command: Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed."""
 
-    @command(mavlink.MAV_CMD_MISSION_START)
+    @command(dialect.MAV_CMD_MISSION_START)
     def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: whole missions only."""
         if (whole(command.p1, 0) or 0) != 0 or (whole(command.p2, 0) or 0) != 0:
             return Result.DENIED
         return self.commander.guidance.start_mission().result
 
-    @command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
+    @command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT)
     def set_mission_current(self, command: Command, source: Source) -> Result:
         """DO_SET_MISSION_CURRENT: p1 item."""
         item = whole(command.p1)
@@ -131,7 +131,7 @@ class ArduPilotCommands(CommandHandlers):
             return Result.DENIED
         return Result.ACCEPTED if self.parts.set_current_item(item) else Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_SET_HOME)
+    @command(dialect.MAV_CMD_DO_SET_HOME)
     def set_home(self, command: Command, source: Source) -> Result:
         """DO_SET_HOME: p1 = 1, or no position given: the current position."""
         nowhere = command.x == 0.0 and command.y == 0.0
@@ -148,7 +148,7 @@ class ArduPilotCommands(CommandHandlers):
         placed = self.commander.home.command(command.x, command.y, altitude_m)
         return Result.ACCEPTED if placed else Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_FLIGHTTERMINATION)
+    @command(dialect.MAV_CMD_DO_FLIGHTTERMINATION)
     def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors permanently."""
         if not command.p1 > 0.5:
@@ -156,7 +156,7 @@ class ArduPilotCommands(CommandHandlers):
         self.commander.terminate()
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_SERVO)
+    @command(dialect.MAV_CMD_DO_SET_SERVO)
     def set_servo(self, command: Command, source: Source) -> Result:
         """DO_SET_SERVO: outputs without a function can be set (and drive nothing here)."""
         channel = whole(command.p1)
@@ -164,13 +164,13 @@ class ArduPilotCommands(CommandHandlers):
             return Result.FAILED
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SEND_BANNER)
+    @command(dialect.MAV_CMD_DO_SEND_BANNER)
     def send_banner(self, command: Command, source: Source) -> Result:
         """DO_SEND_BANNER: send the texts of the firmware's version on the requesting channel."""
         self.parts.banner(source.channel)
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+    @command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
     def run_prearm_checks(self, command: Command, source: Source) -> Result:
         """RUN_PREARM_CHECKS: the reasons follow as texts."""
         if self.commander.armed:

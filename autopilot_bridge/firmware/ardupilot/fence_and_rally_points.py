@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import degrees, e7
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
@@ -22,16 +22,16 @@ from autopilot_bridge.services.plans.messages import plan_checksum
 FENCE_TOTAL: Final = "FENCE_TOTAL"
 RALLY_TOTAL: Final = "RALLY_TOTAL"
 _LEAST_FENCE: Final = 5  # return point, three vertices, and the first vertex again
-_WARNING: Final = mavlink.MAV_SEVERITY_WARNING
-_INFO: Final = mavlink.MAV_SEVERITY_INFO
+_WARNING: Final = dialect.MAV_SEVERITY_WARNING
+_INFO: Final = dialect.MAV_SEVERITY_INFO
 _OldMessage = (
-    mavlink.MAVLink_fence_point_message
-    | mavlink.MAVLink_fence_fetch_point_message
-    | mavlink.MAVLink_rally_point_message
-    | mavlink.MAVLink_rally_fetch_point_message
+    dialect.MAVLink_fence_point_message
+    | dialect.MAVLink_fence_fetch_point_message
+    | dialect.MAVLink_rally_point_message
+    | dialect.MAVLink_rally_fetch_point_message
 )
-_RETURN_POINT: Final = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
-_VERTEX: Final = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+_RETURN_POINT: Final = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
+_VERTEX: Final = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 
 Point = tuple[float, float]
 
@@ -78,13 +78,13 @@ class OldPoints(Microservice):
             self._warned.add(name)
             self._announce(_INFO, f"Received message ({name}) is deprecated")
         match message:
-            case mavlink.MAVLink_fence_point_message():
+            case dialect.MAVLink_fence_point_message():
                 self._take_fence_point(message)
-            case mavlink.MAVLink_fence_fetch_point_message():
+            case dialect.MAVLink_fence_fetch_point_message():
                 self._send_fence_point(message.idx, source)
-            case mavlink.MAVLink_rally_point_message():
+            case dialect.MAVLink_rally_point_message():
                 self._take_rally_point(message)
-            case mavlink.MAVLink_rally_fetch_point_message():
+            case dialect.MAVLink_rally_fetch_point_message():
                 self._send_rally_point(message.idx, source)
 
     def tick(self, time_us: int) -> None:
@@ -115,7 +115,7 @@ class OldPoints(Microservice):
 
     # fence
 
-    def _take_fence_point(self, message: mavlink.MAVLink_fence_point_message) -> None:
+    def _take_fence_point(self, message: dialect.MAVLink_fence_point_message) -> None:
         total = self._total(FENCE_TOTAL)
         if 0 < total < _LEAST_FENCE:
             self._announce(_WARNING, "Invalid FENCE_TOTAL")
@@ -153,14 +153,14 @@ class OldPoints(Microservice):
         else:
             lat, lon = points[index]
             source.channel.send(
-                mavlink.MAVLink_fence_point_message(
+                dialect.MAVLink_fence_point_message(
                     source.system_id, source.component_id, index, len(points), lat, lon
                 )
             )
 
     # rally points
 
-    def _take_rally_point(self, message: mavlink.MAVLink_rally_point_message) -> None:
+    def _take_rally_point(self, message: dialect.MAVLink_rally_point_message) -> None:
         total = self._total(RALLY_TOTAL)
         lat, lon = degrees(message.lat), degrees(message.lng)
         if message.idx >= total:
@@ -171,7 +171,7 @@ class OldPoints(Microservice):
             self._announce(_WARNING, "Bad rally point message lat or lng")
         else:
             self._rally_points[message.idx] = MissionItem(
-                command=mavlink.MAV_CMD_NAV_RALLY_POINT, frame=3, x=lat, y=lon, z=float(message.alt)
+                command=dialect.MAV_CMD_NAV_RALLY_POINT, frame=3, x=lat, y=lon, z=float(message.alt)
             )
             if len(self._rally_points) == total:
                 items = tuple(self._rally_points[k] for k in range(total))
@@ -185,7 +185,7 @@ class OldPoints(Microservice):
             return
         item = items[index]
         source.channel.send(
-            mavlink.MAVLink_rally_point_message(
+            dialect.MAVLink_rally_point_message(
                 source.system_id,
                 source.component_id,
                 index,

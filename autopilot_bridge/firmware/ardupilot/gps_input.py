@@ -13,7 +13,7 @@ from typing import Final
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.external_mapping import GpsSource, ardupilot_gps_source
 from autopilot_bridge.firmware.mapping import clamp, number
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import degrees, m_s, metres
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
@@ -21,7 +21,7 @@ from autopilot_bridge.services.parts import AutopilotParts
 from flightsim import interface as i
 
 _FIX_3D: Final = 3
-_LAST_FIX_TYPE: Final = mavlink.GPS_FIX_TYPE_PPP
+_LAST_FIX_TYPE: Final = dialect.GPS_FIX_TYPE_PPP
 _WEEK_MS: Final = 604_800_000
 _LATEST_US: Final = 500_000
 _DRIFT_US: Final = 20
@@ -53,20 +53,20 @@ class GpsInputService(Microservice):
         self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
         self.taken = self.refused = 0
 
-    @receives(mavlink.MAVLink_gps_input_message)
-    def _on_gps_input(self, message: mavlink.MAVLink_gps_input_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_gps_input_message)
+    def _on_gps_input(self, message: dialect.MAVLink_gps_input_message, source: Source, time_us: int) -> None:
         """Only the first receiver (`gps_id`) exists."""
         if self._listens and message.gps_id == 0:
             self._take(message, _gps_input(message), time_us)
 
-    @receives(mavlink.MAVLink_hil_gps_message)
-    def _on_hil_gps(self, message: mavlink.MAVLink_hil_gps_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_hil_gps_message)
+    def _on_hil_gps(self, message: dialect.MAVLink_hil_gps_message, source: Source, time_us: int) -> None:
         if self._listens:
             self._take(message, _hil_gps(message), time_us)
 
     def _take(
         self,
-        message: mavlink.MAVLink_gps_input_message | mavlink.MAVLink_hil_gps_message,
+        message: dialect.MAVLink_gps_input_message | dialect.MAVLink_hil_gps_message,
         values: list[float] | None,
         time_us: int,
     ) -> None:
@@ -83,12 +83,12 @@ class GpsInputService(Microservice):
 
     def _sent_us(
         self,
-        message: mavlink.MAVLink_gps_input_message | mavlink.MAVLink_hil_gps_message,
+        message: dialect.MAVLink_gps_input_message | dialect.MAVLink_hil_gps_message,
         values: list[float],
         time_us: int,
     ) -> int:
         """The send time of a fix from its GPS time, which removes the variation of the transport delay."""
-        if isinstance(message, mavlink.MAVLink_hil_gps_message):
+        if isinstance(message, dialect.MAVLink_hil_gps_message):
             return time_us
         if message.time_week == 0 or values[i.GPS_FIX_TYPE] < _FIX_3D:
             return time_us
@@ -101,31 +101,31 @@ class GpsInputService(Microservice):
         return stamp_us + self._offset_us
 
 
-def _gps_input(message: mavlink.MAVLink_gps_input_message) -> list[float] | None:
+def _gps_input(message: dialect.MAVLink_gps_input_message) -> list[float] | None:
     """The values of a GPS_INPUT; None: not a fix."""
     ignored = int(message.ignore_flags)
 
     def unless(flag: int, value: float) -> float:
         return math.nan if ignored & flag else float(value)
 
-    unmoved = bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
-    no_climb = unmoved or bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT)
+    unmoved = bool(ignored & dialect.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
+    no_climb = unmoved or bool(ignored & dialect.GPS_INPUT_IGNORE_FLAG_VEL_VERT)
     reported = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
     if not all(abs(part) < _MAX_SPEED_M_S for part in reported):
         return None
     return _fix(
         message,
-        alt_m=0.0 if ignored & mavlink.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
+        alt_m=0.0 if ignored & dialect.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
         velocity=(*reported, math.nan, math.nan, math.nan)[:3],
-        hdop=unless(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
-        vdop=unless(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
-        eph_m=unless(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
-        epv_m=unless(mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
-        speed_accuracy_m_s=unless(mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
+        hdop=unless(dialect.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
+        vdop=unless(dialect.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
+        eph_m=unless(dialect.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
+        epv_m=unless(dialect.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
+        speed_accuracy_m_s=unless(dialect.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
     )
 
 
-def _hil_gps(message: mavlink.MAVLink_hil_gps_message) -> list[float] | None:
+def _hil_gps(message: dialect.MAVLink_hil_gps_message) -> list[float] | None:
     """The values of a HIL_GPS, which has integers."""
     return _fix(
         message,
@@ -137,7 +137,7 @@ def _hil_gps(message: mavlink.MAVLink_hil_gps_message) -> list[float] | None:
 
 
 def _fix(
-    message: mavlink.MAVLink_gps_input_message | mavlink.MAVLink_hil_gps_message,
+    message: dialect.MAVLink_gps_input_message | dialect.MAVLink_hil_gps_message,
     *,
     alt_m: float,
     velocity: tuple[float, ...],

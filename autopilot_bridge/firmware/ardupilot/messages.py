@@ -7,7 +7,7 @@ from typing import Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_ids
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.messages.common import (
@@ -20,7 +20,7 @@ from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 from flightsim.foundation.vectors import euler_of
 
-_M = mavlink
+_M = dialect
 
 _DATA: Final = load_data("ardupilot", "messages.toml")
 
@@ -31,7 +31,7 @@ START_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
 
 
 def _stream(name: str) -> int:
-    return int(getattr(mavlink, f"MAV_DATA_STREAM_{name}"))
+    return int(getattr(dialect, f"MAV_DATA_STREAM_{name}"))
 
 
 STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
@@ -193,7 +193,7 @@ class ArdupilotMessages(CommonMessages):
 
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245): a copter reports VTOL in multicopter state."""
-        return (mavlink.MAV_VTOL_STATE_MC, int(self.context.landed_state))
+        return (dialect.MAV_VTOL_STATE_MC, int(self.context.landed_state))
 
     def battery_status(self) -> FieldValues | None:
         """BATTERY_STATUS (147): kind of battery unknown, energy in hectojoules from charge and voltage."""
@@ -203,8 +203,8 @@ class ArdupilotMessages(CommonMessages):
             return None
         energy_hj = round(battery[0] * battery[2] * _SECONDS_PER_HOUR / 100.0)
         return values._replace(
-            battery_function=mavlink.MAV_BATTERY_FUNCTION_UNKNOWN,
-            type=mavlink.MAV_BATTERY_TYPE_UNKNOWN,
+            battery_function=dialect.MAV_BATTERY_FUNCTION_UNKNOWN,
+            type=dialect.MAV_BATTERY_TYPE_UNKNOWN,
             energy_consumed=energy_hj,
         )
 
@@ -219,7 +219,7 @@ class ArdupilotMessages(CommonMessages):
             mask, given = _VELOCITY_MASK, slice(3, 9)
         return POSITION_TARGET_LOCAL_NED(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
             type_mask=mask,
             **dict(zip(TARGET_FIELDS[given], map(finite, target[given]), strict=True)),
         )
@@ -230,7 +230,7 @@ class ArdupilotMessages(CommonMessages):
         if values is None:
             return None
         return values._replace(
-            coordinate_frame=mavlink.MAV_FRAME_GLOBAL,
+            coordinate_frame=dialect.MAV_FRAME_GLOBAL,
             type_mask=_POSITION_ONLY_MASK,
             **dict.fromkeys(TARGET_FIELDS[3:], 0.0),
         )

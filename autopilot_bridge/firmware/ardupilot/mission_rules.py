@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Final
 
 from autopilot_bridge.firmware.data import commands, load_data
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.plans.policy import CRITICAL, WARNING, MissionPolicy, MissionTexts
@@ -31,7 +31,7 @@ DO_GUIDED_LIMITS, NAV_SCRIPT_TIME, NAV_ATTITUDE_TIME, NAV_PAYLOAD_PLACE, DO_INVE
 PASSED_OVER: Final = commands(_ITEMS["passed_over"])
 """Accepted and skipped on vehicles without the device, as in the firmware."""
 
-AIRCRAFT_REFUSED: Final = frozenset((mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,))
+AIRCRAFT_REFUSED: Final = frozenset((dialect.MAV_CMD_NAV_SPLINE_WAYPOINT,))
 """Items that aircraft refuse."""
 
 _PLACE_OPTIONAL: Final = commands(_ITEMS["place_optional"])
@@ -56,45 +56,45 @@ class ArdupilotItemRules:
         if mission_type is MissionType.RALLY:
             return check_rally(item)
         if seq == 0:  # home: its uploaded values are replaced
-            return int(mavlink.MAV_MISSION_ACCEPTED)
+            return int(dialect.MAV_MISSION_ACCEPTED)
         if item.command in self._refused:
-            return int(mavlink.MAV_MISSION_UNSUPPORTED)
+            return int(dialect.MAV_MISSION_UNSUPPORTED)
         placeless = _without_place(item)
         if item.command in POSITION_COMMANDS and not placeless:
             if item.frame not in GEODETIC_FRAMES:
-                return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+                return int(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
             result = self._check_params(item) or check_position(item)
         elif item.command in PLAIN_COMMANDS or placeless:
             result = self._check_params(item) or check_finite(item)
         else:
-            return int(mavlink.MAV_MISSION_UNSUPPORTED)
+            return int(dialect.MAV_MISSION_UNSUPPORTED)
         return result or check_special(item, seq, count)
 
     def stored(self, item: MissionItem) -> MissionItem:
-        return replace(item, frame=mavlink.MAV_FRAME_GLOBAL) if _without_place(item) else item
+        return replace(item, frame=dialect.MAV_FRAME_GLOBAL) if _without_place(item) else item
 
     def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
         if item.frame not in GEODETIC_FRAMES:
-            return replace(item, frame=mavlink.MAV_FRAME_GLOBAL, x=0.0, y=0.0)
+            return replace(item, frame=dialect.MAV_FRAME_GLOBAL, x=0.0, y=0.0)
         if item.command in PLAIN_COMMANDS or item.frame in GLOBAL_FRAMES:
-            frame = mavlink.MAV_FRAME_GLOBAL
+            frame = dialect.MAV_FRAME_GLOBAL
         elif item.frame in RELATIVE_FRAMES:
-            frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+            frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
         else:
-            frame = mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT
+            frame = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT
         return replace(item, frame=frame)
 
     @staticmethod
     def _check_params(item: MissionItem) -> int:
-        if item.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:  # NaN: no angle, or no rate
+        if item.command == dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:  # NaN: no angle, or no rate
             return check_params(item, nan_allowed=(True, True, True, True))
-        vtol_land = item.command == mavlink.MAV_CMD_NAV_VTOL_LAND
+        vtol_land = item.command == dialect.MAV_CMD_NAV_VTOL_LAND
         yaw_may_be_nan = vtol_land or item.command in _YAW_IN_PARAM4
         return check_params(item, nan_allowed=(False, False, vtol_land, yaw_may_be_nan))
 
 
 def _without_place(item: MissionItem) -> bool:
-    return item.frame == mavlink.MAV_FRAME_MISSION and item.command in _PLACE_OPTIONAL
+    return item.frame == dialect.MAV_FRAME_MISSION and item.command in _PLACE_OPTIONAL
 
 
 ARDUPILOT_MISSION_POLICY: Final = MissionPolicy(
@@ -115,11 +115,11 @@ ARDUPILOT_MISSION_POLICY: Final = MissionPolicy(
     capacity={MissionType.MISSION: 650, MissionType.FENCE: 84, MissionType.RALLY: 50},
     retry_us=1_000_000,
     timeout_us=8_000_000,
-    timeout_result=mavlink.MAV_MISSION_OPERATION_CANCELLED,
+    timeout_result=dialect.MAV_MISSION_OPERATION_CANCELLED,
     requests_as_int=False,
-    wrong_sequence_result=mavlink.MAV_MISSION_INVALID_SEQUENCE,
+    wrong_sequence_result=dialect.MAV_MISSION_INVALID_SEQUENCE,
     restart_on_count=True,
-    foreign_count_result=mavlink.MAV_MISSION_DENIED,
+    foreign_count_result=dialect.MAV_MISSION_DENIED,
     ordered_download=False,
     home_is_item_0=True,
     partial_writes=True,

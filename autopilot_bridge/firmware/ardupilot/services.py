@@ -27,7 +27,7 @@ from autopilot_bridge.firmware.ardupilot.plane.setpoints import ArduPlaneSetpoin
 from autopilot_bridge.firmware.data import commands, load_data, message_ids
 from autopilot_bridge.firmware.mapping import integer
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation.external import ExternalFrame
 from autopilot_bridge.parameter_files import MAVPROXY_SUFFIXES
 from autopilot_bridge.parameters import ParameterStore
@@ -103,8 +103,8 @@ _MESSAGES: Final = load_data("ardupilot", "messages.toml")
 _ITEMS: Final = load_data("ardupilot", "mission_items.toml")
 ODOMETRY: Final = ExternalPolicy(
     messages=frozenset(message_ids(_MESSAGES["odometry"])),
-    pose_frames=frozenset({mavlink.MAV_FRAME_LOCAL_FRD}),
-    velocity_frames=frozenset({mavlink.MAV_FRAME_BODY_FRD}),
+    pose_frames=frozenset({dialect.MAV_FRAME_LOCAL_FRD}),
+    velocity_frames=frozenset({dialect.MAV_FRAME_BODY_FRD}),
     enabled=lambda store: integer(store, "VISO_TYPE", 0) != 0,
     local_frame=_local_frame,
     one_frame=True,
@@ -238,14 +238,14 @@ def _packed_parameters(store: ParameterStore) -> FileStore:
 def _rates_hz(groups: Mapping[int, tuple[int, ...]]) -> Mapping[str, Mapping[int, float]]:
     """The streams by role. An ArduPilot streams nothing to clients without a request; its log has all."""
     log_hz = {message_id: 10.0 for group in groups.values() for message_id in group}
-    fast = (mavlink.MAVLINK_MSG_ID_ATTITUDE, mavlink.MAVLINK_MSG_ID_RAW_IMU)
+    fast = (dialect.MAVLINK_MSG_ID_ATTITUDE, dialect.MAVLINK_MSG_ID_RAW_IMU)
     return MappingProxyType(
         {
             "onboard": messages.START_RATES_HZ,
             "gcs": messages.START_RATES_HZ,
             PAYLOAD_ROLE: PAYLOAD_RATES_HZ,
             LOG_ROLE: MappingProxyType(
-                {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **log_hz, **dict.fromkeys(fast, 25.0)}
+                {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **log_hz, **dict.fromkeys(fast, 25.0)}
             ),
         }
     )

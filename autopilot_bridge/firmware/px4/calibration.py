@@ -6,14 +6,14 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.px4 import calibration_script as scripts
 from autopilot_bridge.firmware.px4.calibration_script import CalibrationScript
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_INFO: Final = mavlink.MAV_SEVERITY_INFO
-_CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
+_INFO: Final = dialect.MAV_SEVERITY_INFO
+_CRITICAL: Final = dialect.MAV_SEVERITY_CRITICAL
 _RADIO_OFF: Final = 1  # param4
 _SCRIPTS: Final[tuple[tuple[int, int, CalibrationScript], ...]] = (
     (1, 1, scripts.GYRO),
@@ -67,7 +67,7 @@ class Px4Calibration(Microservice):
         if self._next == len(script.lines):
             self._end()
 
-    @command(mavlink.MAV_CMD_PREFLIGHT_CALIBRATION)
+    @command(dialect.MAV_CMD_PREFLIGHT_CALIBRATION)
     def _calibrate(self, command: Command, source: Source) -> Result:
         parameters = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
         values = [whole(value, 0) or 0 for value in parameters]
@@ -90,7 +90,7 @@ class Px4Calibration(Microservice):
             return self._mute(False)
         return Result.UNSUPPORTED
 
-    @command(mavlink.MAV_CMD_FIXED_MAG_CAL_YAW)
+    @command(dialect.MAV_CMD_FIXED_MAG_CAL_YAW)
     def _known_heading(self, command: Command, source: Source) -> Result:
         """FIXED_MAG_CAL_YAW: the heading is known, so the vehicle need not be turned."""
         if self._commander.armed or self._running is not None:

@@ -7,7 +7,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import GROUND_STATION_COMPONENT
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import (
@@ -27,16 +27,16 @@ _PROTOCOL_VERSION = 300
 class Px4Commands(CommandHandlers):
     """PX4's commands. Everything not in the table is UNSUPPORTED, as in the firmware."""
 
-    @receives(mavlink.MAVLink_set_mode_message)
+    @receives(dialect.MAVLink_set_mode_message)
     def set_mode_message(
-        self, message: mavlink.MAVLink_set_mode_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_mode_message, source: Source, time_us: int
     ) -> None:
         """SET_MODE: acknowledged once, with the actual result."""
         main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
         result = self._set_mode(message.base_mode, main, sub, source)
-        acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
+        acknowledge(dialect.MAV_CMD_DO_SET_MODE, result, source)
 
-    @command(mavlink.MAV_CMD_DO_SET_MODE)
+    @command(dialect.MAV_CMD_DO_SET_MODE)
     def set_mode(self, command: Command, source: Source) -> Result:
         """DO_SET_MODE: p1 base mode, p2 main mode, p3 sub mode; acknowledged as accepted before it is
         executed, and once more after.
@@ -57,13 +57,13 @@ class Px4Commands(CommandHandlers):
         self.commander.emit(
             CommandDenied(
                 time_us=self.commander.time_us,
-                command=mavlink.MAV_CMD_DO_SET_MODE,
+                command=dialect.MAV_CMD_DO_SET_MODE,
                 reason=Reason.MODE_UNKNOWN,
             )
         )
         return Result.TEMPORARILY_REJECTED
 
-    @command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+    @command(dialect.MAV_CMD_COMPONENT_ARM_DISARM)
     def arm_disarm(self, command: Command, source: Source) -> Result | None:
         """COMPONENT_ARM_DISARM: p1 rounded to 1 or 0; any other value is answered with a text only."""
         action = whole(command.p1)
@@ -75,21 +75,21 @@ class Px4Commands(CommandHandlers):
         self.deny(command, Reason.BAD_PARAMETER, Result.DENIED)
         return None
 
-    @command(mavlink.MAV_CMD_NAV_TAKEOFF)
+    @command(dialect.MAV_CMD_NAV_TAKEOFF)
     def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: p4 yaw deg, altitude over mean sea level (not set: MIS_TAKEOFF_ALT over home)."""
         down_m = self.down_from(command.z, relative=False)
         return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.radians(command.p4)).result
 
-    @command(mavlink.MAV_CMD_NAV_LAND)
+    @command(dialect.MAV_CMD_NAV_LAND)
     def land(self, command: Command, source: Source) -> Result:
         """NAV_LAND: land at the current position."""
         return self.commander.guidance.land().result
 
-    @command(mavlink.MAV_CMD_DO_REPOSITION)
+    @command(dialect.MAV_CMD_DO_REPOSITION)
     def reposition(self, command: Command, source: Source) -> Result:
         """DO_REPOSITION: p1 speed, p2 = 1 change mode, p4 yaw rad, altitude over mean sea level."""
-        if flags(command.p2) != mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
+        if flags(command.p2) != dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
             return Result.UNSUPPORTED
         if not on_earth(command):
             return Result.DENIED
@@ -98,7 +98,7 @@ class Px4Commands(CommandHandlers):
             north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=command.p4, speed_m_s=command.p1
         ).result
 
-    @command(mavlink.MAV_CMD_DO_ORBIT)
+    @command(dialect.MAV_CMD_DO_ORBIT)
     def orbit(self, command: Command, source: Source) -> Result:
         """DO_ORBIT: p1 radius (negative: counter-clockwise), p2 speed, p3 ORBIT_YAW_BEHAVIOUR, centre."""
         if not on_earth(command):
@@ -113,13 +113,13 @@ class Px4Commands(CommandHandlers):
             down_m=down_m,
         ).result
 
-    @command(mavlink.MAV_CMD_DO_CHANGE_SPEED)
+    @command(dialect.MAV_CMD_DO_CHANGE_SPEED)
     def change_speed(self, command: Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed; -1: back to the parameter's speed."""
         self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_HOME)
+    @command(dialect.MAV_CMD_DO_SET_HOME)
     def set_home(self, command: Command, source: Source) -> Result:
         """DO_SET_HOME: p1 = 1: the current position, else the given one."""
         if command.p1 > 0.5:
@@ -130,7 +130,7 @@ class Px4Commands(CommandHandlers):
         placed = self.commander.home.command(command.x, command.y, command.z)
         return Result.ACCEPTED if placed else Result.TEMPORARILY_REJECTED
 
-    @command(mavlink.MAV_CMD_MISSION_START)
+    @command(dialect.MAV_CMD_MISSION_START)
     def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: p1 first item. Changes the mode and arms the vehicle."""
         if self.commander.mission_problem is not None:
@@ -151,18 +151,18 @@ class Px4Commands(CommandHandlers):
         )
         return Result.TEMPORARILY_REJECTED
 
-    @command(mavlink.MAV_CMD_DO_LAND_START)
+    @command(dialect.MAV_CMD_DO_LAND_START)
     def land_start(self, command: Command, source: Source) -> Result:
         """DO_LAND_START: go to the landing sequence of the mission; CANCELLED when it has none."""
         items = self.commander.missions.items
         start = next(
-            (i for i, item in enumerate(items) if item.command == mavlink.MAV_CMD_DO_LAND_START), None
+            (i for i, item in enumerate(items) if item.command == dialect.MAV_CMD_DO_LAND_START), None
         )
         if start is None or not self.parts.set_current_item(start):
             return Result.CANCELLED
         return self.commander.set_mode(FlightMode.MISSION).result
 
-    @command(mavlink.MAV_CMD_INJECT_FAILURE)
+    @command(dialect.MAV_CMD_INJECT_FAILURE)
     def inject_failure(self, command: Command, source: Source) -> Result:
         """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all)."""
         unit, kind, instance = (whole(command.p1), whole(command.p2), whole(command.p3, 0))
@@ -173,16 +173,16 @@ class Px4Commands(CommandHandlers):
             return Result.DENIED
         return self.parts.inject_failure(unit, kind, instance)
 
-    @command(mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION)
+    @command(dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION)
     def request_protocol_version(self, command: Command, source: Source) -> Result:
         """REQUEST_PROTOCOL_VERSION, the former request."""
         return self.parts.intervals.request(source, _PROTOCOL_VERSION)
 
-    @command(mavlink.MAV_CMD_DO_VTOL_TRANSITION, mavlink.MAV_CMD_SET_CAMERA_MODE)
+    @command(dialect.MAV_CMD_DO_VTOL_TRANSITION, dialect.MAV_CMD_SET_CAMERA_MODE)
     def silence(self, command: Command, source: Source) -> None:
         """No acknowledgement at all, as observed on the firmware."""
 
-    @command(mavlink.MAV_CMD_DO_FLIGHTTERMINATION)
+    @command(dialect.MAV_CMD_DO_FLIGHTTERMINATION)
     def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors of an armed vehicle permanently.
 
@@ -209,7 +209,7 @@ class Px4PlaneCommands(Px4Commands):
         )
         return verdict.result
 
-    @command(mavlink.MAV_CMD_DO_GO_AROUND)
+    @command(dialect.MAV_CMD_DO_GO_AROUND)
     def go_around(self, command: Command, source: Source) -> Result:
         """DO_GO_AROUND: abort a landing."""
         gone = self.commander.guidance.go_around()

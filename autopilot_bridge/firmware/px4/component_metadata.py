@@ -16,7 +16,7 @@ from autopilot_bridge.dispatch import on_request
 from autopilot_bridge.firmware.event_kinds import definitions
 from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.px4.actuators import actuator_metadata, choices
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.parameters import ParameterDefinition, ParameterType
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.files.ftp_protocol import crc32
@@ -80,11 +80,11 @@ class ComponentMetadataService(Microservice):
     def _content(self, name: str) -> Callable[[Mapping[str, str]], bytes]:
         return lambda query: self.files[name]
 
-    @on_request(mavlink.MAVLink_component_metadata_message)
+    @on_request(dialect.MAVLink_component_metadata_message)
     def _send(self, channel: Channel, parameter: float) -> None:
         time_ms = self._time_us() // 1000 & 0xFFFFFFFF
         channel.send(
-            mavlink.MAVLink_component_metadata_message(
+            dialect.MAVLink_component_metadata_message(
                 time_ms, crc32(self.files[GENERAL]), _uri(GENERAL).encode()
             )
         )

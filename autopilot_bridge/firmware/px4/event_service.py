@@ -20,7 +20,7 @@ from autopilot_bridge.dispatch import command, receives, streams
 from autopilot_bridge.firmware.event_kinds import Occurrence
 from autopilot_bridge.firmware.px4 import events as px4_events
 from autopilot_bridge.firmware.texts import Notice
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.microservice import Microservice
@@ -50,19 +50,19 @@ class EventService(Microservice):
         self._broadcast = broadcast
         self._notices = notices
         self._sequence = _FIRST_SEQUENCE
-        self._kept: deque[mavlink.MAVLink_event_message] = deque(maxlen=KEPT)
+        self._kept: deque[dialect.MAVLink_event_message] = deque(maxlen=KEPT)
         self._time_us = 0
         self._next_report_us = 0
         self._reported: tuple[Occurrence, ...] = ()
         self._station_connected = False
 
-    @streams(mavlink.MAVLink_current_event_sequence_message)
+    @streams(dialect.MAVLink_current_event_sequence_message)
     def _current(self) -> Values:
         return (self._sequence, 0)
 
-    @receives(mavlink.MAVLink_request_event_message)
+    @receives(dialect.MAVLink_request_event_message)
     def _on_request(
-        self, message: mavlink.MAVLink_request_event_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_request_event_message, source: Source, time_us: int
     ) -> None:
         """REQUEST_EVENT: ranges may wrap. An event that is no longer kept gets one error reply."""
         count = (message.last_sequence - message.first_sequence) % _MODULO + 1
@@ -72,7 +72,7 @@ class EventService(Microservice):
             sequence = (message.first_sequence + step) % _MODULO
             source.channel.send(
                 kept.get(sequence)
-                or mavlink.MAVLink_response_event_error_message(
+                or dialect.MAVLink_response_event_error_message(
                     source.system_id, source.component_id, sequence, oldest, _UNAVAILABLE
                 )
             )
@@ -92,7 +92,7 @@ class EventService(Microservice):
         self._station_connected = situation.gcs_age_s < self._commander.parameters.gcs_loss_s
         return self._station_connected and not before and not self._commander.armed
 
-    @command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+    @command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
     def _run_checks(self, command: Command, source: Source) -> Result:
         """RUN_PREARM_CHECKS; failed checks are sent as texts too, which brings the report."""
         if not self._commander.check_arming():
@@ -115,7 +115,7 @@ class EventService(Microservice):
         kind, values, level = occurrence
         level = kind.level if level is None else level
         self._sequence = (self._sequence + 1) % _MODULO
-        message = mavlink.MAVLink_event_message(
+        message = dialect.MAVLink_event_message(
             0,  # to all systems
             0,
             kind.event_id,

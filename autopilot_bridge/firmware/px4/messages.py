@@ -7,7 +7,7 @@ from typing import Final
 
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_rates
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, e7
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
@@ -23,7 +23,7 @@ from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 from autopilot_bridge.telemetry.view import pressure_altitude_m
 
-_M = mavlink
+_M = dialect
 _ESTIMATOR_STATUS: Final = fields("ESTIMATOR_STATUS")
 _ORBIT_EXECUTION_STATUS: Final = fields("ORBIT_EXECUTION_STATUS")
 _ALTITUDE: Final = fields("ALTITUDE")
@@ -125,7 +125,7 @@ class Px4Messages(CommonMessages):
         mask = sum(bit for bit, value in zip(_TARGET_BITS, target, strict=True) if math.isnan(value))
         return POSITION_TARGET_LOCAL_NED(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
             type_mask=mask,
             **dict(zip(TARGET_FIELDS, target, strict=True)),
         )
@@ -159,7 +159,7 @@ class Px4Messages(CommonMessages):
         return _ORBIT_EXECUTION_STATUS(
             time_usec=self.view.time_us,
             radius=radius_m,
-            frame=mavlink.MAV_FRAME_GLOBAL_INT,
+            frame=dialect.MAV_FRAME_GLOBAL_INT,
             x=e7(lat_deg),
             y=e7(lon_deg),
             z=alt_m,
@@ -176,11 +176,11 @@ class Px4Messages(CommonMessages):
         v = self.view.refreshed()
         if not v.has_global:
             return None
-        airborne = int(self.context.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND
+        airborne = int(self.context.landed_state) != dialect.MAV_LANDED_STATE_ON_GROUND
         course_cdeg = round(math.degrees(math.atan2(v.vel[1], v.vel[0])) % 360.0 * 100.0) % 36000
         pressure_pa, _ = v.pressure()
         return _OPEN_DRONE_ID_LOCATION(
-            status=mavlink.MAV_ODID_STATUS_AIRBORNE if airborne else mavlink.MAV_ODID_STATUS_GROUND,
+            status=dialect.MAV_ODID_STATUS_AIRBORNE if airborne else dialect.MAV_ODID_STATUS_GROUND,
             direction=course_cdeg,
             speed_horizontal=round(v.ground_speed_m_s * 100.0),
             speed_vertical=round(-v.vel[2] * 100.0),
@@ -188,12 +188,12 @@ class Px4Messages(CommonMessages):
             longitude=v.lon_e7,
             altitude_barometric=pressure_altitude_m_or_unknown(pressure_pa),
             altitude_geodetic=v.alt_amsl_m,
-            height_reference=mavlink.MAV_ODID_HEIGHT_REF_OVER_TAKEOFF,
+            height_reference=dialect.MAV_ODID_HEIGHT_REF_OVER_TAKEOFF,
             height=v.alt_relative_m,
-            horizontal_accuracy=mavlink.MAV_ODID_HOR_ACC_1_METER,
-            vertical_accuracy=mavlink.MAV_ODID_VER_ACC_1_METER,
-            barometer_accuracy=mavlink.MAV_ODID_VER_ACC_UNKNOWN,
-            speed_accuracy=mavlink.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
+            horizontal_accuracy=dialect.MAV_ODID_HOR_ACC_1_METER,
+            vertical_accuracy=dialect.MAV_ODID_VER_ACC_1_METER,
+            barometer_accuracy=dialect.MAV_ODID_VER_ACC_UNKNOWN,
+            speed_accuracy=dialect.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
             timestamp=float(UNKNOWN_UINT16),
         )
 
@@ -205,15 +205,15 @@ class Px4Messages(CommonMessages):
             return None
         unix_s = (self.parts.memory.unix_epoch_us + self.view.time_us) // 1_000_000
         return _OPEN_DRONE_ID_SYSTEM(
-            operator_location_type=mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_TAKEOFF,
-            classification_type=mavlink.MAV_ODID_CLASSIFICATION_TYPE_UNDECLARED,
+            operator_location_type=dialect.MAV_ODID_OPERATOR_LOCATION_TYPE_TAKEOFF,
+            classification_type=dialect.MAV_ODID_CLASSIFICATION_TYPE_UNDECLARED,
             operator_latitude=home[0],
             operator_longitude=home[1],
             area_count=1,
             area_ceiling=-1000.0,
             area_floor=-1000.0,
-            category_eu=mavlink.MAV_ODID_CATEGORY_EU_UNDECLARED,
-            class_eu=mavlink.MAV_ODID_CLASS_EU_UNDECLARED,
+            category_eu=dialect.MAV_ODID_CATEGORY_EU_UNDECLARED,
+            class_eu=dialect.MAV_ODID_CLASS_EU_UNDECLARED,
             operator_altitude_geo=home[2] * 1e-3,
             timestamp=max(0, unix_s - ODID_EPOCH_UNIX_S),
         )

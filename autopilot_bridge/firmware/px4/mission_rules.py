@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any, Final
 
 from autopilot_bridge.firmware.data import commands, load_data
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_feasibility.px4 import PARAMETERS, Px4MissionRules, mission_problems
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
@@ -45,44 +45,44 @@ class Px4ItemRules:
     """`ItemRules` of PX4 1.16."""
 
     def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
-        if item.frame not in _POSITION_FRAMES and item.frame != mavlink.MAV_FRAME_MISSION:
-            return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+        if item.frame not in _POSITION_FRAMES and item.frame != dialect.MAV_FRAME_MISSION:
+            return int(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
         if mission_type is MissionType.FENCE:
             return check_fence(item, empty_circles=True)
         if mission_type is MissionType.RALLY:
             return check_rally(item)
-        if item.frame == mavlink.MAV_FRAME_MISSION:
+        if item.frame == dialect.MAV_FRAME_MISSION:
             if item.command not in PLAIN_COMMANDS:
-                return int(mavlink.MAV_MISSION_UNSUPPORTED)
+                return int(dialect.MAV_MISSION_UNSUPPORTED)
             result = check_finite(item)
         else:
             if item.command not in POSITION_COMMANDS:
-                return int(mavlink.MAV_MISSION_UNSUPPORTED)
+                return int(dialect.MAV_MISSION_UNSUPPORTED)
             result = check_params(item, nan_allowed=_UNSET_EVERYWHERE) or check_position(item)
         return result or check_special(item, seq, count) or self._check_roi(item)
 
     def stored(self, item: MissionItem) -> MissionItem:
         """Only the parameters that PX4 stores of an item with a position; the others read back as 0."""
-        if item.frame == mavlink.MAV_FRAME_MISSION:
+        if item.frame == dialect.MAV_FRAME_MISSION:
             return item
         p1 = p2 = p3 = p4 = 0.0
         match item.command:
-            case mavlink.MAV_CMD_NAV_WAYPOINT:
+            case dialect.MAV_CMD_NAV_WAYPOINT:
                 p1, p2, p4 = _number(item.param1), _number(item.param2), _heading(item.param4)
-            case mavlink.MAV_CMD_NAV_LOITER_UNLIM:
+            case dialect.MAV_CMD_NAV_LOITER_UNLIM:
                 p3, p4 = _number(item.param3), _heading(item.param4)
-            case mavlink.MAV_CMD_NAV_LOITER_TIME:
+            case dialect.MAV_CMD_NAV_LOITER_TIME:
                 p1, p2 = _number(item.param1), float(item.param2 > 0.0)
                 p3, p4 = _number(item.param3), float(item.param4 > 0.0)
-            case mavlink.MAV_CMD_NAV_LAND:
+            case dialect.MAV_CMD_NAV_LAND:
                 p2, p4 = float(int(_number(item.param2))), _heading(item.param4)
             case (
-                mavlink.MAV_CMD_NAV_TAKEOFF | mavlink.MAV_CMD_NAV_VTOL_TAKEOFF | mavlink.MAV_CMD_NAV_VTOL_LAND
+                dialect.MAV_CMD_NAV_TAKEOFF | dialect.MAV_CMD_NAV_VTOL_TAKEOFF | dialect.MAV_CMD_NAV_VTOL_LAND
             ):
                 p4 = _heading(item.param4)
-            case mavlink.MAV_CMD_NAV_LOITER_TO_ALT:
+            case dialect.MAV_CMD_NAV_LOITER_TO_ALT:
                 p1, p2, p4 = float(item.param1 > 0.0), _number(item.param2), float(item.param4 > 0.0)
-            case mavlink.MAV_CMD_NAV_ROI | mavlink.MAV_CMD_DO_SET_ROI:
+            case dialect.MAV_CMD_NAV_ROI | dialect.MAV_CMD_DO_SET_ROI:
                 p1 = item.param1
         if item.command in POLYGON_COMMANDS:
             p1 = float(round(item.param1))
@@ -93,24 +93,24 @@ class Px4ItemRules:
     def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
         if item.frame in RELATIVE_FRAMES:
             frame = (
-                mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT if as_int else mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+                dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT if as_int else dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
             )
         elif item.frame in GLOBAL_FRAMES:
-            frame = mavlink.MAV_FRAME_GLOBAL_INT if as_int else mavlink.MAV_FRAME_GLOBAL
+            frame = dialect.MAV_FRAME_GLOBAL_INT if as_int else dialect.MAV_FRAME_GLOBAL
         else:
             return item
         return replace(item, frame=frame)
 
     @staticmethod
     def _check_roi(item: MissionItem) -> int:
-        if item.command not in (mavlink.MAV_CMD_NAV_ROI, mavlink.MAV_CMD_DO_SET_ROI):
+        if item.command not in (dialect.MAV_CMD_NAV_ROI, dialect.MAV_CMD_DO_SET_ROI):
             return int(ACCEPTED)
         allowed = (
-            (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_WPNEXT, mavlink.MAV_ROI_WPINDEX)
-            if item.frame == mavlink.MAV_FRAME_MISSION
-            else (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION)
+            (dialect.MAV_ROI_NONE, dialect.MAV_ROI_WPNEXT, dialect.MAV_ROI_WPINDEX)
+            if item.frame == dialect.MAV_FRAME_MISSION
+            else (dialect.MAV_ROI_NONE, dialect.MAV_ROI_LOCATION)
         )
-        return int(ACCEPTED if item.param1 in allowed else mavlink.MAV_MISSION_INVALID_PARAM1)
+        return int(ACCEPTED if item.param1 in allowed else dialect.MAV_MISSION_INVALID_PARAM1)
 
 
 def _number(value: float) -> float:
@@ -154,7 +154,7 @@ PX4_MISSION_POLICY: Final = MissionPolicy(
     requests_as_int=True,
     wrong_sequence_result=None,
     restart_on_count=False,
-    foreign_count_result=mavlink.MAV_MISSION_ERROR,
+    foreign_count_result=dialect.MAV_MISSION_ERROR,
     ordered_download=True,
     home_is_item_0=False,
     partial_writes=False,

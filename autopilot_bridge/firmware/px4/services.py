@@ -22,7 +22,7 @@ from autopilot_bridge.firmware.px4.setpoints import Px4Setpoints
 from autopilot_bridge.firmware.px4.texts import copter_notices, plane_notices
 from autopilot_bridge.firmware.services import PAYLOAD_RATES_HZ, PAYLOAD_ROLE, FirmwareServices
 from autopilot_bridge.firmware.texts import Notice
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, GROUND_STATION_COMPONENT
 from autopilot_bridge.navigation.external import ExternalFrame
 from autopilot_bridge.parameter_files import QGC_SUFFIX
@@ -230,7 +230,7 @@ SERVICES: Final = FirmwareServices(
         unknown_set=Result.FAILED,
         unknown_get=Result.ACCEPTED,
         unknown_request=Result.DENIED,
-        fixed=frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT}),
+        fixed=frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT}),
         refuse_running=True,
     ),
     card=CARD,

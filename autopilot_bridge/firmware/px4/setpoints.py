@@ -8,13 +8,13 @@ from typing import Final
 
 from autopilot_bridge.commander.events import SetpointDenied, SetpointFault
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs import setpoints as wire
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_GLOBAL_FRAMES: Final = {mavlink.MAV_FRAME_GLOBAL_INT: False, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
+_GLOBAL_FRAMES: Final = {dialect.MAV_FRAME_GLOBAL_INT: False, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
 """Whether the altitude is over home."""
 
 
@@ -24,9 +24,9 @@ class Px4Setpoints(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self.commander = parts.commander
 
-    @receives(mavlink.MAVLink_set_position_target_local_ned_message)
+    @receives(dialect.MAVLink_set_position_target_local_ned_message)
     def on_local(
-        self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         mask = message.type_mask
@@ -34,7 +34,7 @@ class Px4Setpoints(Microservice):
         velocity = wire.velocity_of((message.vx, message.vy, message.vz), mask)
         acceleration = wire.acceleration_of((message.afx, message.afy, message.afz), mask)
         if (
-            message.coordinate_frame == mavlink.MAV_FRAME_BODY_NED
+            message.coordinate_frame == dialect.MAV_FRAME_BODY_NED
         ):  # a position is not used, whatever its bits
             context = self.commander.context
             position = wire.UNSET
@@ -42,14 +42,14 @@ class Px4Setpoints(Microservice):
             velocity = wire.rotated_by_heading(velocity, wire.heading_of(context))
             acceleration = wire.whole(acceleration, wire.ACCELERATION_BITS, mask)
             acceleration = wire.rotated_by_attitude(acceleration, context)
-        elif message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
+        elif message.coordinate_frame != dialect.MAV_FRAME_LOCAL_NED:
             self._deny(message, SetpointFault.FRAME)
             return
         self._take(message, position, velocity, acceleration, time_us)
 
-    @receives(mavlink.MAVLink_set_position_target_global_int_message)
+    @receives(dialect.MAVLink_set_position_target_global_int_message)
     def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         mask = message.type_mask
@@ -71,8 +71,8 @@ class Px4Setpoints(Microservice):
 
     def _take(
         self,
-        message: mavlink.MAVLink_set_position_target_local_ned_message
-        | mavlink.MAVLink_set_position_target_global_int_message,
+        message: dialect.MAVLink_set_position_target_local_ned_message
+        | dialect.MAVLink_set_position_target_global_int_message,
         position: wire.Triple,
         velocity: wire.Triple,
         acceleration: wire.Triple,
@@ -93,8 +93,8 @@ class Px4Setpoints(Microservice):
 
     def _deny(
         self,
-        message: mavlink.MAVLink_set_position_target_local_ned_message
-        | mavlink.MAVLink_set_position_target_global_int_message,
+        message: dialect.MAVLink_set_position_target_local_ned_message
+        | dialect.MAVLink_set_position_target_global_int_message,
         fault: SetpointFault,
     ) -> None:
         commander = self.commander
@@ -107,9 +107,9 @@ class Px4Setpoints(Microservice):
             )
         )
 
-    @receives(mavlink.MAVLink_set_attitude_target_message)
+    @receives(dialect.MAVLink_set_attitude_target_message)
     def on_attitude(
-        self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_attitude_target_message, source: Source, time_us: int
     ) -> None:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask

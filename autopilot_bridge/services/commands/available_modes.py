@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from autopilot_bridge.dispatch import on_request
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.microservice import Microservice
 
@@ -35,13 +35,13 @@ class AvailableModes(Microservice):
     def __init__(self, modes: Sequence[ListedMode]) -> None:
         self._modes = modes
 
-    @on_request(mavlink.MAVLink_available_modes_message)
+    @on_request(dialect.MAVLink_available_modes_message)
     def _send(self, channel: Channel, index: float) -> None:
         """Send the mode with this index (from 1), or all modes for 0."""
         for number, mode in enumerate(self._modes, start=1):
             if index in (0, number):
                 channel.send(
-                    mavlink.MAVLink_available_modes_message(
+                    dialect.MAVLink_available_modes_message(
                         len(self._modes),
                         number,
                         mode.standard_mode,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import degrees
 from autopilot_bridge.mission_wire import UNSET_INT
 from autopilot_bridge.services.channel import Source
@@ -17,14 +17,14 @@ FORCE_NUMBER: Final = 21196
 _LOCAL_M: Final = 1e-4
 _LOCAL_FRAMES: Final = frozenset(
     {
-        mavlink.MAV_FRAME_LOCAL_NED,
-        mavlink.MAV_FRAME_LOCAL_ENU,
-        mavlink.MAV_FRAME_LOCAL_OFFSET_NED,
-        mavlink.MAV_FRAME_BODY_NED,
-        mavlink.MAV_FRAME_BODY_OFFSET_NED,
-        mavlink.MAV_FRAME_BODY_FRD,
-        mavlink.MAV_FRAME_LOCAL_FRD,
-        mavlink.MAV_FRAME_LOCAL_FLU,
+        dialect.MAV_FRAME_LOCAL_NED,
+        dialect.MAV_FRAME_LOCAL_ENU,
+        dialect.MAV_FRAME_LOCAL_OFFSET_NED,
+        dialect.MAV_FRAME_BODY_NED,
+        dialect.MAV_FRAME_BODY_OFFSET_NED,
+        dialect.MAV_FRAME_BODY_FRD,
+        dialect.MAV_FRAME_LOCAL_FRD,
+        dialect.MAV_FRAME_LOCAL_FLU,
     }
 )
 
@@ -57,11 +57,11 @@ class Command(NamedTuple):
 
 
 def command_from_message(
-    message: mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message,
+    message: dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message,
 ) -> Command:
     """A `Command` from a COMMAND_LONG or COMMAND_INT."""
     frame: int | None = None
-    if isinstance(message, mavlink.MAVLink_command_long_message):
+    if isinstance(message, dialect.MAVLink_command_long_message):
         x, y, z = message.param5, message.param6, message.param7
     else:
         z, frame = message.z, message.frame
@@ -104,5 +104,5 @@ Handler = Callable[[Command, Source], Result | None]
 def acknowledge(command: int, result: Result, source: Source) -> None:
     """Send a COMMAND_ACK to the client that has sent the command."""
     source.channel.send(
-        mavlink.MAVLink_command_ack_message(command, int(result), 0, 0, source.system_id, source.component_id)
+        dialect.MAVLink_command_ack_message(command, int(result), 0, 0, source.system_id, source.component_id)
     )

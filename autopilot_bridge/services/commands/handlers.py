@@ -11,14 +11,14 @@ from typing import Final
 from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_HOME_POSITION: Final = mavlink.MAVLINK_MSG_ID_HOME_POSITION
-_AUTOPILOT_VERSION: Final = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+_HOME_POSITION: Final = dialect.MAVLINK_MSG_ID_HOME_POSITION
+_AUTOPILOT_VERSION: Final = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
 
 
 class CommandHandlers(Microservice, ABC):
@@ -39,12 +39,12 @@ class CommandHandlers(Microservice, ABC):
 
     # shared handlers
 
-    @command(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    @command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     def return_to_launch(self, command: Command, source: Source) -> Result:
         """NAV_RETURN_TO_LAUNCH."""
         return self.commander.guidance.return_home().result
 
-    @command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+    @command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL)
     def set_message_interval(self, command: Command, source: Source) -> Result:
         """SET_MESSAGE_INTERVAL: p1 message, p2 interval in microseconds."""
         message_id = whole(command.p1)
@@ -52,13 +52,13 @@ class CommandHandlers(Microservice, ABC):
             return Result.DENIED
         return self.parts.intervals.set_interval(source, message_id, command.p2)
 
-    @command(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL)
+    @command(dialect.MAV_CMD_GET_MESSAGE_INTERVAL)
     def get_message_interval(self, command: Command, source: Source) -> Result:
         """GET_MESSAGE_INTERVAL: p1 message."""
         message_id = whole(command.p1)
         return Result.DENIED if message_id is None else self.parts.intervals.get_interval(source, message_id)
 
-    @command(mavlink.MAV_CMD_REQUEST_MESSAGE)
+    @command(dialect.MAV_CMD_REQUEST_MESSAGE)
     def request_message(self, command: Command, source: Source) -> Result:
         """REQUEST_MESSAGE: p1 message, p2 as the message defines."""
         message_id = whole(command.p1)
@@ -66,13 +66,13 @@ class CommandHandlers(Microservice, ABC):
             return Result.DENIED
         return self.parts.intervals.request(source, message_id, command.p2)
 
-    @command(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES)
+    @command(dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES)
     def request_capabilities(self, command: Command, source: Source) -> Result:
         """REQUEST_AUTOPILOT_CAPABILITIES, the former request for AUTOPILOT_VERSION."""
         self.parts.intervals.request(source, _AUTOPILOT_VERSION)
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_GET_HOME_POSITION)
+    @command(dialect.MAV_CMD_GET_HOME_POSITION)
     def get_home_position(self, command: Command, source: Source) -> Result:
         """GET_HOME_POSITION, the former request for HOME_POSITION."""
         if self.commander.home.position is None:

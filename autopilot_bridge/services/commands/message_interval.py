@@ -11,14 +11,14 @@ from typing import Final
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
 from autopilot_bridge.services.channel import Channel, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 
-ALL_STREAMS: Final = mavlink.MAV_DATA_STREAM_ALL
+ALL_STREAMS: Final = dialect.MAV_DATA_STREAM_ALL
 _FASTEST_REQUESTABLE_US: Final = 100_000
 
 
@@ -77,9 +77,9 @@ class MessageIntervalService(Microservice):
         self._pending: dict[tuple[Channel, int, float], None] = {}  # two equal requests get one answer
         self._time_us = 0
 
-    @receives(mavlink.MAVLink_request_data_stream_message)
+    @receives(dialect.MAVLink_request_data_stream_message)
     def _on_data_stream(
-        self, message: mavlink.MAVLink_request_data_stream_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_request_data_stream_message, source: Source, time_us: int
     ) -> None:
         self._time_us = time_us
         table = self._tables.get(source.channel.name)
@@ -113,7 +113,7 @@ class MessageIntervalService(Microservice):
             return Result.DENIED
         if not self._known(message_id):
             if self._policy.unknown_text:
-                self._announce(mavlink.MAV_SEVERITY_WARNING, self._policy.unknown_text.format(message_id))
+                self._announce(dialect.MAV_SEVERITY_WARNING, self._policy.unknown_text.format(message_id))
             return self._policy.unknown_set
         if message_id in self._policy.fixed:
             return Result.FAILED
@@ -125,7 +125,7 @@ class MessageIntervalService(Microservice):
             interval = table.default_interval_us(message_id)
         elif MICROSECONDS / interval > self._policy.max_rate_hz:
             if self._policy.too_fast_text:
-                self._announce(mavlink.MAV_SEVERITY_WARNING, self._policy.too_fast_text.format(message_id))
+                self._announce(dialect.MAV_SEVERITY_WARNING, self._policy.too_fast_text.format(message_id))
             return Result.DENIED
         table.set_interval(message_id, interval, self._time_us)
         return Result.ACCEPTED
@@ -138,7 +138,7 @@ class MessageIntervalService(Microservice):
             interval_us = table.intervals_us.get(message_id, -1)
         if 0 <= message_id <= 0xFFFF:
             source.channel.send(
-                mavlink.MAVLink_message_interval_message(message_id, min(interval_us, 0x7FFFFFFF))
+                dialect.MAVLink_message_interval_message(message_id, min(interval_us, 0x7FFFFFFF))
             )
         return Result.ACCEPTED if known else self._policy.unknown_get
 

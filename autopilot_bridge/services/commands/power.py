@@ -12,7 +12,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import RebootRequested
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 from autopilot_bridge.services.microservice import Microservice
@@ -68,7 +68,7 @@ class PowerService(Microservice):
         if self._act is not None and (forced or not self._commander.armed):  # not if armed since
             self._act(action)
 
-    @command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
+    @command(dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
     def _command(self, command: Command, source: Source) -> Result:
         policy, requested = self._policy, whole(command.p1, 0)
         action = policy.actions.get(requested or 0)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import NO_CLIENT, AddressRule, Source
 from autopilot_bridge.services.commands.command import Command, Handler, acknowledge, command_from_message
 from autopilot_bridge.services.microservice import Microservice
@@ -32,10 +32,10 @@ class CommandService(Microservice):
         handler = self._table.get(command.id)
         return Result.UNSUPPORTED if handler is None else handler(command, sender)
 
-    @receives(mavlink.MAVLink_command_long_message, mavlink.MAVLink_command_int_message)
+    @receives(dialect.MAVLink_command_long_message, dialect.MAVLink_command_int_message)
     def _on_command(
         self,
-        message: mavlink.MAVLink_command_long_message | mavlink.MAVLink_command_int_message,
+        message: dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message,
         source: Source,
         time_us: int,
     ) -> None:

@@ -9,15 +9,15 @@ from typing import Final
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, flags, whole
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_INFO: Final = mavlink.MAV_SEVERITY_INFO
-_WARNING: Final = mavlink.MAV_SEVERITY_WARNING
-_GRIPPER_ACTIONS: Final = (mavlink.GRIPPER_ACTION_RELEASE, mavlink.GRIPPER_ACTION_GRAB)
+_INFO: Final = dialect.MAV_SEVERITY_INFO
+_WARNING: Final = dialect.MAV_SEVERITY_WARNING
+_GRIPPER_ACTIONS: Final = (dialect.GRIPPER_ACTION_RELEASE, dialect.GRIPPER_ACTION_GRAB)
 
 
 class Px4Actuators(Microservice):
@@ -39,8 +39,8 @@ class Px4Actuators(Microservice):
         while self._moving and time_us >= self._moving[0][0]:
             _, source = self._moving.pop(0)
             source.channel.send(
-                mavlink.MAVLink_command_ack_message(
-                    mavlink.MAV_CMD_DO_GRIPPER,
+                dialect.MAVLink_command_ack_message(
+                    dialect.MAV_CMD_DO_GRIPPER,
                     int(Result.ACCEPTED),
                     0,
                     0,
@@ -49,19 +49,19 @@ class Px4Actuators(Microservice):
                 )
             )
 
-    @command(mavlink.MAV_CMD_DO_WINCH, mavlink.MAV_CMD_CONFIGURE_ACTUATOR)
+    @command(dialect.MAV_CMD_DO_WINCH, dialect.MAV_CMD_CONFIGURE_ACTUATOR)
     def _silence(self, command: Command, source: Source) -> None:
         """No acknowledgement: there is no winch, and no output can be configured."""
 
-    @command(mavlink.MAV_CMD_DO_SET_ACTUATOR)
+    @command(dialect.MAV_CMD_DO_SET_ACTUATOR)
     def _accept(self, command: Command, source: Source) -> Result:
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE)
+    @command(dialect.MAV_CMD_DO_AUTOTUNE_ENABLE)
     def _begin(self, command: Command, source: Source) -> Result:
         return Result.IN_PROGRESS
 
-    @command(mavlink.MAV_CMD_DO_GRIPPER)
+    @command(dialect.MAV_CMD_DO_GRIPPER)
     def _gripper(self, command: Command, source: Source) -> Result | None:
         """DO_GRIPPER: p2 GRIPPER_ACTIONS; acknowledged when it is done, after PD_GRIPPER_TO seconds."""
         if self._parameters.get("PD_GRIPPER_TYPE") < 0 or whole(command.p2) not in _GRIPPER_ACTIONS:
@@ -72,7 +72,7 @@ class Px4Actuators(Microservice):
             self._moving.sort(key=lambda entry: entry[0])
         return None
 
-    @command(mavlink.MAV_CMD_ACTUATOR_TEST)
+    @command(dialect.MAV_CMD_ACTUATOR_TEST)
     def _test(self, command: Command, source: Source) -> Result:
         """ACTUATOR_TEST: p5 ACTUATOR_OUTPUT_FUNCTION; disarmed only."""
         if self._commander.armed or self._parameters.get("COM_MOT_TEST_EN") != 1:
@@ -93,29 +93,29 @@ class ArdupilotActuators(Microservice):
         self._parts = parts
         self._commander = parts.commander
 
-    @command(mavlink.MAV_CMD_DO_GRIPPER)
+    @command(dialect.MAV_CMD_DO_GRIPPER)
     def _gripper(self, command: Command, source: Source) -> Result:
         """DO_GRIPPER: p2 GRIPPER_ACTIONS, with GRIP_ENABLE."""
         action = whole(command.p2)
         if not self._parts.parameters.get("GRIP_ENABLE") or action not in _GRIPPER_ACTIONS:
             return Result.FAILED
-        words = "releasing" if action == mavlink.GRIPPER_ACTION_RELEASE else "grabbing"
+        words = "releasing" if action == dialect.GRIPPER_ACTION_RELEASE else "grabbing"
         self._parts.announce(_INFO, f"Gripper load {words}")
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_SET_RELAY, mavlink.MAV_CMD_DO_REPEAT_RELAY)
+    @command(dialect.MAV_CMD_DO_SET_RELAY, dialect.MAV_CMD_DO_REPEAT_RELAY)
     def _relay(self, command: Command, source: Source) -> Result:
         """DO_SET_RELAY: p1 relay from 0, p2 off or on; a relay without RELAYn_FUNCTION 1 does not exist."""
         relay, state = whole(command.p1), whole(command.p2)
         if relay is None or state is None or not 0 <= relay < self._RELAYS:
             return Result.FAILED
-        if command.id == mavlink.MAV_CMD_DO_SET_RELAY and state not in (0, 1):
+        if command.id == dialect.MAV_CMD_DO_SET_RELAY and state not in (0, 1):
             return Result.FAILED
         name = f"RELAY{relay + 1}_FUNCTION"
         there = name in self._parts.parameters and self._parts.parameters.get(name) == 1
         return Result.ACCEPTED if there else Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_REPEAT_SERVO)
+    @command(dialect.MAV_CMD_DO_REPEAT_SERVO)
     def _repeat_servo(self, command: Command, source: Source) -> Result:
         """DO_REPEAT_SERVO: p1 output without a function, p3 how often."""
         channel = whole(command.p1)
@@ -154,12 +154,12 @@ class ArducopterActuators(ArdupilotActuators):
             self._test_end_us = None
             self._parts.announce(_INFO, "finished motor test")
 
-    @command(mavlink.MAV_CMD_DO_WINCH)
+    @command(dialect.MAV_CMD_DO_WINCH)
     def _fail(self, command: Command, source: Source) -> Result:
         """There is no such device."""
         return Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_MOTOR_TEST)
+    @command(dialect.MAV_CMD_DO_MOTOR_TEST)
     def _motor_test(self, command: Command, source: Source) -> Result:
         """DO_MOTOR_TEST: p1 motor from 1, p2 kind of throttle, p3 throttle, p4 seconds; disarmed."""
         motor, kind = whole(command.p1), whole(command.p2)
@@ -175,7 +175,7 @@ class ArducopterActuators(ArdupilotActuators):
         self._test_end_us = self._commander.time_us + round(command.p4 * 1e6)
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_AUX_FUNCTION)
+    @command(dialect.MAV_CMD_DO_AUX_FUNCTION)
     def _auxiliary(self, command: Command, source: Source) -> Result:
         """DO_AUX_FUNCTION: p1 function, p2 switch position 0 low, 1 middle, 2 high."""
         function, position = whole(command.p1), whole(command.p2)
@@ -195,12 +195,12 @@ class ArducopterActuators(ArdupilotActuators):
 class ArduplaneActuators(ArdupilotActuators):
     """The additional answers of a plane."""
 
-    @command(mavlink.MAV_CMD_DO_MOTOR_TEST)
+    @command(dialect.MAV_CMD_DO_MOTOR_TEST)
     def _fail(self, command: Command, source: Source) -> Result:
         """Motor tests are for quadplanes."""
         return Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE)
+    @command(dialect.MAV_CMD_DO_AUTOTUNE_ENABLE)
     def _autotune(self, command: Command, source: Source) -> Result:
         """DO_AUTOTUNE_ENABLE: accepted; the gains are not changed."""
         self._parts.announce(_INFO, f"{'Started' if flags(command.p1) else 'Stopped'} autotune")

@@ -17,7 +17,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.mission_plan import MissionItem
@@ -27,15 +27,15 @@ from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.services.plans.equipment import GIMBAL_COMMANDS
 
-_CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-_NONE: Final = mavlink.MAV_CMD_DO_SET_ROI_NONE
-_NEXT_WAYPOINT: Final = mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
+_CONFIGURE: Final = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+_NONE: Final = dialect.MAV_CMD_DO_SET_ROI_NONE
+_NEXT_WAYPOINT: Final = dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
 _PRESENT_US: Final = 5_000_000
 _NO_CLIENT: Final = (0, 0)
 _TAKE, _GIVE_UP = -2.0, -3.0
 
 _ROI: Final = frozenset(
-    (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_SYSID, _NONE)
+    (dialect.MAV_CMD_DO_SET_ROI, dialect.MAV_CMD_DO_SET_ROI_LOCATION, dialect.MAV_CMD_DO_SET_ROI_SYSID, _NONE)
 )
 
 
@@ -89,14 +89,14 @@ class PayloadCommands(Microservice):
             GIMBAL_COMPONENT,
         )
 
-    @receives(mavlink.MAVLink_heartbeat_message)
-    def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_heartbeat_message)
+    def _on_heartbeat(self, message: dialect.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
         if self._is_own(source):
             self._received_us[source.component_id] = time_us
 
-    @receives(mavlink.MAVLink_gimbal_manager_status_message)
+    @receives(dialect.MAVLink_gimbal_manager_status_message)
     def _on_manager_status(
-        self, message: mavlink.MAVLink_gimbal_manager_status_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_gimbal_manager_status_message, source: Source, time_us: int
     ) -> None:
         if self._is_own(source):
             primary = (message.primary_control_sysid, message.primary_control_compid)
@@ -169,17 +169,17 @@ def _roi_item(command: Command, *, kinds: bool) -> MissionItem | None:
 
     0/0 ends it, as in ArduPilot.
     """
-    if command.id == mavlink.MAV_CMD_DO_SET_ROI_SYSID:
+    if command.id == dialect.MAV_CMD_DO_SET_ROI_SYSID:
         return None
-    by_kind = command.id == mavlink.MAV_CMD_DO_SET_ROI and kinds
+    by_kind = command.id == dialect.MAV_CMD_DO_SET_ROI and kinds
     kind = command.p1 if by_kind else 0.0
     nowhere = command.x == 0.0 and command.y == 0.0
-    placeless = nowhere and command.id == mavlink.MAV_CMD_DO_SET_ROI_LOCATION
+    placeless = nowhere and command.id == dialect.MAV_CMD_DO_SET_ROI_LOCATION
     number = _NONE if placeless else command.id
-    without_place = number in (_NONE, _NEXT_WAYPOINT) or (by_kind and kind != mavlink.MAV_ROI_LOCATION)
+    without_place = number in (_NONE, _NEXT_WAYPOINT) or (by_kind and kind != dialect.MAV_ROI_LOCATION)
     return MissionItem(
         command=number,
-        frame=mavlink.MAV_FRAME_GLOBAL if command.frame is None else command.frame,
+        frame=dialect.MAV_FRAME_GLOBAL if command.frame is None else command.frame,
         param1=kind,
         param2=command.p2,
         x=0.0 if without_place else command.x,
@@ -192,10 +192,10 @@ def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessag
     """The message that forwards a command, in the form (LONG or INT) in which it came."""
     first = (command.p1, command.p2, command.p3, command.p4)
     if command.frame is None:
-        return mavlink.MAVLink_command_long_message(
+        return dialect.MAVLink_command_long_message(
             system_id, component, command.id, 0, *first, command.x, command.y, command.z
         )
-    return mavlink.MAVLink_command_int_message(
+    return dialect.MAVLink_command_int_message(
         system_id,
         component,
         command.frame,

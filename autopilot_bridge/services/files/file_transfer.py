@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source, is_congested
 from autopilot_bridge.services.files.ftp_protocol import (
     HEADER,
@@ -107,9 +107,9 @@ class FileTransferService(Microservice):
             Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
-    @receives(mavlink.MAVLink_file_transfer_protocol_message)
+    @receives(dialect.MAVLink_file_transfer_protocol_message)
     def on_transfer(
-        self, message: mavlink.MAVLink_file_transfer_protocol_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_file_transfer_protocol_message, source: Source, time_us: int
     ) -> None:
         """Answer a request; replies (ACK, NAK) of other systems are ignored."""
         payload = bytes(message.payload)
@@ -310,5 +310,5 @@ def _chunk(request: Request) -> int:
 
 def _send(client: Client, payload: bytes) -> None:
     client.channel.send(
-        mavlink.MAVLink_file_transfer_protocol_message(0, client.system_id, client.component_id, payload)
+        dialect.MAVLink_file_transfer_protocol_message(0, client.system_id, client.component_id, payload)
     )

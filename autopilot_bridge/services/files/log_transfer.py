@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
 from autopilot_bridge.services.files.log_book import LogBook, LogFile
 from autopilot_bridge.services.microservice import Microservice
@@ -26,10 +26,10 @@ _MAX_RANGES: Final = 64
 _MAX_CLIENTS: Final = 16
 _IDLE_US: Final = 60_000_000
 _Request = (
-    mavlink.MAVLink_log_request_list_message
-    | mavlink.MAVLink_log_request_data_message
-    | mavlink.MAVLink_log_erase_message
-    | mavlink.MAVLink_log_request_end_message
+    dialect.MAVLink_log_request_list_message
+    | dialect.MAVLink_log_request_data_message
+    | dialect.MAVLink_log_erase_message
+    | dialect.MAVLink_log_request_end_message
 )
 
 
@@ -94,13 +94,13 @@ class LogTransferService(Microservice):
             self._refuse(source)
             return
         match message:
-            case mavlink.MAVLink_log_request_list_message():
+            case dialect.MAVLink_log_request_list_message():
                 self._list(message, self._download(source, time_us))
-            case mavlink.MAVLink_log_request_data_message():
+            case dialect.MAVLink_log_request_data_message():
                 self._request(message, self._download(source, time_us))
-            case mavlink.MAVLink_log_erase_message():
+            case dialect.MAVLink_log_erase_message():
                 self._erase()
-            case mavlink.MAVLink_log_request_end_message():
+            case dialect.MAVLink_log_request_end_message():
                 self._download(source, time_us).close()
 
     def tick(self, time_us: int) -> None:
@@ -126,7 +126,7 @@ class LogTransferService(Microservice):
     def _refuse(self, source: Source) -> None:
         if not self._refused:
             text = self._armed_refusal.encode()
-            source.channel.send(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_ERROR, text))
+            source.channel.send(dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_ERROR, text))
         self._refused = True
 
     def _download(self, source: Source, time_us: int) -> _Download:
@@ -141,21 +141,21 @@ class LogTransferService(Microservice):
         download.used_us = time_us
         return download
 
-    def _list(self, message: mavlink.MAVLink_log_request_list_message, download: _Download) -> None:
+    def _list(self, message: dialect.MAVLink_log_request_list_message, download: _Download) -> None:
         self._logs = self._book.logs()
         logs = self._logs
         last = logs[-1].number if logs else 0
         chosen = [log for log in logs if message.start <= log.number <= message.end]
         download.entries = deque(
-            mavlink.MAVLink_log_entry_message(
+            dialect.MAVLink_log_entry_message(
                 log.number, len(logs), last, log.time_utc_s, min(log.size, 0xFFFFFFFF)
             )
             for log in chosen
         )
         if not logs:
-            download.entries.append(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+            download.entries.append(dialect.MAVLink_log_entry_message(0, 0, 0, 0, 0))
 
-    def _request(self, message: mavlink.MAVLink_log_request_data_message, download: _Download) -> None:
+    def _request(self, message: dialect.MAVLink_log_request_data_message, download: _Download) -> None:
         if download.number != message.id:
             download.close()
             if not self._logs:
@@ -205,6 +205,6 @@ class LogTransferService(Microservice):
             data = b""
         if data and offset + len(data) < end:
             download.ranges.appendleft((offset + len(data), end))
-        return mavlink.MAVLink_log_data_message(
+        return dialect.MAVLink_log_data_message(
             download.number, offset, len(data), data.ljust(DATA_BYTES, b"\0")
         )

@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.commander.events import Armed, Disarmed, Event
-from autopilot_bridge.mavlink import FrameEncoder
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage
@@ -168,7 +167,7 @@ class OnboardLog(Microservice):
         try:
             self.path, self._file = self._book.create(self._unix_us())
         except OSError as failure:
-            self._announce(mavlink.MAV_SEVERITY_ERROR, f"Logging failed: {failure.strerror}")
+            self._announce(dialect.MAV_SEVERITY_ERROR, f"Logging failed: {failure.strerror}")
             return
         self._size = 0
         self._add_channel(self._channel, LOG_ROLE)
@@ -181,6 +180,6 @@ class OnboardLog(Microservice):
             self._file.write(self._size, data)
         except OSError as failure:
             self.close()
-            self._announce(mavlink.MAV_SEVERITY_ERROR, f"Logging stopped: {failure.strerror}")
+            self._announce(dialect.MAV_SEVERITY_ERROR, f"Logging stopped: {failure.strerror}")
             return
         self._size += len(data)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import external as external
@@ -42,21 +42,21 @@ _FRD_FROM_FLU: Final = (0.0, 1.0, 0.0, 0.0)
 _SAME: Final = (1.0, 0.0, 0.0, 0.0)
 
 POSE_FRAMES: Final[Mapping[int, tuple[external.ExternalFrame, Quaternion, Quaternion]]] = {
-    mavlink.MAV_FRAME_LOCAL_NED: (external.ExternalFrame.NED, _SAME, _SAME),
-    mavlink.MAV_FRAME_LOCAL_ENU: (external.ExternalFrame.NED, _NED_FROM_ENU, _FRD_FROM_FLU),
-    mavlink.MAV_FRAME_LOCAL_FRD: (external.ExternalFrame.LOCAL_FRD, _SAME, _SAME),
-    mavlink.MAV_FRAME_LOCAL_FLU: (external.ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU, _FRD_FROM_FLU),
+    dialect.MAV_FRAME_LOCAL_NED: (external.ExternalFrame.NED, _SAME, _SAME),
+    dialect.MAV_FRAME_LOCAL_ENU: (external.ExternalFrame.NED, _NED_FROM_ENU, _FRD_FROM_FLU),
+    dialect.MAV_FRAME_LOCAL_FRD: (external.ExternalFrame.LOCAL_FRD, _SAME, _SAME),
+    dialect.MAV_FRAME_LOCAL_FLU: (external.ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU, _FRD_FROM_FLU),
 }
 """By ODOMETRY.frame_id: our frame, our axes from the message's axes, and our body axes from the message's."""
 
 VELOCITY_FRAMES: Final[Mapping[int, tuple[external.ExternalFrame, Quaternion]]] = {
-    mavlink.MAV_FRAME_LOCAL_NED: (external.ExternalFrame.NED, _SAME),
-    mavlink.MAV_FRAME_LOCAL_ENU: (external.ExternalFrame.NED, _NED_FROM_ENU),
-    mavlink.MAV_FRAME_LOCAL_FRD: (external.ExternalFrame.LOCAL_FRD, _SAME),
-    mavlink.MAV_FRAME_LOCAL_FLU: (external.ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU),
-    mavlink.MAV_FRAME_BODY_NED: (external.ExternalFrame.BODY_FRD, _SAME),
-    mavlink.MAV_FRAME_BODY_FRD: (external.ExternalFrame.BODY_FRD, _SAME),
-    mavlink.MAV_FRAME_BODY_OFFSET_NED: (external.ExternalFrame.BODY_FRD, _SAME),
+    dialect.MAV_FRAME_LOCAL_NED: (external.ExternalFrame.NED, _SAME),
+    dialect.MAV_FRAME_LOCAL_ENU: (external.ExternalFrame.NED, _NED_FROM_ENU),
+    dialect.MAV_FRAME_LOCAL_FRD: (external.ExternalFrame.LOCAL_FRD, _SAME),
+    dialect.MAV_FRAME_LOCAL_FLU: (external.ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU),
+    dialect.MAV_FRAME_BODY_NED: (external.ExternalFrame.BODY_FRD, _SAME),
+    dialect.MAV_FRAME_BODY_FRD: (external.ExternalFrame.BODY_FRD, _SAME),
+    dialect.MAV_FRAME_BODY_OFFSET_NED: (external.ExternalFrame.BODY_FRD, _SAME),
 }
 """The same by ODOMETRY.child_frame_id."""
 
@@ -118,9 +118,9 @@ class ExternalOdometryService(Microservice):
         elif self._simulation is None or self._simulation.apply_failure(_VIO, sample.values):
             self._navigation.take_external(sample)
 
-    @receives(mavlink.MAVLink_set_gps_global_origin_message)
+    @receives(dialect.MAVLink_set_gps_global_origin_message)
     def _set_origin(
-        self, message: mavlink.MAVLink_set_gps_global_origin_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_gps_global_origin_message, source: Source, time_us: int
     ) -> None:
         """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
         if self._navigation.frame is not None or message.target_system != self._system_id:
@@ -131,7 +131,7 @@ class ExternalOdometryService(Microservice):
         self._navigation.set_origin(origin)
         send_to_all(
             self._broadcast,
-            mavlink.MAVLink_gps_global_origin_message(
+            dialect.MAVLink_gps_global_origin_message(
                 message.latitude, message.longitude, message.altitude, time_us
             ),
         )
@@ -140,22 +140,22 @@ class ExternalOdometryService(Microservice):
 
     def _sample(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample | None:
         match message:
-            case mavlink.MAVLink_odometry_message():
+            case dialect.MAVLink_odometry_message():
                 return self._odometry(message, time_us)
-            case mavlink.MAVLink_att_pos_mocap_message():
+            case dialect.MAVLink_att_pos_mocap_message():
                 return self._mocap(message, time_us)
-            case mavlink.MAVLink_vision_speed_estimate_message():
+            case dialect.MAVLink_vision_speed_estimate_message():
                 return self._speed(message, time_us)
             case (
-                mavlink.MAVLink_vision_position_estimate_message()
-                | mavlink.MAVLink_global_vision_position_estimate_message()
-                | mavlink.MAVLink_vicon_position_estimate_message()
+                dialect.MAVLink_vision_position_estimate_message()
+                | dialect.MAVLink_global_vision_position_estimate_message()
+                | dialect.MAVLink_vicon_position_estimate_message()
             ):
                 return self._pose(message, time_us)
         return None
 
     def _odometry(
-        self, message: mavlink.MAVLink_odometry_message, time_us: int
+        self, message: dialect.MAVLink_odometry_message, time_us: int
     ) -> external.ExternalSample | None:
         """ODOMETRY (331)."""
         policy = self._policy
@@ -182,9 +182,9 @@ class ExternalOdometryService(Microservice):
 
     def _pose(
         self,
-        message: mavlink.MAVLink_vision_position_estimate_message
-        | mavlink.MAVLink_global_vision_position_estimate_message
-        | mavlink.MAVLink_vicon_position_estimate_message,
+        message: dialect.MAVLink_vision_position_estimate_message
+        | dialect.MAVLink_global_vision_position_estimate_message
+        | dialect.MAVLink_vicon_position_estimate_message,
         time_us: int,
     ) -> external.ExternalSample:
         """VISION_POSITION_ESTIMATE (102), GLOBAL_VISION_POSITION_ESTIMATE (101), VICON_... (104)."""
@@ -201,7 +201,7 @@ class ExternalOdometryService(Microservice):
             int(getattr(message, "reset_counter", 0)),
         )
 
-    def _mocap(self, message: mavlink.MAVLink_att_pos_mocap_message, time_us: int) -> external.ExternalSample:
+    def _mocap(self, message: dialect.MAVLink_att_pos_mocap_message, time_us: int) -> external.ExternalSample:
         """ATT_POS_MOCAP (138)."""
         values = np.full(external.SAMPLE_SIZE, math.nan)
         values[external.POSITION_M] = (message.x, message.y, message.z)
@@ -215,7 +215,7 @@ class ExternalOdometryService(Microservice):
         )
 
     def _speed(
-        self, message: mavlink.MAVLink_vision_speed_estimate_message, time_us: int
+        self, message: dialect.MAVLink_vision_speed_estimate_message, time_us: int
     ) -> external.ExternalSample:
         """VISION_SPEED_ESTIMATE (103)."""
         frame = self._policy.local_frame(self._parameters)

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.wire_units import degrees, metres, velocity_of
 from autopilot_bridge.services.channel import Receiver, Source
@@ -47,25 +47,25 @@ class FollowService(Microservice):
         """FOLLOW_TARGET, and GLOBAL_POSITION_INT where the firmware follows it."""
         taken = dict(super().receivers)
         if not self._by_position:
-            del taken[mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT]
+            del taken[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT]
         return taken
 
-    @receives(mavlink.MAVLink_follow_target_message)
+    @receives(dialect.MAVLink_follow_target_message)
     def _on_follow_target(
-        self, message: mavlink.MAVLink_follow_target_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_follow_target_message, source: Source, time_us: int
     ) -> None:
         self._take(message, source, time_us, *_of_follow(message))
 
-    @receives(mavlink.MAVLink_global_position_int_message)
+    @receives(dialect.MAVLink_global_position_int_message)
     def _on_position(
-        self, message: mavlink.MAVLink_global_position_int_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_global_position_int_message, source: Source, time_us: int
     ) -> None:
         if source.component_id == AUTOPILOT_COMPONENT:
             self._take(message, source, time_us, *self._of_position(message))
 
     def _take(
         self,
-        message: mavlink.MAVLink_global_position_int_message | mavlink.MAVLink_follow_target_message,
+        message: dialect.MAVLink_global_position_int_message | dialect.MAVLink_follow_target_message,
         source: Source,
         time_us: int,
         alt_m: float,
@@ -95,7 +95,7 @@ class FollowService(Microservice):
             leader.take(time_us, place, None if velocity is None else np.array(velocity), sigma_m=sigma_m)
 
     def _of_position(
-        self, message: mavlink.MAVLink_global_position_int_message
+        self, message: dialect.MAVLink_global_position_int_message
     ) -> tuple[float, tuple[float, float, float] | None, float]:
         """(altitude over mean sea level, velocity, 1-sigma) of a GLOBAL_POSITION_INT."""
         context = self._context
@@ -110,7 +110,7 @@ class FollowService(Microservice):
 
 
 def _of_follow(
-    message: mavlink.MAVLink_follow_target_message,
+    message: dialect.MAVLink_follow_target_message,
 ) -> tuple[float, tuple[float, float, float] | None, float]:
     """(altitude over mean sea level, velocity, 1-sigma) of a FOLLOW_TARGET."""
     capabilities = int(message.est_capabilities)

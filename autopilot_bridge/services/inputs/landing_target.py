@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import Receiver, Source
@@ -28,7 +28,7 @@ from flightsim.foundation.vectors import from_euler, rotate, yaw_of
 
 Array = NDArray[np.float64]
 
-_YAW_IN_EARTH: Final = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+_YAW_IN_EARTH: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
 _GIMBAL_US: Final = 500_000
 _MAX_ANGLE_RAD: Final = 1.3
 _STEEPEST: Final = 0.2  # smallest downward component of a usable line of sight
@@ -59,9 +59,9 @@ class LandingTargetService(Microservice):
             return {}
         return super().receivers
 
-    @receives(mavlink.MAVLink_landing_target_message)
+    @receives(dialect.MAVLink_landing_target_message)
     def _on_target(
-        self, message: mavlink.MAVLink_landing_target_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_landing_target_message, source: Source, time_us: int
     ) -> None:
         """A landing target from the vehicle's own payload or from any other system."""
         place = self._place(message, source, time_us)
@@ -69,9 +69,9 @@ class LandingTargetService(Microservice):
         if place is None or not track.take(place[0], place[1], sigma_m=place[2]):
             self.refused += 1
 
-    @receives(mavlink.MAVLink_gimbal_device_attitude_status_message)
+    @receives(dialect.MAVLink_gimbal_device_attitude_status_message)
     def _on_gimbal(
-        self, message: mavlink.MAVLink_gimbal_device_attitude_status_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_gimbal_device_attitude_status_message, source: Source, time_us: int
     ) -> None:
         if source.system_id != self._system_id or source.component_id != GIMBAL_COMPONENT:
             return
@@ -81,7 +81,7 @@ class LandingTargetService(Microservice):
             self._gimbal.append((in_vehicle_time(message.time_boot_ms * 1000, time_us), q, in_earth))
 
     def _place(
-        self, message: mavlink.MAVLink_landing_target_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_landing_target_message, source: Source, time_us: int
     ) -> tuple[int, Array, float] | None:
         """(time, local NED, 1-sigma) from the message; None if the message is not usable."""
         measured_us = in_vehicle_time(int(message.time_usec), time_us)
@@ -93,10 +93,10 @@ class LandingTargetService(Microservice):
             place = np.array((message.x, message.y, message.z), dtype=np.float64)
             if not float(np.abs(place).max()) < 1e5:
                 return None
-            if message.frame == mavlink.MAV_FRAME_LOCAL_NED:
+            if message.frame == dialect.MAV_FRAME_LOCAL_NED:
                 return measured_us, place, _LEAST_SIGMA_M
-            if message.frame in (mavlink.MAV_FRAME_BODY_FRD, mavlink.MAV_FRAME_LOCAL_FRD):
-                offset = rotated(q if message.frame == mavlink.MAV_FRAME_BODY_FRD else _heading(q), place)
+            if message.frame in (dialect.MAV_FRAME_BODY_FRD, dialect.MAV_FRAME_LOCAL_FRD):
+                offset = rotated(q if message.frame == dialect.MAV_FRAME_BODY_FRD else _heading(q), place)
                 return measured_us, position + offset, _LEAST_SIGMA_M
             return None
         angle_x, angle_y = float(message.angle_x), float(message.angle_y)

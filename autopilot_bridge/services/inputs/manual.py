@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.dispatch import receives, streams
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs.transmitter import (
@@ -93,9 +93,9 @@ class ManualService(Microservice):
             self._switch.tick(time_us)
         self._gesture.tick(time_us)
 
-    @receives(mavlink.MAVLink_heartbeat_message)
-    def _on_heartbeat(self, message: mavlink.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
-        gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
+    @receives(dialect.MAVLink_heartbeat_message)
+    def _on_heartbeat(self, message: dialect.MAVLink_heartbeat_message, source: Source, time_us: int) -> None:
+        gcs = self._may_steer(source) if self._rules.gcs_only else message.type == dialect.MAV_TYPE_GCS
         if gcs:
             self._commander.pilot.on_gcs(time_us)
 
@@ -103,9 +103,9 @@ class ManualService(Microservice):
         only = self._rules.gcs_only
         return not only or source.system_id == round(self._parameters.get(only))
 
-    @receives(mavlink.MAVLink_manual_control_message)
+    @receives(dialect.MAVLink_manual_control_message)
     def _on_manual(
-        self, message: mavlink.MAVLink_manual_control_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_manual_control_message, source: Source, time_us: int
     ) -> None:
         """MANUAL_CONTROL: x forward, y right, r clockwise in -1000..1000; z throttle in 0..1000."""
         if message.target not in (0, self._system_id) or not self._may_steer(source):
@@ -132,9 +132,9 @@ class ManualService(Microservice):
                 time_us=time_us,
             )
 
-    @receives(mavlink.MAVLink_rc_channels_override_message)
+    @receives(dialect.MAVLink_rc_channels_override_message)
     def _on_override(
-        self, message: mavlink.MAVLink_rc_channels_override_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_rc_channels_override_message, source: Source, time_us: int
     ) -> None:
         """RC_CHANNELS_OVERRIDE: pulses of channels 1 to 18."""
         if message.target_system not in (0, self._system_id) or not self._may_steer(source):
@@ -178,7 +178,7 @@ class ManualService(Microservice):
             self._steering = False
             self._commander.pilot.release()
 
-    @streams(mavlink.MAVLink_rc_channels_message)
+    @streams(dialect.MAVLink_rc_channels_message)
     def _rc_channels(self) -> Values | None:
         """RC_CHANNELS (65); None without a radio."""
         pulses_us = self._radio.pulses_us

@@ -12,7 +12,7 @@ import numpy as np
 
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
@@ -20,10 +20,10 @@ from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
-_AVOIDANCE: Final = int(mavlink.FAILURE_UNIT_SYSTEM_AVOIDANCE)
+_AVOIDANCE: Final = int(dialect.FAILURE_UNIT_SYSTEM_AVOIDANCE)
 _UNKNOWN_CM: Final = 65535
 _SENSOR_WIDTH_RAD: Final = math.radians(30.0)
-_HORIZONTAL: Final = range(mavlink.MAV_SENSOR_ROTATION_NONE, mavlink.MAV_SENSOR_ROTATION_YAW_315 + 1)
+_HORIZONTAL: Final = range(dialect.MAV_SENSOR_ROTATION_NONE, dialect.MAV_SENSOR_ROTATION_YAW_315 + 1)
 
 
 class ObstacleService(Microservice):
@@ -45,26 +45,26 @@ class ObstacleService(Microservice):
         self._enabled = enabled
         self.refused = 0
 
-    @receives(mavlink.MAVLink_obstacle_distance_message, mavlink.MAVLink_distance_sensor_message)
+    @receives(dialect.MAVLink_obstacle_distance_message, dialect.MAVLink_distance_sensor_message)
     def _on_obstacles(
         self,
-        message: mavlink.MAVLink_obstacle_distance_message | mavlink.MAVLink_distance_sensor_message,
+        message: dialect.MAVLink_obstacle_distance_message | dialect.MAVLink_distance_sensor_message,
         source: Source,
         time_us: int,
     ) -> None:
         """A DISTANCE_SENSOR of another vehicle is ignored."""
         if not self._enabled(self._parameters) or source.component_id == AUTOPILOT_COMPONENT:
             return
-        if isinstance(message, mavlink.MAVLink_obstacle_distance_message):
+        if isinstance(message, dialect.MAVLink_obstacle_distance_message):
             taken = self._circle(message, time_us)
         else:
             taken = self._beam(message, time_us)
         self.refused += not taken
 
-    def _circle(self, message: mavlink.MAVLink_obstacle_distance_message, time_us: int) -> bool:
+    def _circle(self, message: dialect.MAVLink_obstacle_distance_message, time_us: int) -> bool:
         """OBSTACLE_DISTANCE (330)."""
         frame = message.frame
-        if frame not in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_FRD):
+        if frame not in (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_BODY_FRD):
             return False
         step_rad = math.radians(abs(message.increment_f) or float(message.increment))
         if not math.radians(0.5) <= step_rad <= math.tau:
@@ -74,7 +74,7 @@ class ObstacleService(Microservice):
         first_rad = math.radians(message.angle_offset) if abs(message.angle_offset) <= 720.0 else math.nan
         if math.isnan(first_rad):
             return False
-        if frame != mavlink.MAV_FRAME_BODY_FRD:
+        if frame != dialect.MAV_FRAME_BODY_FRD:
             first_rad -= float(self._context.nav[nav.EULER_RAD][2])
         values = np.array(message.distances, dtype=np.float64)[:SECTORS]
         known = values != _UNKNOWN_CM
@@ -91,14 +91,14 @@ class ObstacleService(Microservice):
             obstacles.take(first_rad + k * step_rad, abs(step_rad), distance_m, time_us)
         return True
 
-    def _beam(self, message: mavlink.MAVLink_distance_sensor_message, time_us: int) -> bool:
+    def _beam(self, message: dialect.MAVLink_distance_sensor_message, time_us: int) -> bool:
         """DISTANCE_SENSOR (132) in one of the eight horizontal directions."""
         if message.orientation not in _HORIZONTAL:
             return False
         reach_m, distance_m = message.max_distance * 0.01, message.current_distance * 0.01
         if distance_m < message.min_distance * 0.01:
             return False
-        direction_rad = (message.orientation - mavlink.MAV_SENSOR_ROTATION_NONE) * math.pi / 4.0
+        direction_rad = (message.orientation - dialect.MAV_SENSOR_ROTATION_NONE) * math.pi / 4.0
         width = float(message.horizontal_fov)
         width = width if 0.01 < width < math.tau else _SENSOR_WIDTH_RAD
         self._context.surroundings.obstacles.take(

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import layout as nav
 from flightsim.foundation.rotations import rotate
@@ -171,7 +171,7 @@ def whole(values: Triple, bits: tuple[int, int, int], type_mask: int) -> Triple:
     return UNSET if any(type_mask & bit for bit in bits) else values
 
 
-def rates_of(message: mavlink.MAVLink_set_attitude_target_message) -> Triple:
+def rates_of(message: dialect.MAVLink_set_attitude_target_message) -> Triple:
     """Body rates that are not ignored, rad/s; NaN for the others."""
     values = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
     roll, pitch, yaw = (

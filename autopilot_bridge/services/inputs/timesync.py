@@ -8,7 +8,7 @@ addressed to its sender).
 from typing import Final
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.microservice import Microservice
 
@@ -40,17 +40,17 @@ class TimeSyncService(Microservice):
     def __init__(self, *, answers_ping: bool) -> None:
         self._answers_ping = answers_ping
 
-    @receives(mavlink.MAVLink_timesync_message)
-    def _on_timesync(self, message: mavlink.MAVLink_timesync_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_timesync_message)
+    def _on_timesync(self, message: dialect.MAVLink_timesync_message, source: Source, time_us: int) -> None:
         if message.tc1 == 0:
             now_ns = min(time_us * _NS_PER_US, _INT64_MAX)
-            source.channel.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
+            source.channel.send(dialect.MAVLink_timesync_message(now_ns, message.ts1))
 
-    @receives(mavlink.MAVLink_ping_message)
-    def _on_ping(self, message: mavlink.MAVLink_ping_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_ping_message)
+    def _on_ping(self, message: dialect.MAVLink_ping_message, source: Source, time_us: int) -> None:
         if self._answers_ping and message.target_system == 0 and message.target_component == 0:
             source.channel.send(
-                mavlink.MAVLink_ping_message(
+                dialect.MAVLink_ping_message(
                     message.time_usec, message.seq, source.system_id, source.component_id
                 )
             )

@@ -10,7 +10,7 @@ from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.dispatch import receives, streams
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import layout as nav
@@ -23,8 +23,8 @@ _LIFETIME_US: Final = 30_000_000
 _LEAST_INTERVAL_US: Final = 90_000  # between two reports of one aircraft
 _REMIND_US: Final = 60_000_000
 _PASSED_M: Final = 1000.0  # distance beyond us up to which the other's path is checked
-_NEEDED: Final = mavlink.ADSB_FLAGS_VALID_COORDS | mavlink.ADSB_FLAGS_VALID_ALTITUDE
-_NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
+_NEEDED: Final = dialect.ADSB_FLAGS_VALID_COORDS | dialect.ADSB_FLAGS_VALID_ALTITUDE
+_NOTICE: Final = dialect.MAV_SEVERITY_NOTICE
 
 
 @dataclass(slots=True)
@@ -68,18 +68,18 @@ class TrafficService(Microservice):
         """ICAO addresses of the aircraft received recently."""
         return tuple(self._aircraft)
 
-    @streams(mavlink.MAVLink_adsb_vehicle_message)
+    @streams(dialect.MAVLink_adsb_vehicle_message)
     def _no_report(self) -> None:
         """ADSB_VEHICLE can be requested, and is not sent."""
 
-    @receives(mavlink.MAVLink_adsb_vehicle_message)
-    def _on_report(self, message: mavlink.MAVLink_adsb_vehicle_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_adsb_vehicle_message)
+    def _on_report(self, message: dialect.MAVLink_adsb_vehicle_message, source: Source, time_us: int) -> None:
         """A report forwarded by another autopilot is not forwarded again."""
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0
         if switched_on and source.component_id != AUTOPILOT_COMPONENT:
             self._take(message, time_us)
 
-    def _take(self, message: mavlink.MAVLink_adsb_vehicle_message, time_us: int) -> None:
+    def _take(self, message: dialect.MAVLink_adsb_vehicle_message, time_us: int) -> None:
         address = message.ICAO_address
         for old in [
             icao for icao, seen in self._aircraft.items() if seen.received_us < time_us - _LIFETIME_US
@@ -97,7 +97,7 @@ class TrafficService(Microservice):
         if self._rules.conflicts:
             self._warn(message, known, time_us)
 
-    def _warn(self, message: mavlink.MAVLink_adsb_vehicle_message, known: _Aircraft, time_us: int) -> None:
+    def _warn(self, message: dialect.MAVLink_adsb_vehicle_message, known: _Aircraft, time_us: int) -> None:
         action = round(self._parts.parameters.get("NAV_TRAFF_AVOID"))
         separation_m = self._conflict(message) if action > 0 else None
         if separation_m is None:
@@ -115,7 +115,7 @@ class TrafficService(Microservice):
         if mode is not None and self._commander.airborne:
             self._commander.set_mode(mode)
 
-    def _conflict(self, message: mavlink.MAVLink_adsb_vehicle_message) -> float | None:
+    def _conflict(self, message: dialect.MAVLink_adsb_vehicle_message) -> float | None:
         """The distance at which the other's straight path passes us, metres; None without a conflict.
 
         As in PX4, a conflict means: its path passes nearer than NAV_TRAFF_A_HOR ahead of it, its height

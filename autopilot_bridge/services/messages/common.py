@@ -5,7 +5,7 @@ from typing import Final
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.dispatch import streams
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, e7, mm, place_e7
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -42,17 +42,17 @@ class CommonMessages(Microservice):
         self.view = parts.view
         self.context = parts.commander.context
 
-    @streams(mavlink.MAVLink_heartbeat_message)
+    @streams(dialect.MAVLink_heartbeat_message)
     def heartbeat(self) -> Values:
         """HEARTBEAT (0)."""
         return self.parts.status.heartbeat()
 
-    @streams(mavlink.MAVLink_autopilot_version_message)
+    @streams(dialect.MAVLink_autopilot_version_message)
     def autopilot_version(self) -> Values:
         """AUTOPILOT_VERSION (148)."""
         return self.parts.status.autopilot_version()
 
-    @streams(mavlink.MAVLink_sys_status_message)
+    @streams(dialect.MAVLink_sys_status_message)
     def sys_status(self) -> Values:
         """SYS_STATUS (1)."""
         present, enabled, health = self.parts.status.sys_status()
@@ -71,12 +71,12 @@ class CommonMessages(Microservice):
             battery_remaining=remaining,
         )
 
-    @streams(mavlink.MAVLink_system_time_message)
+    @streams(dialect.MAVLink_system_time_message)
     def system_time(self) -> Values:
         """SYSTEM_TIME (2)."""
         return (self.parts.memory.unix_epoch_us + self.view.time_us, self.view.time_ms)
 
-    @streams(mavlink.MAVLink_gps_raw_int_message)
+    @streams(dialect.MAVLink_gps_raw_int_message)
     def gps_raw_int(self) -> Values | None:
         """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send.
 
@@ -125,7 +125,7 @@ class CommonMessages(Microservice):
             vel_acc=round(v[interface.GPS_SPEED_ACCURACY_M_S] * 1000.0),
         )
 
-    @streams(mavlink.MAVLink_scaled_pressure_message)
+    @streams(dialect.MAVLink_scaled_pressure_message)
     def scaled_pressure(self) -> Values | None:
         """SCALED_PRESSURE (29), hPa."""
         pressure_pa, temperature_c = self.view.pressure()
@@ -143,7 +143,7 @@ class CommonMessages(Microservice):
         """Pressure of the pitot tube; 0 without one."""
         return 0.0
 
-    @streams(mavlink.MAVLink_servo_output_raw_message)
+    @streams(dialect.MAVLink_servo_output_raw_message)
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""
         motors = self.parts.controller.actuators.tolist()[:4]
@@ -153,7 +153,7 @@ class CommonMessages(Microservice):
             pulses = [self.servo_disarmed_us] * 4
         return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
 
-    @streams(mavlink.MAVLink_gps_global_origin_message)
+    @streams(dialect.MAVLink_gps_global_origin_message)
     def gps_global_origin(self) -> Values | None:
         """GPS_GLOBAL_ORIGIN (49): the filter's local origin."""
         frame = self.context.frame
@@ -161,7 +161,7 @@ class CommonMessages(Microservice):
             return None
         return (*place_e7(frame.origin), self.view.time_us)
 
-    @streams(mavlink.MAVLink_vfr_hud_message)
+    @streams(dialect.MAVLink_vfr_hud_message)
     def vfr_hud(self) -> Values:
         """VFR_HUD (74)."""
         v = self.view.refreshed()
@@ -182,7 +182,7 @@ class CommonMessages(Microservice):
         """Collective being commanded, 0..1."""
         return self.parts.controller.thrust if self.context.armed else 0.0
 
-    @streams(mavlink.MAVLink_attitude_target_message)
+    @streams(dialect.MAVLink_attitude_target_message)
     def attitude_target(self) -> Values | None:
         """ATTITUDE_TARGET (83): the setpoint of the attitude loop."""
         context = self.context
@@ -207,7 +207,7 @@ class CommonMessages(Microservice):
         values = context.setpoint.tolist()
         return [*values[sp.MOTION], values[sp.YAW_RAD], values[sp.YAW_RATE_RAD_S]]
 
-    @streams(mavlink.MAVLink_position_target_local_ned_message)
+    @streams(dialect.MAVLink_position_target_local_ned_message)
     def position_target_local_ned(self) -> Values | None:
         """POSITION_TARGET_LOCAL_NED (85)."""
         target = self.trajectory_setpoint()
@@ -215,11 +215,11 @@ class CommonMessages(Microservice):
             return None
         return POSITION_TARGET_LOCAL_NED(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
             **dict(zip(TARGET_FIELDS, target, strict=True)),
         )
 
-    @streams(mavlink.MAVLink_position_target_global_int_message)
+    @streams(dialect.MAVLink_position_target_global_int_message)
     def position_target_global_int(self) -> FieldValues | None:
         """POSITION_TARGET_GLOBAL_INT (87)."""
         target = self.trajectory_setpoint()
@@ -229,7 +229,7 @@ class CommonMessages(Microservice):
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(*target[:3])
         return POSITION_TARGET_GLOBAL_INT(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT,
+            coordinate_frame=dialect.MAV_FRAME_GLOBAL_INT,
             lat_int=e7(lat_deg),
             lon_int=e7(lon_deg),
             alt=alt_m,
@@ -250,13 +250,13 @@ class CommonMessages(Microservice):
         """IMU temperature, centidegrees."""
         return round(self.view.imu()[interface.IMU_TEMPERATURE_C] * 100.0)
 
-    @streams(mavlink.MAVLink_scaled_imu_message)
+    @streams(dialect.MAVLink_scaled_imu_message)
     def scaled_imu(self) -> Values | None:
         """SCALED_IMU (26)."""
         values = self.raw_scaled_imu()
         return None if values is None else (self.view.time_ms, *values, self.temperature_cdeg())
 
-    @streams(mavlink.MAVLink_battery_status_message)
+    @streams(dialect.MAVLink_battery_status_message)
     def battery_status(self) -> FieldValues | None:
         """BATTERY_STATUS (147)."""
         battery = self.view.battery
@@ -264,8 +264,8 @@ class CommonMessages(Microservice):
             return None
         voltage_v, current_a, used_ah, remaining = battery
         return _BATTERY_STATUS(
-            battery_function=mavlink.MAV_BATTERY_FUNCTION_ALL,
-            type=mavlink.MAV_BATTERY_TYPE_LIPO,
+            battery_function=dialect.MAV_BATTERY_FUNCTION_ALL,
+            type=dialect.MAV_BATTERY_TYPE_LIPO,
             temperature=_NO_TEMPERATURE,
             voltages=(round(voltage_v * 1000.0), *(UNKNOWN_UINT16,) * 9),
             current_battery=round(current_a * 100.0),
@@ -275,12 +275,12 @@ class CommonMessages(Microservice):
             charge_state=int(self.parts.commander.battery_level),
         )
 
-    @streams(mavlink.MAVLink_vibration_message)
+    @streams(dialect.MAVLink_vibration_message)
     def vibration(self) -> Values:
         """VIBRATION (241)."""
         return (self.view.time_us, *self.view.vibration.rms_m_s2, 0, 0, 0)
 
-    @streams(mavlink.MAVLink_home_position_message)
+    @streams(dialect.MAVLink_home_position_message)
     def home_position(self) -> Values | None:
         """HOME_POSITION (242)."""
         place = self.home_place()
@@ -313,12 +313,12 @@ class CommonMessages(Microservice):
         half_yaw = 0.5 * self.context.home_yaw_rad
         return (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
 
-    @streams(mavlink.MAVLink_extended_sys_state_message)
+    @streams(dialect.MAVLink_extended_sys_state_message)
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245)."""
-        return (mavlink.MAV_VTOL_STATE_UNDEFINED, int(self.context.landed_state))
+        return (dialect.MAV_VTOL_STATE_UNDEFINED, int(self.context.landed_state))
 
-    @streams(mavlink.MAVLink_distance_sensor_message)
+    @streams(dialect.MAVLink_distance_sensor_message)
     def distance_sensor(self) -> Values | None:
         """DISTANCE_SENSOR (132), facing down."""
         reading = self.parts.readings.rangefinder
@@ -334,7 +334,7 @@ class CommonMessages(Microservice):
             min_distance=round(min_m * 100.0),
             max_distance=round(max_m * 100.0),
             current_distance=round(distance_m * 100.0) if in_range else beyond_cm,
-            type=mavlink.MAV_DISTANCE_SENSOR_LASER,
-            orientation=mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+            type=dialect.MAV_DISTANCE_SENSOR_LASER,
+            orientation=dialect.MAV_SENSOR_ROTATION_PITCH_270,
             signal_quality=100 if in_range else 1,
         )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.parameters import (
     INTEGER_LIMITS,
@@ -136,15 +136,15 @@ class ParameterService(Microservice):
             self._continue_list(listing)
         self._listings = [listing for listing in self._listings if listing.next_index < self._store.count]
 
-    @receives(mavlink.MAVLink_param_request_list_message)
+    @receives(dialect.MAVLink_param_request_list_message)
     def _on_list_request(
-        self, message: mavlink.MAVLink_param_request_list_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_param_request_list_message, source: Source, time_us: int
     ) -> None:
         self.list_on(source.channel)
 
-    @receives(mavlink.MAVLink_param_request_read_message)
+    @receives(dialect.MAVLink_param_request_read_message)
     def _on_read(
-        self, message: mavlink.MAVLink_param_request_read_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_param_request_read_message, source: Source, time_us: int
     ) -> None:
         channel = source.channel
         if message.param_index >= 0:
@@ -181,8 +181,8 @@ class ParameterService(Microservice):
                 listing.channel.send(self._value_message(definition, index=listing.next_index))
             listing.next_index += 1
 
-    @receives(mavlink.MAVLink_param_set_message)
-    def _on_set(self, message: mavlink.MAVLink_param_set_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_param_set_message)
+    def _on_set(self, message: dialect.MAVLink_param_set_message, source: Source, time_us: int) -> None:
         channel = source.channel
         name = _name_of(message)
         if self._policy.hash_parameter and name == HASH_NAME:
@@ -217,7 +217,7 @@ class ParameterService(Microservice):
             )
 
     def _decode(
-        self, definition: ParameterDefinition, message: mavlink.MAVLink_param_set_message
+        self, definition: ParameterDefinition, message: dialect.MAVLink_param_set_message
     ) -> float | None:
         """The value in a PARAM_SET; None when the firmware would ignore it."""
         value = message.param_value
@@ -251,7 +251,7 @@ class ParameterService(Microservice):
         value = self._store.get(definition.name)
         if self._policy.bytewise and definition.is_integer:
             value = _AS_FLOAT.unpack(_raw_int(value))[0]
-        return mavlink.MAVLink_param_value_message(
+        return dialect.MAVLink_param_value_message(
             (name or definition.name).encode("ascii", "replace"),
             float(value),
             int(definition.type),
@@ -261,7 +261,7 @@ class ParameterService(Microservice):
 
     def _hash_message(self) -> MavlinkMessage:
         value = _AS_FLOAT.unpack(_AS_UINT32.pack(self.hash_check))[0]
-        return mavlink.MAVLink_param_value_message(
+        return dialect.MAVLink_param_value_message(
             HASH_NAME.encode(), value, int(ParameterType.UINT32), self._store.count, NO_INDEX
         )
 
@@ -270,7 +270,7 @@ def _raw_int(value: float) -> bytes:
     return _AS_UINT32.pack(int(value) & 0xFFFFFFFF)
 
 
-def _name_of(message: mavlink.MAVLink_param_set_message | mavlink.MAVLink_param_request_read_message) -> str:
+def _name_of(message: dialect.MAVLink_param_set_message | dialect.MAVLink_param_request_read_message) -> str:
     """The parameter name of a message, up to the first NUL."""
     name = message.param_id
     if isinstance(name, bytes):

@@ -10,7 +10,7 @@ from typing import Final
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Source
 from autopilot_bridge.services.commands.command import Command, whole
@@ -81,7 +81,7 @@ class ParameterStorageService(Microservice):
         """Store changed values when it is time."""
         self._time_us = time_us
         if self._stored.damaged is not None:
-            self._announce(mavlink.MAV_SEVERITY_ERROR, "Stored parameters damaged, using defaults")
+            self._announce(dialect.MAV_SEVERITY_ERROR, "Stored parameters damaged, using defaults")
             self._stored.damaged = None
         if self._due_us is not None and time_us >= self._due_us:
             self._save()
@@ -101,13 +101,13 @@ class ParameterStorageService(Microservice):
             self._stored.save()
         except OSError as failure:
             if not self._reported:
-                self._announce(mavlink.MAV_SEVERITY_ERROR, f"Storing parameters failed: {failure.strerror}")
+                self._announce(dialect.MAV_SEVERITY_ERROR, f"Storing parameters failed: {failure.strerror}")
             self._reported = True
             return Result.FAILED
         self._reported = False
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_PREFLIGHT_STORAGE)
+    @command(dialect.MAV_CMD_PREFLIGHT_STORAGE)
     def _command(self, command: Command, source: Source) -> Result | None:
         action = whole(command.p1, 0)
         if action not in self._policy.actions:
@@ -128,7 +128,7 @@ class ParameterStorageService(Microservice):
             except OSError:
                 return Result.FAILED
             self._due_us = None
-            self._announce(mavlink.MAV_SEVERITY_WARNING, "All parameters reset, reboot board")
+            self._announce(dialect.MAV_SEVERITY_WARNING, "All parameters reset, reboot board")
             return Result.ACCEPTED
         self._stored.reset(_SENSOR_PREFIXES if action == RESET_SENSORS else ("",))
         return self._save()

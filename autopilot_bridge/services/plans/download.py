@@ -5,7 +5,7 @@ PX4 opens a list and sends its items in order; ArduPilot answers each request in
 
 from collections.abc import Callable
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_message
 from autopilot_bridge.services.channel import Announce, Source
@@ -36,7 +36,7 @@ class MissionDownloads:
 
     def on_list(
         self,
-        message: mavlink.MAVLink_mission_request_list_message,
+        message: dialect.MAVLink_mission_request_list_message,
         source: Source,
         time_us: int,
         *,
@@ -46,28 +46,28 @@ class MissionDownloads:
         if self._policy.ordered_download:
             self._open_list(message, mission_type, source, time_us, uploader)
         elif uploader is not None:
-            self._ack(source, mavlink.MAV_MISSION_DENIED, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_DENIED, message.mission_type)
         elif mission_type is None:
-            self._ack(source, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
         else:
             self._count(source, len(self._read_plan(mission_type)), mission_type)
 
     def on_request(
         self,
-        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        message: dialect.MAVLink_mission_request_message | dialect.MAVLink_mission_request_int_message,
         source: Source,
         time_us: int,
         *,
         uploader: Source | None,
     ) -> None:
-        as_int = message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT
+        as_int = message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT
         if self._policy.ordered_download:
             self._sessions.of(source.channel).as_int = as_int
             self._next_of_list(message, source, time_us, uploader, as_int=as_int)
         else:
             self._single(message, source, uploader, as_int=as_int)
 
-    def on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source) -> None:
+    def on_ack(self, message: dialect.MAVLink_mission_ack_message, source: Source) -> None:
         """The client has received everything, or has cancelled."""
         session = self._sessions.of(source.channel)
         download = session.download
@@ -87,7 +87,7 @@ class MissionDownloads:
 
     def _open_list(
         self,
-        message: mavlink.MAVLink_mission_request_list_message,
+        message: dialect.MAVLink_mission_request_list_message,
         mission_type: MissionType | None,
         source: Source,
         time_us: int,
@@ -112,7 +112,7 @@ class MissionDownloads:
 
     def _next_of_list(
         self,
-        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        message: dialect.MAVLink_mission_request_message | dialect.MAVLink_mission_request_int_message,
         source: Source,
         time_us: int,
         uploader: Source | None,
@@ -135,14 +135,14 @@ class MissionDownloads:
             download.next_seq += 1
         elif message.seq != download.next_seq - 1:
             session.download = None
-            self._ack(source, mavlink.MAV_MISSION_ERROR, download.mission_type)
+            self._ack(source, dialect.MAV_MISSION_ERROR, download.mission_type)
             self._say(self._policy.texts.unexpected_request)
             return
         self._item(source, download.items[message.seq], message.seq, download.mission_type, as_int=as_int)
 
     def _single(
         self,
-        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        message: dialect.MAVLink_mission_request_message | dialect.MAVLink_mission_request_int_message,
         source: Source,
         uploader: Source | None,
         *,
@@ -154,14 +154,14 @@ class MissionDownloads:
             self._say(self._policy.texts.float_request)
         mission_type = mission_type_of(message.mission_type)
         if mission_type is None:
-            self._ack(source, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         if uploader is not None:
-            self._ack(source, mavlink.MAV_MISSION_DENIED, mission_type)
+            self._ack(source, dialect.MAV_MISSION_DENIED, mission_type)
             return
         items = self._read_plan(mission_type)
         if message.seq >= len(items):
-            self._ack(source, mavlink.MAV_MISSION_ERROR, mission_type)
+            self._ack(source, dialect.MAV_MISSION_ERROR, mission_type)
             self._count(source, len(items), mission_type)
             return
         self._item(source, items[message.seq], message.seq, mission_type, as_int=as_int)

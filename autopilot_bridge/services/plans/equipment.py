@@ -12,7 +12,7 @@ from autopilot_bridge.commander.events import Event, ItemCommanded, ModeChanged
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.plan_reading import is_waypoint
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.mission_plan import MissionItem, MissionType
@@ -24,34 +24,34 @@ from autopilot_bridge.services.parts import AutopilotParts
 
 CAMERA_COMMANDS: Final = frozenset(
     (
-        mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
-        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
-        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-        mavlink.MAV_CMD_DO_CONTROL_VIDEO,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
-        mavlink.MAV_CMD_SET_CAMERA_MODE,
-        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
-        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
-        mavlink.MAV_CMD_SET_CAMERA_SOURCE,
-        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
-        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+        dialect.MAV_CMD_DO_TRIGGER_CONTROL,
+        dialect.MAV_CMD_DO_DIGICAM_CONFIGURE,
+        dialect.MAV_CMD_DO_DIGICAM_CONTROL,
+        dialect.MAV_CMD_DO_CONTROL_VIDEO,
+        dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        dialect.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
+        dialect.MAV_CMD_SET_CAMERA_MODE,
+        dialect.MAV_CMD_SET_CAMERA_ZOOM,
+        dialect.MAV_CMD_SET_CAMERA_FOCUS,
+        dialect.MAV_CMD_SET_CAMERA_SOURCE,
+        dialect.MAV_CMD_IMAGE_START_CAPTURE,
+        dialect.MAV_CMD_IMAGE_STOP_CAPTURE,
+        dialect.MAV_CMD_VIDEO_START_CAPTURE,
+        dialect.MAV_CMD_VIDEO_STOP_CAPTURE,
     )
 )
-MOUNT_COMMANDS: Final = frozenset((mavlink.MAV_CMD_DO_MOUNT_CONTROL, mavlink.MAV_CMD_DO_MOUNT_CONFIGURE))
+MOUNT_COMMANDS: Final = frozenset((dialect.MAV_CMD_DO_MOUNT_CONTROL, dialect.MAV_CMD_DO_MOUNT_CONFIGURE))
 GIMBAL_COMMANDS: Final = frozenset(
-    (*MOUNT_COMMANDS, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
+    (*MOUNT_COMMANDS, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
 )
-_CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-_POINT: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+_CONFIGURE: Final = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+_POINT: Final = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
 _KEEP, _GIVE_UP = -1.0, -3.0  # of DO_GIMBAL_MANAGER_CONFIGURE
 _MODE_FLAGS: Final = {
-    mavlink.MAV_MOUNT_MODE_RETRACT: mavlink.GIMBAL_MANAGER_FLAGS_RETRACT,
-    mavlink.MAV_MOUNT_MODE_NEUTRAL: mavlink.GIMBAL_MANAGER_FLAGS_NEUTRAL,
+    dialect.MAV_MOUNT_MODE_RETRACT: dialect.GIMBAL_MANAGER_FLAGS_RETRACT,
+    dialect.MAV_MOUNT_MODE_NEUTRAL: dialect.GIMBAL_MANAGER_FLAGS_NEUTRAL,
 }
-_LEVEL: Final = mavlink.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | mavlink.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
+_LEVEL: Final = dialect.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
 
 
 class MissionEquipment(Microservice):
@@ -102,13 +102,13 @@ class MissionEquipment(Microservice):
 
     def _point_mount(self, item: MissionItem) -> None:
         """Convert DO_MOUNT_CONTROL, DO_MOUNT_CONFIGURE of gimbal protocol v1 to v2."""
-        configures = item.command == mavlink.MAV_CMD_DO_MOUNT_CONFIGURE
+        configures = item.command == dialect.MAV_CMD_DO_MOUNT_CONFIGURE
         value = item.param1 if configures else item.z
         mode = round(value) if math.isfinite(value) else -1
         flags = _MODE_FLAGS.get(mode)
         if flags is not None:
             self._command_gimbal(_POINT, math.nan, math.nan, math.nan, math.nan, float(flags), 0.0, 0.0)
-        elif mode == mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING and not configures:
+        elif mode == dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING and not configures:
             pitch, yaw = item.param1, item.param3
             self._command_gimbal(_POINT, pitch, yaw, math.nan, math.nan, float(_LEVEL), 0.0, 0.0)
 
@@ -116,16 +116,16 @@ class MissionEquipment(Microservice):
         """Set a region of interest (a position on Earth), or end it."""
         place = self._place_of(index, item)
         if place is None:
-            self._command_gimbal(mavlink.MAV_CMD_DO_SET_ROI_NONE)
+            self._command_gimbal(dialect.MAV_CMD_DO_SET_ROI_NONE)
             return
         frame = place.frame
         if frame in TERRAIN_FRAMES:  # the ground is assumed level with home
-            frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
-        message = mavlink.MAVLink_command_int_message(
+            frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        message = dialect.MAVLink_command_int_message(
             self._parts.system_id,
             GIMBAL_COMPONENT,
             frame,
-            mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION,
             0,
             0,
             0.0,
@@ -141,13 +141,13 @@ class MissionEquipment(Microservice):
     def _place_of(self, index: int, item: MissionItem) -> MissionItem | None:
         """The item with the position of the region of interest; None: no region of interest."""
         items = self._missions.items
-        by_kind = item.command in (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_NAV_ROI)
+        by_kind = item.command in (dialect.MAV_CMD_DO_SET_ROI, dialect.MAV_CMD_NAV_ROI)
         kind = round(item.param1) if by_kind and math.isfinite(item.param1) else 0
-        if item.command == mavlink.MAV_CMD_DO_SET_ROI_NONE:
+        if item.command == dialect.MAV_CMD_DO_SET_ROI_NONE:
             return None
-        if item.command == mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET or kind == mavlink.MAV_ROI_WPNEXT:
+        if item.command == dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET or kind == dialect.MAV_ROI_WPNEXT:
             return next((later for later in items[index + 1 :] if is_waypoint(later)), None)
-        if kind == mavlink.MAV_ROI_WPINDEX:
+        if kind == dialect.MAV_ROI_WPINDEX:
             number = round(item.param2) if math.isfinite(item.param2) else -1
             return items[number] if 0 <= number < len(items) and is_waypoint(items[number]) else None
         placed = is_geodetic(item) and not (item.x == 0.0 and item.y == 0.0)
@@ -160,7 +160,7 @@ class MissionEquipment(Microservice):
 
     def _command(self, component: int, command: int, *parameters: float) -> None:
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
-        message: MavlinkMessage = mavlink.MAVLink_command_long_message(
+        message: MavlinkMessage = dialect.MAVLink_command_long_message(
             self._parts.system_id, component, command, 0, *values
         )
         send_to_all(self._parts.broadcast, message)

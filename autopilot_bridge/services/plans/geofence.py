@@ -12,7 +12,7 @@ from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, FenceType
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, streams
 from autopilot_bridge.flight.plan_reading import target_of
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
@@ -42,25 +42,25 @@ class ArdupilotGeofence(Microservice):
         if isinstance(event, FenceBreached):
             values = self._status()
             if values is not None:
-                send_to_all(self._broadcast, mavlink.MAVLink_fence_status_message(*values))
+                send_to_all(self._broadcast, dialect.MAVLink_fence_status_message(*values))
 
-    @streams(mavlink.MAVLink_fence_status_message)
+    @streams(dialect.MAVLink_fence_status_message)
     def _status(self) -> tuple[int, int, int, int, int] | None:
         """FENCE_STATUS (162), while the fence is on."""
         watch = self._commander.fence
         if not watch.enabled(self._commander.parameters.fence):
             return None
-        kind = mavlink.FENCE_BREACH_NONE
+        kind = dialect.FENCE_BREACH_NONE
         if FenceType.HEIGHT_MIN in watch.broken:
-            kind = mavlink.FENCE_BREACH_MINALT
+            kind = dialect.FENCE_BREACH_MINALT
         if FenceType.HEIGHT_MAX in watch.broken:
-            kind = mavlink.FENCE_BREACH_MAXALT
+            kind = dialect.FENCE_BREACH_MAXALT
         if watch.broken & (FenceType.CIRCLE | FenceType.SHAPES):
-            kind = mavlink.FENCE_BREACH_BOUNDARY
+            kind = dialect.FENCE_BREACH_BOUNDARY
         time_ms = (watch.breach_time_us // 1000) & 0xFFFFFFFF
-        return (int(bool(watch.broken)), watch.breaches, kind, time_ms, mavlink.FENCE_MITIGATE_NONE)
+        return (int(bool(watch.broken)), watch.breaches, kind, time_ms, dialect.FENCE_MITIGATE_NONE)
 
-    @command(mavlink.MAV_CMD_DO_FENCE_ENABLE)
+    @command(dialect.MAV_CMD_DO_FENCE_ENABLE)
     def _enable(self, command: Command, source: Source) -> Result:
         """DO_FENCE_ENABLE: p1 0 off, 1 on, 2 the floor off; p2 FENCE_TYPE bits, 0: all."""
         action, bits = whole(command.p1), whole(command.p2, 0) or 0

@@ -11,8 +11,7 @@ import zlib
 from collections.abc import Callable
 from typing import ClassVar, Final
 
-from autopilot_bridge.mavlink import MAVLinkMessage
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_message
 from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
@@ -46,7 +45,7 @@ def _with_extensions(base: type[MAVLinkMessage], names: tuple[str, ...]) -> Call
         def wire_payload(self) -> bytes:
             return packer.pack(*[getattr(self, name) for name in self.ordered_fieldnames])
 
-        def pack(self, mav: mavlink.MAVLink, force_mavlink1: bool = False) -> bytes:
+        def pack(self, mav: dialect.MAVLink, force_mavlink1: bool = False) -> bytes:
             payload = self.wire_payload()
             return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
@@ -54,10 +53,10 @@ def _with_extensions(base: type[MAVLinkMessage], names: tuple[str, ...]) -> Call
     return Extended
 
 
-_Count: Final = _with_extensions(mavlink.MAVLink_mission_count_message, ("opaque_id",))
-_Ack: Final = _with_extensions(mavlink.MAVLink_mission_ack_message, ("opaque_id",))
+_Count: Final = _with_extensions(dialect.MAVLink_mission_count_message, ("opaque_id",))
+_Ack: Final = _with_extensions(dialect.MAVLink_mission_ack_message, ("opaque_id",))
 _Current: Final = _with_extensions(
-    mavlink.MAVLink_mission_current_message, ("mission_id", "fence_id", "rally_points_id")
+    dialect.MAVLink_mission_current_message, ("mission_id", "fence_id", "rally_points_id")
 )
 
 
@@ -118,20 +117,20 @@ def current_message(
 def request_message(to: Source, seq: int, mission_type: int, *, as_int: bool) -> MavlinkMessage:
     """MISSION_REQUEST_INT, or MISSION_REQUEST."""
     message = (
-        mavlink.MAVLink_mission_request_int_message if as_int else mavlink.MAVLink_mission_request_message
+        dialect.MAVLink_mission_request_int_message if as_int else dialect.MAVLink_mission_request_message
     )
     return message(to.system_id, to.component_id, seq, mission_type)
 
 
 def message_checksum(
-    message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message, previous: int
+    message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message, previous: int
 ) -> int:
     """PX4's plan identifier, continued over one more MISSION_ITEM(_INT).
 
     CRC-32 (reflected 0xEDB88320, no inversion) over frame, command, autocontinue and the seven parameters as
     they were on the wire (PX4 1.16 mavlink_mission, CrcMissionItem).
     """
-    as_int = message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT
+    as_int = message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
     head = _CRC_HEAD.pack(
         message.frame,
         message.command,

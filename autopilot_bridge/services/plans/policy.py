@@ -4,14 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.plans.rules import ItemRules
 
-CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
-WARNING: Final = mavlink.MAV_SEVERITY_WARNING
-INFO: Final = mavlink.MAV_SEVERITY_INFO
+CRITICAL: Final = dialect.MAV_SEVERITY_CRITICAL
+WARNING: Final = dialect.MAV_SEVERITY_WARNING
+INFO: Final = dialect.MAV_SEVERITY_INFO
 
 Text = tuple[int, str] | None
 """A STATUSTEXT (MAV_SEVERITY, text), or nothing."""

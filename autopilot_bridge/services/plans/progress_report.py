@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Final, Protocol
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, send_to_all
 from autopilot_bridge.services.plans.messages import current_message, send_extended
@@ -105,17 +105,17 @@ class MissionReport:
             self._unsent = False
             self._repeats_left = self._policy.reached_repeats
             self._repeat_at_us = time_us + REPEAT_INTERVAL_US
-            send_to_all(self._broadcast, mavlink.MAVLink_mission_item_reached_message(self._reached))
+            send_to_all(self._broadcast, dialect.MAVLink_mission_item_reached_message(self._reached))
         elif self._repeats_left and time_us >= self._repeat_at_us:
             self._repeats_left -= 1
             self._repeat_at_us += REPEAT_INTERVAL_US
-            send_to_all(self._broadcast, mavlink.MAVLink_mission_item_reached_message(self._reached))
+            send_to_all(self._broadcast, dialect.MAVLink_mission_item_reached_message(self._reached))
 
     def _state(self, total: int) -> int:
         if total <= 0:
-            return int(mavlink.MISSION_STATE_NO_MISSION)
+            return int(dialect.MISSION_STATE_NO_MISSION)
         if not self._progress.active:
-            return int(mavlink.MISSION_STATE_NOT_STARTED)
+            return int(dialect.MISSION_STATE_NOT_STARTED)
         if self._progress.complete:
-            return int(mavlink.MISSION_STATE_COMPLETE)
-        return int(mavlink.MISSION_STATE_ACTIVE)
+            return int(dialect.MISSION_STATE_COMPLETE)
+        return int(dialect.MISSION_STATE_ACTIVE)

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 from autopilot_bridge.commander.events import Event, MissionItemReached
 from autopilot_bridge.dispatch import receives, streams
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
@@ -120,7 +120,7 @@ class MissionService(Microservice):
     def stores(self) -> Mapping[MissionType, MissionStore]:
         return self._stores
 
-    @streams(mavlink.MAVLink_mission_current_message)
+    @streams(dialect.MAVLink_mission_current_message)
     def _current(self) -> bytes | None:
         return extended_payload(self.current_message())
 
@@ -183,50 +183,50 @@ class MissionService(Microservice):
         self._downloads.tick(time_us)
         self._report.tick(time_us)
 
-    @receives(mavlink.MAVLink_mission_count_message)
-    def _on_count(self, message: mavlink.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_mission_count_message)
+    def _on_count(self, message: dialect.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
         self._report.forget_reached()
         self._uploads.on_count(message, source, time_us)
 
-    @receives(mavlink.MAVLink_mission_item_message, mavlink.MAVLink_mission_item_int_message)
+    @receives(dialect.MAVLink_mission_item_message, dialect.MAVLink_mission_item_int_message)
     def _on_item(
         self,
-        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
         source: Source,
         time_us: int,
     ) -> None:
         if not self._take_guided_item(message, source):
             self._uploads.on_item(message, source, time_us)
 
-    @receives(mavlink.MAVLink_mission_write_partial_list_message)
+    @receives(dialect.MAVLink_mission_write_partial_list_message)
     def _on_partial(
-        self, message: mavlink.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
     ) -> None:
         self._uploads.on_partial(message, source, time_us)
 
-    @receives(mavlink.MAVLink_mission_ack_message)
-    def _on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
+    @receives(dialect.MAVLink_mission_ack_message)
+    def _on_ack(self, message: dialect.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
         self._downloads.on_ack(message, source)
         self._uploads.on_ack(message, source, time_us)
 
-    @receives(mavlink.MAVLink_mission_request_list_message)
+    @receives(dialect.MAVLink_mission_request_list_message)
     def _on_list(
-        self, message: mavlink.MAVLink_mission_request_list_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_mission_request_list_message, source: Source, time_us: int
     ) -> None:
         self._downloads.on_list(message, source, time_us, uploader=self._uploads.partner)
 
-    @receives(mavlink.MAVLink_mission_request_message, mavlink.MAVLink_mission_request_int_message)
+    @receives(dialect.MAVLink_mission_request_message, dialect.MAVLink_mission_request_int_message)
     def _on_request(
         self,
-        message: mavlink.MAVLink_mission_request_message | mavlink.MAVLink_mission_request_int_message,
+        message: dialect.MAVLink_mission_request_message | dialect.MAVLink_mission_request_int_message,
         source: Source,
         time_us: int,
     ) -> None:
         self._downloads.on_request(message, source, time_us, uploader=self._uploads.partner)
 
-    @receives(mavlink.MAVLink_mission_clear_all_message)
+    @receives(dialect.MAVLink_mission_clear_all_message)
     def _on_clear(
-        self, message: mavlink.MAVLink_mission_clear_all_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_mission_clear_all_message, source: Source, time_us: int
     ) -> None:
         uploader = self._uploads.partner
         mission_type = mission_type_of(message.mission_type)
@@ -235,27 +235,27 @@ class MissionService(Microservice):
             if uploading_here or self._sessions.of(source.channel).download is not None:
                 self._say(self._policy.texts.clear_busy)
                 return
-            result = mavlink.MAV_MISSION_ACCEPTED
+            result = dialect.MAV_MISSION_ACCEPTED
             wanted = [mission_type] if mission_type is not None else []
-            if message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
+            if message.mission_type == dialect.MAV_MISSION_TYPE_ALL:
                 wanted = list(MissionType)
         elif mission_type is None:
-            result, wanted = mavlink.MAV_MISSION_UNSUPPORTED, []
+            result, wanted = dialect.MAV_MISSION_UNSUPPORTED, []
         elif uploader is not None or (
             mission_type is MissionType.MISSION
             and self._policy.refuses_clear_in_flight
             and self._progress.active
         ):
-            result, wanted = mavlink.MAV_MISSION_ERROR, []
+            result, wanted = dialect.MAV_MISSION_ERROR, []
         else:
-            result, wanted = mavlink.MAV_MISSION_ACCEPTED, [mission_type]
+            result, wanted = dialect.MAV_MISSION_ACCEPTED, [mission_type]
         for kind in wanted:
             self._replace(kind, (), 0)
         source.channel.send(ack_message(source, result, message.mission_type))
 
-    @receives(mavlink.MAVLink_mission_set_current_message)
+    @receives(dialect.MAVLink_mission_set_current_message)
     def _on_set_current(
-        self, message: mavlink.MAVLink_mission_set_current_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_mission_set_current_message, source: Source, time_us: int
     ) -> None:
         uploader = self._uploads.partner
         texts = self._policy.texts
@@ -272,15 +272,15 @@ class MissionService(Microservice):
 
     def _take_guided_item(
         self,
-        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
         source: Source,
     ) -> bool:
         if not self._policy.guided_items or message.current != _GUIDED_ITEM or self._on_guided_item is None:
             return False
         item = item_from_message(message)
         result = self._policy.rules.check(item, MissionType.MISSION, 1, 2)
-        if result == mavlink.MAV_MISSION_ACCEPTED and not self._on_guided_item(item):
-            result = mavlink.MAV_MISSION_ERROR
+        if result == dialect.MAV_MISSION_ACCEPTED and not self._on_guided_item(item):
+            result = dialect.MAV_MISSION_ERROR
         source.channel.send(ack_message(source, result, message.mission_type))
         return True
 
@@ -295,8 +295,8 @@ class MissionService(Microservice):
         if home is None:
             return otherwise
         return MissionItem(
-            command=mavlink.MAV_CMD_NAV_WAYPOINT,
-            frame=mavlink.MAV_FRAME_GLOBAL,
+            command=dialect.MAV_CMD_NAV_WAYPOINT,
+            frame=dialect.MAV_FRAME_GLOBAL,
             x=home.lat_deg,
             y=home.lon_deg,
             z=home.alt_m,
@@ -352,4 +352,4 @@ def _finite_home(item: MissionItem) -> MissionItem:
     """Item 0 as uploaded, used until home is known; its values were not checked."""
     good = all(math.isfinite(value) for value in (item.x, item.y, item.z))
     x, y, z = (item.x, item.y, item.z) if good else (0.0, 0.0, 0.0)
-    return MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, frame=mavlink.MAV_FRAME_GLOBAL, x=x, y=y, z=z)
+    return MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, frame=dialect.MAV_FRAME_GLOBAL, x=x, y=y, z=z)

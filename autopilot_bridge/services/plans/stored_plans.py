@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Mapping
 from typing import Final
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Announce
 from autopilot_bridge.services.microservice import Microservice
@@ -110,7 +110,7 @@ class StoredPlans(Microservice):
         """Store a plan that was changed."""
         if self._damaged:
             for kind in self._damaged:
-                self._announce(mavlink.MAV_SEVERITY_ERROR, f"Stored {_NAMES[kind]} damaged, not loaded")
+                self._announce(dialect.MAV_SEVERITY_ERROR, f"Stored {_NAMES[kind]} damaged, not loaded")
             self._damaged = []
         for kind, store in self._stores.items():
             if store.version != self._versions[kind]:
@@ -130,7 +130,7 @@ class StoredPlans(Microservice):
             replace_whole(self._files, self._path(kind), pack_plan(store.items, kind, store.plan_id))
         except OSError as failure:
             self._announce(
-                mavlink.MAV_SEVERITY_ERROR, f"Storing the {_NAMES[kind]} failed: {failure.strerror}"
+                dialect.MAV_SEVERITY_ERROR, f"Storing the {_NAMES[kind]} failed: {failure.strerror}"
             )
 
     def _load(self, kind: MissionType) -> bool:
@@ -164,7 +164,7 @@ class StoredPlans(Microservice):
                 raise ValueError(f"item {seq} of the stored plan holds what no message can")
             if seq == 0 and self._policy.home_is_item_0 and not math.isfinite(item.x + item.y + item.z):
                 raise ValueError("the home of the stored plan is nowhere")
-            if self._policy.rules.check(item, kind, seq, count) != mavlink.MAV_MISSION_ACCEPTED:
+            if self._policy.rules.check(item, kind, seq, count) != dialect.MAV_MISSION_ACCEPTED:
                 raise ValueError(f"item {seq} of the stored plan, command {item.command}, is not taken")
-        if kind is MissionType.FENCE and check_fence_polygons(items) != mavlink.MAV_MISSION_ACCEPTED:
+        if kind is MissionType.FENCE and check_fence_polygons(items) != dialect.MAV_MISSION_ACCEPTED:
             raise ValueError("a polygon of the stored fence has too few or too many vertices")

@@ -8,7 +8,7 @@ types.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.services.channel import Announce, Source
@@ -73,12 +73,12 @@ class MissionUploads:
         """The client that is uploading now; None: no upload."""
         return None if self._upload is None else self._upload.partner
 
-    def on_count(self, message: mavlink.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
+    def on_count(self, message: dialect.MAVLink_mission_count_message, source: Source, time_us: int) -> None:
         texts = self._policy.texts
         upload = self._upload
         if upload is None and self._sessions.of(source.channel).download is not None:
             self._say(texts.download_open)
-            self._ack(source, mavlink.MAV_MISSION_ERROR, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_ERROR, message.mission_type)
             return
         if upload is not None:
             if not same_partner(upload.partner, source):
@@ -87,17 +87,17 @@ class MissionUploads:
             if upload.items and not self._policy.restart_on_count:
                 upload.received_us = time_us
                 self._say(texts.upload_busy)
-                self._ack(source, mavlink.MAV_MISSION_ERROR, upload.mission_type)
+                self._ack(source, dialect.MAV_MISSION_ERROR, upload.mission_type)
                 return
         mission_type = mission_type_of(message.mission_type)
         if mission_type is None:
-            self._ack(source, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         capacity = self._policy.capacity[mission_type]
         if message.count > capacity:
             if texts.too_many is not None:
                 self._announce(texts.too_many[0], texts.too_many[1].format(capacity=capacity))
-            self._ack(source, mavlink.MAV_MISSION_NO_SPACE, mission_type)
+            self._ack(source, dialect.MAV_MISSION_NO_SPACE, mission_type)
             return
         self._upload = Upload(source, mission_type, 0, message.count, (), time_us, time_us)
         if message.count == 0:
@@ -106,7 +106,7 @@ class MissionUploads:
             self._request(self._upload, time_us)
 
     def on_partial(
-        self, message: mavlink.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_mission_write_partial_list_message, source: Source, time_us: int
     ) -> None:
         """MISSION_WRITE_PARTIAL_LIST: items start_index..end_index (inclusive) are uploaded again."""
         if not self._policy.partial_writes:
@@ -116,12 +116,12 @@ class MissionUploads:
             return
         mission_type = mission_type_of(message.mission_type)
         if mission_type is None:
-            self._ack(source, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         kept = self._stores[mission_type].items
         if not 0 <= message.start_index <= message.end_index < len(kept):
             self._say(self._policy.texts.partial_rejected)
-            self._ack(source, mavlink.MAV_MISSION_ERROR, mission_type)
+            self._ack(source, dialect.MAV_MISSION_ERROR, mission_type)
             return
         self._upload = Upload(
             source, mission_type, message.start_index, message.end_index + 1, kept, time_us, time_us
@@ -130,12 +130,12 @@ class MissionUploads:
 
     def on_item(
         self,
-        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
         source: Source,
         time_us: int,
     ) -> None:
         session = self._sessions.of(source.channel)
-        session.as_int = message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT
+        session.as_int = message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
         if not session.as_int and not session.warned_item:
             session.warned_item = True
             self._say(self._policy.texts.float_item)
@@ -149,7 +149,7 @@ class MissionUploads:
             self._say(self._policy.texts.partner_mismatch)
             return
         if message.mission_type != upload.mission_type:
-            self._ack(source, mavlink.MAV_MISSION_ERROR, message.mission_type)
+            self._ack(source, dialect.MAV_MISSION_ERROR, message.mission_type)
             return
         if message.seq != upload.next_seq:
             if self._policy.wrong_sequence_result is None:
@@ -159,14 +159,14 @@ class MissionUploads:
             return
         self._take(upload, message, time_us)
 
-    def on_ack(self, message: mavlink.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
+    def on_ack(self, message: dialect.MAVLink_mission_ack_message, source: Source, time_us: int) -> None:
         """MISSION_ACK of the client: it does not support that form of item, or it cancels."""
         upload = self._upload
         if upload is None or not same_partner(upload.partner, source):
             return
-        if message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED:
+        if message.type == dialect.MAV_MISSION_OPERATION_CANCELLED:
             self._upload = None
-        elif message.type == mavlink.MAV_MISSION_UNSUPPORTED and self._policy.requests_as_int:
+        elif message.type == dialect.MAV_MISSION_UNSUPPORTED and self._policy.requests_as_int:
             session = self._sessions.of(source.channel)
             session.as_int = not session.as_int
             self._request(upload, time_us)
@@ -186,14 +186,14 @@ class MissionUploads:
     def _take(
         self,
         upload: Upload,
-        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
         time_us: int,
     ) -> None:
         upload.received_us = time_us
         item = item_from_message(message)
         rules = self._policy.rules
         result = rules.check(item, upload.mission_type, message.seq, upload.plan_size)
-        if result != mavlink.MAV_MISSION_ACCEPTED:
+        if result != dialect.MAV_MISSION_ACCEPTED:
             self._fail(upload, result)
             return
         upload.checksum = message_checksum(message, upload.checksum)
@@ -209,7 +209,7 @@ class MissionUploads:
         items = (*upload.kept[: upload.first], *upload.items, *upload.kept[upload.end :])
         if upload.mission_type is MissionType.FENCE:
             result = check_fence_polygons(items)
-            if result != mavlink.MAV_MISSION_ACCEPTED:
+            if result != dialect.MAV_MISSION_ACCEPTED:
                 self._fail(upload, result)
                 return
         self._upload = None
@@ -217,7 +217,7 @@ class MissionUploads:
         plan_id = self._stores[upload.mission_type].plan_id if self._policy.plan_ids else 0
         session = self._sessions.of(upload.partner.channel)
         session.finished = Finished(upload.partner, upload.mission_type, upload.end - 1, plan_id)
-        self._ack(upload.partner, mavlink.MAV_MISSION_ACCEPTED, upload.mission_type, plan_id)
+        self._ack(upload.partner, dialect.MAV_MISSION_ACCEPTED, upload.mission_type, plan_id)
 
     def _fail(self, upload: Upload, result: int) -> None:
         self._upload = None
@@ -227,7 +227,7 @@ class MissionUploads:
 
     def _on_unexpected_item(
         self,
-        message: mavlink.MAVLink_mission_item_message | mavlink.MAVLink_mission_item_int_message,
+        message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
         source: Source,
     ) -> None:
         finished = self._sessions.of(source.channel).finished
@@ -238,10 +238,10 @@ class MissionUploads:
             and finished.mission_type == message.mission_type
             and finished.last_seq == message.seq
         ):
-            self._ack(source, mavlink.MAV_MISSION_ACCEPTED, message.mission_type, finished.plan_id)
+            self._ack(source, dialect.MAV_MISSION_ACCEPTED, message.mission_type, finished.plan_id)
             return
         self._say(self._policy.texts.no_transfer)
-        self._ack(source, mavlink.MAV_MISSION_ERROR, message.mission_type)
+        self._ack(source, dialect.MAV_MISSION_ERROR, message.mission_type)
 
     def _request(self, upload: Upload, time_us: int) -> None:
         upload.sent_us = time_us

@@ -8,7 +8,7 @@ from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.flight.heading import Turn
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
@@ -23,7 +23,7 @@ class ArduCopterCommands(ArduPilotCommands):
         """The mode of a custom_mode number; None where a client can't select it."""
         return ardupilot_modes.commanded_mode(number)
 
-    @command(mavlink.MAV_CMD_NAV_TAKEOFF)
+    @command(dialect.MAV_CMD_NAV_TAKEOFF)
     def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: altitude over home; in GUIDED, armed, on the ground."""
         if command.is_int and command.frame not in RELATIVE_FRAMES:
@@ -40,12 +40,12 @@ class ArduCopterCommands(ArduPilotCommands):
         self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_NAV_LAND)
+    @command(dialect.MAV_CMD_NAV_LAND)
     def land(self, command: Command, source: Source) -> Result:
         """NAV_LAND: land at the current position."""
         return self.commander.guidance.land().result
 
-    @command(mavlink.MAV_CMD_CONDITION_YAW)
+    @command(dialect.MAV_CMD_CONDITION_YAW)
     def turn(self, command: Command, source: Source) -> Result:
         """CONDITION_YAW: p1 deg, p2 deg/s (0: ATC_SLEW_YAW), p3 direction, p4 1 = relative."""
         if not 0.0 <= command.p1 <= 360.0 or command.p4 not in (0.0, 1.0):
@@ -60,7 +60,7 @@ class ArduCopterCommands(ArduPilotCommands):
         )
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
+    @command(dialect.MAV_CMD_DO_PAUSE_CONTINUE)
     def pause_continue(self, command: Command, source: Source) -> Result:
         """DO_PAUSE_CONTINUE: 0 holds, 1 goes on; in AUTO and GUIDED."""
         action = whole(command.p1)

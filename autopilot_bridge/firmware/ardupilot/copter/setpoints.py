@@ -9,23 +9,23 @@ from typing import Final
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs import setpoints as wire
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
 
 _GLOBAL_FRAMES: Final = {
-    mavlink.MAV_FRAME_GLOBAL_INT: False,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
-    mavlink.MAV_FRAME_GLOBAL: False,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
+    dialect.MAV_FRAME_GLOBAL_INT: False,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
+    dialect.MAV_FRAME_GLOBAL: False,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
 }
 """Whether the altitude is over home."""
 _OFFSET_FRAMES: Final = frozenset(
-    {mavlink.MAV_FRAME_LOCAL_OFFSET_NED, mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED}
+    {dialect.MAV_FRAME_LOCAL_OFFSET_NED, dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_OFFSET_NED}
 )
-_BODY_FRAMES: Final = frozenset({mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED})
+_BODY_FRAMES: Final = frozenset({dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_OFFSET_NED})
 
 
 class ArduCopterSetpoints(Microservice):
@@ -34,16 +34,16 @@ class ArduCopterSetpoints(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self.commander = parts.commander
 
-    @receives(mavlink.MAVLink_set_position_target_local_ned_message)
+    @receives(dialect.MAVLink_set_position_target_local_ned_message)
     def on_local(
-        self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED."""
         guided = self._guided()
         if guided is None:
             return
         context, frame, mask = self.commander.context, message.coordinate_frame, message.type_mask
-        if frame != mavlink.MAV_FRAME_LOCAL_NED and frame not in _OFFSET_FRAMES:
+        if frame != dialect.MAV_FRAME_LOCAL_NED and frame not in _OFFSET_FRAMES:
             guided.set_hold(context)
             return
         position = _whole(wire.POSITION_BITS, mask, wire.position_of((message.x, message.y, message.z), 0))
@@ -63,9 +63,9 @@ class ArduCopterSetpoints(Microservice):
             position = (position[0] + north_m, position[1] + east_m, position[2] + down_m)
         self._follow(guided, wire.Target(position, velocity, acceleration, yaw, yaw_rate))
 
-    @receives(mavlink.MAVLink_set_position_target_global_int_message)
+    @receives(dialect.MAVLink_set_position_target_global_int_message)
     def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT."""
         guided = self._guided()
@@ -93,8 +93,8 @@ class ArduCopterSetpoints(Microservice):
     def _motion(
         self,
         guided: GuidedTask,
-        message: mavlink.MAVLink_set_position_target_local_ned_message
-        | mavlink.MAVLink_set_position_target_global_int_message,
+        message: dialect.MAVLink_set_position_target_local_ned_message
+        | dialect.MAVLink_set_position_target_global_int_message,
     ) -> tuple[wire.Triple, wire.Triple] | None:
         """Velocity and acceleration; None: the message is not used further.
 
@@ -140,9 +140,9 @@ class ArduCopterSetpoints(Microservice):
         else:
             guided.set_hold(context)
 
-    @receives(mavlink.MAVLink_set_attitude_target_message)
+    @receives(dialect.MAVLink_set_attitude_target_message)
     def on_attitude(
-        self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_attitude_target_message, source: Source, time_us: int
     ) -> None:
         """SET_ATTITUDE_TARGET."""
         mask = message.type_mask

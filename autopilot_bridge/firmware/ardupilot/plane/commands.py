@@ -9,14 +9,14 @@ from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
 from autopilot_bridge.flight.plan_reading import in_landing_sequence, landing_start
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_feasibility.ardupilot import PLANE_PARAMETERS, plane_problems
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.command import Command, whole
 
-_CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
-_INFO: Final = mavlink.MAV_SEVERITY_INFO
+_CRITICAL: Final = dialect.MAV_SEVERITY_CRITICAL
+_INFO: Final = dialect.MAV_SEVERITY_INFO
 _AIRSPEED, _GROUND_SPEED = 0, 1  # SPEED_TYPE
 _DEFAULT_SPEED: Final = -2.0
 _COURSE, _HEADING = 0, 1  # HEADING_TYPE
@@ -93,7 +93,7 @@ class ArduPlaneCommands(ArduPilotCommands):
             self.parts.announce(_INFO, "Mission complete, changing mode to RTL")
             self.commander.set_mode(FlightMode.RETURN)
 
-    @command(mavlink.MAV_CMD_DO_LAND_START)
+    @command(dialect.MAV_CMD_DO_LAND_START)
     def land_start(self, command: Command, source: Source) -> Result:
         """DO_LAND_START: jump to the mission's landing sequence, in AUTO."""
         start = landing_start(self.commander.missions.items)
@@ -101,18 +101,18 @@ class ArduPlaneCommands(ArduPilotCommands):
             return Result.FAILED
         return self.commander.set_mode(FlightMode.MISSION).result
 
-    @command(mavlink.MAV_CMD_NAV_TAKEOFF)
+    @command(dialect.MAV_CMD_NAV_TAKEOFF)
     def take_off(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: aircraft take off in a mission, or in mode TAKEOFF."""
         return Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_GO_AROUND)
+    @command(dialect.MAV_CMD_DO_GO_AROUND)
     def go_around(self, command: Command, source: Source) -> Result:
         """DO_GO_AROUND: p1 height over home to climb to; not positive: the landing item's height."""
         height_m = command.p1 if 0.0 < command.p1 < math.inf else math.nan
         return Result.ACCEPTED if self.commander.guidance.go_around(height_m).accepted else Result.FAILED
 
-    @command(mavlink.MAV_CMD_DO_AUX_FUNCTION)
+    @command(dialect.MAV_CMD_DO_AUX_FUNCTION)
     def auxiliary(self, command: Command, source: Source) -> Result:
         """DO_AUX_FUNCTION: p1 function, p2 switch position; the functions that choose a mode."""
         mode, position = _SWITCHES.get(whole(command.p1, -1) or 0), whole(command.p2)
@@ -154,7 +154,7 @@ class ArduPlaneCommands(ArduPilotCommands):
             return Result.ACCEPTED
         return Result.FAILED
 
-    @command(mavlink.MAV_CMD_GUIDED_CHANGE_SPEED)
+    @command(dialect.MAV_CMD_GUIDED_CHANGE_SPEED)
     def change_airspeed(self, command: Command, source: Source) -> Result:
         """GUIDED_CHANGE_SPEED: p1 airspeed only, p2 m/s, p3 m/s^2 (0: at once)."""
         if self.commander.mode is not FlightMode.GUIDED:
@@ -167,7 +167,7 @@ class ArduPlaneCommands(ArduPilotCommands):
         self.commander.guidance.change_airspeed(command.p2, acceleration_m_s2=acceleration)
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_GUIDED_CHANGE_ALTITUDE)
+    @command(dialect.MAV_CMD_GUIDED_CHANGE_ALTITUDE)
     def change_altitude(self, command: Command, source: Source) -> Result:
         """GUIDED_CHANGE_ALTITUDE: p7 altitude, p3 m/s (0: at once); a COMMAND_LONG's is over home."""
         if self.commander.mode is not FlightMode.GUIDED:
@@ -183,7 +183,7 @@ class ArduPlaneCommands(ArduPilotCommands):
         self.commander.guidance.change_altitude(down_m, rate_m_s=_magnitude(command.p3))
         return Result.ACCEPTED
 
-    @command(mavlink.MAV_CMD_GUIDED_CHANGE_HEADING)
+    @command(dialect.MAV_CMD_GUIDED_CHANGE_HEADING)
     def change_heading(self, command: Command, source: Source) -> Result:
         """GUIDED_CHANGE_HEADING: p1 HEADING_TYPE, p2 deg, p3 lateral acceleration m/s^2, at least 0.05."""
         if self.commander.mode is not FlightMode.GUIDED:

@@ -9,7 +9,7 @@ from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.ardupilot import messages as ardupilot
 from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages, ekf_flags
 from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES, NAVIGATING_MODES
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.services.messages.common import POSITION_TARGET_GLOBAL_INT, POSITION_TARGET_LOCAL_NED
@@ -18,7 +18,7 @@ from autopilot_bridge.telemetry.fields import FieldValues
 from autopilot_bridge.telemetry.streams import Values
 from flightsim import interface
 
-_M = mavlink
+_M = dialect
 
 STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
     {
@@ -43,7 +43,7 @@ _SENSOR_USED: Final = 2
 _CUSTOM_MODE_FIELD: Final = 3  # of HEARTBEAT's values
 _NAVIGATING: Final = frozenset(CUSTOM_MODES[mode] for mode in NAVIGATING_MODES)
 _TARGET_MASK: Final = 0xFDF8
-_ABSOLUTE: Final = mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_PRED_POS_HORIZ_ABS
+_ABSOLUTE: Final = dialect.EKF_POS_HORIZ_ABS | dialect.EKF_PRED_POS_HORIZ_ABS
 
 
 class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
@@ -133,7 +133,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
         if not health.wind_dead_reckoning:
             return super().ekf_status_flags()
         flags = ekf_flags(health, position_ready=True)
-        return (flags | int(mavlink.EKF_POS_HORIZ_REL)) & ~int(_ABSOLUTE)
+        return (flags | int(dialect.EKF_POS_HORIZ_REL)) & ~int(_ABSOLUTE)
 
     def position_target_local_ned(self) -> Values | None:
         """POSITION_TARGET_LOCAL_NED (85): the place flown to."""
@@ -142,7 +142,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
             return None
         return POSITION_TARGET_LOCAL_NED(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
             type_mask=_TARGET_MASK & 0xDFF,
             x=path.north_m,
             y=path.east_m,
@@ -157,7 +157,7 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(path.north_m, path.east_m, path.down_m)
         return POSITION_TARGET_GLOBAL_INT(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_GLOBAL,
+            coordinate_frame=dialect.MAV_FRAME_GLOBAL,
             type_mask=_TARGET_MASK,
             lat_int=e7(lat_deg),
             lon_int=e7(lon_deg),
@@ -167,9 +167,9 @@ class ArduPlaneMessages(AircraftAir, ArdupilotMessages):
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245): no VTOL; a take-off is reported as flight."""
         landed = int(self.context.landed_state)
-        if landed == mavlink.MAV_LANDED_STATE_TAKEOFF:
-            landed = int(mavlink.MAV_LANDED_STATE_IN_AIR)
-        return (mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
+        if landed == dialect.MAV_LANDED_STATE_TAKEOFF:
+            landed = int(dialect.MAV_LANDED_STATE_IN_AIR)
+        return (dialect.MAV_VTOL_STATE_UNDEFINED, landed)
 
     def esc_telemetry(self) -> Values | None:
         """ESC_TELEMETRY_1_TO_4 (11030): the one ESC is on the throttle's channel, the third."""

@@ -12,7 +12,7 @@ import numpy as np
 from autopilot_bridge.commander.events import AltitudeChanged
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs.setpoints import POSITION_BITS, place_of, unit_quaternion
 from autopilot_bridge.services.microservice import Microservice
@@ -25,9 +25,9 @@ _ATTITUDE_BIT: Final = 128
 _QUATERNION_TOLERANCE: Final = 0.1
 _Z_BIT: Final = POSITION_BITS[2]
 _MAX_ALTITUDE_M: Final = 1e5
-_AMSL: Final = frozenset({mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT})
+_AMSL: Final = frozenset({dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT})
 _RELATIVE: Final = frozenset(
-    {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
+    {dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
 )
 
 
@@ -37,15 +37,15 @@ class ArduPlaneSetpoints(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self.commander = parts.commander
 
-    @receives(mavlink.MAVLink_set_position_target_local_ned_message)
+    @receives(dialect.MAVLink_set_position_target_local_ned_message)
     def on_local(
-        self, message: mavlink.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_position_target_local_ned_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_LOCAL_NED: in MAV_FRAME_LOCAL_OFFSET_NED (7) a step in height, nothing else.
 
         The mask is not checked, as in the firmware.
         """
-        if message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_OFFSET_NED:
+        if message.coordinate_frame != dialect.MAV_FRAME_LOCAL_OFFSET_NED:
             return
         guided = self._guided() if abs(message.z) <= _MAX_ALTITUDE_M else None
         if guided is None:
@@ -58,9 +58,9 @@ class ArduPlaneSetpoints(Microservice):
         height_m = self._home_down_m() - down_m
         self.commander.emit(AltitudeChanged(time_us=self.commander.time_us, height_m=height_m))
 
-    @receives(mavlink.MAVLink_set_position_target_global_int_message)
+    @receives(dialect.MAVLink_set_position_target_global_int_message)
     def on_global(
-        self, message: mavlink.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_position_target_global_int_message, source: Source, time_us: int
     ) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT: its altitude.
 
@@ -84,9 +84,9 @@ class ArduPlaneSetpoints(Microservice):
         if guided is not None:
             self._fly_at(guided, reference_down_m - message.alt)
 
-    @receives(mavlink.MAVLink_set_attitude_target_message)
+    @receives(dialect.MAVLink_set_attitude_target_message)
     def on_attitude(
-        self, message: mavlink.MAVLink_set_attitude_target_message, source: Source, time_us: int
+        self, message: dialect.MAVLink_set_attitude_target_message, source: Source, time_us: int
     ) -> None:
         """SET_ATTITUDE_TARGET: what the mask does not ignore of roll, pitch and throttle.
 

@@ -7,7 +7,7 @@ from typing import Final
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.firmware.data import by_member, load_data, modes
 from autopilot_bridge.firmware.flavour import ModeDisplay
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.services.commands.available_modes import ListedMode
 
 MAIN_MANUAL: Final = 1
@@ -41,8 +41,8 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = by_member(
     FlightMode, {name: mode["name"] for name, mode in _DATA["modes"].items()}
 )
 
-_ADVANCED: Final = mavlink.MAV_MODE_PROPERTY_ADVANCED
-_NOT_SELECTABLE: Final = mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+_ADVANCED: Final = dialect.MAV_MODE_PROPERTY_ADVANCED
+_NOT_SELECTABLE: Final = dialect.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 
 
 def _own(name: str, main: int, sub: int = 0, properties: int = _ADVANCED) -> ListedMode:
@@ -55,21 +55,21 @@ def _standard(standard_mode: int, main: int, sub: int = 0, properties: int = _AD
 
 LISTED_MODES: Final = (
     _own("Manual", MAIN_MANUAL),
-    _standard(mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD, MAIN_ALTITUDE, properties=0),
-    _standard(mavlink.MAV_STANDARD_MODE_POSITION_HOLD, MAIN_POSITION, properties=0),
-    _standard(mavlink.MAV_STANDARD_MODE_MISSION, MAIN_AUTO, 4),
+    _standard(dialect.MAV_STANDARD_MODE_ALTITUDE_HOLD, MAIN_ALTITUDE, properties=0),
+    _standard(dialect.MAV_STANDARD_MODE_POSITION_HOLD, MAIN_POSITION, properties=0),
+    _standard(dialect.MAV_STANDARD_MODE_MISSION, MAIN_AUTO, 4),
     _own("Hold", MAIN_AUTO, 3),
-    _standard(mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY, MAIN_AUTO, 5),
+    _standard(dialect.MAV_STANDARD_MODE_SAFE_RECOVERY, MAIN_AUTO, 5),
     _own("Position Slow", MAIN_POSITION, 2),
     _own("Acro", MAIN_ACRO),
     _own("Termination", MAIN_TERMINATION, properties=_ADVANCED | _NOT_SELECTABLE),
     _own("Offboard", MAIN_OFFBOARD),
     _own("Stabilized", MAIN_STABILIZED),
-    _standard(mavlink.MAV_STANDARD_MODE_TAKEOFF, MAIN_AUTO, 2),
-    _standard(mavlink.MAV_STANDARD_MODE_LAND, MAIN_AUTO, 6),
+    _standard(dialect.MAV_STANDARD_MODE_TAKEOFF, MAIN_AUTO, 2),
+    _standard(dialect.MAV_STANDARD_MODE_LAND, MAIN_AUTO, 6),
     _own("Follow Target", MAIN_AUTO, 8),
     _own("Precision Landing", MAIN_AUTO, 9),
-    _standard(mavlink.MAV_STANDARD_MODE_ORBIT, MAIN_POSITION, 1),
+    _standard(dialect.MAV_STANDARD_MODE_ORBIT, MAIN_POSITION, 1),
     _own("VTOL Takeoff", MAIN_AUTO, 10),
     *(_own("(Mode not available)", MAIN_AUTO, sub, _NOT_SELECTABLE) for sub in range(11, 19)),
 )

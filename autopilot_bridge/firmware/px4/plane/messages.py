@@ -9,7 +9,7 @@ from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.px4 import messages as px4
 from autopilot_bridge.firmware.px4.messages import Px4Messages
 from autopilot_bridge.flight.context import LandedState
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.services.messages.aircraft import AircraftAir, AircraftState
 from autopilot_bridge.services.messages.common import (
@@ -22,7 +22,7 @@ from autopilot_bridge.services.parts import AutopilotParts
 from autopilot_bridge.telemetry.fields import FieldValues, fields
 from autopilot_bridge.telemetry.streams import Values
 
-_M = mavlink
+_M = dialect
 
 ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {**px4.ONBOARD_RATES_HZ, _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 10, _M.MAVLINK_MSG_ID_WIND_COV: 10}
@@ -126,7 +126,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(path.north_m, path.east_m, path.down_m)
         return POSITION_TARGET_GLOBAL_INT(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT,
+            coordinate_frame=dialect.MAV_FRAME_GLOBAL_INT,
             lat_int=e7(lat_deg),
             lon_int=e7(lon_deg),
             alt=alt_m,
@@ -151,7 +151,7 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
         x, y, z = place
         return POSITION_TARGET_LOCAL_NED(
             time_boot_ms=self.view.time_ms,
-            coordinate_frame=mavlink.MAV_FRAME_LOCAL_NED,
+            coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
             type_mask=_PLACE_MASK,
             x=x,
             y=y,
@@ -170,4 +170,4 @@ class Px4PlaneMessages(AircraftAir, Px4Messages):
     def orbit_execution_status(self) -> FieldValues | None:
         """ORBIT_EXECUTION_STATUS (360) in frame 0, as recorded."""
         values = super().orbit_execution_status()
-        return None if values is None else values._replace(frame=mavlink.MAV_FRAME_GLOBAL)
+        return None if values is None else values._replace(frame=dialect.MAV_FRAME_GLOBAL)

@@ -7,7 +7,7 @@ from typing import Final
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.firmware.flavour import ModeDisplay
 from autopilot_bridge.firmware.px4.copter import modes as px4_modes
-from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mavlink import dialect
 
 _STABILIZE: Final = 0x10
 MULTICOPTER_ONLY: Final = frozenset({FlightMode.ORBIT, FlightMode.POSITION_SLOW, FlightMode.PRECISION_LAND})
@@ -20,8 +20,8 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
 )
 
 LISTED_MODES: Final = tuple(
-    mode._replace(standard_mode=mavlink.MAV_STANDARD_MODE_CRUISE)
-    if mode.standard_mode == mavlink.MAV_STANDARD_MODE_POSITION_HOLD
+    mode._replace(standard_mode=dialect.MAV_STANDARD_MODE_CRUISE)
+    if mode.standard_mode == dialect.MAV_STANDARD_MODE_POSITION_HOLD
     else mode
     for mode in px4_modes.LISTED_MODES
 )
