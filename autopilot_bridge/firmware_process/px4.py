@@ -27,7 +27,7 @@ from autopilot_bridge.firmware_process.process import FirmwareProcess
 from autopilot_bridge.firmware_process.px4_files import AIRFRAME_NUMBER, write_start_files
 from autopilot_bridge.firmware_process.relay import LOOPBACK, FirmwareLinks, ports_to
 from autopilot_bridge.firmware_process.working_folder import WorkingFolder
-from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, decode_as, dialect
+from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, decode_as, dialect, wire_units
 from autopilot_bridge.sitl.backend import BackendSetup
 from flightsim import interface as i
 from flightsim.airframe import AirframeKind
@@ -248,9 +248,9 @@ class Px4Backend:
         message = dialect.MAVLink_hil_gps_message(
             time_usec=self._unix_us + gps.time_us,
             fix_type=int(values[i.GPS_FIX_TYPE]),
-            lat=round(_number(values[i.GPS_LAT_DEG]) * 1e7),
-            lon=round(_number(values[i.GPS_LON_DEG]) * 1e7),
-            alt=round(_number(values[i.GPS_ALT_M]) * 1e3),
+            lat=wire_units.e7(_number(values[i.GPS_LAT_DEG])),
+            lon=wire_units.e7(_number(values[i.GPS_LON_DEG])),
+            alt=wire_units.mm(_number(values[i.GPS_ALT_M])),
             eph=min(65535, round(_number(values[i.GPS_EPH_M]) * 100.0)),
             epv=min(65535, round(_number(values[i.GPS_EPV_M]) * 100.0)),
             vel=min(65535, round(math.hypot(north, east))),
