@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from estimators.relative_pose.belief import LevelMotion
 from estimators.tracking.recursive_ransac import RecursiveRansac
 
 Array = NDArray[np.float64]
+
+_LOOK_M: Final = 3.0  # a measurement this close to a track, and to no other, shows what its target looks like
 
 
 class AircraftTracks:
@@ -25,6 +28,7 @@ class AircraftTracks:
         reckoning: motion of the aircraft since the start.
         history: past places of the tracks, in the frame of `reckoning`.
         time_us: time of the newest frame.
+        looks: what the targets of tracks that were seen in it look like, by number (`appearance`).
     """
 
     def __init__(
@@ -34,6 +38,7 @@ class AircraftTracks:
         self.reckoning = reckoning or DeadReckoning()
         self.history = TrackHistory(keep_s)
         self.time_us = 0
+        self.looks: dict[int, Array] = {}
         self._places: dict[int, tuple[float, float]] = {}
 
     def move(self, dt_s: float, motion: LevelMotion) -> None:
@@ -41,7 +46,12 @@ class AircraftTracks:
         self.reckoning.advance(dt_s, motion)
 
     def scan(
-        self, time_us: int, level: Array, covariances: Array, taken: DeadReckoning | None = None
+        self,
+        time_us: int,
+        level: Array,
+        covariances: Array,
+        taken: DeadReckoning | None = None,
+        looks: Array | None = None,
     ) -> None:
         """Process the measurements of one frame.
 
@@ -50,6 +60,7 @@ class AircraftTracks:
             level: (n, 2) forward and right in the level frame of that time.
             covariances: (n, 2, 2) theirs.
             taken: the motion at that time; None: the present one.
+            looks: (n, d) what is measured looks like; None: not known.
         """
         if time_us <= self.time_us:
             return
@@ -57,11 +68,23 @@ class AircraftTracks:
         reckoning = self.reckoning if taken is None else taken
         c, s = math.cos(reckoning.heading_rad), math.sin(reckoning.heading_rad)
         turn = np.array([[c, -s], [s, c]])
-        self.tracker.scan(time_us, reckoning.placed(level), turn @ covariances @ turn.T)
+        placed = reckoning.placed(level)
+        self.tracker.scan(time_us, placed, turn @ covariances @ turn.T)
         self._places = {
             track.number: (float(track.state[0]), float(track.state[1])) for track in self.tracker.tracks
         }
+        self.looks = {} if looks is None else self._looks_of(placed, looks)
         self.history.add(time_us, reckoning, [(number, *place) for number, place in self._places.items()])
+
+    def _looks_of(self, placed: Array, looks: Array) -> dict[int, Array]:
+        """The looks by track: of the measurements that are close to one track only."""
+        if not (len(placed) and self._places):
+            return {}
+        numbers = list(self._places)
+        off = placed[:, None] - np.array(list(self._places.values()))  # (measurements, tracks, 2)
+        close = np.hypot(off[..., 0], off[..., 1]) < _LOOK_M
+        alone = close & (close.sum(axis=0) == 1) & (close.sum(axis=1) == 1)[:, None]
+        return {numbers[k]: looks[i] for i, k in zip(*np.nonzero(alone), strict=True)}
 
     @property
     def places(self) -> Mapping[int, tuple[float, float]]:

@@ -1,69 +1,129 @@
-"""Which track of the tracking aircraft is the target, and how probable it is that it still is.
+"""Which track of the tracking aircraft is the target, and how probable that is.
 
-An operator designates a track. A tracker of several targets may exchange the tracks of two that come close to
-each other, and then follows another target under the same number. Nothing in the tracks shows it, so the
-probability that the track still is the designated target is part of what the aircraft reports. A track that
-begins beside the target's is no other target: a tracker often has two tracks of one target for a second.
+An operator designates a track. From then on its identity is a probability for each track, and for targets
+that have no track at present ("identity management": Shin, Guibas and Zhao 2003, "A distributed algorithm for
+managing multi-target identities in wireless ad-hoc sensor networks"). It changes when
+
+* two tracks come close to each other: a tracker of several targets may exchange them, and nothing in the
+  tracks shows it. The probabilities of both are mixed, the more the closer they came;
+* a track is lost: its probability goes to the place where its target may be, which widens as the target walks
+  on, and from there to a new track that begins near it;
+* a new track begins beside a living one: a tracker often has two tracks of one target for a second;
+* tracks look like the designated target, or do not (`appearance`); without looks they are all alike.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from estimators.handoff.appearance import AppearanceParameters, KnownLook, Look, LookMean
 from flightsim.foundation.checks import Positive, Share
 from flightsim.foundation.options import Options
 
 Place = tuple[float, float]
+_NO_LOOKS: Mapping[int, Look] = {}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignationParameters(Options):
-    """When an identity becomes doubtful.
+    """When an identity becomes doubtful, and when it is found again.
 
     Attributes:
-        exchange_m: a track that comes as near as this to the target's has exchanged targets with it with a
+        exchange_m: a track that comes as near as this to another one has exchanged targets with it with a
             probability of 0.5 exp(-1/2).
-        regained_m: a track that is this close to the place where the target's was lost is taken for it.
-        regained: probability that it is.
-        doubled: the same of a track that began beside the target's while that lived; in none of 252 frames
-            was such a track of another target. It must leave room for a decision at 0.99.
-        lost_s: time without a track after which the target is lost.
+        beside_m: a track that begins this close to a living one may be of the same target.
+        doubled: probability that it is, once that one is lost; in none of 252 frames was such a track of
+            another target. It must leave room for a decision at 0.99.
+        lost_sigma_m, lost_sigma_m_s: standard deviations per axis of the place and of the velocity of a
+            target when its track is lost.
+        speed_m_s, turn_s: the same of a walker's velocity per axis, and its correlation time.
+        elsewhere: probability that a lost target is anywhere in the area.
+        area_m2: of the area.
+        untracked: mean number of other targets without a track, lost ones not counted, in the area.
+        forget_s: time after which a lost track that is not the target is forgotten.
+        lost_s: time without a track after which the target is lost, and a designation is needed.
+        least: a track with a smaller probability is not reported as the target.
+        appearance: spread of looks.
+        alone_m: looks count only while no other track is nearer.
     """
 
     exchange_m: Positive = 2.0
-    regained_m: Positive = 10.0
-    regained: Share = 0.9
+    beside_m: Positive = 10.0
     doubled: Share = 0.995
-    lost_s: Positive = 5.0
+    lost_sigma_m: Positive = 3.0
+    lost_sigma_m_s: Positive = 0.5
+    speed_m_s: Positive = 1.0
+    turn_s: Positive = 20.0
+    elsewhere: Share = 0.05
+    area_m2: Positive = 40_000.0
+    untracked: Positive = 1.0
+    forget_s: Positive = 30.0
+    lost_s: Positive = 60.0
+    least: Share = 0.2
+    appearance: AppearanceParameters = field(default_factory=AppearanceParameters)
+    alone_m: Positive = 6.0
+
+
+@dataclass(slots=True, kw_only=True)
+class _Living:
+    """A track.
+
+    Attributes:
+        weight: probability that it is the target, without the looks since it was alone.
+        place, velocity: smoothed.
+        looks: since it has been alone.
+        beside: living tracks beside which it began, and from which it has not been away.
+        nearest: least distance of other tracks in the present encounter, by number.
+    """
+
+    weight: float
+    place: Place
+    velocity: Place = (0.0, 0.0)
+    looks: LookMean = field(default_factory=LookMean)
+    beside: set[int] = field(default_factory=set)
+    nearest: dict[int, float] = field(default_factory=dict)
+
+
+@dataclass(slots=True, kw_only=True)
+class _Lost:
+    """A target that had a track.
+
+    Attributes:
+        weight: probability that it is the designated one.
+        exists: probability that no new track is of it.
+        since_us: time at which its track was lost.
+        place, velocity: at that time.
+    """
+
+    weight: float
+    exists: float
+    since_us: int
+    place: Place
+    velocity: Place
 
 
 class Designation:
-    """The designated track.
+    """The designated target.
 
     Args:
         parameters: when it becomes doubtful.
 
     Attributes:
-        number: of the track; None: none is designated, or it was lost.
+        number: of the track that most probably is the target; None: none is designated, or it has no track.
+        probability: probability that this track is the designated target.
         count: number of designations.
     """
 
     def __init__(self, parameters: DesignationParameters | None = None) -> None:
         self.parameters = parameters or DesignationParameters()
         self.number: int | None = None
+        self.probability = 1.0
         self.count = 0
-        self._place: Place | None = None
+        self._time_us = 0
         self._seen_us = 0
-        self._settled = 1.0  # probability before the present encounter
-        self._nearest_m = math.inf  # least distance of another track in the present encounter
-        self._apart: set[int] = set()  # tracks that have been away from the target's: other targets
-        self._beside: set[int] = set()  # tracks that began beside it
-
-    @property
-    def probability(self) -> float:
-        """Probability that the track still is the designated target."""
-        apart = self._nearest_m / self.parameters.exchange_m
-        return self._settled * (1.0 - 0.5 * math.exp(-0.5 * apart * apart))
+        self._living: dict[int, _Living] = {}
+        self._lost: list[_Lost] = []
+        self._look = KnownLook(self.parameters.appearance)
 
     def designate(self, time_us: int, number: int, place: Place, sure: float = 1.0) -> None:
         """An operator designates a track, or confirms that it is the target.
@@ -73,39 +133,246 @@ class Designation:
             number, place: of the track.
             sure: probability that it is the target.
         """
-        self.number, self._place, self._seen_us = number, place, time_us
-        self._settled, self._nearest_m = sure, math.inf
+        self._join_looks()
+        known = self._living.setdefault(number, _Living(weight=0.0, place=place))
+        others = [entry for entry in self._entries() if entry is not known]
+        total = sum(entry.weight for entry in others)
+        for entry in others:
+            entry.weight = (1.0 - sure) * (entry.weight / total if total > 0.0 else 1.0 / len(others))
+        known.weight = sure
         self.count += 1
+        self._seen_us = time_us
+        self._choose()
 
-    def update(self, time_us: int, places: Mapping[int, Place]) -> None:
+    def designate_place(self, time_us: int, place: Place, sure: float = 1.0) -> None:
+        """An operator designates a place at which there is no track yet: the next one near it is the target.
+
+        Args:
+            time_us: of the place.
+            place: in the frame of the tracks.
+            sure: probability that the target is there.
+        """
+        for entry in self._entries():
+            entry.weight *= 1.0 - sure
+        self._lost.append(_Lost(weight=sure, exists=1.0, since_us=time_us, place=place, velocity=(0.0, 0.0)))
+        self.count += 1
+        self._seen_us = time_us
+        self._choose()
+
+    def refuse(self, number: int, sure: float = 1.0) -> None:
+        """An operator says that a track is not the target.
+
+        Args:
+            number: of the track.
+            sure: probability that it is not.
+        """
+        self._join_looks()
+        track = self._living.get(number)
+        if track is None:
+            return
+        track.weight *= 1.0 - sure
+        total = sum(entry.weight for entry in self._entries())
+        if total > 0.0:
+            for entry in self._entries():
+                entry.weight /= total
+        self._choose()
+
+    def update(
+        self, time_us: int, places: Mapping[int, Place], looks: Mapping[int, Look] = _NO_LOOKS
+    ) -> None:
         """Process the tracks of a frame.
 
         Args:
             time_us: its time.
             places: of the tracks by number, in a frame in which targets move smoothly.
+            looks: of the tracks that were seen in it.
         """
+        dt_s = (time_us - self._time_us) * 1e-6
+        self._time_us = time_us
+        self._lose(time_us, places)
+        self._move(dt_s, places)
+        self._begin(time_us, places)
+        self._meet()
         p = self.parameters
-        if self._place is None:
+        for number, look in looks.items():
+            track = self._living.get(number)
+            if track is not None and all(m > p.alone_m for m in track.nearest.values()):
+                track.looks.add(look)
+        self._lost = [
+            lost
+            for lost in self._lost
+            if lost.weight > 1e-6 or (time_us - lost.since_us) * 1e-6 < p.forget_s
+        ]
+        self._choose()
+        if self.number is not None:
+            self._seen_us = time_us
+
+    @property
+    def expected(self) -> Place | None:
+        """Where the target most probably is: its track, or where a lost one may have gone to; None: it was
+        never designated, or was lost for too long.
+        """
+        if self.number is not None:
+            return self._living[self.number].place
+        lost = max(self._lost, key=lambda lost: lost.weight, default=None)
+        if lost is None or not lost.weight or self.lost_s > self.parameters.lost_s:
+            return None
+        return self._walked(lost, self._time_us)[0]
+
+    @property
+    def lost_s(self) -> float:
+        """Time since the target had a track; 0: it has one."""
+        return 0.0 if self.number is not None else (self._time_us - self._seen_us) * 1e-6
+
+    def _entries(self) -> list[_Living | _Lost]:
+        return [*self._living.values(), *self._lost]
+
+    # what changes the probabilities
+
+    def _lose(self, time_us: int, places: Mapping[int, Place]) -> None:
+        """Tracks that have ended."""
+        ended = [number for number in self._living if number not in places]
+        if ended:
+            self._join_looks()
+        for number in ended:
+            track = self._living.pop(number)
+            weight = track.weight
+            for k, other in self._living.items():
+                if number in other.beside:
+                    moved = self.parameters.doubled * weight
+                    self._living[k].weight += moved
+                    weight -= moved
+                    other.beside.discard(number)
+                other.nearest.pop(number, None)
+                other.beside.discard(number)
+            self._lost.append(
+                _Lost(
+                    weight=weight, exists=1.0, since_us=time_us, place=track.place, velocity=track.velocity
+                )
+            )
+
+    def _move(self, dt_s: float, places: Mapping[int, Place]) -> None:
+        share = min(1.0, max(0.0, dt_s / 2.0))
+        for number, track in self._living.items():
+            x, y = places[number]
+            if dt_s > 0.0:
+                u, v = track.velocity
+                track.velocity = (
+                    u + share * ((x - track.place[0]) / dt_s - u),
+                    v + share * ((y - track.place[1]) / dt_s - v),
+                )
+            track.place = (x, y)
+
+    def _begin(self, time_us: int, places: Mapping[int, Place]) -> None:
+        """New tracks: of a target beside that of a living one, of a lost target, or of another."""
+        p = self.parameters
+        for number in sorted(places.keys() - self._living.keys()):
+            place = places[number]
+            beside = {
+                k for k, track in self._living.items() if math.dist(track.place, place) <= p.beside_m
+            }
+            new = _Living(weight=0.0, place=place, beside=beside)
+            if not beside:
+                densities = [lost.exists * self._density(lost, time_us, place) for lost in self._lost]
+                every = sum(densities) + p.untracked / p.area_m2
+                for lost, density in zip(self._lost, densities, strict=True):
+                    share = density / every
+                    new.weight += share * lost.weight
+                    lost.weight -= share * lost.weight
+                    lost.exists *= 1.0 - share
+            self._living[number] = new
+
+    def _walked(self, lost: _Lost, time_us: int) -> tuple[Place, float]:
+        """Mean and variance per axis of the place of a lost target."""
+        p = self.parameters
+        age_s = (time_us - lost.since_us) * 1e-6
+        ages = age_s / p.turn_s
+        way_s = p.turn_s * (1.0 - math.exp(-ages))
+        # of an Ornstein-Uhlenbeck velocity whose first value is known
+        spread = (p.speed_m_s * p.turn_s) ** 2 * max(
+            0.0, 2.0 * ages - 3.0 + 4.0 * math.exp(-ages) - math.exp(-2.0 * ages)
+        )
+        variance = p.lost_sigma_m**2 + (p.lost_sigma_m_s * way_s) ** 2 + spread
+        return (lost.place[0] + way_s * lost.velocity[0], lost.place[1] + way_s * lost.velocity[1]), variance
+
+    def _density(self, lost: _Lost, time_us: int, place: Place) -> float:
+        p = self.parameters
+        mean, variance = self._walked(lost, time_us)
+        squared = ((place[0] - mean[0]) ** 2 + (place[1] - mean[1]) ** 2) / variance
+        return (1.0 - p.elsewhere) * math.exp(-0.5 * squared) / (
+            math.tau * variance
+        ) + p.elsewhere / p.area_m2
+
+    def _meet(self) -> None:
+        """Tracks that come close to each other."""
+        p = self.parameters
+        numbers = list(self._living)
+        for i, a in enumerate(numbers):
+            one = self._living[a]
+            for b in numbers[i + 1 :]:
+                other = self._living[b]
+                away_m = math.dist(one.place, other.place)
+                if away_m > 5.0 * p.exchange_m:
+                    if b in one.nearest:  # the encounter is over
+                        del one.nearest[b], other.nearest[a]
+                    one.beside.discard(b)
+                    other.beside.discard(a)
+                    continue
+                if a in other.beside or b in one.beside:
+                    continue
+                before_m = one.nearest.get(b, math.inf)
+                if away_m >= before_m:
+                    continue
+                if before_m == math.inf:
+                    self._join_looks()
+                one.nearest[b] = other.nearest[a] = away_m
+                mixed = 0.5 * (1.0 - _kept(away_m / p.exchange_m) / _kept(before_m / p.exchange_m))
+                one.weight, other.weight = (
+                    one.weight + mixed * (other.weight - one.weight),
+                    other.weight + mixed * (one.weight - other.weight),
+                )
+
+    # looks
+
+    def _join_looks(self) -> None:
+        """Put the looks so far into the probabilities, and begin new ones."""
+        posterior, lost = self._posterior()
+        for number, track in self._living.items():
+            track.weight = posterior[number]
+        for entry, weight in zip(self._lost, lost, strict=True):
+            entry.weight = weight
+        for track in self._living.values():
+            if track.weight > 0.95:
+                self._look.learn(track.looks)
+            track.looks = LookMean()
+
+    def _posterior(self) -> tuple[dict[int, float], list[float]]:
+        """Probabilities of the tracks with their looks, and of the lost targets."""
+        found = {
+            number: track.weight * (self._look.likelihood_ratio(track.looks) if track.weight else 1.0)
+            for number, track in self._living.items()
+        }
+        lost = [entry.weight for entry in self._lost]
+        total = sum(found.values()) + sum(lost)
+        if not total > 0.0:
+            return found, lost
+        return {k: weight / total for k, weight in found.items()}, [weight / total for weight in lost]
+
+    def _choose(self) -> None:
+        """The track that is reported."""
+        posterior, _ = self._posterior()
+        best = max(posterior, key=lambda k: posterior[k], default=None)
+        held = self.number
+        if held in posterior and best is not None and posterior[best] < posterior[held] + 0.1:
+            best = held  # two tracks that are as probable do not take turns
+        if best is None or posterior[best] < self.parameters.least:
+            self.number = None
             return
-        if self.number is None or self.number not in places:
-            if (time_us - self._seen_us) * 1e-6 > p.lost_s:
-                self.number = self._place = None
-                return
-            near = [k for k, place in places.items() if math.dist(place, self._place) <= p.regained_m]
-            if not near:
-                return
-            lost_at = self._place
-            number = min(near, key=lambda k: math.dist(places[k], lost_at))
-            same = p.doubled if number in self._beside else p.regained / len(near)
-            self._settled, self._nearest_m = self.probability * same, math.inf
-            self.number = number
-        self._place, self._seen_us = places[self.number], time_us
-        here = self._place
-        off_m = {k: math.dist(place, here) for k, place in places.items() if k != self.number}
-        self._apart |= {k for k, away_m in off_m.items() if away_m > p.regained_m}
-        self._beside = {k for k in off_m if k not in self._apart}
-        nearest_m = min((off_m[k] for k in off_m if k in self._apart), default=math.inf)
-        if nearest_m > 5.0 * p.exchange_m:  # the encounter is over
-            self._settled, self._nearest_m = self.probability, math.inf
-        else:
-            self._nearest_m = min(self._nearest_m, nearest_m)
+        self.number, self.probability = best, posterior[best]
+
+
+def _kept(apart: float) -> float:
+    """1 - 2 q of an encounter down to a distance, with the probability q of an exchange: it composes as a
+    product.
+    """
+    return max(1e-9, 1.0 - math.exp(-0.5 * apart * apart)) if apart < math.inf else 1.0

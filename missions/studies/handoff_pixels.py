@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimators.vision.ground_points import on_ground
 from missions.embedded.walker_pictures import WalkerPictures
-from missions.studies.handoff_world import HandoffSetting, HandoffWorld
+from missions.studies.handoff_world import GroundPoints, HandoffSetting, HandoffWorld
 
 __all__ = ["PixelWorld"]
 
@@ -21,11 +21,11 @@ class PixelWorld(HandoffWorld):
         super().__init__(setting, seed)
         self._pictures = tuple(WalkerPictures(2 * seed + which) for which in range(2))
 
-    def frame(self, which: int, pointing: tuple[float, float]) -> tuple[Array, Array] | None:
+    def frame(self, which: int, pointing: tuple[float, float]) -> GroundPoints | None:
         s, a, pictures = self.setting, self._aircraft[which], self._pictures[which]
-        roll, pitch = a.tilt.tolist()
+        roll, pitch = a.attitude_error.tolist()
         height_m = a.height_m + float(a.rng.normal(0.0, s.height_sigma_m))
-        directions = pictures.moving(
+        moving = pictures.moving(
             self.time_us,
             np.array([*a.place, -a.height_m]),
             a.heading_rad,
@@ -34,9 +34,10 @@ class PixelWorld(HandoffWorld):
             tilt_rad=(roll, pitch),
             height_m=height_m,
         )
-        if directions is None:
+        if moving is None:
             return None
+        directions, looks = moving
         sigma = math.hypot(pictures.sigma, 0.3 * s.tilt_sigma_rad)  # as in the world of points
         places, covariances = on_ground(directions, height_m, sigma)
         below = np.isfinite(places).all(axis=1)
-        return places[below], covariances[below]
+        return GroundPoints(places=places[below], covariances=covariances[below], looks=looks[below])

@@ -1,6 +1,7 @@
 """One trial of the study `handoff`: two aircraft fly until a track is decided for, or for 15 minutes."""
 
 import math
+from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
@@ -10,11 +11,9 @@ from numpy.typing import NDArray
 
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.comparison import TrackComparison
-from estimators.handoff.designation import Designation
 from estimators.handoff.evidence import EvidenceComparison
 from estimators.handoff.matching import MatchComparison, MatchingParameters, Residual
 from estimators.handoff.process import HandoffProcess, TrackerReport, WindowParameters
-from estimators.orbit_target.relative_target import RelativeState
 from estimators.relative_pose import (
     GaussianBank,
     LevelMotion,
@@ -23,21 +22,21 @@ from estimators.relative_pose import (
     RelativePoseParameters,
 )
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
+from flightsim.foundation.random_streams import RandomStreams
 from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
+from missions.studies.handoff_operator import Operator
+from missions.studies.handoff_tracker import SEARCH_ROLL_RAD, Tracker, orbit_roll
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
+from missions.studies.handoff_worlds import HANDOFF_WORLDS
 from missions.studies.options import TIMEOUT_S, PoseBelief
+from missions.studies.worlds import NOMINAL
 
 Array = NDArray[np.float64]
 Early = tuple[float, bool]
 """Score of a track, and whether it is of the tracked target."""
 
 _EVERY_S: Final = 0.1  # between two samples of a window
-_SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
 _DETECTED: Final = 0.8  # what the trackers expect, whatever the distance
-_SURE: Final = 0.995  # with a smaller probability of the identity, which limits that of the decision, the
-# operator designates anew
-_OPERATOR_S: Final = 5.0  # time that it takes
-_APART_M: Final = 10.0  # the operator tells targets apart that are farther from each other
 
 
 class Comparison(StrEnum):
@@ -53,12 +52,17 @@ class Cell:
     """Parameters of a trial.
 
     Attributes:
+        operator: who designates the target.
+        world: name of the true world (`HANDOFF_WORLDS`); the estimators have the parameters of the nominal
+            one.
         comparison: what decides.
         window: samples of the windows (paper: 100).
         residual_m: T_r (paper: 15 m); without effect on the evidence.
         belief: what estimates the relative pose.
     """
 
+    operator: str = Operator.ONCE.value
+    world: str = NOMINAL
     comparison: str = Comparison.EVIDENCE.value
     window: int = 100
     residual_m: float = 15.0
@@ -81,6 +85,7 @@ class Handoff:
         tracker_error_m: distance from the place that the tracker reports to the target.
         resets: times that the belief about the pose started anew.
         designations: times that the tracker's operator designated the target.
+        requests: times that the operator was asked; 0 of the one who watches.
         cause: of a failure.
     """
 
@@ -97,55 +102,8 @@ class Handoff:
     tracker_error_m: float | None
     resets: int
     designations: int
+    requests: int
     cause: str
-
-
-class Tracker:
-    """The tracking aircraft: its tracks, and an operator who designates the target.
-
-    The operator designates it anew when its track is lost or its identity is doubtful, some seconds later
-    and only when no other target is close to it.
-    """
-
-    def __init__(self, world: HandoffWorld, tracks: AircraftTracks) -> None:
-        self._world = world
-        self.tracks = tracks
-        self.designation = Designation()
-        self._doubtful_us: int | None = 0
-
-    def step(self) -> tuple[LevelMotion, TrackerReport]:
-        """Take a frame; returns the motion since the last one, and the report."""
-        world, which, designation = self._world, HandoffWorld.TRACKER, self.designation
-        motion = world.motion(which)
-        self.tracks.move(1.0 / world.setting.rate_hz, motion)
-        known = self.tracks.level()
-        held = known.get(designation.number) if designation.number is not None else None
-        # without a track the operator holds the camera on the target
-        true = world.seen_from(which, world.targets)
-        frame = world.frame(which, held or (float(true[0, 0]), float(true[0, 1])))
-        if frame is not None:
-            self.tracks.scan(world.time_us, *frame)
-        designation.update(world.time_us, self.tracks.places)
-        self._operate(true)
-        return motion, TrackerReport(
-            tracks=self.tracks.level(), number=designation.number, identity=designation.probability
-        )
-
-    def _operate(self, true: Array) -> None:
-        designation, now_us = self.designation, self._world.time_us
-        if designation.number is not None and designation.probability >= _SURE:
-            self._doubtful_us = None
-            return
-        if self._doubtful_us is None:
-            self._doubtful_us = now_us
-        waited_s = (now_us - self._doubtful_us) * 1e-6
-        close = np.hypot(*(true[1:] - true[0]).T) < _APART_M
-        if waited_s < (_OPERATOR_S if designation.count else 0.0) or close.any():
-            return
-        seen = self._world.apparent(HandoffWorld.TRACKER)
-        for number, target in targets_of(self.tracks.level(), seen).items():
-            if target == 0:
-                designation.designate(now_us, number, self.tracks.places[number])
 
 
 class TrialFlight:
@@ -154,6 +112,8 @@ class TrialFlight:
     Args:
         world: the truth, and the measurements of it.
         tracks: of the tracker.
+        operator: of the tracker.
+        seed: of its operator.
         process: of the handoff aircraft.
 
     Attributes:
@@ -162,20 +122,33 @@ class TrialFlight:
         report: its newest report.
     """
 
-    def __init__(self, world: HandoffWorld, tracks: AircraftTracks, process: HandoffProcess) -> None:
+    def __init__(
+        self,
+        world: HandoffWorld,
+        tracks: AircraftTracks,
+        process: HandoffProcess,
+        operator: Operator,
+        seed: int,
+    ) -> None:
         self.world, self.process = world, process
-        self.tracker = Tracker(world, tracks)
-        self.report = TrackerReport()
-        self._pilots = [
+        pilots = [
             OrbitGuidance(OrbitParameters(radius_m=world.setting.radius_m, direction=d)) for d in (1, -1)
         ]
+        person = RandomStreams(seed).generator("handoff", "operator")
+        self.tracker = Tracker(world, tracks, operator, pilots[0], person)
+        self.report = TrackerReport()
+        self._pilot = pilots[1]
         self._rolls = (0.0, 0.0)
+        # what the tracker has sent, as old as its clock makes it; the newest last
+        late = round(world.setting.clock_s * world.setting.rate_hz)
+        self._sent: deque[tuple[LevelMotion, TrackerReport]] = deque(maxlen=late + 1)
 
     def step(self) -> None:
         """Advance by one period of the rate."""
         world, process = self.world, self.process
         world.advance(self._rolls)
-        motion, self.report = self.tracker.step()
+        self._sent.append(self.tracker.step())
+        motion, self.report = self._sent[0]
         pointing = process.target()
         frame = None if pointing is None else world.frame(HandoffWorld.HANDOFF, pointing)
         own = world.motion(HandoffWorld.HANDOFF)
@@ -185,21 +158,16 @@ class TrialFlight:
             motion,
             self.report,
             world.measured(),
-            frame,
+            None if frame is None else (frame.places, frame.covariances),
             world.setting.heights_m[HandoffWorld.HANDOFF],
         )
+        target = process.target()
         self._rolls = (
-            _orbit_roll(
-                self._pilots[0],
-                world.time_us,
-                tuple(world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0].tolist()),
-                world.ground_velocity(HandoffWorld.TRACKER),
-                world.roll_rad(HandoffWorld.TRACKER),
-            ),
-            _SEARCH_ROLL_RAD
-            if (target := process.target()) is None
-            else _orbit_roll(
-                self._pilots[1],
+            self.tracker.roll_rad,
+            SEARCH_ROLL_RAD
+            if target is None
+            else orbit_roll(
+                self._pilot,
                 world.time_us,
                 target,
                 (own.forward_m_s, own.right_m_s),  # equation 34
@@ -227,7 +195,7 @@ class HandoffTrial:
     """The trial: a function of its cell and its seed.
 
     Args:
-        setting: targets, aircraft and sensors.
+        setting: targets, aircraft and sensors of the nominal world.
         timeout_s: time without a decision that is a failure.
         pixels: frames are rendered and searched (`PixelWorld`).
     """
@@ -251,14 +219,15 @@ class HandoffTrial:
         keep_s = 1.5 * windows.span_s + 1.0
         tracks = [AircraftTracks(self._ransac(seed, which), keep_s) for which in range(2)]
         process = HandoffProcess(self._belief(cell, seed), tracks[1], comparison, windows)
-        return TrialFlight(self._world(seed), tracks[0], process)
+        return TrialFlight(self._world(cell, seed), tracks[0], process, Operator(cell.operator), seed)
 
-    def _world(self, seed: int) -> HandoffWorld:
+    def _world(self, cell: Cell, seed: int) -> HandoffWorld:
+        true = HANDOFF_WORLDS[cell.world].setting.over(self.setting)
         if not self.pixels:
-            return HandoffWorld(self.setting, seed)
+            return HandoffWorld(true, seed)
         from missions.studies.handoff_pixels import PixelWorld
 
-        return PixelWorld(self.setting, seed)
+        return PixelWorld(true, seed)
 
     def _ransac(self, seed: int, which: int) -> RecursiveRansac:
         s = self.setting
@@ -300,23 +269,6 @@ def comparison_of(cell: Cell) -> TrackComparison:
         return EvidenceComparison()
     residual = Residual.FROBENIUS if kind is Comparison.PAPER else Residual.RMS
     return MatchComparison(MatchingParameters(residual=residual, residual_m=cell.residual_m))
-
-
-def _orbit_roll(
-    pilot: OrbitGuidance,
-    time_us: int,
-    target: tuple[float, ...],
-    velocity: tuple[float, float],
-    roll_rad: float,
-) -> float:
-    """Roll of the orbit guidance; everything in the level frame, in which the heading is 0."""
-    state = RelativeState(
-        time_us=time_us,
-        offset_ne_m=(target[0], target[1]),
-        offset_rate_ne_m_s=(-velocity[0], -velocity[1]),
-        offset_std_m=0.0,
-    )
-    return pilot.command(state, 0.0, roll_rad).roll_rad
 
 
 def outcome_of(flight: TrialFlight, comparison: TrackComparison, early: Early | None) -> Handoff:
@@ -364,5 +316,6 @@ def outcome_of(flight: TrialFlight, comparison: TrackComparison, early: Early | 
         tracker_error_m=tracker_error_m,
         resets=process.pose.resets,
         designations=flight.tracker.designation.count,
+        requests=flight.tracker.person.asked,
         cause=cause,
     )

@@ -6,6 +6,7 @@ parameter with a default of our own.
 """
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -61,6 +62,18 @@ class HandoffSetting(Options):
         distance_spread: of the logarithm of the distance at which a target is lost.
         hidden_s: correlation time of what hides a target, as the ground behind it and its attitude.
         false_points: mean number of false points in a frame.
+        gps_sigma_m_s: noise of the tracker's velocity over ground, per axis.
+        cue_sigma_m: error per axis of the place to which the tracker was sent.
+        clothes_sigma: standard deviation between targets of what they look like: brightness, red less green
+            and blue less green of the patch against the ground, in levels of 255. This and the next two were
+            measured on rendered pictures (docs/handoff.md).
+        look_slow_sigma, look_slow_s: of one target, with the side that is seen and the ground behind it, and
+            the correlation time.
+        look_noise_sigma: from frame to frame.
+        clock_s: time by which what the tracker sends is older than its stamps say.
+        heading_bias_rad: constant error of the relative heading, to either side.
+        iron_rad: amplitude of the error of each heading by hard iron: one cycle in a turn.
+        mount_rad: constant error of roll and of pitch of each camera, standard deviation.
     """
 
     targets: Count = 5
@@ -91,7 +104,51 @@ class HandoffSetting(Options):
     distance_spread: Positive = 0.263
     hidden_s: Positive = 0.6
     false_points: NotNegative = 0.32
+    gps_sigma_m_s: NotNegative = 0.2
+    cue_sigma_m: NotNegative = 8.0
+    clothes_sigma: tuple[NotNegative, NotNegative, NotNegative] = (25.0, 10.0, 10.0)
+    look_slow_sigma: tuple[NotNegative, NotNegative, NotNegative] = (8.0, 3.0, 3.0)
+    look_slow_s: Positive = 8.0
+    look_noise_sigma: tuple[NotNegative, NotNegative, NotNegative] = (12.0, 5.0, 5.0)
+    clock_s: NotNegative = 0.0
+    heading_bias_rad: NotNegative = 0.0
+    iron_rad: NotNegative = 0.0
+    mount_rad: NotNegative = 0.0
 
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GroundPoints:
+    """What one aircraft measures of moving objects in a frame.
+
+    Attributes:
+        places, covariances: (n, 2) forward and right in the level frame, with the errors of attitude and
+            image, and (n, 2, 2).
+        looks: (n, 3) what they look like.
+    """
+
+    places: Array
+    covariances: Array
+    looks: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenTarget:
+    """A target as a person sees it in the picture of an aircraft.
+
+    Attributes:
+        x_px, y_px: from the middle of the picture, right and down.
+        height_px: of the standing person.
+        wanted: it is the one that the person looks for.
+    """
+
+    x_px: float
+    y_px: float
+    height_px: float
+    wanted: bool
+
+
+PERSON_M: Final = 1.75
+FOCAL_PX: Final = 554.0  # 640 pixels over 60 degrees
 
 @dataclass
 class _Aircraft:
@@ -105,8 +162,17 @@ class _Aircraft:
     rate_bias_rad_s: float
     roll_rad: float = 0.0
     yaw_rate_rad_s: float = 0.0
-    tilt: Array = field(default_factory=lambda: np.zeros(2))  # errors of roll and pitch
+    tilt: Array = field(default_factory=lambda: np.zeros(2))  # slow errors of roll and pitch
+    mount: Array = field(default_factory=lambda: np.zeros(2))  # constant ones
+    iron_phase_rad: float = 0.0
+    looks: Array = field(default_factory=lambda: np.zeros((0, 3)))  # slow part, by target
     hidden: Array = field(default_factory=lambda: np.zeros(0))  # standard normal, by target
+
+    @property
+    def attitude_error(self) -> Array:
+        """(2,) present errors of roll and pitch."""
+        found: Array = self.tilt + self.mount
+        return found
 
 
 class HandoffWorld:
@@ -130,7 +196,13 @@ class HandoffWorld:
         self._walk = streams.generator("handoff", "targets")
         self._link = streams.generator("handoff", "link")
         start = streams.generator("handoff", "start")
+        deviation = streams.generator("handoff", "deviations")
         n = s.targets
+        self._clothes = streams.generator("handoff", "clothes").normal(0.0, s.clothes_sigma, (n, 3))
+        self._look_noise = [streams.generator("handoff", "looks", k) for k in range(2)]
+        self._gps = streams.generator("handoff", "gps")
+        self._heading_bias_rad = s.heading_bias_rad * deviation.choice((-1.0, 1.0))
+        self._clock_steps = round(s.clock_s * s.rate_hz)
         self._half = 0.5 * np.array(s.area_m)
         self.targets: Array = self._walk.uniform(-1.0, 1.0, (n, 2)) * self._half
         self._headings = self._walk.uniform(-math.pi, math.pi, n)
@@ -151,10 +223,16 @@ class HandoffWorld:
                 speed_bias_m_s=rng.normal(0.0, s.airspeed_bias_m_s),
                 rate_bias_rad_s=rng.normal(0.0, s.yaw_rate_bias_rad_s),
                 tilt=rng.normal(0.0, s.tilt_sigma_rad, 2),
+                mount=deviation.normal(0.0, s.mount_rad, 2),
+                iron_phase_rad=deviation.uniform(-math.pi, math.pi),
+                looks=self._look_noise[k].normal(0.0, s.look_slow_sigma, (n, 3)),
                 hidden=rng.standard_normal(n),
             )
             for k in range(2)
         )
+        self._cue = self.targets[0] + deviation.normal(0.0, s.cue_sigma_m, 2)
+        # of the tracker, as old as its clock makes them; the newest last
+        self._sent_headings_rad = deque([self._magnetic_rad(self.TRACKER)], maxlen=self._clock_steps + 1)
 
     def advance(self, rolls_rad: tuple[float, float]) -> None:
         """Advance by one period of the rate with commanded rolls of the tracker and the handoff aircraft."""
@@ -179,6 +257,10 @@ class HandoffWorld:
             keep = math.exp(-step / s.hidden_s)
             aircraft.hidden *= keep
             aircraft.hidden += math.sqrt(1.0 - keep * keep) * aircraft.rng.standard_normal(n)
+        keep = math.exp(-step / s.look_slow_s)
+        for aircraft, noise in zip(self._aircraft, self._look_noise, strict=True):
+            aircraft.looks *= keep
+            aircraft.looks += math.sqrt(1.0 - keep * keep) * noise.normal(0.0, s.look_slow_sigma, (n, 3))
         self._headings += s.turn_rad_sqrt_s * math.sqrt(step) * self._walk.standard_normal(n)
         outside = np.any(np.abs(self.targets) > self._half, axis=1)
         # a target at the edge turns to the middle
@@ -189,6 +271,12 @@ class HandoffWorld:
         )
         self._step += 1
         self.time_us = round(1e6 * self._step * step)
+        self._sent_headings_rad.append(self._magnetic_rad(self.TRACKER))
+
+    def _magnetic_rad(self, which: int) -> float:
+        """Heading by the magnetometer of an aircraft, without noise."""
+        a = self._aircraft[which]
+        return a.heading_rad + self.setting.iron_rad * math.sin(a.heading_rad - a.iron_phase_rad)
 
     def motion(self, which: int) -> LevelMotion:
         """Airspeed and yaw rate as an aircraft measures them."""
@@ -212,33 +300,69 @@ class HandoffWorld:
         return PoseMeasurement(
             range_m=math.nan if missing else slant + s.range_sigma_m * noise[0],
             down_m=down + s.height_sigma_m * (noise[1] - noise[2]),
-            heading_rad=handoff.heading_rad
-            - tracker.heading_rad
+            heading_rad=self._magnetic_rad(self.HANDOFF)
+            - self._sent_headings_rad[0]
+            + self._heading_bias_rad
             + s.heading_sigma_rad * (noise[3] - noise[4]),
         )
 
-    def frame(self, which: int, pointing: tuple[float, float]) -> tuple[Array, Array] | None:
-        """Moving objects in a frame of a camera that points at a place of its level frame.
-
-        Returns:
-            (n, 2) forward and right in the level frame, with the errors of attitude and image, and (n, 2, 2)
-            the covariances that the aircraft gives them; None: the frame was not searched.
+    def frame(self, which: int, pointing: tuple[float, float]) -> GroundPoints | None:
+        """Moving objects in a frame of a camera that points at a place of its level frame; None: the frame
+        was not searched.
         """
         s, a = self.setting, self._aircraft[which]
         camera = CameraAxes.towards(*pointing, a.height_m)
-        level = self.seen_from(which, self.targets)
-        points = camera.project(np.column_stack((level, np.full(len(level), a.height_m - s.seen_m))))
-        inside = np.all(np.abs(points) < s.half_view, axis=1)  # NaN behind the camera is outside
-        seen = inside & (ndtr(a.hidden) < self.detectable(np.hypot(np.hypot(*level.T), a.height_m)))
-        points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (int(seen.sum()), 2))
+        inside, points = self._image_points(which, camera)
+        slant_m = np.hypot(np.hypot(*self.seen_from(which, self.targets).T), a.height_m)
+        seen = inside & (ndtr(a.hidden) < self.detectable(slant_m))
+        count, noise = int(seen.sum()), self._look_noise[which]
+        points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (count, 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
+        looks = np.vstack(
+            ((self._clothes + a.looks)[seen], noise.normal(0.0, s.clothes_sigma, (len(false), 3)))
+        )
+        looks += noise.normal(0.0, s.look_noise_sigma, looks.shape)
         directions = camera.directions(np.vstack((points, false)))
         height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
         # only the part of the tilt's error that changes from frame to frame is noise to the tracker
         sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
-        places, covariances = on_ground(_tilted(directions, a.tilt), height_m, sigma)
+        places, covariances = on_ground(_tilted(directions, a.attitude_error), height_m, sigma)
         below = np.isfinite(places).all(axis=1) & (np.hypot(*places.T) < 6.0 * a.height_m)
-        return places[below], covariances[below]
+        return GroundPoints(places=places[below], covariances=covariances[below], looks=looks[below])
+
+    def _image_points(self, which: int, camera: CameraAxes) -> tuple[NDArray[np.bool_], Array]:
+        """Whether each target is in the picture, and its image point (n, 2), as tangents."""
+        height_m = self._aircraft[which].height_m - self.setting.seen_m
+        level = self.seen_from(which, self.targets)
+        points = camera.project(np.column_stack((level, np.full(len(level), height_m))))
+        return np.all(np.abs(points) < self.setting.half_view, axis=1), points  # NaN is outside
+
+    def picture(self, which: int, pointing: tuple[float, float]) -> tuple[SeenTarget, ...]:
+        """What a person sees in the picture of a camera: the targets that are in view and not hidden."""
+        a = self._aircraft[which]
+        inside, points = self._image_points(which, CameraAxes.towards(*pointing, a.height_m))
+        slant_m = np.hypot(np.hypot(*self.seen_from(which, self.targets).T), a.height_m)
+        seen = inside & (ndtr(a.hidden) < self.setting.detected)
+        return tuple(
+            SeenTarget(
+                x_px=FOCAL_PX * float(points[k, 0]),
+                y_px=FOCAL_PX * float(points[k, 1]),
+                height_px=FOCAL_PX * PERSON_M / float(slant_m[k]),
+                wanted=bool(k == 0),
+            )
+            for k in np.flatnonzero(seen)
+        )
+
+    def known_camera(self, which: int, pointing: tuple[float, float]) -> CameraAxes:
+        """Axes of a camera as the aircraft knows them, with its errors of roll and pitch."""
+        a = self._aircraft[which]
+        axes = CameraAxes.towards(*pointing, a.height_m).axes
+        return CameraAxes(axes=_tilted(axes, a.attitude_error))
+
+    def cue(self) -> tuple[float, float]:
+        """Forward and right in the tracker's level frame of the place to which it was sent, at the start."""
+        (place,) = self.seen_from(self.TRACKER, self._cue[None]).tolist()
+        return place[0], place[1]
 
     def detectable(self, distances_m: Array) -> Array:
         """Probability that a target in view at slant distances gives a point."""
@@ -253,7 +377,7 @@ class HandoffWorld:
         a = self._aircraft[which]
         level = self.seen_from(which, self.targets)
         directions = np.column_stack((level, np.full(len(level), a.height_m - self.setting.seen_m)))
-        return np.nan_to_num(on_ground(_tilted(directions, a.tilt), a.height_m, 0.0)[0], nan=np.inf)
+        return np.nan_to_num(on_ground(_tilted(directions, a.attitude_error), a.height_m, 0.0)[0], nan=np.inf)
 
     def seen_from(self, which: int, places: Array) -> Array:
         """True forward and right (n, 2) of places (n, 2), north and east, in an aircraft's level frame."""
@@ -263,15 +387,17 @@ class HandoffWorld:
         return found
 
     def ground_velocity(self, which: int) -> tuple[float, float]:
-        """True velocity over ground in the level frame."""
+        """Velocity over ground in the level frame, by GPS."""
         a = self._aircraft[which]
         c, s = math.cos(a.heading_rad), math.sin(a.heading_rad)
-        forward = c * self.wind[0] + s * self.wind[1]
-        return self.setting.airspeed_m_s + forward, -s * self.wind[0] + c * self.wind[1]
+        forward = self.setting.airspeed_m_s + c * self.wind[0] + s * self.wind[1]
+        noise = self._gps.normal(0.0, self.setting.gps_sigma_m_s, 2).tolist()
+        return forward + noise[0], -s * self.wind[0] + c * self.wind[1] + noise[1]
 
     def roll_rad(self, which: int) -> float:
-        """True roll."""
-        return self._aircraft[which].roll_rad
+        """Roll as the aircraft knows it."""
+        a = self._aircraft[which]
+        return a.roll_rad + float(a.attitude_error[0])
 
 
 def _tilted(directions: Array, tilt: Array) -> Array:

@@ -1,0 +1,110 @@
+"""What a target looks like: few numbers of the pixels that show it, and how well they identify it.
+
+A look is a short vector of a target in one frame, such as the colour of its patch against the ground around
+it. Looks of one target differ: by noise from frame to frame, and slowly, with the side that is seen, its
+shadow and the ground behind it. So the mean of many looks is not known better than the slow part.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.foundation.checks import Share
+from flightsim.foundation.options import Options
+
+__all__ = ["AppearanceParameters", "KnownLook", "Look", "LookMean"]
+
+Array = NDArray[np.float64]
+Look = NDArray[np.float64]
+"""(d,) of a target in one frame; all NaN: not measured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppearanceParameters(Options):
+    """Spread of looks, for brightness, red less green and blue less green of a patch of few pixels, in levels
+    of 255. Measured on rendered persons in clothes of five colours (docs/handoff.md).
+
+    Attributes:
+        mean: of all targets.
+        sigma: standard deviation between targets.
+        slow_sigma: of the part of one target that changes slowly.
+        noise_sigma: of the part that changes from frame to frame.
+        unlike: probability that a target looks like any other from now on: it has entered a shadow, or the
+            front end measures its surroundings.
+    """
+
+    mean: tuple[float, ...] = (0.0, 0.0, 0.0)
+    sigma: tuple[float, ...] = (25.0, 10.0, 10.0)
+    slow_sigma: tuple[float, ...] = (8.0, 3.0, 3.0)
+    noise_sigma: tuple[float, ...] = (12.0, 5.0, 5.0)
+    unlike: Share = 0.02
+
+
+class LookMean:
+    """Mean of the looks of one track while it certainly is of one target.
+
+    Attributes:
+        count: number of looks.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._sum: Array | None = None
+
+    def add(self, look: Look) -> None:
+        """Add a look; one that was not measured is left out."""
+        if math.isfinite(float(look.sum())):
+            self._sum = look.copy() if self._sum is None else self._sum + look
+            self.count += 1
+
+    def mean(self) -> Array:
+        """(d,) of the looks; there must be one."""
+        assert self._sum is not None, "no look yet"
+        found: Array = self._sum / self.count
+        return found
+
+    def variance(self, parameters: AppearanceParameters) -> Array:
+        """(d,) of the mean against the target's own."""
+        slow, noise = np.square(parameters.slow_sigma), np.square(parameters.noise_sigma)
+        found: Array = slow + noise / self.count
+        return found
+
+
+class KnownLook:
+    """What is known of how the designated target looks: a Gaussian for each number.
+
+    Args:
+        parameters: spread of looks.
+    """
+
+    def __init__(self, parameters: AppearanceParameters) -> None:
+        self.parameters = parameters
+        self.mean: Array = np.array(parameters.mean)
+        self.variance: Array = np.square(parameters.sigma)
+        self.known = False
+
+    def learn(self, looks: LookMean) -> None:
+        """Looks that are of the target."""
+        if not looks.count:
+            return
+        of_looks = looks.variance(self.parameters)
+        gain = self.variance / (self.variance + of_looks)
+        self.mean = self.mean + gain * (looks.mean() - self.mean)
+        self.variance = (1.0 - gain) * self.variance
+        self.known = True
+
+    def likelihood_ratio(self, looks: LookMean) -> float:
+        """How many times as probable looks are of the target as of any other; 1: nothing is known."""
+        if not (self.known and looks.count):
+            return 1.0
+        p = self.parameters
+        seen, of_looks = looks.mean(), looks.variance(p)
+        as_target = _log_density(seen - self.mean, self.variance + of_looks)
+        as_other = _log_density(seen - np.array(p.mean), np.square(p.sigma) + of_looks)
+        return p.unlike + (1.0 - p.unlike) * math.exp(min(50.0, as_target - as_other))
+
+
+def _log_density(off: Array, variance: Array) -> float:
+    return -0.5 * float(np.sum(off * off / variance + np.log(variance)))
