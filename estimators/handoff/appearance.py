@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import Share
+from flightsim.foundation.checks import Positive, Share
 from flightsim.foundation.options import Options
 
 __all__ = ["AppearanceParameters", "KnownLook", "Look", "LookMean"]
@@ -29,16 +29,17 @@ class AppearanceParameters(Options):
     Attributes:
         mean: of all targets.
         sigma: standard deviation between targets.
-        slow_sigma: of the part of one target that changes slowly.
+        slow_sigma, slow_s: of the part of one target that changes slowly, and its correlation time.
         noise_sigma: of the part that changes from frame to frame.
         unlike: probability that a target looks like any other from now on: it has entered a shadow, or the
             front end measures its surroundings.
     """
 
-    mean: tuple[float, ...] = (0.0, 0.0, 0.0)
-    sigma: tuple[float, ...] = (25.0, 10.0, 10.0)
-    slow_sigma: tuple[float, ...] = (8.0, 3.0, 3.0)
-    noise_sigma: tuple[float, ...] = (12.0, 5.0, 5.0)
+    mean: tuple[float, ...] = (-43.0, 4.0, 36.0)
+    sigma: tuple[float, ...] = (15.0, 13.0, 6.0)
+    slow_sigma: tuple[float, ...] = (12.0, 6.0, 6.0)
+    slow_s: Positive = 8.0
+    noise_sigma: tuple[float, ...] = (7.0, 4.0, 4.0)
     unlike: Share = 0.02
 
 
@@ -52,11 +53,15 @@ class LookMean:
     def __init__(self) -> None:
         self.count = 0
         self._sum: Array | None = None
+        self._first_us = self._last_us = 0
 
-    def add(self, look: Look) -> None:
+    def add(self, time_us: int, look: Look) -> None:
         """Add a look; one that was not measured is left out."""
         if math.isfinite(float(look.sum())):
             self._sum = look.copy() if self._sum is None else self._sum + look
+            if not self.count:
+                self._first_us = time_us
+            self._last_us = time_us
             self.count += 1
 
     def mean(self) -> Array:
@@ -68,7 +73,9 @@ class LookMean:
     def variance(self, parameters: AppearanceParameters) -> Array:
         """(d,) of the mean against the target's own."""
         slow, noise = np.square(parameters.slow_sigma), np.square(parameters.noise_sigma)
-        found: Array = slow + noise / self.count
+        # the mean of a first-order process over a time of many correlation times
+        apart = 1.0 + (self._last_us - self._first_us) * 1e-6 / (2.0 * parameters.slow_s)
+        found: Array = slow / apart + noise / self.count
         return found
 
 

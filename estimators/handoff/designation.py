@@ -197,7 +197,7 @@ class Designation:
         for number, look in looks.items():
             track = self._living.get(number)
             if track is not None and all(m > p.alone_m for m in track.nearest.values()):
-                track.looks.add(look)
+                track.looks.add(time_us, look)
         self._lost = [
             lost
             for lost in self._lost
@@ -224,6 +224,13 @@ class Designation:
         """Time since the target had a track; 0: it has one."""
         return 0.0 if self.number is not None else (self._time_us - self._seen_us) * 1e-6
 
+    def beside(self, number: int) -> frozenset[int]:
+        """Tracks that probably are of the same target as a track: one of both began beside the other."""
+        track = self._living.get(number)
+        if track is None:
+            return frozenset()
+        return frozenset(track.beside | {k for k, other in self._living.items() if number in other.beside})
+
     def _entries(self) -> list[_Living | _Lost]:
         return [*self._living.values(), *self._lost]
 
@@ -238,11 +245,10 @@ class Designation:
             track = self._living.pop(number)
             weight = track.weight
             for k, other in self._living.items():
-                if number in other.beside:
+                if number in other.beside or k in track.beside:
                     moved = self.parameters.doubled * weight
-                    self._living[k].weight += moved
+                    other.weight += moved
                     weight -= moved
-                    other.beside.discard(number)
                 other.nearest.pop(number, None)
                 other.beside.discard(number)
             self._lost.append(

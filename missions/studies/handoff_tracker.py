@@ -187,8 +187,9 @@ class Tracker:
         )
         height_px = FOCAL_PX * PERSON_M / slant_m
         sure = 1.0 - p.lapse
+        same = {number, *self.designation.beside(number)}
         for k, there in places.items():
-            if k != number:
+            if k not in same:
                 sure *= 1.0 - slip(math.dist(here, there), height_px, p)
         return sure
 

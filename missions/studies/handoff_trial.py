@@ -234,11 +234,12 @@ class HandoffTrial:
         rate = s.rate_hz
         return RecursiveRansac(
             RansacParameters(
-                noise_density=0.2,
+                noise_density=0.5,
+                gate_squared=13.8,
                 clutter_per_m2=max(s.false_points, 0.1) / 40_000.0,
                 window=round(2.0 * rate),
                 good_age=round(1.0 * rate),
-                lost_after=round(1.5 * rate),
+                lost_after=round(4.0 * rate),
                 inlier_m=4.0,
                 speed_max_m_s=2.0 * s.walk_m_s[1] + 1.5 * s.wind_m_s + 2.0,
                 seed_support=round(0.6 * rate),

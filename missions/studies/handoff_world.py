@@ -64,9 +64,9 @@ class HandoffSetting(Options):
         false_points: mean number of false points in a frame.
         gps_sigma_m_s: noise of the tracker's velocity over ground, per axis.
         cue_sigma_m: error per axis of the place to which the tracker was sent.
-        clothes_sigma: standard deviation between targets of what they look like: brightness, red less green
-            and blue less green of the patch against the ground, in levels of 255. This and the next two were
-            measured on rendered pictures (docs/handoff.md).
+        clothes_mean, clothes_sigma: mean and standard deviation between targets of what they look like:
+            brightness, red less green and blue less green of the patch against the ground, in levels of 255.
+            This and the next two were measured on rendered pictures (docs/handoff.md).
         look_slow_sigma, look_slow_s: of one target, with the side that is seen and the ground behind it, and
             the correlation time.
         look_noise_sigma: from frame to frame.
@@ -106,10 +106,11 @@ class HandoffSetting(Options):
     false_points: NotNegative = 0.32
     gps_sigma_m_s: NotNegative = 0.2
     cue_sigma_m: NotNegative = 8.0
-    clothes_sigma: tuple[NotNegative, NotNegative, NotNegative] = (25.0, 10.0, 10.0)
-    look_slow_sigma: tuple[NotNegative, NotNegative, NotNegative] = (8.0, 3.0, 3.0)
+    clothes_mean: tuple[float, float, float] = (-43.0, 4.0, 36.0)
+    clothes_sigma: tuple[NotNegative, NotNegative, NotNegative] = (15.0, 13.0, 6.0)
+    look_slow_sigma: tuple[NotNegative, NotNegative, NotNegative] = (12.0, 6.0, 6.0)
     look_slow_s: Positive = 8.0
-    look_noise_sigma: tuple[NotNegative, NotNegative, NotNegative] = (12.0, 5.0, 5.0)
+    look_noise_sigma: tuple[NotNegative, NotNegative, NotNegative] = (7.0, 4.0, 4.0)
     clock_s: NotNegative = 0.0
     heading_bias_rad: NotNegative = 0.0
     iron_rad: NotNegative = 0.0
@@ -198,7 +199,7 @@ class HandoffWorld:
         start = streams.generator("handoff", "start")
         deviation = streams.generator("handoff", "deviations")
         n = s.targets
-        self._clothes = streams.generator("handoff", "clothes").normal(0.0, s.clothes_sigma, (n, 3))
+        self._clothes = streams.generator("handoff", "clothes").normal(s.clothes_mean, s.clothes_sigma, (n, 3))
         self._look_noise = [streams.generator("handoff", "looks", k) for k in range(2)]
         self._gps = streams.generator("handoff", "gps")
         self._heading_bias_rad = s.heading_bias_rad * deviation.choice((-1.0, 1.0))
@@ -319,7 +320,7 @@ class HandoffWorld:
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (count, 2))
         false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
         looks = np.vstack(
-            ((self._clothes + a.looks)[seen], noise.normal(0.0, s.clothes_sigma, (len(false), 3)))
+            ((self._clothes + a.looks)[seen], noise.normal(s.clothes_mean, s.clothes_sigma, (len(false), 3)))
         )
         looks += noise.normal(0.0, s.look_noise_sigma, looks.shape)
         directions = camera.directions(np.vstack((points, false)))
