@@ -136,6 +136,10 @@ class Designation:
         self._join_looks()
         known = self._living.setdefault(number, _Living(weight=0.0, place=place))
         others = [entry for entry in self._entries() if entry is not known]
+        if not others and sure < 1.0:  # then the target is one that has no track
+            unseen = _Lost(weight=0.0, exists=1.0 - sure, since_us=time_us, place=place, velocity=(0.0, 0.0))
+            self._lost.append(unseen)
+            others = [unseen]
         total = sum(entry.weight for entry in others)
         for entry in others:
             entry.weight = (1.0 - sure) * (entry.weight / total if total > 0.0 else 1.0 / len(others))
@@ -199,9 +203,7 @@ class Designation:
             if track is not None and all(m > p.alone_m for m in track.nearest.values()):
                 track.looks.add(time_us, look)
         self._lost = [
-            lost
-            for lost in self._lost
-            if lost.weight > 1e-6 or (time_us - lost.since_us) * 1e-6 < p.forget_s
+            lost for lost in self._lost if lost.weight > 1e-6 or (time_us - lost.since_us) * 1e-6 < p.forget_s
         ]
         self._choose()
         if self.number is not None:
@@ -252,9 +254,7 @@ class Designation:
                 other.nearest.pop(number, None)
                 other.beside.discard(number)
             self._lost.append(
-                _Lost(
-                    weight=weight, exists=1.0, since_us=time_us, place=track.place, velocity=track.velocity
-                )
+                _Lost(weight=weight, exists=1.0, since_us=time_us, place=track.place, velocity=track.velocity)
             )
 
     def _move(self, dt_s: float, places: Mapping[int, Place]) -> None:
@@ -274,9 +274,7 @@ class Designation:
         p = self.parameters
         for number in sorted(places.keys() - self._living.keys()):
             place = places[number]
-            beside = {
-                k for k, track in self._living.items() if math.dist(track.place, place) <= p.beside_m
-            }
+            beside = {k for k, track in self._living.items() if math.dist(track.place, place) <= p.beside_m}
             new = _Living(weight=0.0, place=place, beside=beside)
             if not beside:
                 densities = [lost.exists * self._density(lost, time_us, place) for lost in self._lost]

@@ -52,6 +52,7 @@ from estimators.tracking.recursive_ransac import RecursiveRansac
 from estimators.vehicle_time import UNIX_TIME_US
 
 _AGAIN: Final = 0.5  # probability that the nearest track is of a target that was lost
+_LOST_S: Final = 5.0  # after which the nearest track is taken
 _PATH_S: Final = 5.0
 _PENDING_US: Final = 2_000_000
 _RECEIVED: Final = (
@@ -300,7 +301,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         if taken is None:
             return Outcome.WAITING
         designation.update(taken_us, tracks.places)
-        if designation.number is None:  # by its place
+        if not designation.count or designation.lost_s > _LOST_S:  # by its place
             level = tracks.level(taken)
             expected = self._place.level(time_us)
             if level and expected is not None:

@@ -124,6 +124,7 @@ class RelativePoseBelief(ABC):
         self.known = False
         self.resets = 0
         self._nis = 1.0
+        self._since_heading_s = 0.0
         self._modes: tuple[PoseMode, ...] | None = None
 
     def reset(self) -> None:
@@ -142,6 +143,7 @@ class RelativePoseBelief(ABC):
         """
         if self.known and dt_s > 0.0:
             self._modes = None
+            self._since_heading_s += dt_s
             self._move(dt_s, own, other)
 
     def update(self, measured: PoseMeasurement) -> None:
@@ -153,6 +155,8 @@ class RelativePoseBelief(ABC):
                 self.known, self._nis = True, 1.0
             return
         nis = self._fuse(measured)
+        if math.isfinite(measured.heading_rad):
+            self._since_heading_s = 0.0
         if math.isfinite(nis):
             p = self.parameters
             # one outlier must not reset: a single value counts with at most ten times the limit
@@ -160,6 +164,23 @@ class RelativePoseBelief(ABC):
             if self._nis > p.reset_nis:
                 self.resets += 1
                 self.reset()
+
+    @property
+    def _first_heading_sigma_rad(self) -> float:
+        """Standard deviation of a single relative heading."""
+        p = self.parameters
+        return math.hypot(p.heading_sigma_rad, p.heading_bias_rad)
+
+    @property
+    def _heading_sigma_rad(self) -> float:
+        """Standard deviation with which the next relative heading is fused.
+
+        Slow errors are nearly the same in headings that follow one another, so each counts only as far as its
+        error is a new one: white noise of the same density, 2 T sigma^2, has the variance 2 T / dt sigma^2.
+        """
+        p = self.parameters
+        repeated = max(1.0, 2.0 * p.heading_bias_s / max(self._since_heading_s, 1e-3))
+        return math.hypot(p.heading_sigma_rad, p.heading_bias_rad * math.sqrt(repeated))
 
     @property
     def consistency(self) -> float:

@@ -71,13 +71,14 @@ class GaussianBank(RelativePoseBelief):
         self.covariances[:, 1, 1] = along * s * s + across * c * c
         self.covariances[:, 0, 1] = self.covariances[:, 1, 0] = (along - across) * c * s
         self.covariances[:, 2, 2] = self._variances[1]
-        self.covariances[:, 3, 3] = self._variances[2]
+        self.covariances[:, 3, 3] = self._first_heading_sigma_rad**2
 
     def _move(self, dt_s: float, own: LevelMotion, other: LevelMotion) -> None:
         _move(self.means, self.covariances, motion_array(own), motion_array(other), dt_s, self._walks)
 
     def _fuse(self, measured: PoseMeasurement) -> float:
         self._measured[:] = measured.range_m, measured.down_m, measured.heading_rad
+        self._variances[2] = self._heading_sigma_rad**2
         nis = _fuse(self.weights, self.means, self.covariances, self._measured, self._variances)
         kept = _merge(self.weights, self.means, self.covariances)
         self.weights = self.weights[:kept] / self.weights[:kept].sum()

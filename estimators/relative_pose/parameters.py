@@ -22,6 +22,14 @@ class RelativePoseParameters(Options):
     heading_sigma_rad: float = option(
         0.0141, above=0.0, help="Standard deviation of the difference of both magnetic headings."
     )
+    heading_bias_rad: float = option(
+        0.0,
+        least=0.0,
+        help="Standard deviation of slow errors of the relative heading: hard iron, mounting, clocks.",
+    )
+    heading_bias_s: float = option(
+        15.0, above=0.0, help="Correlation time of slow errors of the relative heading."
+    )
     walk_m_sqrt_s: float = option(
         0.5,
         above=0.0,

@@ -68,7 +68,7 @@ class ParticlePose(RelativePoseBelief):
         down = measured.down_m + self._sigmas[1] * noise[1]
         slant = measured.range_m + self._sigmas[0] * noise[0]
         rho = np.sqrt(np.maximum(0.0, slant * slant - down * down))
-        heading = measured.heading_rad + self._sigmas[2] * noise[2]
+        heading = measured.heading_rad + self._first_heading_sigma_rad * noise[2]
         self.poses[kernels.FORWARD], self.poses[kernels.RIGHT] = rho * np.cos(bearing), rho * np.sin(bearing)
         self.poses[kernels.DOWN] = down
         self.poses[kernels.COS], self.poses[kernels.SIN] = np.cos(heading), np.sin(heading)
@@ -86,6 +86,7 @@ class ParticlePose(RelativePoseBelief):
 
     def _fuse(self, measured: PoseMeasurement) -> float:
         self._measured[:] = measured.range_m, measured.down_m, measured.heading_rad
+        self._sigmas[2] = self._heading_sigma_rad
         nis = kernels.weigh(self.poses, self.weights, self._measured, self._sigmas, self._fits)
         p, count = self.parameters, self.weights.size
         if effective_count(self.weights) < p.resample_below * count:

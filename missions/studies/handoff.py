@@ -4,22 +4,24 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from missions.studies.calibration import calibration_of, rounded, verdicts_of
 from missions.studies.design import listed
 from missions.studies.handoff_paired import PairedTrial
 from missions.studies.handoff_surface import draw_surface
 from missions.studies.handoff_trial import Cell, Comparison, Handoff, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting
-from missions.studies.options import Comparisons, HandoffStudyOptions, Points
+from missions.studies.handoff_worlds import HANDOFF_WORLDS
+from missions.studies.options import Comparisons, HandoffStudyOptions, Operator, Points
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, rate_of
 from missions.studies.study import Study
+from missions.studies.worlds import chosen_worlds, described
 
 __all__ = ["study"]
 
@@ -39,7 +41,7 @@ RESIDUALS_M: Final[Mapping[Comparison, tuple[float, ...]]] = {
 }
 """Windows and thresholds of the trade-off (figure 9)."""
 
-_BINS: Final = (-1.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.995, 0.999, 1.0)
+_BINS: Final = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.995, 0.999, 1.0)
 _COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
 
 
@@ -54,7 +56,17 @@ def study(options: HandoffStudyOptions | None = None) -> Study[Cell, Handoff]:
     rate_hz = o.rate_hz or (PIXELS_HZ if pixels else HandoffSetting().rate_hz)
     kinds = tuple(Comparison) if o.comparison is Comparisons.ALL else (Comparison(o.comparison.value),)
     cells = [
-        Cell(comparison=kind.value, window=samples, residual_m=residual_m, belief=o.belief.value)
+        Cell(
+            operator=operator.value,
+            world=world,
+            comparison=kind.value,
+            window=samples,
+            residual_m=residual_m,
+            belief=o.belief.value,
+        )
+        for operator in Operator
+        if operator in o.operator
+        for world in chosen_worlds(o.world, HANDOFF_WORLDS)
         for kind in kinds
         for samples in (WINDOWS if o.trade_off else (o.window,))
         for residual_m in (RESIDUALS_M[kind] if o.trade_off else (_residual_m(kind),))
@@ -73,7 +85,12 @@ def study(options: HandoffStudyOptions | None = None) -> Study[Cell, Handoff]:
         runs=500,
         success="correct",
         metrics=("time_s", "converged_s", "track_error_m"),
-        options={**asdict(o), "rate_hz": rate_hz},
+        options={
+            **asdict(o),
+            "rate_hz": rate_hz,
+            "operator": ",".join(o.operator),
+            "world": ",".join(o.world),
+        },
         summarise=summarise,
         report=lines_of,
         draw=partial(draw_trade_off, timeout_s=o.timeout_s) if o.trade_off else draw,
@@ -86,10 +103,65 @@ def _residual_m(kind: Comparison) -> float:
 
 
 def summarise(results: Results) -> Mapping[str, Any]:
-    """Entries of `summary.json`: those of the first cell, of all cells, and the paper's."""
+    """Entries of `summary.json`: those of the first cell, of all cells, by operator and by world, and the
+    paper's.
+    """
     cells = [_cell(results, number) for number in range(len(results.cells))]
     first = {key: value for key, value in cells[0].items() if key not in results.cells[0]}
-    return {**first, "cells_of_handoff": cells, "paper": dict(PAPER)}
+    return {
+        **first,
+        "operators": {
+            name: _operator(results, numbers) for name, numbers in _by(results, "operator").items()
+        },
+        "worlds": {name: _world(results, name, numbers) for name, numbers in _by(results, "world").items()},
+        "cells_of_handoff": cells,
+        "paper": dict(PAPER),
+    }
+
+
+def _by(results: Results, name: str) -> dict[str, list[int]]:
+    """Cells by a parameter."""
+    found: dict[str, list[int]] = {}
+    for number, cell in enumerate(results.cells):
+        found.setdefault(str(cell[name]), []).append(number)
+    return found
+
+
+def _operator(results: Results, numbers: Sequence[int]) -> dict[str, Any]:
+    """Figures of an operator, of its first world and comparison."""
+    number = numbers[0]
+    times = figures_of(results.values("time_s")[number])
+    requests = results.values("requests")[number]
+    return {
+        "world": results.cells[number]["world"],
+        **_verdicts(results, numbers[:1]),
+        "mean_time_s": rounded(times.mean),
+        "longest_time_s": rounded(times.n and float(np.nanmax(results.values("time_s")[number]))),
+        "mean_requests": rounded(figures_of(requests).mean),
+    }
+
+
+def _world(results: Results, name: str, numbers: Sequence[int]) -> dict[str, Any]:
+    """Figures of a world, of its first operator and comparison, and the right, wrong and undecided of all."""
+    first = numbers[0]
+    nees = results.values("pose_nees")[first]
+    return {
+        **described(HANDOFF_WORLDS[name]),
+        "operator": results.cells[first]["operator"],
+        **_verdicts(results, numbers[:1]),
+        "mean_time_s": rounded(figures_of(results.values("time_s")[first]).mean),
+        "pose_nees_per_state": rounded(figures_of(nees).mean / 2.0),
+    }
+
+
+def _verdicts(results: Results, numbers: Sequence[int]) -> dict[str, Any]:
+    """Right, wrong and undecided trials of cells."""
+    correct, wrong, stated = (
+        np.concatenate([results.values(name)[number] for number in numbers])
+        for name in ("correct", "wrong", "score")
+    )
+    known = np.isfinite(correct)
+    return verdicts_of(correct[known] > 0.0, wrong[known] > 0.0, stated[known], edges=_BINS)
 
 
 def _cell(results: Results, number: int) -> dict[str, Any]:
@@ -103,14 +175,14 @@ def _cell(results: Results, number: int) -> dict[str, Any]:
         **results.cells[number],
         "runs": rate.n,
         "correct": counts["correct"],
-        "correct_ci95": [_rounded(value) for value in rate.ci95],
-        "mean_time_s": _rounded(times.mean),
-        "mean_time_s_ci95": [_rounded(value) for value in times.mean_ci95],
-        "median_time_s": _rounded(times.median),
+        "correct_ci95": [rounded(value) for value in rate.ci95],
+        "mean_time_s": rounded(times.mean),
+        "mean_time_s_ci95": [rounded(value) for value in times.mean_ci95],
+        "median_time_s": rounded(times.median),
         "wrong": counts["wrong"],
         "timeouts": counts["timeout"],
         "converged_in_30_s": int(np.sum(converged <= 30.0)),
-        "mean_stated": _rounded(np.nanmean(results.values("score")[number]) if counts["correct"] else np.nan),
+        "mean_stated": rounded(np.nanmean(results.values("score")[number]) if counts["correct"] else np.nan),
         "causes": _causes(results, number),
         "calibration": _calibration(results, number, "score", "correct"),
         "calibration_early": _calibration(results, number, "early_score", "early_correct"),
@@ -133,31 +205,14 @@ def _calibration(results: Results, number: int, score: str, right: str) -> list[
     Args:
         score, right: fields of the rows: those of the decision, or those of the first comparison.
     """
-    scores, correct = results.values(score)[number], results.values(right)[number]
-    found = []
-    for low, high in pairwise(_BINS):
-        inside = (scores > low) & (scores <= high)
-        if inside.any():
-            rate = rate_of(int(correct[inside].sum()), int(inside.sum()))
-            found.append(
-                {
-                    "above": max(0.0, low),
-                    "decisions": rate.n,
-                    "stated": _rounded(float(scores[inside].mean())),
-                    "right": _rounded(rate.rate),
-                    "right_ci95": [_rounded(value) for value in rate.ci95],
-                }
-            )
-    return found
-
-
-def _rounded(value: float) -> float | None:
-    return round(float(value), 4) if np.isfinite(value) else None
+    stated = results.values(score)[number]
+    return calibration_of(stated, results.values(right)[number] > 0.0, _BINS)
 
 
 def lines_of(results: Results) -> Sequence[str]:
     """The table of the study."""
     lines = [
+        f"{'operator':<9} {'world':<8} "
         f"{'comparison':<10} {'window':>6} {'T_r m':>6} {'runs':>5} {'correct':>8} {'95 %':>14} {'wrong':>6} "
         f"{'timeouts':>8} {'mean s':>7} {'median':>7}"
     ]
@@ -170,11 +225,14 @@ def lines_of(results: Results) -> Sequence[str]:
             for name in ("mean_time_s", "median_time_s")
         )
         lines.append(
+            f"{cell['operator']:<9} {cell['world']:<8} "
             f"{cell['comparison']:<10} {cell['window']:>6} {cell['residual_m']:>6g} {cell['runs']:>5} "
             f"{share:>8} {100 * low:>6.1f} to {100 * high:<5.1f} {cell['wrong']:>5} {cell['timeouts']:>8} "
             f"{times}"
         )
         lines += [f"    {count} x {cause}" for cause, count in cell["causes"].items()]
+    if any(cell["operator"] == Operator.WATCHES for cell in results.cells):
+        lines.append("watches reads the true targets and designates anew without limit: an upper bound")
     lines.append("paper      window 100, T_r 15 m: 500 runs, 97.2 % correct, mean 314 s")
     return lines
 

@@ -8,7 +8,6 @@ tracker knows how often that happens (`slip`) and counts every request.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -16,20 +15,9 @@ from flightsim.foundation.checks import Count, NotNegative, Positive, Share
 from flightsim.foundation.options import Options
 from missions.studies.handoff_world import SeenTarget
 
-__all__ = ["Answer", "Operator", "Person", "PersonParameters", "slip"]
+__all__ = ["Answer", "Person", "PersonParameters", "slip"]
 
 Pixel = tuple[float, float]
-
-
-class Operator(StrEnum):
-    """What the tracker's operator does."""
-
-    ONCE = "once"
-    """Points at the target at the start, and never again."""
-    CONFIRMS = "confirms"
-    """Is asked again when the identity is doubtful: says yes, or points anew."""
-    WATCHES = "watches"
-    """Reads the true targets, and designates anew without limit: an upper bound, and no model of a person."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -66,18 +66,20 @@ class _Observers(TrackComparison):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTrial:
-    """The trial of a cell, which is computed together with those of all other cells of its run.
+    """The trial of a cell, which is computed together with those of the other cells of its run.
 
     Args:
         trial: setting and timeout.
-        cells: all cells; they have one belief.
+        cells: all cells; they have one belief. Those of one operator and one world share a flight.
     """
 
     trial: HandoffTrial
     cells: tuple[Cell, ...]
 
     def __call__(self, cell: Cell, seed: int) -> Handoff:
-        return _flown(self.trial, self.cells, seed)[cell]
+        shared = (cell.operator, cell.world)
+        cells = tuple(other for other in self.cells if (other.operator, other.world) == shared)
+        return _flown(self.trial, cells, seed)[cell]
 
 
 @lru_cache(maxsize=1)  # the trials of a run follow one another

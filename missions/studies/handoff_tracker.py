@@ -17,8 +17,9 @@ from estimators.orbit_target.relative_target import RelativeState
 from estimators.relative_pose import LevelMotion
 from estimators.vision.ground_points import CameraAxes, on_ground
 from missions.planning.orbit_guidance import OrbitGuidance
-from missions.studies.handoff_operator import Operator, Person, PersonParameters, slip
+from missions.studies.handoff_operator import Person, PersonParameters, slip
 from missions.studies.handoff_world import FOCAL_PX, PERSON_M, HandoffWorld, targets_of
+from missions.studies.options import Operator
 
 __all__ = ["SEARCH_ROLL_RAD", "Tracker", "orbit_roll"]
 
@@ -218,9 +219,6 @@ def orbit_roll(
 ) -> float:
     """Roll of the orbit guidance; everything in the level frame, in which the heading is 0."""
     state = RelativeState(
-        time_us=time_us,
-        offset_ne_m=target,
-        offset_rate_ne_m_s=(-velocity[0], -velocity[1]),
-        offset_std_m=0.0,
+        time_us=time_us, offset_ne_m=target, offset_rate_ne_m_s=(-velocity[0], -velocity[1]), offset_std_m=0.0
     )
     return pilot.command(state, 0.0, roll_rad).roll_rad

@@ -21,14 +21,14 @@ from estimators.relative_pose import (
     RelativePoseBelief,
     RelativePoseParameters,
 )
+from estimators.tracking.metrics import nees
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
 from flightsim.foundation.random_streams import RandomStreams
 from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
-from missions.studies.handoff_operator import Operator
 from missions.studies.handoff_tracker import SEARCH_ROLL_RAD, Tracker, orbit_roll
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
 from missions.studies.handoff_worlds import HANDOFF_WORLDS
-from missions.studies.options import TIMEOUT_S, PoseBelief
+from missions.studies.options import TIMEOUT_S, Operator, PoseBelief
 from missions.studies.worlds import NOMINAL
 
 Array = NDArray[np.float64]
@@ -36,6 +36,8 @@ Early = tuple[float, bool]
 """Score of a track, and whether it is of the tracked target."""
 
 _EVERY_S: Final = 0.1  # between two samples of a window
+_HEADING_BIAS_RAD: Final = 0.06  # calibrated magnetometers keep a few degrees of hard iron and misalignment
+_JUDGED_US: Final = 1_000_000
 _DETECTED: Final = 0.8  # what the trackers expect, whatever the distance
 
 
@@ -86,6 +88,8 @@ class Handoff:
         resets: times that the belief about the pose started anew.
         designations: times that the tracker's operator designated the target.
         requests: times that the operator was asked; 0 of the one who watches.
+        pose_nees: mean of the normalized squared error of the tracker's place by the converged pose, once a
+            second; consistent at 2. None: it never converged.
         cause: of a failure.
     """
 
@@ -103,6 +107,7 @@ class Handoff:
     resets: int
     designations: int
     requests: int
+    pose_nees: float | None
     cause: str
 
 
@@ -120,6 +125,7 @@ class TrialFlight:
         world, process: as given.
         tracker: the tracking aircraft.
         report: its newest report.
+        pose_nees: normalized squared errors of the place of the converged pose, once a second.
     """
 
     def __init__(
@@ -137,6 +143,7 @@ class TrialFlight:
         person = RandomStreams(seed).generator("handoff", "operator")
         self.tracker = Tracker(world, tracks, operator, pilots[0], person)
         self.report = TrackerReport()
+        self.pose_nees: list[float] = []
         self._pilot = pilots[1]
         self._rolls = (0.0, 0.0)
         # what the tracker has sent, as old as its clock makes it; the newest last
@@ -161,6 +168,8 @@ class TrialFlight:
             None if frame is None else (frame.places, frame.covariances),
             world.setting.heights_m[HandoffWorld.HANDOFF],
         )
+        if world.time_us % _JUDGED_US == 0:
+            self._judge_pose()
         target = process.target()
         self._rolls = (
             self.tracker.roll_rad,
@@ -174,6 +183,12 @@ class TrialFlight:
                 world.roll_rad(HandoffWorld.HANDOFF),
             ),
         )
+
+    def _judge_pose(self) -> None:
+        best = self.process.pose.best if self.process.pose.converged else None
+        if best is not None:
+            off = (best.forward_m, best.right_m) - self.world.tracker_from_handoff()
+            self.pose_nees.append(float(nees(off, best.covariance[:2, :2])))
 
     def best(self, comparison: TrackComparison) -> Early | None:
         """Score of the best track, and whether it is of the tracked target; None: no track has one."""
@@ -254,6 +269,7 @@ class HandoffTrial:
             range_sigma_m=s.range_sigma_m,
             height_sigma_m=math.sqrt(2.0) * s.height_sigma_m,
             heading_sigma_rad=math.sqrt(2.0) * s.heading_sigma_rad,
+            heading_bias_rad=_HEADING_BIAS_RAD,
             seed=seed,
         )
         return (
@@ -318,5 +334,6 @@ def outcome_of(flight: TrialFlight, comparison: TrackComparison, early: Early | 
         resets=process.pose.resets,
         designations=flight.tracker.designation.count,
         requests=flight.tracker.person.asked,
+        pose_nees=float(np.mean(flight.pose_nees)) if flight.pose_nees else None,
         cause=cause,
     )

@@ -151,6 +151,7 @@ class SeenTarget:
 PERSON_M: Final = 1.75
 FOCAL_PX: Final = 554.0  # 640 pixels over 60 degrees
 
+
 @dataclass
 class _Aircraft:
     """One aircraft that turns by its bank, without sideslip; north, east, and its errors."""
@@ -199,7 +200,9 @@ class HandoffWorld:
         start = streams.generator("handoff", "start")
         deviation = streams.generator("handoff", "deviations")
         n = s.targets
-        self._clothes = streams.generator("handoff", "clothes").normal(s.clothes_mean, s.clothes_sigma, (n, 3))
+        self._clothes = streams.generator("handoff", "clothes").normal(
+            s.clothes_mean, s.clothes_sigma, (n, 3)
+        )
         self._look_noise = [streams.generator("handoff", "looks", k) for k in range(2)]
         self._gps = streams.generator("handoff", "gps")
         self._heading_bias_rad = s.heading_bias_rad * deviation.choice((-1.0, 1.0))
@@ -386,6 +389,10 @@ class HandoffWorld:
         c, s = math.cos(a.heading_rad), math.sin(a.heading_rad)
         found: Array = (places - a.place) @ np.array([[c, -s], [s, c]])
         return found
+
+    def tracker_from_handoff(self) -> Array:
+        """(2,) true place of the tracker in the level frame of the handoff aircraft."""
+        return self.seen_from(self.HANDOFF, self._aircraft[self.TRACKER].place)
 
     def ground_velocity(self, which: int) -> tuple[float, float]:
         """Velocity over ground in the level frame, by GPS."""

@@ -67,9 +67,7 @@ HANDOFF_WORLDS: Final[Mapping[str, World[Deviation]]] = MappingProxyType(
             tilt_sigma_rad=0.018,
             targets=8,
         ),
-        "alike": _world(
-            "all targets look the same", "uniforms", clothes_sigma=(0.0, 0.0, 0.0)
-        ),
+        "alike": _world("all targets look the same", "uniforms", clothes_sigma=(0.0, 0.0, 0.0)),
     }
 )
 """The nominal world, and those that differ from what the estimators assume."""

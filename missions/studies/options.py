@@ -39,6 +39,32 @@ class PoseBelief(StrEnum):
     GAUSSIANS = "gaussians"
 
 
+class Operator(StrEnum):
+    """What the operator of the tracking aircraft does."""
+
+    ONCE = "once"
+    """Points at the target at the start, and never again."""
+    CONFIRMS = "confirms"
+    """Is asked again when the identity is doubtful: says yes, or points anew."""
+    WATCHES = "watches"
+    """Reads the true targets, and designates anew without limit: an upper bound, and no model of a person."""
+
+
+class HandoffWorlds(StrEnum):
+    """Worlds of the study of the handoff (`missions.studies.handoff_worlds`)."""
+
+    NOMINAL = "nominal"
+    MISMATCHED = "mismatched"
+    """All that follow."""
+    CLOCK = "clock"
+    HEADING = "heading"
+    IRON = "iron"
+    TILT = "tilt"
+    DENSE = "dense"
+    MIXED = "mixed"
+    ALIKE = "alike"
+
+
 class Points(StrEnum):
     """Where the moving points of a camera come from: a model, or rendered pictures."""
 
@@ -50,6 +76,14 @@ class Points(StrEnum):
 class HandoffStudyOptions(PlanOptions):
     """Options of the study `handoff`."""
 
+    operator: tuple[Operator, ...] = option(
+        tuple(Operator),
+        help="Operators of the tracker: once, confirms, or watches, which is an upper bound; repeat.",
+    )
+    world: tuple[HandoffWorlds, ...] = option(
+        (HandoffWorlds.NOMINAL,),
+        help="True worlds; mismatched: all that differ from what the estimators assume; repeat.",
+    )
     comparison: Comparisons = option(
         Comparisons.EVIDENCE, help="Comparison that decides: evidence, the paper's thresholds, rms, or all."
     )

@@ -176,9 +176,54 @@ def test_an_identity_becomes_doubtful_when_tracks_meet_and_is_restored_by_the_op
     designation.designate(400, 1, (0.0, 0.0))
     assert designation.probability == 1.0
     designation.update(500, {3: (2.0, 0.0)})  # lost, and a new track where it was
-    assert designation.number == 3 and designation.probability == pytest.approx(0.9)
+    assert designation.number == 3 and 0.99 < designation.probability < 1.0
     designation.update(6_000_000, {4: (90.0, 0.0)})
-    assert designation.number is None
+    assert designation.number is None and designation.expected == pytest.approx((2.0, 0.0), abs=1.0)
+
+
+def test_a_lost_target_is_found_again_by_its_place_the_less_surely_the_later():
+    found = []
+    for gap_s in (1, 5, 20):
+        designation = Designation()
+        designation.designate(0, 1, (0.0, 0.0))
+        for k in range(1, 31):  # it walks at 1 m/s
+            designation.update(100_000 * k, {1: (0.1 * k, 0.0), 2: (60.0, 0.0)})
+        designation.update(3_100_000, {2: (60.0, 0.0)})
+        assert designation.number is None
+        designation.update(3_000_000 + 1_000_000 * gap_s, {2: (60.0, 0.0), 3: (3.0 + gap_s, 0.0)})
+        found.append(designation.probability)
+        assert designation.number == 3
+    assert found == sorted(found, reverse=True) and found[0] > 0.99 and found[-1] < 0.98
+
+
+def test_looks_tell_which_of_two_tracks_that_met_is_the_target():
+    rng = np.random.default_rng(3)
+    red, grey = np.array([-40.0, 25.0, 36.0]), np.array([-45.0, 0.0, 32.0])
+
+    def met(exchanged):
+        designation = Designation()
+        designation.designate(0, 1, (0.0, 0.0))
+        for k in range(1, 800):
+            off_m = 30.0 if k < 300 or k > 320 else 0.5
+            looks = (grey, red) if exchanged and k > 320 else (red, grey)
+            noisy = {number: look + rng.normal(0.0, 4.0, 3) for number, look in enumerate(looks, start=1)}
+            designation.update(100_000 * k, {1: (0.0, 0.0), 2: (off_m, 0.0)}, noisy)
+        return designation.number, designation.probability
+
+    assert met(False)[0] == 1 and met(True)[0] == 2
+    assert min(met(False)[1], met(True)[1]) > 0.9
+
+
+def test_an_operator_who_sees_another_one_under_the_mark_refuses_it():
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0), 0.9)
+    designation.update(100_000, {1: (0.0, 0.0), 2: (30.0, 0.0)})
+    designation.refuse(1, 0.9)
+    before = designation.probability
+    assert designation.number is None or before < 0.6
+    designation.designate_place(200_000, (50.0, 0.0), 0.99)
+    designation.update(300_000, {1: (0.0, 0.0), 2: (30.0, 0.0), 3: (51.0, 0.0)})
+    assert designation.number == 3 and designation.probability > 0.95
 
 
 def test_a_second_track_of_the_same_target_leaves_no_doubt():

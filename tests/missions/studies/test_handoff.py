@@ -14,9 +14,9 @@ from missions.studies.handoff_pixels import PixelWorld
 from missions.studies.handoff_surface import draw_surface
 from missions.studies.handoff_trial import Cell, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld
-from missions.studies.options import Comparisons, HandoffStudyOptions, Points
+from missions.studies.options import Comparisons, HandoffStudyOptions, Operator, Points
 
-ALL = HandoffStudyOptions(comparison=Comparisons.ALL, trade_off=True)
+ALL = HandoffStudyOptions(comparison=Comparisons.ALL, trade_off=True, operator=(Operator.WATCHES,))
 
 
 def test_targets_stay_in_their_area_and_the_noise_is_the_papers():
@@ -50,7 +50,8 @@ def test_a_frame_shows_the_targets_where_they_are():
     for _ in range(40):
         world.advance((0.3, 0.0))
         (target,) = world.seen_from(0, world.targets[:1])
-        places, covariances = world.frame(0, (target[0], target[1]))
+        frame = world.frame(0, (target[0], target[1]))
+        places, covariances = frame.places, frame.covariances
         true = world.seen_from(0, world.targets)
         assert len(places) == len(covariances) <= 5
         for place in places:
@@ -75,7 +76,7 @@ def test_a_trial_that_is_too_short_is_a_timeout():
 
 
 def test_the_summary_has_the_papers_figures(tmp_path):
-    made = study()
+    made = study(HandoffStudyOptions(operator=(Operator.ONCE,)))
     result = run_study(made, runs=2, engine=Inline(), out=tmp_path / "handoff")
     folder = Path(result.folder)
     summary = json.loads((folder / "summary.json").read_text())
@@ -86,6 +87,9 @@ def test_the_summary_has_the_papers_figures(tmp_path):
     assert low <= summary["correct"] / 2 <= high
     assert 10.0 < summary["mean_time_s"] < 900.0
     assert summary["paper"]["correct"] == 486
+    once, nominal = summary["operators"]["once"], summary["worlds"]["nominal"]
+    assert once["n"] == once["right"] + once["wrong"] + once["undecided"] == 2
+    assert once["mean_requests"] == 1.0 and nominal["interval"] == once["interval"]
     assert (folder / "handoff.png").stat().st_size > 10_000
     assert "evidence" in (folder / "table.txt").read_text()
 
@@ -150,7 +154,7 @@ def test_the_front_end_finds_the_walkers_in_the_pictures_of_the_study():
         if frame is None:
             continue
         searched += 1
-        off = np.hypot(*(frame[0][:, None] - targets).transpose(2, 0, 1)).min(axis=1, initial=np.inf)
+        off = np.hypot(*(frame.places[:, None] - targets).transpose(2, 0, 1)).min(axis=1, initial=np.inf)
         found, true = found + len(off), true + int((off < 15.0).sum())
     assert searched == 60 - 16 and found > searched
     assert true / found > 0.9
