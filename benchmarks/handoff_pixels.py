@@ -73,7 +73,7 @@ def frames_of_the_tracker(frames: int, seed: int) -> None:
         frame = world.frame(which, (float(targets[0, 0]), float(targets[0, 1])))
         if frame is not None:
             searched += 1
-            off_m += np.hypot(*(frame[0][:, None] - targets).transpose(2, 0, 1)).min(axis=1).tolist()
+            off_m += np.hypot(*(frame.places[:, None] - targets).transpose(2, 0, 1)).min(axis=1).tolist()
     for name, spent_ms in (("rendered", rendering), ("searched", searching)):
         median, most = np.median(spent_ms), np.quantile(spent_ms, 0.99)
         sys.stdout.write(f"{name}: {median:.1f} ms a frame (99 %: {most:.1f} ms)\n")
@@ -127,16 +127,19 @@ def approach(seed: int) -> Iterator[tuple[list[Seen], int]]:
         inside = np.all(
             np.abs(points_of(camera, seen, height_m)) < EDGE * np.array(setting.half_view), axis=1
         )
-        off_m = np.hypot(*(seen[:, None] - found[0]).transpose(2, 0, 1))
+        places = found.places
+        off_m = np.hypot(*(seen[:, None] - places).transpose(2, 0, 1))
         rows = []
         for k in np.flatnonzero(inside):
             nearest = int(off_m[k].argmin()) if off_m.shape[1] else 0
             near = bool(off_m.shape[1]) and bool(off_m[k, nearest] < max(6.0, 0.03 * slant_m[k]))
-            pair = np.vstack((seen[k], found[0][nearest])) if near else np.full((2, 2), np.nan)
+            pair = np.vstack((seen[k], places[nearest])) if near else np.full((2, 2), np.nan)
             lateral = float(np.diff(points_of(camera, pair, height_m)[:, 0])[0])
             rows.append(Seen((seed, int(k)), number, float(slant_m[k]), near, lateral))
         false = (
-            off_m.min(axis=0) > np.maximum(8.0, 0.04 * np.hypot(*found[0].T)) if off_m.size else np.zeros(0)
+            off_m.min(axis=0) > np.maximum(8.0, 0.04 * np.hypot(*found.places.T))
+            if off_m.size
+            else np.zeros(0)
         )
         yield rows, int(false.sum())
 

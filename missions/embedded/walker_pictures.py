@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from estimators.vision import CameraPose, FrameDifferenceDetector, VideoFrame
 from estimators.vision.ground_points import CameraAxes
+from estimators.vision.patch_looks import patch_looks
 from flightsim.foundation.vectors import from_euler, product
 from flightsim.payload import NO_TAG, CameraView, TargetShape, TargetView
 from flightsim.picture import Renderer
@@ -47,9 +48,9 @@ class WalkerPictures:
         *,
         tilt_rad: tuple[float, float],
         height_m: float,
-    ) -> Array | None:
-        """Directions (n, 3) of what moves in a picture, in the level frame as the aircraft knows it; None:
-        the picture says nothing about it.
+    ) -> tuple[Array, Array] | None:
+        """Directions (n, 3) of what moves in a picture, in the level frame as the aircraft knows it, and what
+        it looks like (n, 3); None: the picture says nothing about it.
 
         Args:
             time_us: of the picture.
@@ -82,11 +83,8 @@ class WalkerPictures:
         )
         known = rotation_of(product(from_euler(*tilt_rad, 0.0), from_euler(0.0, -depression, azimuth)))
         axes = CameraAxes(axes=known[:, [1, 2, 0]].T)
+        picture = self._renderer.render(view)
         found = self._detector.detect(
-            VideoFrame(
-                time_us=time_us,
-                pixels=self._renderer.render(view),
-                pose=CameraPose(axes=axes, height_m=height_m),
-            )
+            VideoFrame(time_us=time_us, pixels=picture, pose=CameraPose(axes=axes, height_m=height_m))
         )
-        return None if found is None else axes.directions(found.rays)
+        return None if found is None else (axes.directions(found.rays), patch_looks(picture, found.pixels))
