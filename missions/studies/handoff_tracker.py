@@ -36,7 +36,7 @@ _ASK_AGAIN_S: Final = 15.0
 _CLICKED_M: Final = 12.0  # a track that is this close to the clicked place is meant
 _NOT_SEEN: Final = 0.9  # probability that a marked track is another target, when the person sees none
 _WATCHES_S: Final = 5.0  # time that the operator who watches takes
-_APART_M: Final = 10.0  # targets that are farther from each other are told apart by the one who watches
+_APART_M: Final = 10.0  # the one who watches distinguishes targets that are farther from each other
 
 
 class Tracker:

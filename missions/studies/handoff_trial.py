@@ -228,13 +228,17 @@ class HandoffTrial:
             early = early or flight.best(comparison)
         return outcome_of(flight, comparison, early)
 
-    def flight(self, cell: Cell, seed: int, comparison: TrackComparison) -> TrialFlight:
-        """The flight at its start, with the windows of a cell."""
+    def flight(
+        self, cell: Cell, seed: int, comparison: TrackComparison, world: HandoffWorld | None = None
+    ) -> TrialFlight:
+        """The flight at its start, with the windows of a cell; `world` None: that of the cell."""
         windows = WindowParameters(samples=cell.window, every_s=max(_EVERY_S, 1.0 / self.setting.rate_hz))
         keep_s = 1.5 * windows.span_s + 1.0
         tracks = [AircraftTracks(self._ransac(seed, which), keep_s) for which in range(2)]
         process = HandoffProcess(self._belief(cell, seed), tracks[1], comparison, windows)
-        return TrialFlight(self._world(cell, seed), tracks[0], process, Operator(cell.operator), seed)
+        return TrialFlight(
+            world or self._world(cell, seed), tracks[0], process, Operator(cell.operator), seed
+        )
 
     def _world(self, cell: Cell, seed: int) -> HandoffWorld:
         true = HANDOFF_WORLDS[cell.world].setting.over(self.setting)
