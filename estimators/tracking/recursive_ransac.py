@@ -138,10 +138,8 @@ class RecursiveRansac:
     def __init__(self, parameters: RansacParameters | None = None) -> None:
         p = self.parameters = parameters or RansacParameters()
         self._random = RandomStreams(p.seed).generator("recursive_ransac")
-        room, size = (
-            p.hypotheses + 1,
-            2 * (p.order + 1),
-        )  # one more, for the newest before the worst is dropped
+        # one more, for the newest before the worst is dropped
+        room, size = p.hypotheses + 1, 2 * (p.order + 1)
         self._count = 0
         self._means = np.zeros((room, size))
         self._covariances = np.zeros((room, size, size))
@@ -265,16 +263,22 @@ class RecursiveRansac:
             explained |= (off * off).sum(axis=1) <= p.inlier_m**2
 
     def _room(self) -> int:
-        """Index of a free row; the worst hypothesis makes room for it."""
+        """Index of a free row; in a full bank the worst hypothesis makes room for it."""
+        self._drop_worst()
+        return self._count
+
+    def _drop_worst(self) -> None:
+        """Limit the bank to its size: of the M hypotheses and the newest one the worst is dropped, and a track
+        last.
+        """
         if self._count > self.parameters.hypotheses:
             ratios = self._hits[: self._count].mean(axis=1) + (self._numbers[: self._count] > 0)
             keep = np.ones(self._count, dtype=np.bool_)
             keep[int(np.argmin(ratios))] = False
             self._keep(keep)
-        return self._count
 
     def _tidy(self) -> None:
-        """Merge, prune, and number the tracks."""
+        """Merge, prune, limit the bank, and number the tracks."""
         p, count = self.parameters, self._count
         if not count:
             return
@@ -290,6 +294,7 @@ class RecursiveRansac:
         )
         lost = (ratios < p.prune_ratio) | (self._missed[:count] >= p.lost_after)
         self._keep(~(self._drop[:count] | lost))
+        self._drop_worst()
         count = self._count
         ratios = self._hits[:count].mean(axis=1)
         for k in np.flatnonzero((self._numbers[:count] == 0) & (ratios >= p.good_ratio)):

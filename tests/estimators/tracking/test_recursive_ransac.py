@@ -147,15 +147,30 @@ def test_a_target_that_leaves_is_dropped_and_its_number_is_not_used_again():
     assert [track.number for track in tracker.tracks] == [2]
 
 
-def test_clutter_alone_makes_no_tracks_and_the_bank_stays_bounded():
+def test_clutter_alone_makes_no_tracks_and_fills_the_bank_to_its_size():
     rng = np.random.default_rng(9)
-    tracker = RecursiveRansac(RansacParameters(clutter_per_m2=20.0 / 200.0**2, hypotheses=10))
-    shown = 0
+    tracker = RecursiveRansac(RansacParameters(clutter_per_m2=20.0 / 200.0**2, hypotheses=2))
+    shown, sizes = 0, []
     for k in range(200):
         tracker.scan(k * STEP_US, rng.uniform(-100.0, 100.0, (20, 2)))
-        assert tracker.hypotheses <= 10 + 1
+        sizes.append(tracker.hypotheses)
         shown += len(tracker.tracks)
+    assert max(sizes) == 2  # without the limit 3
     assert shown <= 4
+
+
+def test_a_full_bank_keeps_its_track():
+    rng = np.random.default_rng(3)
+    tracker = RecursiveRansac(RansacParameters(clutter_per_m2=20.0 / 200.0**2, hypotheses=2))
+    full = 0
+    for k in range(200):
+        # far from its path the target has a bank full of false hypotheses beside it
+        false = rng.uniform(-100.0, 100.0, (20 if k >= 30 else 0, 2))
+        tracker.scan(k * STEP_US, np.vstack(([[0.1 * k, 0.0]] + 0.2 * rng.standard_normal((1, 2)), false)))
+        full += tracker.hypotheses == 2
+        if k >= 30:
+            assert 1 in [track.number for track in tracker.tracks]
+    assert full >= 20
 
 
 def test_old_scans_are_ignored_and_the_seed_decides_all():
