@@ -65,6 +65,7 @@ def scene(number: int, kind: Belief, clutter: float, scans: int, *, find: bool) 
         east_m=HALF_M,
         reach_m=55.0,
         clutter_per_scan=clutter,
+        unknown_clutter_per_scan=0.0,
         belief=kind,
         expected_targets=MEAN_TARGETS,
         found_mass=0.9 if find else 1e9,
@@ -86,8 +87,7 @@ def scene(number: int, kind: Belief, clutter: float, scans: int, *, find: bool) 
             (sensor.reach_m * np.sqrt(rng.random(false)), rng.uniform(-math.pi, math.pi, false))
         )
         belief.observe(k * 1_000_000, np.vstack((scan, places)), viewpoint)
-        found = [(t.north_m, t.east_m) for t in belief.found]
-        reported = np.array([*found, *((c.north_m, c.east_m) for c in belief.candidates)])
+        reported = np.array([(target.north_m, target.east_m) for target in belief.targets])
         numbers[k] = belief.expected_targets, count
         distances[k] = (
             ospa(reported.reshape(-1, 2), targets, cutoff=CUTOFF_M),

@@ -13,7 +13,7 @@ class TargetRow:
 
     Attributes:
         north_m, east_m: place from the origin.
-        mass: expected number of targets at that place; 1 for a found target.
+        mass: expected number of targets at that place; for a found target at most 1, when it was found.
         width_m: standard deviation per axis.
         found: whether it counts as found.
     """

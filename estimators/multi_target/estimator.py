@@ -17,7 +17,7 @@ from autopilot_bridge.mavlink.wire_units import degrees, e7, heading_of, home_of
 from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message, on
-from estimators.multi_target.estimate import MultiTargetEstimate, SearchEstimate, TargetRow
+from estimators.multi_target.estimate import MultiTargetEstimate, SearchEstimate
 from estimators.multi_target.parameters import MultiTargetParameters
 from estimators.multi_target.scans import Scan, ScanAssembler
 from estimators.multi_target.search_belief import SearchBelief
@@ -128,7 +128,10 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         # the time in the message, and not when it was received, so that a scan has one time on every link
         time_us = scan.time_us + searcher.offset_us
         belief.observe(time_us, scan.detections, viewpoint)
-        self._estimates = (self._targets(time_us), self._search(time_us, message.src_system))
+        self._estimates = (
+            MultiTargetEstimate(time_us=time_us, targets=belief.targets),
+            self._search(time_us, message.src_system),
+        )
         return Outcome.UPDATED
 
     def _viewpoint(self, searcher: _Searcher, scan: Scan) -> Viewpoint | None:
@@ -165,18 +168,6 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
     def _in_the_air(self, searcher: _Searcher) -> bool:
         position = searcher.position
         return position is not None and metres(position.relative_alt) >= self.parameters.least_height_m
-
-    def _targets(self, time_us: int) -> MultiTargetEstimate:
-        belief = self.belief
-        found = [
-            TargetRow(north_m=t.north_m, east_m=t.east_m, mass=1.0, width_m=t.width_m, found=True)
-            for t in belief.found
-        ]
-        others = [
-            TargetRow(north_m=c.north_m, east_m=c.east_m, mass=c.mass, width_m=c.width_m, found=False)
-            for c in belief.candidates
-        ]
-        return MultiTargetEstimate(time_us=time_us, targets=(*found, *others))
 
     def _search(self, time_us: int, vehicle: int) -> SearchEstimate:
         belief = self.belief

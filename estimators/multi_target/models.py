@@ -31,7 +31,7 @@ def sensor_of(parameters: MultiTargetParameters) -> RangeBearingSensor:
         reach_m=parameters.range_m,
         range_sigma_m=math.hypot(parameters.range_sigma_m, parameters.place_sigma_m),
         bearing_sigma_rad=math.hypot(parameters.bearing_sigma_rad, parameters.heading_sigma_rad),
-        clutter_per_scan=parameters.clutter_per_scan,
+        clutter_per_scan=parameters.clutter_per_scan + parameters.unknown_clutter_per_scan,
     )
 
 

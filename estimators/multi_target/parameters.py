@@ -18,10 +18,14 @@ _LEAST_CELL_M: Final = 5.0
 
 
 class Belief(StrEnum):
-    """How the intensity of targets is represented."""
+    """The filter of the detected targets."""
 
     PARTICLES = "particles"
+    """PHD filter, its intensity as particles (the paper's)."""
     GAUSSIANS = "gaussians"
+    """PHD filter, its intensity as Gaussian components."""
+    BERNOULLIS = "bernoullis"
+    """Poisson multi-Bernoulli filter: each target has a probability to exist."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +60,14 @@ class MultiTargetParameters(Options):
         0.02, least=0.0, help="Standard deviation of the vehicle's own heading."
     )
     clutter_per_scan: float = option(0.0, least=0.0, help="Mean number of false detections in a scan.")
-    belief: Belief = option(Belief.PARTICLES, help="Representation of the intensity of targets.")
+    unknown_clutter_per_scan: float = option(
+        0.2,
+        least=0.0,
+        help="Mean number of false detections in a scan allowed for beyond `clutter_per_scan`.",
+    )
+    belief: Belief = option(
+        Belief.BERNOULLIS, help="Filter: PHD by particles (paper) or Gaussians, or Poisson multi-Bernoulli."
+    )
     expected_targets: float = option(
         18.0, above=0.0, help="Number of targets in the area that is expected before the search."
     )

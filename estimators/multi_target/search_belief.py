@@ -11,11 +11,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.models import layout_of, motion_of, particles_of, sensor_of
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
 from estimators.tracking.exploration import ExplorationMap
 from estimators.tracking.gaussian_phd import GaussianPhd
 from estimators.tracking.intensity import Cluster, TargetIntensity
+from estimators.tracking.multi_bernoulli import MultiBernoulli
 from estimators.tracking.range_bearing import Viewpoint
 from estimators.tracking.smc_phd import SmcPhd
 from flightsim.foundation.random_streams import RandomStreams
@@ -34,12 +36,14 @@ class FoundTarget:
     Attributes:
         time_us: vehicle time of the scan with which it was found.
         north_m, east_m: place.
+        mass: expected number of targets there, at most 1: the probability that there is one.
         width_m: standard deviation per axis.
     """
 
     time_us: int
     north_m: float
     east_m: float
+    mass: float
     width_m: float
 
 
@@ -65,8 +69,10 @@ class SearchBelief:
         if p.belief is Belief.PARTICLES:
             seed = RandomStreams(p.seed).child("multi_target")
             self.intensity = SmcPhd(self.sensor, motion, particles_of(p), seed=seed)
-        else:
+        elif p.belief is Belief.GAUSSIANS:
             self.intensity = GaussianPhd(self.sensor, motion)
+        else:
+            self.intensity = MultiBernoulli(self.sensor, motion)
         self._static = not motion.moves
         self.exploration = ExplorationMap(layout_of(p), self.sensor, math.inf if self._static else p.forget_s)
         self.found: list[FoundTarget] = []
@@ -129,7 +135,11 @@ class SearchBelief:
             self.intensity.remove(cluster)
             self.found.append(
                 FoundTarget(
-                    time_us=time_us, north_m=cluster.north_m, east_m=cluster.east_m, width_m=cluster.width_m
+                    time_us=time_us,
+                    north_m=cluster.north_m,
+                    east_m=cluster.east_m,
+                    mass=min(1.0, cluster.mass),
+                    width_m=cluster.width_m,
                 )
             )
         if new:
@@ -139,6 +149,19 @@ class SearchBelief:
     def candidates(self) -> list[Cluster]:
         """Clusters that are reported as targets and do not count as found."""
         return [cluster for cluster in self.clusters if cluster.mass >= self.parameters.reported_mass]
+
+    @property
+    def targets(self) -> tuple[TargetRow, ...]:
+        """The reported targets: the found ones in order, then the others."""
+        found = [
+            TargetRow(north_m=t.north_m, east_m=t.east_m, mass=t.mass, width_m=t.width_m, found=True)
+            for t in self.found
+        ]
+        others = [
+            TargetRow(north_m=c.north_m, east_m=c.east_m, mass=c.mass, width_m=c.width_m, found=False)
+            for c in self.candidates
+        ]
+        return (*found, *others)
 
     @property
     def expected_targets(self) -> float:

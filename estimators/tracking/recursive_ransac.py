@@ -268,9 +268,7 @@ class RecursiveRansac:
         return self._count
 
     def _drop_worst(self) -> None:
-        """Limit the bank to its size: of the M hypotheses and the newest one the worst is dropped, and a track
-        last.
-        """
+        """Limit the bank to its size: of one hypothesis too many the worst is dropped, a track last."""
         if self._count > self.parameters.hypotheses:
             ratios = self._hits[: self._count].mean(axis=1) + (self._numbers[: self._count] > 0)
             keep = np.ones(self._count, dtype=np.bool_)

@@ -59,6 +59,7 @@ class TargetSensorParameters(DeviceParameters):
         reach_m: radius of the field of view; there is no detection beyond it. The paper has no limit.
         range_sigma_m, bearing_sigma_rad: standard deviations of the noise. The paper has one value for both,
             in no unit, and does not state it.
+        range_bias_m, bearing_bias_rad: constant errors of every measurement, as of a scale or a mount.
         clutter_per_scan: mean number of false detections, Poisson, uniform over the field of view.
         disturbances: times in which the sensor is off or has more false detections.
     """
@@ -70,6 +71,8 @@ class TargetSensorParameters(DeviceParameters):
     reach_m: Positive = 100.0
     range_sigma_m: NotNegative = 0.5
     bearing_sigma_rad: NotNegative = 0.03
+    range_bias_m: float = 0.0
+    bearing_bias_rad: float = 0.0
     clutter_per_scan: NotNegative = 0.0
     disturbances: tuple[ScanDisturbance, ...] = ()
 
@@ -218,8 +221,9 @@ class TargetSensor(Device[TargetScan]):
                 continue
             if self._terrain is not None and self._terrain.hides(eye, north_m, east_m, size_m):
                 continue
-            range_m = abs(math.hypot(forward_m, right_m) + p.range_sigma_m * range_noise)
-            bearing_rad = math.atan2(right_m, forward_m) + p.bearing_sigma_rad * bearing_noise
+            range_m = abs(math.hypot(forward_m, right_m) + p.range_bias_m + p.range_sigma_m * range_noise)
+            bearing_rad = math.atan2(right_m, forward_m) + p.bearing_bias_rad
+            bearing_rad += p.bearing_sigma_rad * bearing_noise
             found.append((range_m, float(wrap_pi(bearing_rad))))
         return found
 

@@ -8,13 +8,13 @@ from missions.base.options import PlanOptions
 from missions.cli.mission_command import FlightOption, Given, declared_options, made
 from missions.cli.option_classes import named
 from missions.cli.study_command import StudyCommand
-from missions.multi_target.options import MultiTargetOptions
 from missions.studies.options import (
     HandoffStudyOptions,
     IdentificationStudyOptions,
     LissajousStudyOptions,
     LocalizationStudyOptions,
     MagneticStudyOptions,
+    MultiTargetStudyOptions,
     VisionStudyOptions,
 )
 
@@ -35,24 +35,11 @@ def _study(name: str, kind: type[PlanOptions]) -> "Callable[[Given], Study[Any, 
     return build
 
 
-def _multi_target(given: Given) -> "Study[Any, Any]":
-    from missions.studies.multi_target_search import study
-
-    return study(_made(MultiTargetOptions, _PLANNING, given).planning)
-
-
 def _made(kind: type[T], options: Iterable[FlightOption], given: Given) -> T:
     return made(
         kind, options, given, {name for name, value in given.items() if value not in (None, (), False)}
     )
 
-
-_PLANNING: Final = tuple(
-    option
-    for option in declared_options(MultiTargetOptions)
-    if option.user.path == "planning" and option.name != "beam"
-)
-"""Options of the planner of `fly multi-target`."""
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
     {
@@ -114,10 +101,12 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
             help=(
                 "Search for an unknown number of targets: the experiments E1 and E2 of Yousuf, Lendek and "
                 "Busoniu, as flights on SITL.\n\n"
-                "The proposed planner beside a lawnmower and information alone. The folder gets found.png."
+                "The proposed planner beside the paper's, a lawnmower, information alone, a sweep with "
+                "detours and ergodic coverage; every run of E2 has a terrain of its own. Worlds that the "
+                "filter does not expect are chosen by --world. The folder gets found.png."
             ),
-            options=_PLANNING,
-            build=_multi_target,
+            options=declared_options(MultiTargetStudyOptions),
+            build=_study("multi_target_search", MultiTargetStudyOptions),
         ),
         "vision-search": StudyCommand(
             help=(

@@ -1,25 +1,27 @@
 """The entries of `summary.json` about a search, and its verdict."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.multi_target.estimate import TargetRow
+from estimators.multi_target.parameters import MultiTargetParameters
 from estimators.received import GAP_US, interpolated
 from estimators.tracking.association import assign
 from estimators.tracking.motion import MotionKind
-from estimators.tracking.ospa import gospa, ospa
+from estimators.tracking.ospa import Gospa, gospa, ospa
 from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.targets import true_targets
 
 if TYPE_CHECKING:
     from missions.base.report import Debriefing
-    from missions.multi_target.search import SearchState
     from missions.multi_target.team import TargetSearchTeam
 
-__all__ = ["SearchScore", "search_figures", "search_score", "search_verdict"]
+__all__ = ["SearchScore", "score_figures", "scored", "search_figures", "search_score", "search_verdict"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +29,7 @@ CUTOFF_M: Final = 10.0
 """Cut-off of OSPA and GOSPA."""
 
 _LATE_SHARE: Final = 0.1
+_NO_PAIR: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,8 +40,11 @@ class SearchScore:
         time_s: (n,) since the begin of the search.
         found: (n,) number of found targets.
         right: (n,) number of true targets within `match_m` of a found one, each of its own.
-        ospa_m, gospa_m: (n,) of all reported targets, with the cut-off `CUTOFF_M`.
+        ospa_m: (n,) of all reported targets, with the cut-off `CUTOFF_M`.
+        gospa: n, likewise, with its parts.
         targets_ne_m: (m, 2) true places at the end.
+        reported: the targets that are reported at the end.
+        errors_m: of each of them, distance from its own true target; infinite: none is within `match_m`.
         match_m: largest distance between a found and a true target.
     """
 
@@ -46,8 +52,10 @@ class SearchScore:
     found: NDArray[np.int64]
     right: NDArray[np.int64]
     ospa_m: Array
-    gospa_m: Array
+    gospa: tuple[Gospa, ...]
     targets_ne_m: Array
+    reported: tuple[TargetRow, ...]
+    errors_m: Array
     match_m: float
 
 
@@ -62,7 +70,6 @@ def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchSc
     truth = true_targets(debriefing.records, LocalFrame(origin))
     if not truth and not debriefing.records.truth(debriefing.flights[0][0].system_id).size:
         return None
-    match_m = team.watch.belief.parameters.found_distance_m
     places = np.empty((len(states), len(truth), 2))
     times = np.array([state.time_us for state in states], dtype=np.float64)
     for k, (time_us, place) in enumerate(truth):
@@ -70,40 +77,64 @@ def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchSc
     known = np.isfinite(places).all(axis=(1, 2))
     if not known.any():
         return None
-    states, times, places = [states[k] for k in np.flatnonzero(known)], times[known], places[known]
-    # of moving targets the reported ones count as found
-    moving = team.watch.belief.parameters.motion is not MotionKind.STATIC
-    right, apart, apart_general = [], [], []
-    for state, true in zip(states, places, strict=True):
-        reported = np.array([(t.north_m, t.east_m) for t in state.targets]).reshape(-1, 2)
-        counted = [t for t in state.targets if t.found or moving]
-        found = np.array([(t.north_m, t.east_m) for t in counted]).reshape(-1, 2)
-        right.append(matched(found, true, match_m))
-        apart.append(ospa(reported, true, cutoff=CUTOFF_M))
-        apart_general.append(gospa(reported, true, cutoff=CUTOFF_M).distance)
-    return SearchScore(
-        time_s=(times - search.began_us) * 1e-6,
-        found=np.array([_found(state) for state in states]),
-        right=np.array(right),
-        ospa_m=np.array(apart),
-        gospa_m=np.array(apart_general),
-        targets_ne_m=places[-1],
-        match_m=match_m,
+    kept = np.flatnonzero(known)
+    return scored(
+        team.watch.belief.parameters,
+        (times[known] - search.began_us) * 1e-6,
+        [states[k].targets for k in kept],
+        places[known],
     )
 
 
-def _found(state: "SearchState") -> int:
-    return sum(target.found for target in state.targets)
+def scored(
+    parameters: MultiTargetParameters, time_s: Array, states: Sequence[Sequence[TargetRow]], places: Array
+) -> SearchScore:
+    """The score of reported targets.
+
+    Args:
+        parameters: of the estimator.
+        time_s: (n,) since the begin of the search.
+        states: the reported targets at each time, n.
+        places: (n, m, 2) true places.
+    """
+    # of moving targets the reported ones count as found
+    moving = parameters.motion is not MotionKind.STATIC
+    right, apart, apart_general = [], [], []
+    for state, true in zip(states, places, strict=True):
+        reported = np.array([(t.north_m, t.east_m) for t in state]).reshape(-1, 2)
+        found = np.array([(t.north_m, t.east_m) for t in state if t.found or moving]).reshape(-1, 2)
+        right.append(int(np.isfinite(matched_m(found, true, parameters.found_distance_m)).sum()))
+        apart.append(ospa(reported, true, cutoff=CUTOFF_M))
+        apart_general.append(gospa(reported, true, cutoff=CUTOFF_M))
+    return SearchScore(
+        time_s=time_s,
+        found=np.array([sum(t.found for t in state) for state in states]),
+        right=np.array(right),
+        ospa_m=np.array(apart),
+        gospa=tuple(apart_general),
+        targets_ne_m=places[-1],
+        reported=tuple(states[-1]),
+        errors_m=matched_m(reported, places[-1], parameters.found_distance_m),
+        match_m=parameters.found_distance_m,
+    )
 
 
-def matched(found: Array, true: Array, match_m: float) -> int:
-    """Number of pairs of a found and a true target within a distance, each in one pair."""
-    few, many = sorted((found, true), key=len)
-    if not len(few):
-        return 0
-    distance = np.linalg.norm(few[:, None, :] - many[None, :, :], axis=-1)
-    cost = np.where(distance <= match_m, distance, 1e6)
-    return int(np.count_nonzero(cost[np.arange(len(few)), assign(cost)] < 1e6))
+def matched_m(found: Array, true: Array, match_m: float) -> Array:
+    """Distance of each found target (n, 2) from the true one (m, 2) that it is paired with, (n,): pairs
+    within `match_m` and each target in one pair, as many as possible. Infinite: it is in none.
+    """
+    distances = np.full(len(found), np.inf)
+    if not (len(found) and len(true)):
+        return distances
+    apart = np.linalg.norm(found[:, None, :] - true[None, :, :], axis=-1)
+    cost = np.where(apart <= match_m, apart, _NO_PAIR)
+    if len(found) <= len(true):
+        rows, columns = np.arange(len(found)), assign(cost)
+    else:
+        rows, columns = assign(np.ascontiguousarray(cost.T)), np.arange(len(true))
+    near = cost[rows, columns] < _NO_PAIR
+    distances[rows[near]] = apart[rows[near], columns[near]]
+    return distances
 
 
 def search_figures(team: "TargetSearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:
@@ -135,23 +166,45 @@ def search_figures(team: "TargetSearchTeam", debriefing: "Debriefing") -> Mappin
             for target in belief.found
         ],
         "estimator_remarks": team.watch.remarks,
-        "targets_true": None,
-        "targets_found_right": None,
+        "targets_expected": round(belief.expected_targets, 4),
         "match_m": belief.parameters.found_distance_m,
-        "ospa_end_m": None,
-        "gospa_end_m": None,
-        "found_right_s": None,
+        **score_figures(score),
     }
-    if score is not None:
-        rises = np.flatnonzero(np.diff(score.right, prepend=0) > 0)
-        figures |= {
-            "targets_true": len(score.targets_ne_m),
-            "targets_found_right": int(score.right[-1]),
-            "ospa_end_m": round(float(score.ospa_m[-1]), 3),
-            "gospa_end_m": round(float(score.gospa_m[-1]), 3),
-            "found_right_s": [[round(float(score.time_s[k]), 3), int(score.right[k])] for k in rises],
-        }
     return figures
+
+
+def score_figures(score: SearchScore | None) -> Mapping[str, Any]:
+    """The entries that need the true targets; None without them.
+
+    Args:
+        score: of the search.
+    """
+    if score is None:
+        return dict.fromkeys(
+            (
+                *("targets_true", "targets_found_right", "ospa_end_m", "gospa_end_m", "gospa_missed"),
+                *("gospa_false", "found_right_s", "targets_reported"),
+            )
+        )
+    rises = np.flatnonzero(np.diff(score.right, prepend=0) > 0)
+    end = score.gospa[-1]
+    return {
+        "targets_true": len(score.targets_ne_m),
+        "targets_found_right": int(score.right[-1]),
+        "ospa_end_m": round(float(score.ospa_m[-1]), 3),
+        "gospa_end_m": round(end.distance, 3),
+        "gospa_missed": end.missed,
+        "gospa_false": end.false,
+        "found_right_s": [[round(float(score.time_s[k]), 3), int(score.right[k])] for k in rises],
+        "targets_reported": [
+            {
+                "mass": round(row.mass, 4),
+                "width_m": round(row.width_m, 3),
+                "error_m": round(error_m, 3) if math.isfinite(error_m) else None,
+            }
+            for row, error_m in zip(score.reported, score.errors_m.tolist(), strict=True)
+        ],
+    }
 
 
 def _mean_step_s(team: "TargetSearchTeam") -> float | None:

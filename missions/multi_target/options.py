@@ -23,6 +23,10 @@ class PlannerKind(StrEnum):
     """Information alone."""
     SWEEP = "sweep"
     """Along the legs of a parallel sweep, whatever is detected."""
+    REVISIT = "revisit"
+    """Along the same legs, with detours to targets that are detected and not found."""
+    ERGODIC = "ergodic"
+    """By ergodic coverage of the targets that are expected and not found."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +47,9 @@ class MultiTargetOptions(StepSearchOptions):
         help="Place of the first scan, m; other vehicles begin east of it.",
     )
     planner: PlannerKind = option(
-        PlannerKind.EXPLORING, help="Planner: information and exploration, information alone, or a sweep."
+        PlannerKind.EXPLORING,
+        help="Planner: information and exploration, information alone, a sweep, a sweep with detours, "
+        "or ergodic coverage.",
     )
     step_m: float | None = other_default(None, varies="9; aircraft: 2.5 turn radii")
     planning: PlannerParameters = held(

@@ -173,7 +173,7 @@ def _draw_found(axes: Any, team: "TargetSearchTeam", score: SearchScore | None) 
 def _draw_metrics(axes: Any, team: "TargetSearchTeam", score: SearchScore | None) -> None:
     if score is not None:
         axes.plot(score.time_s, score.ospa_m, color=_COLOURS[0], label=f"OSPA, cut-off {CUTOFF_M:g} m")
-        axes.plot(score.time_s, score.gospa_m, color=_COLOURS[1], label="GOSPA")
+        axes.plot(score.time_s, [part.distance for part in score.gospa], color=_COLOURS[1], label="GOSPA")
         _style(axes, "distance to the true targets, m")
         return
     left = [state.expected_undetected for state in team.search.states]

@@ -12,8 +12,10 @@ from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.information import condensed
 from estimators.tracking.range_bearing import Viewpoint
+from missions.multi_target.ergodic import ErgodicPlanner
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.planner import ExploringPlanner, SearchPlanner
+from missions.multi_target.revisit import RevisitPlanner
 from missions.search.area import Place
 from missions.search.sweep import SweepPlanner, sweep_path
 from missions.search.team import HEADING_RAD
@@ -70,10 +72,13 @@ class Moment:
 def planner_of(options: MultiTargetOptions) -> SearchPlanner:
     """The planner that one vehicle's options describe."""
     parameters, area = options.planner_parameters, options.area
-    if options.planner is PlannerKind.SWEEP:
+    if options.planner is PlannerKind.ERGODIC:
+        return ErgodicPlanner(area, parameters.step_m, parameters.turn_limit_rad)
+    if options.planner in (PlannerKind.SWEEP, PlannerKind.REVISIT):
         share = area if options.vehicles == 1 else area.strip(options.index, options.vehicles)
         path = sweep_path(share, options.own_start_ne_m, parameters.step_m * options.steps, options.spacing_m)
-        return SweepPlanner(path, parameters.step_m)
+        along = SweepPlanner if options.planner is PlannerKind.SWEEP else RevisitPlanner
+        return along(path, parameters.step_m)
     heading_rad = HEADING_RAD if options.turn_limit_rad is None else None  # an aircraft flies where it looks
     return ExploringPlanner(
         parameters, area, heading_rad=heading_rad, seed=options.estimator.seed * 256 + options.index

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from flightsim.foundation.options import option
+from flightsim.foundation.checks import NotNegative, Positive
+from flightsim.foundation.options import Options, option
 from missions.base.options import PlanOptions
 from missions.errors import PlanError
 
@@ -29,3 +30,22 @@ class TargetField(PlanOptions):
     def check_together(self) -> None:
         if self.clusters > self.count:
             raise PlanError(f"`clusters` {self.clusters} is not in 0..{self.count}, the number of targets")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation(Options):
+    """In what a world differs from what the estimator expects.
+
+    Attributes:
+        detection_scale: factor of the distances over which the probability of detection falls.
+        clutter_per_scan: mean number of false detections; None: as the estimator expects.
+        range_bias_m, bearing_bias_rad: of every measurement.
+        walk_m_sqrt_s: of each target, standard deviation of its place per axis after one second; the paths
+            are legs of 10 s in random directions.
+    """
+
+    detection_scale: Positive = 1.0
+    clutter_per_scan: NotNegative | None = None
+    range_bias_m: float = 0.0
+    bearing_bias_rad: float = 0.0
+    walk_m_sqrt_s: NotNegative = 0.0

@@ -21,17 +21,18 @@ from flightsim.payload import (
 from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.multi_target.options import MultiTargetOptions
-from missions.multi_target.target_field import TargetField
+from missions.multi_target.target_field import Deviation, TargetField
 from missions.search.area import Area
 from missions.worlds.payloads import carrying
 
-__all__ = ["multi_target_world", "places_of", "terrain_targets_world"]
+__all__ = ["deviating_world", "multi_target_world", "places_of", "terrain_targets_world"]
 
 MAX_TARGETS: Final = 250
 _APART_M: Final = 6.0  # least distance of two targets of a cluster
 _CENTRES_APART: Final = 0.28  # least distance of two clusters, in shorter sides of the area
 _EDGE: Final = 0.15  # of a side: the centres of clusters keep this distance from the edges
 _TRIES: Final = 10_000
+_LEG_S: Final = 10.0  # of a target that walks at random
 _TERRAIN_SIGMA_M: Final = 15.0  # standard deviation of a cluster at a high or low place
 _TERRAIN_RELIEF_M: Final = 25.0
 _TERRAIN_APART_M: Final = 90.0
@@ -136,19 +137,72 @@ def _motion(place_ne_m: tuple[float, float], area: Area, speed_m_s: float) -> Ta
     )
 
 
-def terrain_targets_world(
-    world: WorldSpec, options: MultiTargetOptions, number: int, *, count: int, clusters: int
-) -> WorldSpec:
-    """The world with targets in clusters at the lowest places of a terrain (even numbers), or at the highest
-    (odd numbers): litter that water carries downhill, or that stays uphill (the paper's second experiment).
-
-    The terrain is the same for every seed. It decides where the targets are, and hides none.
+def deviating_world(world: WorldSpec, options: MultiTargetOptions, deviation: Deviation) -> WorldSpec:
+    """The world of a search with what the estimator does not expect.
 
     Args:
-        world: the targets are drawn from its seed.
+        world: of `multi_target_world`.
         options: the search.
-        number: number of the terrain.
-        count, clusters: of the targets.
+        deviation: in what it differs.
+    """
+    d, area = deviation, options.area
+
+    def differing(sensor: TargetSensorParameters | None) -> TargetSensorParameters | None:
+        if sensor is None:
+            return None
+        return replace(
+            sensor,
+            forward_scale_m=d.detection_scale * sensor.forward_scale_m,
+            right_scale_m=d.detection_scale * sensor.right_scale_m,
+            clutter_per_scan=sensor.clutter_per_scan if d.clutter_per_scan is None else d.clutter_per_scan,
+            range_bias_m=d.range_bias_m,
+            bearing_bias_rad=d.bearing_bias_rad,
+        )
+
+    vehicles = tuple(
+        replace(
+            vehicle, payload=replace(vehicle.payload, target_sensor=differing(vehicle.payload.target_sensor))
+        )
+        for vehicle in world.vehicles
+    )
+    targets = world.targets
+    if d.walk_m_sqrt_s > 0.0:
+        # legs of speed v and duration T in random directions spread by v sqrt(T / 2) per axis and root second
+        speed_m_s = d.walk_m_sqrt_s / math.sqrt(0.5 * _LEG_S)
+        targets = tuple(
+            replace(
+                target,
+                motion=RandomWalk(
+                    south_m=area.south_m,
+                    west_m=area.west_m,
+                    north_m=area.north_m,
+                    east_m=area.east_m,
+                    speed_m_s=speed_m_s,
+                    leg_s=_LEG_S,
+                    turn_rad=math.inf,
+                    start_m=(target.motion.north_m, target.motion.east_m),
+                ),
+            )
+            for target in targets
+            if isinstance(target.motion, Static)
+        )
+    return replace(world, vehicles=vehicles, targets=targets)
+
+
+def terrain_targets_world(
+    world: WorldSpec, options: MultiTargetOptions, *, counts: range, clusters: range
+) -> WorldSpec:
+    """The world with targets in clusters at the lowest and the highest places of a terrain: litter that water
+    carries downhill, or that stays uphill (the paper's second experiment). The terrain decides where the
+    targets are, and hides none.
+
+    Terrain, number of targets, number of clusters, which of them are low, and the places are all drawn from
+    the world's seed.
+
+    Args:
+        world: the rest of the world.
+        options: the search.
+        counts, clusters: numbers that are drawn.
     """
     area = options.area
     terrain = TerrainSpec(
@@ -157,21 +211,21 @@ def terrain_targets_world(
         north_m=area.north_m,
         east_m=area.east_m,
         relief_m=_TERRAIN_RELIEF_M,
-        stream=number,
-    ).made(0)
-    heights = terrain.height_m if number % 2 == 0 else -terrain.height_m
-    rows, columns = np.indices(heights.shape)
+    ).made(world.seed)
+    rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("multi_target", "terrain")))
+    count, groups = int(rng.choice(counts)), int(rng.choice(clusters))
+    rows, columns = np.indices(terrain.height_m.shape)
     north = terrain.south_m + terrain.spacing_m * rows
     east = terrain.west_m + terrain.spacing_m * columns
     free = (north >= area.south_m + _TERRAIN_EDGE_M) & (north <= area.north_m - _TERRAIN_EDGE_M)
     free &= (east >= area.west_m + _TERRAIN_EDGE_M) & (east <= area.east_m - _TERRAIN_EDGE_M)
     centres: list[tuple[float, float]] = []
-    for _ in range(clusters):
+    for _ in range(groups):
+        heights = terrain.height_m if rng.random() < 0.5 else -terrain.height_m
         lowest = int(np.argmin(np.where(free, heights, np.inf)))
         centre = float(north.flat[lowest]), float(east.flat[lowest])
         centres.append(centre)
         free &= np.hypot(north - centre[0], east - centre[1]) >= _TERRAIN_APART_M
-    rng = np.random.Generator(np.random.PCG64(RandomStreams(world.seed).child("multi_target", "terrain")))
     places = _around(centres, count, _TERRAIN_SIGMA_M, area, rng)
     targets = tuple(GroundTargetParameters(motion=_motion(place, area, 0.0)) for place in places)
     return replace(world, targets=targets)

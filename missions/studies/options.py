@@ -4,9 +4,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from flightsim.foundation.options import option
+from estimators.multi_target.parameters import Belief
+from flightsim.foundation.options import held, option
 from missions.base.options import PlanOptions
+from missions.multi_target.options import MultiTargetOptions
 from missions.occupancy.parameters import Identify
+from missions.search.planner_parameters import PlannerParameters
+from missions.studies.multi_target_worlds import SearchWorlds
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 
@@ -139,6 +143,46 @@ class MagneticStudyOptions(PlanOptions):
 
     identify: tuple[Identify, ...] = option(tuple(Identify), help="Ways that are compared; repeat.")
     flights: bool = option(False, help="Flights of fly occupancy in place of points.")
+
+
+class Experiments(StrEnum):
+    """The experiments of Yousuf, Lendek and Busoniu."""
+
+    E1 = "E1"
+    E2 = "E2"
+
+
+class Planners(StrEnum):
+    """Planners that are compared in searches for many targets."""
+
+    PROPOSED = "proposed"
+    """That of the mission."""
+    PAPER = "paper"
+    """The paper's: one step, and the exploration map at the vehicle's place."""
+    LAWNMOWER = "lawnmower"
+    INFORMATION = "information"
+    """Information alone (Dames and Kumar)."""
+    REVISIT = "revisit"
+    """The lawnmower with detours to what it detects."""
+    ERGODIC = "ergodic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MultiTargetStudyOptions(PlanOptions):
+    """Options of the study `multi-target`."""
+
+    experiment: tuple[Experiments, ...] = option(tuple(Experiments), help="Experiments; repeat.")
+    planner: tuple[Planners, ...] = option(tuple(Planners), help="Planners that are compared; repeat.")
+    world: tuple[SearchWorlds, ...] = option(
+        (SearchWorlds.NOMINAL,), help="Worlds; mismatched: all but the nominal one; repeat."
+    )
+    belief: tuple[Belief, ...] = option(
+        (MultiTargetOptions().estimator.belief,), help="Filters of the estimator that are compared; repeat."
+    )
+    points: bool = option(False, help="Points that are where they plan to be, in place of flights.")
+    planning: PlannerParameters = held(
+        MultiTargetOptions().planning, alpha="alpha", exploration="exploration", horizon="horizon"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""PHD filters: weights against an exact reference in NumPy, unbiased numbers, clusters, moving targets."""
+"""Filters of many targets: weights against an exact reference in NumPy, numbers, clusters, moving targets."""
 
 import math
 
@@ -8,10 +8,12 @@ import pytest
 from estimators.tracking.clusters import find_clusters
 from estimators.tracking.gaussian_phd import GaussianPhd
 from estimators.tracking.motion import Motion, MotionKind
+from estimators.tracking.multi_bernoulli import MultiBernoulli
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
 from estimators.tracking.smc_phd import SmcPhd, update_weights
 
 SENSOR = RangeBearingSensor(clutter_per_scan=0.5)
+KINDS = ("particles", "gaussians", "bernoullis")
 
 
 def scan_of(rng, targets, viewpoint, sensor, *, range_sigma=0.5, bearing_sigma=0.03, clutter=0.0):
@@ -39,7 +41,7 @@ def scan_of(rng, targets, viewpoint, sensor, *, range_sigma=0.5, bearing_sigma=0
 def belief_of(kind, sensor, motion=None, seed=0):
     if kind == "particles":
         return SmcPhd(sensor, motion, seed=np.random.SeedSequence(seed))
-    return GaussianPhd(sensor, motion)
+    return {"gaussians": GaussianPhd, "bernoullis": MultiBernoulli}[kind](sensor, motion)
 
 
 def constant(density):
@@ -96,7 +98,7 @@ def test_clusters_find_separate_masses_and_their_widths():
     assert find_clusters(np.zeros(0), np.zeros(0), np.zeros(0), radius_m=2.0) == []
 
 
-@pytest.mark.parametrize("kind", ["particles", "gaussians"])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("clutter", [0.0, 2.0])
 @pytest.mark.sampled(2)
 def test_the_expected_number_is_that_of_the_targets(kind, clutter):
@@ -130,7 +132,7 @@ def test_the_expected_number_is_that_of_the_targets(kind, clutter):
     assert abs(mean) <= 3.0 * sigma + 0.2  # 2 % of ten targets
 
 
-@pytest.mark.parametrize("kind", ["particles", "gaussians"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_targets_with_constant_velocity_are_followed(kind):
     sensor = RangeBearingSensor(forward_scale_m=100.0, right_scale_m=100.0)
     motion = Motion(kind=MotionKind.CONSTANT_VELOCITY, survival_per_s=0.99, speed_sigma_m_s=1.5)
