@@ -10,9 +10,18 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.navigation.layout import NAV_SIZE
+from autopilot_bridge.navigation.layout import NAV_SIZE, NavigationState
 from flightsim.foundation.kernels import bound
-from flightsim.foundation.records import Record, Vector3, Vector4, pack, packed, record_array, the_record
+from flightsim.foundation.records import (
+    Record,
+    Vector3,
+    Vector4,
+    pack,
+    packed,
+    record_array,
+    the_record,
+    viewed,
+)
 from flightsim.interface import MAX_ACTUATORS
 
 if TYPE_CHECKING:
@@ -44,9 +53,9 @@ class Controller(ABC, Generic[P, S]):
         parameters: gains and limits.
         physics_rate_hz: rate at which `step` is called.
         nav: navigation state, layout `navigation.layout`, shared with the filter.
-        kernel: the step: (nav, setpoint, record of the parameters, of the state, `scratch` ..., actuators).
+        kernel: the step: (records of nav, setpoint, parameters and state, `scratch` ..., actuators).
         state: the record of the state.
-        setpoint: the module that names the places of the setpoint, and its levels.
+        setpoint: the module with the record of the setpoint, its places and levels.
         outer_rate_hz: least rate of the outer loops.
         scratch: further arrays of the kernel.
 
@@ -90,7 +99,13 @@ class Controller(ABC, Generic[P, S]):
         self._state.dt = 1.0 / physics_rate_hz
         self._state.divisor = max(1.0, math.floor(physics_rate_hz / outer_rate_hz))
         self.step: Callable[[], None] = bound(
-            kernel, nav, self.setpoint, self._packed, states, *scratch, self.actuators
+            kernel,
+            viewed(nav, NavigationState),
+            viewed(self.setpoint, setpoint.Setpoint),
+            self._packed,
+            states,
+            *scratch,
+            self.actuators,
         )
         self.set_parameters(parameters)
 

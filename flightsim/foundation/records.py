@@ -8,7 +8,8 @@ kernel is compiled. All numbers are float64, one after the other.
 """
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hints
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +24,52 @@ T = TypeVar("T")
 RecordT = TypeVar("RecordT", bound="Record")
 
 
+_NUMBER_BYTES: Final = 8
+
+
 class Record:
     """Base of the declarations: each annotation is a field, a `float`, `Vector3` or `Vector4`."""
 
 
 def record_array(kind: type[Record], count: int = 1) -> NDArray[np.void]:
     """An array (count,) of records of zeros, for kernels; an array's column has the name of its field."""
+    return np.zeros(count, _layout(kind))
+
+
+def viewed(numbers: NDArray[np.float64], kind: type[Record]) -> NDArray[np.void]:
+    """An array (1,) with the record that the numbers of an array are; it shares the array's memory."""
+    return numbers.view(_layout(kind))
+
+
+def size_of(kind: type[Record]) -> int:
+    """How many numbers a record has."""
+    return _layout(kind).itemsize // _NUMBER_BYTES
+
+
+def place(kind: type[Record], name: str) -> int:
+    """Index of a number in the flat array of a record, by its field's name."""
+    return vector(kind, name).start
+
+
+def vector(kind: type[Record], name: str) -> slice:
+    """The numbers of a field in the flat array of a record."""
+    fields_by_name: Any = _layout(kind).fields
+    field, offset = fields_by_name[name][:2]
+    first = offset // _NUMBER_BYTES
+    return slice(first, first + field.itemsize // _NUMBER_BYTES)
+
+
+def _layout(kind: type[Record]) -> np.dtype[np.void]:
+    key: Any = kind  # mypy does not see that a type is hashable
+    return _cached_layout(key)
+
+
+@cache
+def _cached_layout(kind: Any) -> np.dtype[np.void]:
     places: list[Any] = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
         places.append((name, np.float64) if hint is float else (name, np.float64, (get_args(hint)[1],)))
-    return np.zeros(count, np.dtype(places))
+    return np.dtype(places)
 
 
 def the_record(array: NDArray[np.void], kind: type[T]) -> T:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from types import ModuleType
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -18,10 +19,10 @@ from autopilot_bridge.control.multicopter import layout as copter
 from autopilot_bridge.control.multicopter import setpoint as copter_setpoint
 from autopilot_bridge.control.multicopter.attitude import limit_rates, rate_control
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
-from autopilot_bridge.control.multicopter.position import update_airborne
+from autopilot_bridge.control.multicopter.position import trajectory_control, update_airborne, update_filters
 from autopilot_bridge.navigation import layout as n
-from autopilot_bridge.navigation.layout import NAV_SIZE
-from flightsim.foundation.records import new_record, packed, record_array, the_record
+from autopilot_bridge.navigation.layout import NavigationState
+from flightsim.foundation.records import new_record, packed, record_array, size_of, the_record, viewed
 
 
 @pytest.mark.parametrize("kind", [copter.MulticopterState, wing.FixedWingState])
@@ -36,24 +37,35 @@ def test_the_state_is_a_record_of_numbers_without_gaps(kind: type[ControllerStat
 
 
 def test_another_array_in_the_place_of_the_state_does_not_compile() -> None:
-    nav, state = np.zeros(NAV_SIZE), new_record(copter.MulticopterState)
+    nav, state = new_record(NavigationState), new_record(copter.MulticopterState)
     update_airborne(nav, state)
-    with pytest.raises(TypingError, match="airborne"):
+    with pytest.raises((TypingError, KeyError), match="airborne"):
         update_airborne(nav, nav)  # type: ignore[arg-type]
     with pytest.raises((TypingError, KeyError), match="airborne"):  # a record without the field
         update_airborne(nav, new_record(wing.FixedWingState))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("setpoint", [copter_setpoint, wing_setpoint], ids=["copter", "wing"])
-def test_the_setpoint_is_filled_without_gaps_or_overlaps(setpoint: ModuleType) -> None:
-    found: list[int] = []
-    for name in vars(setpoint):
-        place = getattr(setpoint, name)
-        if name.endswith(
-            ("_M", "_M_S", "_M_S2", "_RAD", "_RAD_S", "FRD", "SURFACES", "THROTTLE", "THRUST", "MAX")
-        ) or name in ("LEVEL", "FLAPS", "BRAKE", "YAW_STICK"):
-            found.extend(range(place.start, place.stop) if isinstance(place, slice) else [place])
-    assert sorted(found) == list(range(setpoint.SETPOINT_SIZE))
+def test_places_in_the_array_are_those_of_the_record(setpoint: ModuleType) -> None:
+    for kind, names in ((setpoint.Setpoint, setpoint), (NavigationState, n)):
+        numbers = np.arange(float(size_of(kind)))
+        record = the_record(viewed(numbers, kind), kind)
+        for name in get_type_hints(kind):
+            assert np.array_equal(numbers[getattr(names, name.upper())], getattr(record, name)), name
+
+
+def test_the_setpoint_in_the_place_of_the_navigation_state_does_not_compile() -> None:
+    state = new_record(copter.MulticopterState)
+    setpoint = new_record(copter_setpoint.Setpoint)
+    with pytest.raises((TypingError, KeyError), match="specific_force_frd_m_s2"):
+        update_filters(setpoint, packed_copter(), state, 0.02)  # type: ignore[arg-type]
+    nav = new_record(NavigationState)
+    with pytest.raises((TypingError, KeyError), match=r"yaw_rad|level|vel_ned_m_s"):
+        trajectory_control(nav, nav, packed_copter(), state, 0.02, False)  # type: ignore[arg-type]
+
+
+def packed_copter() -> MulticopterParameters:
+    return the_record(packed(MulticopterParameters()), MulticopterParameters)
 
 
 def test_another_record_in_the_place_of_the_parameters_does_not_compile() -> None:
@@ -81,7 +93,7 @@ def test_the_gains_of_an_axis_are_its_own(axis: int) -> None:
 def _outputs(parameters: MulticopterParameters | FixedWingParameters) -> NDArray[np.float64]:
     """Torques or surfaces (n, 3) of rate errors that change their signs, until integrals are at a limit."""
     outputs = []
-    nav = np.zeros(NAV_SIZE)
+    nav = new_record(NavigationState)
     if isinstance(parameters, MulticopterParameters):
         p, s = the_record(packed(parameters), MulticopterParameters), new_record(copter.MulticopterState)
         s.dt = 0.1
@@ -94,7 +106,7 @@ def _outputs(parameters: MulticopterParameters | FixedWingParameters) -> NDArray
     wing_p, wing_s = the_record(packed(parameters), FixedWingParameters), new_record(wing.FixedWingState)
     wing_s.dt, wing_s.eas = 0.1, 15.0
     for step in range(60):
-        nav[n.RATES_FRD_RAD_S] = 0.1 * math.sin(step)
+        nav.rates_frd_rad_s[:] = 0.1 * math.sin(step)
         wing_s.rate_setpoint[:] = 0.5
         surfaces = np.zeros(3)
         wing_rate_control(nav, wing_p, wing_s, surfaces, False)

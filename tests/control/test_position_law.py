@@ -1,36 +1,40 @@
 """Position and velocity loops of a multicopter, one step at a time, against PX4's published structure."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.multicopter import MulticopterParameters
+from autopilot_bridge.control.multicopter import MulticopterParameters, position
 from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter import setpoint as sp
-from autopilot_bridge.control.multicopter.position import (
-    estimate_hover_thrust,
-    lowpass_gain,
-    trajectory_control,
-    update_airborne,
-    update_filters,
-    vertical_control,
-)
+from autopilot_bridge.control.multicopter.position import lowpass_gain
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation import records
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
 from flightsim.foundation.records import new_record, the_record
 from flightsim.foundation.rotations import quaternion_from_euler
+from tests.control.on_arrays import on_arrays
 from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
 DT_S = 0.016
 HOVER = 0.5
 BUMP_TIME_S = 0.3
+trajectory_control, vertical_control, update_filters, update_airborne, estimate_hover_thrust = on_arrays(
+    sp.Setpoint,
+    position.trajectory_control,
+    position.vertical_control,
+    position.update_filters,
+    position.update_airborne,
+    position.estimate_hover_thrust,
+)
 LOOSE = {"speed_xy_max_m_s": 20.0, "speed_up_max_m_s": 8.0, "speed_down_max_m_s": 8.0, "thrust_min": 0.05}
 
 
+@cache
 def packed(**values: float | bool) -> MulticopterParameters:
     parameters = MulticopterParameters(**(LOOSE | values))  # type: ignore[arg-type]
     return the_record(records.packed(parameters), MulticopterParameters)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
 
@@ -24,32 +24,34 @@ _RATIO_SPEED_M_S: Final = 3.0  # below it true over equivalent airspeed isn't ta
 
 
 @kernel
-def acceleration_along_flow(nav: Array) -> float:
+def acceleration_along_flow(nav: NavigationState) -> float:
     """Acceleration along the velocity through the air, m/s^2; without wind or velocity, along body x.
 
     The body's x axis is off the flow by the angle of attack, and in a turn or a pull-up it then sees a part
     of the acceleration across the flow.
     """
-    north, east = nav[n.VEL] - nav[n.WIND], nav[n.VEL + 1] - nav[n.WIND + 1]
-    down = nav[n.VEL + 2]
-    if math.isfinite(nav[n.WIND + 2]):
-        down -= nav[n.WIND + 2]
+    north, east = nav.vel_ned_m_s[0] - nav.wind_ned_m_s[0], nav.vel_ned_m_s[1] - nav.wind_ned_m_s[1]
+    down = nav.vel_ned_m_s[2]
+    if math.isfinite(nav.wind_ned_m_s[2]):
+        down -= nav.wind_ned_m_s[2]
     speed = math.sqrt(north * north + east * east + down * down)
     if not speed > _DIRECTION_SPEED_M_S:  # true for NaN
-        north, east, down = body_axis(nav[n.Q], nav[n.Q + 1], nav[n.Q + 2], nav[n.Q + 3], 0)
+        north, east, down = body_axis(
+            nav.q_ned_from_frd[0], nav.q_ned_from_frd[1], nav.q_ned_from_frd[2], nav.q_ned_from_frd[3], 0
+        )
         speed = 1.0
-    return (north * nav[n.ACC] + east * nav[n.ACC + 1] + down * nav[n.ACC + 2]) / speed
+    return (north * nav.acc_ned_m_s2[0] + east * nav.acc_ned_m_s2[1] + down * nav.acc_ned_m_s2[2]) / speed
 
 
 @kernel
-def update_air(nav: Array, p: FixedWingParameters, s: FixedWingState, dt: float) -> None:
+def update_air(nav: NavigationState, p: FixedWingParameters, s: FixedWingState, dt: float) -> None:
     """One step: writes EAS, EAS_RATE, EAS_TO_TAS and EAS_KNOWN."""
-    measured = nav[n.AIRSPEED_M_S]
+    measured = nav.airspeed_m_s
     known = math.isfinite(measured)
     if s.eas_to_tas <= 0.0:
         s.eas_to_tas = 1.0
-    if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav[n.AIRSPEED_TRUE_M_S]):
-        s.eas_to_tas = min(3.0, max(0.8, nav[n.AIRSPEED_TRUE_M_S] / measured))
+    if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav.airspeed_true_m_s):
+        s.eas_to_tas = min(3.0, max(0.8, nav.airspeed_true_m_s / measured))
     if not known:
         s.eas = p.airspeed_trim_m_s
         s.eas_rate = 0.0

@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.lateral import ROLL_MAX_RAD, stall_speed
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.control.fixed_wing.setpoint import Setpoint
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_pi
@@ -33,9 +33,9 @@ _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 
 
 @kernel
-def attitude_control(nav: Array, p: FixedWingParameters, s: FixedWingState) -> None:
+def attitude_control(nav: NavigationState, p: FixedWingParameters, s: FixedWingState) -> None:
     """Write RATE_SETPOINT (FRD) for ROLL_SETPOINT and PITCH_SETPOINT."""
-    roll, pitch = nav[n.ROLL], nav[n.PITCH]
+    roll, pitch = nav.euler_rad[0], nav.euler_rad[1]
     roll_rate = wrap_pi(s.roll_setpoint - roll) / p.roll_time_constant_s
     pitch_rate = (s.pitch_setpoint - pitch) / p.pitch_time_constant_s
     airspeed = max(0.7 * p.airspeed_min_m_s, s.eas) * s.eas_to_tas
@@ -48,7 +48,7 @@ def attitude_control(nav: Array, p: FixedWingParameters, s: FixedWingState) -> N
     x = roll_rate - sin_pitch * turn_rate
     y = cos_roll * pitch_rate + cos_pitch * sin_roll * turn_rate
     z = -sin_roll * pitch_rate + cos_pitch * cos_roll * turn_rate
-    slip = nav[n.FORCE + 1]
+    slip = nav.specific_force_frd_m_s2[1]
     if s.ground_contact == 0.0 and math.isfinite(slip):
         z -= p.sideslip_gain_rad_s_per_m_s2 * min(_SLIP_MAX_M_S2, max(-_SLIP_MAX_M_S2, slip))
     s.rate_setpoint[0] = min(p.roll_rate_max_rad_s, max(-p.roll_rate_max_rad_s, x))
@@ -88,7 +88,7 @@ def _rate_axis(
 
 @kernel
 def rate_control(
-    nav: Array, p: FixedWingParameters, s: FixedWingState, surfaces: Array, rolling: bool
+    nav: NavigationState, p: FixedWingParameters, s: FixedWingState, surfaces: Array, rolling: bool
 ) -> None:
     """surfaces (3,) = aileron, elevator, rudder that fly RATE_SETPOINT; `rolling`: on the runway, integrators
     wait."""
@@ -101,9 +101,9 @@ def rate_control(
     roll = (p.rate_roll_p, p.rate_roll_i, p.rate_roll_d, p.rate_roll_ff, p.rate_roll_integral_max)
     pitch = (p.rate_pitch_p, p.rate_pitch_i, p.rate_pitch_d, p.rate_pitch_ff, p.rate_pitch_integral_max)
     yaw = (p.rate_yaw_p, p.rate_yaw_i, p.rate_yaw_d, p.rate_yaw_ff, p.rate_yaw_integral_max)
-    surfaces[0] = _rate_axis(0, roll, nav[n.RATES], s, scale, alpha, rolling) + p.trim_aileron
-    surfaces[1] = _rate_axis(1, pitch, nav[n.RATES + 1], s, scale, alpha, rolling) + p.trim_elevator
-    surfaces[2] = _rate_axis(2, yaw, nav[n.RATES + 2], s, scale, alpha, rolling) + p.trim_rudder
+    surfaces[0] = _rate_axis(0, roll, nav.rates_frd_rad_s[0], s, scale, alpha, rolling) + p.trim_aileron
+    surfaces[1] = _rate_axis(1, pitch, nav.rates_frd_rad_s[1], s, scale, alpha, rolling) + p.trim_elevator
+    surfaces[2] = _rate_axis(2, yaw, nav.rates_frd_rad_s[2], s, scale, alpha, rolling) + p.trim_rudder
 
 
 @kernel
@@ -129,16 +129,16 @@ def limit_surfaces(p: FixedWingParameters, s: FixedWingState, yaw_stick: float, 
 
 
 @kernel
-def wheel_control(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState) -> float:
+def wheel_control(nav: NavigationState, sp: Setpoint, p: FixedWingParameters, s: FixedWingState) -> float:
     """Steering -1..1 that holds the setpoint's heading on the ground; its yaw rate is the rudder's too."""
-    error = wrap_pi(sp[to.STEERING_HEADING_RAD] - nav[n.YAW])
+    error = wrap_pi(sp.steering_heading_rad - nav.euler_rad[2])
     limit = p.wheel_rate_max_rad_s
     wanted = min(limit, max(-limit, error / p.wheel_time_constant_s))
     s.rate_setpoint[2] = wanted
-    speed = math.sqrt(nav[n.VEL] * nav[n.VEL] + nav[n.VEL + 1] * nav[n.VEL + 1])
+    speed = math.sqrt(nav.vel_ned_m_s[0] * nav.vel_ned_m_s[0] + nav.vel_ned_m_s[1] * nav.vel_ned_m_s[1])
     slow = _WHEEL_SPEED_SHARE * p.airspeed_min_m_s
     scale = slow / speed if speed > slow else 1.0  # false for NaN
-    rate_error = wanted - nav[n.RATES + 2]
+    rate_error = wanted - nav.rates_frd_rad_s[2]
     command = scale * (p.wheel_ff * wanted + scale * (p.wheel_p * rate_error + s.wheel_integral))
     if speed > 1.0 and abs(command) < 1.0:
         limit = p.wheel_integral_max

@@ -15,13 +15,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
+from autopilot_bridge.control.fixed_wing.setpoint import Setpoint
 from autopilot_bridge.control.fixed_wing.vertical import follow_height, pitch_for_climb, reset_height
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
@@ -110,11 +110,11 @@ def _trim_pitch(airspeed: float, p: FixedWingParameters, s: FixedWingState) -> f
 
 @kernel
 def _wanted_climb(
-    nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, hold: bool
+    nav: NavigationState, sp: Setpoint, p: FixedWingParameters, s: FixedWingState, dt: float, hold: bool
 ) -> float:
     """Climb rate to fly, m/s; NaN: no climb rate is commanded. `hold`: the present height by default."""
-    height, climb = -nav[n.POS + 2], -nav[n.VEL + 2]
-    wanted, rate = -sp[to.DOWN_M], sp[to.HEIGHT_RATE_M_S]
+    height, climb = -nav.pos_ned_m[2], -nav.vel_ned_m_s[2]
+    wanted, rate = -sp.down_m, sp.height_rate_m_s
     if math.isfinite(wanted) or not (math.isfinite(rate) or not hold):
         if not math.isfinite(height):
             return 0.0 if not math.isfinite(rate) else rate
@@ -139,11 +139,11 @@ def _wanted_climb(
 
 @kernel
 def _fly_pitch(
-    sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, speed: float, under: float
+    sp: Setpoint, p: FixedWingParameters, s: FixedWingState, dt: float, speed: float, under: float
 ) -> None:
     """PITCH_SETPOINT that flies the rate of the energy balance; `speed` is the true airspeed."""
-    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p.pitch_min_rad
-    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p.pitch_max_rad
+    lowest = sp.pitch_min_rad if math.isfinite(sp.pitch_min_rad) else p.pitch_min_rad
+    highest = sp.pitch_max_rad if math.isfinite(sp.pitch_max_rad) else p.pitch_max_rad
     # a climb-out's least pitch gives way before the wing stalls
     lowest = (1.0 - under) * lowest + under * min(lowest, p.pitch_min_rad)
     highest = max(highest, lowest)
@@ -167,20 +167,20 @@ def _fly_pitch(
 
 @kernel
 def _fly_climb_by_pitch(
-    nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, climb: float
+    nav: NavigationState, sp: Setpoint, p: FixedWingParameters, s: FixedWingState, dt: float, climb: float
 ) -> None:
     """PITCH_SETPOINT that flies a climb rate whatever becomes of the airspeed."""
-    lowest = sp[to.PITCH_MIN_RAD] if math.isfinite(sp[to.PITCH_MIN_RAD]) else p.pitch_min_rad
-    highest = sp[to.PITCH_MAX_RAD] if math.isfinite(sp[to.PITCH_MAX_RAD]) else p.pitch_max_rad
+    lowest = sp.pitch_min_rad if math.isfinite(sp.pitch_min_rad) else p.pitch_min_rad
+    highest = sp.pitch_max_rad if math.isfinite(sp.pitch_max_rad) else p.pitch_max_rad
     s.pitch_setpoint = pitch_for_climb(nav, p, s, dt, climb, lowest, max(lowest, highest))
 
 
 @kernel
-def _fly_throttle(sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, under: float) -> None:
+def _fly_throttle(sp: Setpoint, p: FixedWingParameters, s: FixedWingState, dt: float, under: float) -> None:
     """THROTTLE that flies the rate of the total energy."""
     lowest, highest = p.throttle_min, p.throttle_max
-    if math.isfinite(sp[to.THROTTLE_MAX]):
-        highest = _clip(sp[to.THROTTLE_MAX], 0.0, highest)
+    if math.isfinite(sp.throttle_max):
+        highest = _clip(sp.throttle_max, 0.0, highest)
         lowest = min(lowest, highest)
     rate_max, rate_min = GRAVITY_M_S2 * p.climb_max_m_s, -GRAVITY_M_S2 * p.sink_min_m_s
     wanted = s.energy_rate_setpoint
@@ -220,14 +220,14 @@ def _wanted_speed_rate(p: FixedWingParameters, s: FixedWingState, speed: float, 
 
 @kernel
 def energy_control(
-    nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float, entering: bool
+    nav: NavigationState, sp: Setpoint, p: FixedWingParameters, s: FixedWingState, dt: float, entering: bool
 ) -> None:
     """One guidance step: writes PITCH_SETPOINT, THROTTLE and what led to them."""
-    pitch_given, throttle_given = math.isfinite(sp[to.PITCH_RAD]), math.isfinite(sp[to.THROTTLE])
+    pitch_given, throttle_given = math.isfinite(sp.pitch_rad), math.isfinite(sp.throttle)
     powered, known = p.powered, s.eas_known != 0.0
-    climb = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
+    climb = -nav.vel_ned_m_s[2] if math.isfinite(nav.vel_ned_m_s[2]) else 0.0
     if entering or s.ground_contact != 0.0:
-        reset_height(-nav[n.POS + 2], climb, s)
+        reset_height(-nav.pos_ned_m[2], climb, s)
         s.pitch_integral = 0.0
         s.throttle_integral = 0.0
     load_factor = _load_factor(s)
@@ -247,7 +247,7 @@ def energy_control(
     powerless = _update_powerless(p, s, dt, energy_flown, potential_rate + inertial_rate)
 
     airspeed_min = min(p.airspeed_max_m_s, p.airspeed_min_m_s * math.sqrt(load_factor))
-    airspeed = sp[to.AIRSPEED_M_S] if math.isfinite(sp[to.AIRSPEED_M_S]) else p.airspeed_trim_m_s
+    airspeed = sp.airspeed_m_s if math.isfinite(sp.airspeed_m_s) else p.airspeed_trim_m_s
     airspeed = max(airspeed, s.airspeed_floor)
     # a glide lasts longest, with room left over the stall, a little above the lowest airspeed
     airspeed -= powerless * max(0.0, airspeed - _GLIDE_SHARE * airspeed_min)
@@ -279,7 +279,7 @@ def energy_control(
     )
 
     if pitch_given:
-        s.pitch_setpoint = _clip(sp[to.PITCH_RAD], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
+        s.pitch_setpoint = _clip(sp.pitch_rad, -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
     elif flare and known and p.lift_angle_rad > 0.0:
         _fly_climb_by_pitch(nav, sp, p, s, dt, wanted_climb)
     else:
@@ -288,7 +288,7 @@ def energy_control(
             s.pitch_integral = 0.0
         _fly_pitch(sp, p, s, dt, speed, under)
     if throttle_given:
-        s.throttle = _clip(sp[to.THROTTLE], 0.0, 1.0)
+        s.throttle = _clip(sp.throttle, 0.0, 1.0)
     elif powered:
         _fly_throttle(sp, p, s, dt, under)
     else:

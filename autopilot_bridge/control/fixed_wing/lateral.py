@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.fixed_wing import setpoint as to
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.control.fixed_wing.setpoint import Setpoint
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_pi
@@ -67,11 +67,11 @@ def airspeed_for_ground_speed(course: float, ground_speed: float, wind_n: float,
 
 
 @kernel
-def bank_limit(sp: Array, p: FixedWingParameters, s: FixedWingState) -> float:
+def bank_limit(sp: Setpoint, p: FixedWingParameters, s: FixedWingState) -> float:
     """Largest bank angle, rad: of parameters, setpoint, load factor, and stall at the present airspeed."""
     limit = min(p.roll_limit_rad, math.acos(1.0 / p.load_factor_max))
-    if sp[to.ROLL_LIMIT_RAD] >= 0.0:  # false for NaN
-        limit = min(limit, sp[to.ROLL_LIMIT_RAD])
+    if sp.roll_limit_rad >= 0.0:  # false for NaN
+        limit = min(limit, sp.roll_limit_rad)
     if p.stall_prevention and s.eas_known != 0.0:
         ratio = s.eas / (p.stall_margin * stall_speed(p))
         by_stall = math.acos(1.0 / (ratio * ratio)) if ratio > 1.0 else 0.0
@@ -80,7 +80,9 @@ def bank_limit(sp: Array, p: FixedWingParameters, s: FixedWingState) -> float:
 
 
 @kernel
-def lateral_control(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, dt: float) -> None:
+def lateral_control(
+    nav: NavigationState, sp: Setpoint, p: FixedWingParameters, s: FixedWingState, dt: float
+) -> None:
     """One guidance step: writes ROLL_SETPOINT and what led to it."""
     true_airspeed = s.eas * s.eas_to_tas
     limit = bank_limit(sp, p, s)
@@ -88,34 +90,31 @@ def lateral_control(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingS
     s.heading_setpoint = math.nan
     s.course_setpoint = math.nan
     s.airspeed_floor = 0.0
-    if math.isfinite(sp[to.ROLL_RAD]):
-        roll = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, sp[to.ROLL_RAD]))
+    if math.isfinite(sp.roll_rad):
+        roll = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, sp.roll_rad))
         s.roll_setpoint = roll
         s.lateral_acceleration = GRAVITY_M_S2 * math.tan(roll)
         return
-    acceleration = (
-        sp[to.LATERAL_ACCELERATION_M_S2] if math.isfinite(sp[to.LATERAL_ACCELERATION_M_S2]) else 0.0
-    )
+    acceleration = sp.lateral_acceleration_m_s2 if math.isfinite(sp.lateral_acceleration_m_s2) else 0.0
     present, wanted = math.nan, math.nan
-    yaw = nav[n.YAW]
-    if math.isfinite(sp[to.COURSE_RAD]):
-        wind_n, wind_e = nav[n.WIND], nav[n.WIND + 1]
+    yaw = nav.euler_rad[2]
+    if math.isfinite(sp.course_rad):
+        wind_n, wind_e = nav.wind_ned_m_s[0], nav.wind_ned_m_s[1]
         if not math.isfinite(wind_n + wind_e):
             wind_n, wind_e = 0.0, 0.0
-        air_n, air_e = nav[n.VEL] - wind_n, nav[n.VEL + 1] - wind_e
+        air_n, air_e = nav.vel_ned_m_s[0] - wind_n, nav.vel_ned_m_s[1] - wind_e
         if not math.isfinite(air_n + air_e):
             air_n, air_e = true_airspeed * math.cos(yaw), true_airspeed * math.sin(yaw)
         airspeed = max(1.0, math.sqrt(air_n * air_n + air_e * air_e))
         present = math.atan2(air_e, air_n)
-        wanted = heading_for_course(sp[to.COURSE_RAD], airspeed, wind_n, wind_e)
-        s.course_setpoint = wrap_pi(sp[to.COURSE_RAD])
+        wanted = heading_for_course(sp.course_rad, airspeed, wind_n, wind_e)
+        s.course_setpoint = wrap_pi(sp.course_rad)
         s.airspeed_floor = (
-            airspeed_for_ground_speed(sp[to.COURSE_RAD], p.ground_speed_min_m_s, wind_n, wind_e)
-            / s.eas_to_tas
+            airspeed_for_ground_speed(sp.course_rad, p.ground_speed_min_m_s, wind_n, wind_e) / s.eas_to_tas
         )
-    elif math.isfinite(sp[to.HEADING_RAD]):
+    elif math.isfinite(sp.heading_rad):
         present = yaw
-        wanted = wrap_pi(sp[to.HEADING_RAD])
+        wanted = wrap_pi(sp.heading_rad)
     if math.isfinite(wanted):
         error = wrap_pi(wanted - present)
         # beyond a right angle: turn at full strength, whichever way is shorter

@@ -13,30 +13,55 @@ fixed wing.
 from typing import Final
 
 from autopilot_bridge.control.multicopter import setpoint as multicopter
-from flightsim.foundation.layouts import Slots
+from flightsim.foundation.records import Record, Vector3, place, size_of, vector
 
-LEVEL: Final = multicopter.LEVEL
-_at = Slots(LEVEL + 1)
-COURSE_RAD: Final = _at.place()  # direction over ground to fly
-HEADING_RAD: Final = _at.place()  # direction through the air (of the nose, without sideslip) to fly
-LATERAL_ACCELERATION_M_S2: Final = _at.place()  # to the right; feed-forward of a curved path
-ROLL_RAD: Final = _at.place()  # bank angle, past the lateral guidance
-DOWN_M: Final = _at.place()  # height to fly, local NED
-HEIGHT_RATE_M_S: Final = _at.place()  # climb rate, up; alone, or as the slope of the path `DOWN_M` is on
-AIRSPEED_M_S: Final = _at.place()  # equivalent airspeed; NaN: the trim airspeed of the parameters
-PITCH_RAD: Final = _at.place()  # pitch angle of the body, past the total-energy control
-THROTTLE: Final = _at.place()  # 0..1, past the total-energy control; 0 stops the propeller
-RATES_FRD_RAD_S: Final = _at.vector(3)  # level RATES
-SURFACES: Final = _at.vector(3)  # level SURFACES: aileron, elevator, rudder, -1..1
-STEERING_HEADING_RAD: Final = _at.place()  # held on the ground by wheels and rudder; NaN: off
-PITCH_MIN_RAD: Final = _at.place()  # limit of the total-energy control's pitch; NaN: the parameter's
-PITCH_MAX_RAD: Final = _at.place()
-THROTTLE_MAX: Final = _at.place()  # limit of the total-energy control's throttle; NaN: the parameter's
-ROLL_LIMIT_RAD: Final = _at.place()  # of the lateral guidance; NaN: the parameter's (wing tips at the ground)
-FLAPS: Final = _at.place()  # 0..1; NaN: 0
-BRAKE: Final = _at.place()  # 0..1; NaN: 0
-YAW_STICK: Final = _at.place()  # -1..1, added to the coordinating rudder; NaN: 0
-SETPOINT_SIZE: Final = _at.size
+
+class Setpoint(Record):
+    """The setpoint as kernels take it; its numbers follow each other in the array."""
+
+    level: float
+    course_rad: float  # direction over ground to fly
+    heading_rad: float  # direction through the air (of the nose, without sideslip) to fly
+    lateral_acceleration_m_s2: float  # to the right; feed-forward of a curved path
+    roll_rad: float  # bank angle, past the lateral guidance
+    down_m: float  # height to fly, local NED
+    height_rate_m_s: float  # climb rate, up; alone, or as the slope of the path `DOWN_M` is on
+    airspeed_m_s: float  # equivalent airspeed; NaN: the trim airspeed of the parameters
+    pitch_rad: float  # pitch angle of the body, past the total-energy control
+    throttle: float  # 0..1, past the total-energy control; 0 stops the propeller
+    rates_frd_rad_s: Vector3  # level RATES
+    surfaces: Vector3  # level SURFACES: aileron, elevator, rudder, -1..1
+    steering_heading_rad: float  # held on the ground by wheels and rudder; NaN: off
+    pitch_min_rad: float  # limit of the total-energy control's pitch; NaN: the parameter's
+    pitch_max_rad: float
+    throttle_max: float  # limit of the total-energy control's throttle; NaN: the parameter's
+    roll_limit_rad: float  # of the lateral guidance; NaN: the parameter's (wing tips at the ground)
+    flaps: float  # 0..1; NaN: 0
+    brake: float  # 0..1; NaN: 0
+    yaw_stick: float  # -1..1, added to the coordinating rudder; NaN: 0
+
+
+LEVEL: Final = place(Setpoint, "level")
+COURSE_RAD: Final = place(Setpoint, "course_rad")
+HEADING_RAD: Final = place(Setpoint, "heading_rad")
+LATERAL_ACCELERATION_M_S2: Final = place(Setpoint, "lateral_acceleration_m_s2")
+ROLL_RAD: Final = place(Setpoint, "roll_rad")
+DOWN_M: Final = place(Setpoint, "down_m")
+HEIGHT_RATE_M_S: Final = place(Setpoint, "height_rate_m_s")
+AIRSPEED_M_S: Final = place(Setpoint, "airspeed_m_s")
+PITCH_RAD: Final = place(Setpoint, "pitch_rad")
+THROTTLE: Final = place(Setpoint, "throttle")
+RATES_FRD_RAD_S: Final = vector(Setpoint, "rates_frd_rad_s")
+SURFACES: Final = vector(Setpoint, "surfaces")
+STEERING_HEADING_RAD: Final = place(Setpoint, "steering_heading_rad")
+PITCH_MIN_RAD: Final = place(Setpoint, "pitch_min_rad")
+PITCH_MAX_RAD: Final = place(Setpoint, "pitch_max_rad")
+THROTTLE_MAX: Final = place(Setpoint, "throttle_max")
+ROLL_LIMIT_RAD: Final = place(Setpoint, "roll_limit_rad")
+FLAPS: Final = place(Setpoint, "flaps")
+BRAKE: Final = place(Setpoint, "brake")
+YAW_STICK: Final = place(Setpoint, "yaw_stick")
+SETPOINT_SIZE: Final = size_of(Setpoint)
 
 # values of LEVEL
 OFF: Final = multicopter.OFF  # propeller stopped, surfaces neutral

@@ -1,7 +1,6 @@
 """One physics step of the fixed-wing control laws: guidance at 50 Hz, attitude and rates every step."""
 
 import math
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +19,13 @@ from autopilot_bridge.control.fixed_wing.energy import PITCH_LIMIT_RAD, energy_c
 from autopilot_bridge.control.fixed_wing.lateral import lateral_control
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.control.fixed_wing.setpoint import Setpoint
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, FLAPS, RUDDER, STEERING, THROTTLE
 
 Array = NDArray[np.float64]
-
-_RATES: Final[int] = to.RATES_FRD_RAD_S.start
-_SURFACES: Final[int] = to.SURFACES.start
 
 
 @kernel
@@ -66,7 +63,7 @@ def _clear_guidance(s: FixedWingState) -> None:
 
 
 @kernel
-def _rest(nav: Array, s: FixedWingState, actuators: Array) -> None:
+def _rest(nav: NavigationState, s: FixedWingState, actuators: Array) -> None:
     """Propeller stopped, surfaces neutral, every integrator and filter at its start."""
     for i in range(actuators.shape[0]):
         actuators[i] = 0.0
@@ -88,7 +85,7 @@ def _rest(nav: Array, s: FixedWingState, actuators: Array) -> None:
     s.course_setpoint = math.nan
     for i in range(3):
         s.vel_setpoint[i] = math.nan
-        rate = nav[n.RATES + i]
+        rate = nav.rates_frd_rad_s[i]
         s.rate_previous[i] = rate if math.isfinite(rate) else 0.0
 
 
@@ -118,7 +115,9 @@ def _sum_of_guidance(s: FixedWingState) -> float:
 
 
 @kernel
-def _guide(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, level: float) -> None:
+def _guide(
+    nav: NavigationState, sp: Setpoint, p: FixedWingParameters, s: FixedWingState, level: float
+) -> None:
     """The 50 Hz part: airspeed filter, lateral guidance, energy control."""
     dt = s.dt * s.divisor
     update_air(nav, p, s, dt)
@@ -129,15 +128,15 @@ def _guide(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, lev
         s.course_setpoint = math.nan
         s.height_controlled = 0.0
         s.underspeed = 0.0
-        s.roll_setpoint = nav[n.ROLL]
-        s.pitch_setpoint = nav[n.PITCH]
-        s.throttle = _given(sp[to.THROTTLE], 0.0, 1.0)
+        s.roll_setpoint = nav.euler_rad[0]
+        s.pitch_setpoint = nav.euler_rad[1]
+        s.throttle = _given(sp.throttle, 0.0, 1.0)
         return
     entering = s.flying == 0.0
     if entering:  # from the attitude flown so far, so that the switch isn't felt
         s.flying = 1.0
-        s.roll_setpoint = nav[n.ROLL]
-        s.pitch_setpoint = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav[n.PITCH]))
+        s.roll_setpoint = nav.euler_rad[0]
+        s.pitch_setpoint = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav.euler_rad[1]))
     lateral_control(nav, sp, p, s, dt)
     energy_control(nav, sp, p, s, dt, entering)
     if not math.isfinite(_sum_of_guidance(s)):  # absurd inputs have overflowed: begin again
@@ -146,18 +145,20 @@ def _guide(nav: Array, sp: Array, p: FixedWingParameters, s: FixedWingState, lev
 
 @kernel
 def control_step(
-    nav: Array, sp: Array, parameters: RecordArray, states: RecordArray, actuators: Array
+    navs: RecordArray, setpoints: RecordArray, parameters: RecordArray, states: RecordArray, actuators: Array
 ) -> None:
     """Write the actuators (MAX_ACTUATORS,) from navigation state, setpoint, parameters and state (1,)."""
+    nav: NavigationState = navs[0]
+    sp: Setpoint = setpoints[0]
     p, s = parameters[0], states[0]
-    level = sp[to.LEVEL]
+    level = sp.level
     flown = level == to.FLY or level == to.RATES or level == to.SURFACES_DIRECT
     known = True
     for i in range(4):
-        known = known and math.isfinite(nav[n.Q + i])
+        known = known and math.isfinite(nav.q_ned_from_frd[i])
     for i in range(3):
-        known = known and math.isfinite(nav[n.RATES + i])
-    known = known and math.isfinite(nav[n.ROLL] + nav[n.PITCH] + nav[n.YAW])
+        known = known and math.isfinite(nav.rates_frd_rad_s[i])
+    known = known and math.isfinite(nav.euler_rad[0] + nav.euler_rad[1] + nav.euler_rad[2])
     direct = level == to.SURFACES_DIRECT
     if not flown or not (known or direct):
         _rest(nav, s, actuators)
@@ -170,23 +171,23 @@ def control_step(
     s.last_level = level
 
     surfaces = actuators[0:3]  # in the kernels' order: aileron, elevator, rudder
-    yaw_stick = _given(sp[to.YAW_STICK], -1.0, 1.0)
+    yaw_stick = _given(sp.yaw_stick, -1.0, 1.0)
     steering = yaw_stick
     if direct:
         for i in range(3):
-            surfaces[i] = _given(sp[_SURFACES + i], -1.0, 1.0)
+            surfaces[i] = _given(sp.surfaces[i], -1.0, 1.0)
             s.rate_integral[i] = 0.0
             s.rate_setpoint[i] = 0.0
-        s.throttle = _given(sp[to.THROTTLE], 0.0, 1.0)
+        s.throttle = _given(sp.throttle, 0.0, 1.0)
         steering = surfaces[2]
     else:
         if level == to.RATES:
             for i in range(3):
-                s.rate_setpoint[i] = _given(sp[_RATES + i], -20.0, 20.0)
-            s.throttle = _given(sp[to.THROTTLE], 0.0, 1.0)
+                s.rate_setpoint[i] = _given(sp.rates_frd_rad_s[i], -20.0, 20.0)
+            s.throttle = _given(sp.throttle, 0.0, 1.0)
         else:
             attitude_control(nav, p, s)
-        rolling = math.isfinite(sp[to.STEERING_HEADING_RAD])
+        rolling = math.isfinite(sp.steering_heading_rad)
         if rolling:
             steering = min(1.0, max(-1.0, wheel_control(nav, sp, p, s) + yaw_stick))
             yaw_stick = steering  # the rudder helps the wheels
@@ -201,7 +202,7 @@ def control_step(
     actuators[ELEVATOR] = elevator
     actuators[THROTTLE] = s.throttle
     actuators[RUDDER] = rudder
-    actuators[FLAPS] = _given(sp[to.FLAPS], 0.0, 1.0)
+    actuators[FLAPS] = _given(sp.flaps, 0.0, 1.0)
     actuators[STEERING] = steering
-    actuators[BRAKE] = _given(sp[to.BRAKE], 0.0, 1.0)
-    quaternion_from_euler(s.roll_setpoint, s.pitch_setpoint, nav[n.YAW], s.q_setpoint)
+    actuators[BRAKE] = _given(sp.brake, 0.0, 1.0)
+    quaternion_from_euler(s.roll_setpoint, s.pitch_setpoint, nav.euler_rad[2], s.q_setpoint)

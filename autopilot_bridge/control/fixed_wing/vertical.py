@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.control.fixed_wing.lateral import stall_speed
 from autopilot_bridge.control.fixed_wing.layout import FixedWingState
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
@@ -44,7 +44,7 @@ def _angle_of_attack(airspeed: float, load_factor: float, p: FixedWingParameters
 
 @kernel
 def pitch_for_climb(
-    nav: Array,
+    nav: NavigationState,
     p: FixedWingParameters,
     s: FixedWingState,
     dt: float,
@@ -53,10 +53,10 @@ def pitch_for_climb(
     highest: float,
 ) -> float:
     """Pitch setpoint, rad, that flies a climb rate within limits of the pitch."""
-    airspeed = nav[n.AIRSPEED_M_S] if math.isfinite(nav[n.AIRSPEED_M_S]) else s.eas
+    airspeed = nav.airspeed_m_s if math.isfinite(nav.airspeed_m_s) else s.eas
     airspeed = max(airspeed, stall_speed(p))
     speed = max(s.eas, stall_speed(p)) * s.eas_to_tas
-    actual = -nav[n.VEL + 2] if math.isfinite(nav[n.VEL + 2]) else 0.0
+    actual = -nav.vel_ned_m_s[2] if math.isfinite(nav.vel_ned_m_s[2]) else 0.0
     missing = climb - actual
     share = min(
         _ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN / p.pitch_time_constant_s * missing / GRAVITY_M_S2)
@@ -67,14 +67,14 @@ def pitch_for_climb(
     if s.climb_flown == 0.0:  # from the pitch flown so far
         s.climb_flown = 1.0
         s.liftless_pitch = s.pitch_setpoint - pitch
-    felt = -nav[n.FORCE + 2] / GRAVITY_M_S2
+    felt = -nav.specific_force_frd_m_s2[2] / GRAVITY_M_S2
     if math.isfinite(felt):
-        liftless = nav[n.PITCH] - path - _angle_of_attack(airspeed, felt, p)
+        liftless = nav.euler_rad[1] - path - _angle_of_attack(airspeed, felt, p)
         lag_s = _GUST_LAG * p.pitch_time_constant_s
         s.liftless_pitch += dt / (dt + lag_s) * (liftless - s.liftless_pitch)
     s.liftless_pitch = min(_GUST_MAX_RAD, max(-_GUST_MAX_RAD, s.liftless_pitch))
     wanted = pitch + s.liftless_pitch
-    wanted += _HASTE * (wanted - nav[n.PITCH])
+    wanted += _HASTE * (wanted - nav.euler_rad[1])
     return min(highest, max(lowest, wanted))
 
 

@@ -23,7 +23,8 @@ from autopilot_bridge.control.multicopter.position import (
     update_filters,
     vertical_control,
 )
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.control.multicopter.setpoint import Setpoint
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.kernels import kernel
 
 POSITION_RATE_HZ: Final = 62.5  # of the position loop, at least
@@ -31,17 +32,12 @@ _MIN_COS_TILT: Final = 0.5  # collective isn't raised any more beyond 60 deg of 
 
 
 @kernel
-def _finite4(v: Array, start: int) -> bool:
-    return (
-        math.isfinite(v[start])
-        and math.isfinite(v[start + 1])
-        and math.isfinite(v[start + 2])
-        and math.isfinite(v[start + 3])
-    )
+def _finite4(v: Array) -> bool:
+    return math.isfinite(v[0]) and math.isfinite(v[1]) and math.isfinite(v[2]) and math.isfinite(v[3])
 
 
 @kernel
-def _rest(nav: Array, s: MulticopterState, command: float, actuators: Array) -> None:
+def _rest(nav: NavigationState, s: MulticopterState, command: float, actuators: Array) -> None:
     """Motors at one command, every integrator and filter at its start."""
     for i in range(actuators.shape[0]):
         actuators[i] = command if i < MOTORS else 0.0
@@ -66,9 +62,9 @@ def _rest(nav: Array, s: MulticopterState, command: float, actuators: Array) -> 
     s.yaw_torque = 0.0
     s.counter = s.divisor
     s.q_setpoint[0] = 1.0
-    s.start_down_m = nav[n.POS + 2] if math.isfinite(nav[n.POS + 2]) else 0.0
+    s.start_down_m = nav.pos_ned_m[2] if math.isfinite(nav.pos_ned_m[2]) else 0.0
     for i in range(3):
-        rate = nav[n.RATES + i]
+        rate = nav.rates_frd_rad_s[i]
         s.rate_previous[i] = rate if math.isfinite(rate) else 0.0
     s.thrust_given = 0.0
     s.thrust_lagged = 0.0
@@ -76,39 +72,51 @@ def _rest(nav: Array, s: MulticopterState, command: float, actuators: Array) -> 
 
 @kernel
 def _collective(
-    nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, entering: bool
+    nav: NavigationState,
+    sp: Setpoint,
+    p: MulticopterParameters,
+    s: MulticopterState,
+    dt: float,
+    entering: bool,
 ) -> float:
     """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
-    if math.isfinite(sp[to.THRUST]):
+    if math.isfinite(sp.thrust):
         s.vel_integral[2] = 0.0
         s.bump[2] = 0.0
         s.acc_setpoint[2] = math.nan  # the vertical isn't controlled
-        return min(1.0, max(0.0, sp[to.THRUST]))
+        return min(1.0, max(0.0, sp.thrust))
     # same speed limits and position P as in flight along a trajectory
-    vz = sp[to.VEL + 2]
-    ez = sp[to.POS + 2] - nav[n.POS + 2]
+    vz = sp.vel_ned_m_s[2]
+    ez = sp.pos_ned_m[2] - nav.pos_ned_m[2]
     if math.isfinite(ez):
         vz = (vz if math.isfinite(vz) else 0.0) + p.pos_z_p_1_s * ez
-    elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
+    elif math.isnan(vz) and math.isnan(sp.acc_ned_m_s2[2]):
         vz = 0.0
     s.vel_setpoint[2] = min(p.speed_down_max_m_s, max(-p.speed_up_max_m_s, vz)) if vz == vz else vz
     up = vertical_control(nav, sp, p, s, dt, entering)
-    _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
+    _, _, cos_tilt = body_z_of(nav.q_ned_from_frd)
     return min(p.thrust_max, max(p.thrust_min, up / max(_MIN_COS_TILT, cos_tilt)))
 
 
 @kernel
 def _step(
-    nav: Array, sp: Array, parameters: RecordArray, states: RecordArray, scratch: Array, actuators: Array
+    navs: RecordArray,
+    setpoints: RecordArray,
+    parameters: RecordArray,
+    states: RecordArray,
+    scratch: Array,
+    actuators: Array,
 ) -> None:
+    nav: NavigationState = navs[0]
+    sp: Setpoint = setpoints[0]
     p, s = parameters[0], states[0]
-    level = sp[to.LEVEL]
+    level = sp.level
     dt = s.dt
     if not level >= to.IDLE:  # OFF, and NaN
         _rest(nav, s, 0.0, actuators)
         return
-    rates = nav[n.RATES_FRD_RAD_S]
-    attitude_known = _finite4(nav, n.Q) and math.isfinite(rates[0] + rates[1] + rates[2])
+    rates = nav.rates_frd_rad_s
+    attitude_known = _finite4(nav.q_ned_from_frd) and math.isfinite(rates[0] + rates[1] + rates[2])
     if level < to.RATES or not attitude_known:
         _rest(nav, s, p.motor_idle, actuators)
         return
@@ -128,31 +136,31 @@ def _step(
             s.vel_integral[1] = 0.0
             entering = math.isnan(s.acc_setpoint[2]) or s.last_level == 0.0
             s.thrust_setpoint = _collective(nav, sp, p, s, dt_outer, entering)
-            s.yaw_rate_ff = sp[to.YAW_RATE_RAD_S] if math.isfinite(sp[to.YAW_RATE_RAD_S]) else 0.0
+            s.yaw_rate_ff = sp.yaw_rate_rad_s if math.isfinite(sp.yaw_rate_rad_s) else 0.0
     s.last_level = level
 
     rate_sp = s.rate_setpoint
     if level == to.RATES:
         for i in range(3):
-            rate_sp[i] = sp[to.BODY_RATES + i] if math.isfinite(sp[to.BODY_RATES + i]) else 0.0
+            rate_sp[i] = sp.rates_frd_rad_s[i] if math.isfinite(sp.rates_frd_rad_s[i]) else 0.0
     else:
         q_sp = s.q_setpoint
         if level == to.ATTITUDE:
             norm = 0.0
             for i in range(4):
-                norm += sp[to.Q + i] * sp[to.Q + i]
+                norm += sp.q_ned_from_frd[i] * sp.q_ned_from_frd[i]
             if norm > 0.1 and math.isfinite(norm):
                 scale = 1.0 / math.sqrt(norm)
                 for i in range(4):
-                    q_sp[i] = sp[to.Q + i] * scale
+                    q_sp[i] = sp.q_ned_from_frd[i] * scale
             else:  # no attitude to fly: level, nose as it is
-                q_sp[0], q_sp[1], q_sp[2] = math.cos(0.5 * nav[n.YAW]), 0.0, 0.0
-                q_sp[3] = math.sin(0.5 * nav[n.YAW])
-        attitude_control(nav[n.Q_NED_FROM_FRD], q_sp, s.yaw_rate_ff, p, rate_sp, scratch)
+                q_sp[0], q_sp[1], q_sp[2] = math.cos(0.5 * nav.euler_rad[2]), 0.0, 0.0
+                q_sp[3] = math.sin(0.5 * nav.euler_rad[2])
+        attitude_control(nav.q_ned_from_frd, q_sp, s.yaw_rate_ff, p, rate_sp, scratch)
         if level == to.ATTITUDE:
             for i in range(3):
-                if math.isfinite(sp[to.BODY_RATES + i]):
-                    rate_sp[i] += sp[to.BODY_RATES + i]
+                if math.isfinite(sp.rates_frd_rad_s[i]):
+                    rate_sp[i] += sp.rates_frd_rad_s[i]
     limit_rates(rate_sp, p)
 
     thrust = s.thrust_setpoint

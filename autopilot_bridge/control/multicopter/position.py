@@ -16,11 +16,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control.multicopter import setpoint as to
 from autopilot_bridge.control.multicopter.attitude import body_z_of, quaternion_from_thrust_axis
 from autopilot_bridge.control.multicopter.layout import MulticopterState
 from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
-from autopilot_bridge.navigation import layout as n
+from autopilot_bridge.control.multicopter.setpoint import Setpoint
+from autopilot_bridge.navigation.layout import NavigationState
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import body_axis
@@ -47,7 +47,9 @@ def lowpass_gain(dt: float, cutoff_hz: float) -> float:
 
 
 @kernel
-def estimate_hover_thrust(nav: Array, p: MulticopterParameters, s: MulticopterState, dt: float) -> None:
+def estimate_hover_thrust(
+    nav: NavigationState, p: MulticopterParameters, s: MulticopterState, dt: float
+) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
@@ -55,7 +57,7 @@ def estimate_hover_thrust(nav: Array, p: MulticopterParameters, s: MulticopterSt
     and the landing would not be detected.
     """
     s.thrust_lagged += (s.thrust_given - s.thrust_lagged) * min(1.0, dt / max(dt, p.rotor_time_constant_s))
-    measured = -nav[n.FORCE + 2]
+    measured = -nav.specific_force_frd_m_s2[2]
     if not p.use_hover_thrust_estimate or s.airborne == 0.0 or s.ground_contact != 0.0:
         return
     if not math.isfinite(measured):
@@ -81,30 +83,30 @@ def estimate_hover_thrust(nav: Array, p: MulticopterParameters, s: MulticopterSt
 
 
 @kernel
-def update_airborne(nav: Array, s: MulticopterState) -> None:
+def update_airborne(nav: NavigationState, s: MulticopterState) -> None:
     """Latch AIRBORNE once the vehicle has moved vertically under power; OFF and IDLE clear it."""
     if s.airborne == 0.0 and (
-        abs(nav[n.VEL + 2]) > _AIRBORNE_SPEED_M_S or s.start_down_m - nav[n.POS + 2] > _AIRBORNE_CLIMB_M
+        abs(nav.vel_ned_m_s[2]) > _AIRBORNE_SPEED_M_S or s.start_down_m - nav.pos_ned_m[2] > _AIRBORNE_CLIMB_M
     ):
         s.airborne = 1.0
 
 
 @kernel
-def update_filters(nav: Array, p: MulticopterParameters, s: MulticopterState, dt: float) -> None:
+def update_filters(nav: NavigationState, p: MulticopterParameters, s: MulticopterState, dt: float) -> None:
     """Low-passed acceleration (the velocity derivative) and measured drag."""
     alpha = lowpass_gain(dt, p.vel_derivative_cutoff_hz)
     for i in range(3):
-        acc = nav[n.ACC + i]
+        acc = nav.acc_ned_m_s2[i]
         if math.isfinite(acc):
             s.acc_filtered[i] += alpha * (acc - s.acc_filtered[i])
     if p.drag_compensation_cutoff_hz <= 0.0 or s.airborne == 0.0:
         s.drag[0] = 0.0
         s.drag[1] = 0.0
         return
-    w, x, y, z = nav[n.Q], nav[n.Q + 1], nav[n.Q + 2], nav[n.Q + 3]
+    w, x, y, z = nav.q_ned_from_frd[0], nav.q_ned_from_frd[1], nav.q_ned_from_frd[2], nav.q_ned_from_frd[3]
     x_north, x_east, _ = body_axis(w, x, y, z, 0)
     y_north, y_east, _ = body_axis(w, x, y, z, 1)
-    fx, fy = nav[n.FORCE], nav[n.FORCE + 1]
+    fx, fy = nav.specific_force_frd_m_s2[0], nav.specific_force_frd_m_s2[1]
     north, east = x_north * fx + y_north * fy, x_east * fx + y_east * fy
     if s.ground_contact != 0.0:
         # a sideways force of the ground is no drag: tilting against it would overturn the vehicle
@@ -121,20 +123,22 @@ def update_filters(nav: Array, p: MulticopterParameters, s: MulticopterState, dt
 
 
 @kernel
-def _velocity_setpoint(nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState) -> None:
+def _velocity_setpoint(
+    nav: NavigationState, sp: Setpoint, p: MulticopterParameters, s: MulticopterState
+) -> None:
     """VEL_SETPOINT from position P and feed-forward, limited; NaN where the velocity isn't controlled."""
     px, py = 0.0, 0.0  # share of the position loop, which keeps its right of way under the speed limit
-    vx, vy = sp[to.VEL], sp[to.VEL + 1]
-    ex, ey = sp[to.POS] - nav[n.POS], sp[to.POS + 1] - nav[n.POS + 1]
+    vx, vy = sp.vel_ned_m_s[0], sp.vel_ned_m_s[1]
+    ex, ey = sp.pos_ned_m[0] - nav.pos_ned_m[0], sp.pos_ned_m[1] - nav.pos_ned_m[1]
     if math.isfinite(ex):
         px = p.pos_xy_p_1_s * ex
         vx = vx if math.isfinite(vx) else 0.0
-    elif math.isnan(vx) and math.isnan(sp[to.ACC]):
+    elif math.isnan(vx) and math.isnan(sp.acc_ned_m_s2[0]):
         vx = 0.0  # not commanded: stand still
     if math.isfinite(ey):
         py = p.pos_xy_p_1_s * ey
         vy = vy if math.isfinite(vy) else 0.0
-    elif math.isnan(vy) and math.isnan(sp[to.ACC + 1]):
+    elif math.isnan(vy) and math.isnan(sp.acc_ned_m_s2[1]):
         vy = 0.0
     limit = p.speed_xy_max_m_s
     size = math.sqrt(px * px + py * py)
@@ -155,11 +159,11 @@ def _velocity_setpoint(nav: Array, sp: Array, p: MulticopterParameters, s: Multi
     s.vel_setpoint[0] = px + fx if math.isfinite(vx) else math.nan
     s.vel_setpoint[1] = py + fy if math.isfinite(vy) else math.nan
 
-    vz = sp[to.VEL + 2]
-    ez = sp[to.POS + 2] - nav[n.POS + 2]
+    vz = sp.vel_ned_m_s[2]
+    ez = sp.pos_ned_m[2] - nav.pos_ned_m[2]
     if math.isfinite(ez):
         vz = (vz if math.isfinite(vz) else 0.0) + p.pos_z_p_1_s * ez
-    elif math.isnan(vz) and math.isnan(sp[to.ACC + 2]):
+    elif math.isnan(vz) and math.isnan(sp.acc_ned_m_s2[2]):
         vz = 0.0
     if math.isfinite(vz):
         vz = min(p.speed_down_max_m_s, max(-p.speed_up_max_m_s, vz))
@@ -173,11 +177,11 @@ def _finite_or_zero(value: float) -> float:
 
 @kernel
 def _acceleration_axis(
-    axis: int, nav: Array, sp: Array, kp: float, kd: float, s: MulticopterState
+    axis: int, nav: NavigationState, sp: Setpoint, kp: float, kd: float, s: MulticopterState
 ) -> tuple[float, float, bool]:
     """(acceleration, velocity error, controlled) of one NED axis."""
-    acc = _finite_or_zero(sp[to.ACC + axis])
-    error = s.vel_setpoint[axis] - nav[n.VEL + axis]
+    acc = _finite_or_zero(sp.acc_ned_m_s2[axis])
+    error = s.vel_setpoint[axis] - nav.vel_ned_m_s[axis]
     if not math.isfinite(error):
         s.vel_integral[axis] = 0.0
         return acc, 0.0, False
@@ -186,14 +190,19 @@ def _acceleration_axis(
 
 @kernel
 def vertical_control(
-    nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, entering: bool
+    nav: NavigationState,
+    sp: Setpoint,
+    p: MulticopterParameters,
+    s: MulticopterState,
+    dt: float,
+    entering: bool,
 ) -> float:
     """Vertical thrust (positive up, normalised, before tilt) from the vertical part of the setpoint."""
     acc, error, controlled = _acceleration_axis(2, nav, sp, p.vel_z_p_1_s, p.vel_z_d, s)
     hover = s.hover
     if entering and s.airborne != 0.0:
         # start from the thrust flown so far, so that the switch isn't felt
-        _, _, cos_tilt = body_z_of(nav[n.Q_NED_FROM_FRD])
+        _, _, cos_tilt = body_z_of(nav.q_ned_from_frd)
         present = GRAVITY_M_S2 * (1.0 - s.thrust_given * max(0.3, cos_tilt) / hover)
         s.bump[2] = min(5.0, max(-5.0, present - acc))
     acc += s.bump[2]
@@ -213,7 +222,12 @@ def vertical_control(
 
 @kernel
 def trajectory_control(
-    nav: Array, sp: Array, p: MulticopterParameters, s: MulticopterState, dt: float, entering: bool
+    nav: NavigationState,
+    sp: Setpoint,
+    p: MulticopterParameters,
+    s: MulticopterState,
+    dt: float,
+    entering: bool,
 ) -> None:
     """One step of the position loop: writes Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF."""
     _velocity_setpoint(nav, sp, p, s)
@@ -222,7 +236,7 @@ def trajectory_control(
     hover = s.hover
     thrust_max = p.thrust_max
     if entering and s.airborne != 0.0:
-        zx, zy, _ = body_z_of(nav[n.Q_NED_FROM_FRD])
+        zx, zy, _ = body_z_of(nav.q_ned_from_frd)
         pull = GRAVITY_M_S2 * s.thrust_given / hover
         s.bump[0] = -zx * pull + s.drag[0] - ax
         s.bump[1] = -zy * pull + s.drag[1] - ay
@@ -283,8 +297,8 @@ def trajectory_control(
     if thrust > 1e-6:
         zx, zy, zz = -tx / thrust, -ty / thrust, up / thrust
     s.thrust_setpoint = max(thrust, p.thrust_min)
-    yaw = sp[to.YAW_RAD]
+    yaw = sp.yaw_rad
     if not math.isfinite(yaw):
-        yaw = nav[n.YAW]
-    s.yaw_rate_ff = _finite_or_zero(sp[to.YAW_RATE_RAD_S])
+        yaw = nav.euler_rad[2]
+    s.yaw_rate_ff = _finite_or_zero(sp.yaw_rate_rad_s)
     quaternion_from_thrust_axis(zx, zy, zz, yaw, s.q_setpoint)

@@ -7,22 +7,36 @@ velocity feeds acceleration, and given velocity and acceleration add as feed-for
 
 from typing import Final
 
-from flightsim.foundation.layouts import Slots
+from flightsim.foundation.records import Record, Vector3, Vector4, place, size_of, vector
 
-_at = Slots()
-LEVEL: Final = _at.place()
-POS_NED_M: Final = _at.vector(3)
-VEL_NED_M_S: Final = _at.vector(3)
-ACC_NED_M_S2: Final = _at.vector(3)
-YAW_RAD: Final = _at.place()  # NaN: hold by yaw rate only
-YAW_RATE_RAD_S: Final = _at.place()
-Q_NED_FROM_FRD: Final = _at.vector(4)  # level ATTITUDE
-RATES_FRD_RAD_S: Final = _at.vector(3)  # level RATES; feed-forward at level ATTITUDE (NaN: none)
-# collective, 0..1 (levels ATTITUDE and RATES); NaN: the vertical part of the trajectory
-THRUST: Final = _at.place()
-SETPOINT_SIZE: Final = _at.size
 
-# First places of the vectors, for kernels and single components
+class Setpoint(Record):
+    """The setpoint as kernels take it; its numbers follow each other in the array."""
+
+    level: float
+    pos_ned_m: Vector3
+    vel_ned_m_s: Vector3
+    acc_ned_m_s2: Vector3
+    yaw_rad: float  # NaN: hold by yaw rate only
+    yaw_rate_rad_s: float
+    q_ned_from_frd: Vector4  # level ATTITUDE
+    rates_frd_rad_s: Vector3  # level RATES; feed-forward at level ATTITUDE (NaN: none)
+    # collective, 0..1 (levels ATTITUDE and RATES); NaN: the vertical part of the trajectory
+    thrust: float
+
+
+LEVEL: Final = place(Setpoint, "level")
+POS_NED_M: Final = vector(Setpoint, "pos_ned_m")
+VEL_NED_M_S: Final = vector(Setpoint, "vel_ned_m_s")
+ACC_NED_M_S2: Final = vector(Setpoint, "acc_ned_m_s2")
+YAW_RAD: Final = place(Setpoint, "yaw_rad")
+YAW_RATE_RAD_S: Final = place(Setpoint, "yaw_rate_rad_s")
+Q_NED_FROM_FRD: Final = vector(Setpoint, "q_ned_from_frd")
+RATES_FRD_RAD_S: Final = vector(Setpoint, "rates_frd_rad_s")
+THRUST: Final = place(Setpoint, "thrust")
+SETPOINT_SIZE: Final = size_of(Setpoint)
+
+# First places of the vectors, for single components
 POS: Final[int] = POS_NED_M.start
 VEL: Final[int] = VEL_NED_M_S.start
 ACC: Final[int] = ACC_NED_M_S2.start

@@ -7,18 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot_bridge.control.fixed_wing import FixedWingParameters
+from autopilot_bridge.control.fixed_wing import FixedWingParameters, lateral
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.control.fixed_wing.lateral import (
     airspeed_for_ground_speed,
-    bank_limit,
     heading_for_course,
     stall_speed,
 )
 from flightsim.foundation import records
 from flightsim.foundation.records import new_record, the_record
+from tests.control.on_arrays import on_arrays
 
+(bank_limit,) = on_arrays(sp.Setpoint, lateral.bank_limit)
 angles = st.floats(-math.pi, math.pi)
 winds = st.floats(-40.0, 40.0)
 

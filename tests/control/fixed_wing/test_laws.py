@@ -8,27 +8,25 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
 
-from autopilot_bridge.control.fixed_wing import FixedWingParameters
+from autopilot_bridge.control.fixed_wing import FixedWingParameters, air, attitude, energy, lateral
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing import setpoint as sp
-from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow, update_air
-from autopilot_bridge.control.fixed_wing.attitude import (
-    attitude_control,
-    ease_on_runway,
-    limit_surfaces,
-    rate_control,
-    wheel_control,
-)
-from autopilot_bridge.control.fixed_wing.energy import energy_control
-from autopilot_bridge.control.fixed_wing.lateral import heading_for_course, lateral_control
+from autopilot_bridge.control.fixed_wing.attitude import ease_on_runway, limit_surfaces
+from autopilot_bridge.control.fixed_wing.lateral import heading_for_course
 from autopilot_bridge.control.fixed_wing.vertical import follow_height, reset_height
 from autopilot_bridge.navigation import layout as n
 from flightsim.foundation.atmosphere import GRAVITY_M_S2 as G
 from flightsim.foundation.records import new_record
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.control.fixed_wing.test_lateral import packed
+from tests.control.on_arrays import on_arrays
 
 Array = NDArray[np.float64]
+acceleration_along_flow, update_air = on_arrays(sp.Setpoint, air.acceleration_along_flow, air.update_air)
+attitude_control, rate_control, wheel_control = on_arrays(
+    sp.Setpoint, attitude.attitude_control, attitude.rate_control, attitude.wheel_control
+)
+energy_control, lateral_control = on_arrays(sp.Setpoint, energy.energy_control, lateral.lateral_control)
 PHYSICS_S = 0.004
 GUIDANCE_S = 0.02
 AIRSPEED = 15.0

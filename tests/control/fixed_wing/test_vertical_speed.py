@@ -12,7 +12,7 @@ from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.vertical import pitch_for_climb
 from autopilot_bridge.navigation import layout as n
 from flightsim.environment import CosineGust, Environment
-from flightsim.foundation.records import new_record
+from flightsim.foundation.records import new_record, the_record, viewed
 from tests.control.fixed_wing.aerosonde import AEROSONDE
 from tests.control.fixed_wing.rig import Rig
 from tests.control.fixed_wing.test_lateral import packed
@@ -33,6 +33,7 @@ class Law:
         self, *, airspeed_m_s: float = 25.0, climb_m_s: float = 0.0, pitch_rad: float, bank_rad: float = 0.0
     ) -> None:
         self.nav, self.p, self.s = np.zeros(n.NAV_SIZE), packed(PARAMETERS), new_record(c.FixedWingState)
+        self.motion = the_record(viewed(self.nav, n.NavigationState), n.NavigationState)
         self.nav[n.AIRSPEED_M_S] = self.s.eas = airspeed_m_s
         self.nav[DOWN] = -climb_m_s
         self.nav[PITCH] = pitch_rad
@@ -52,7 +53,7 @@ class Law:
         self.nav[FORCE_DOWN] = -load_factor * G_M_S2
 
     def pitch(self, climb_m_s: float, lowest: float = LOWEST, highest: float = HIGHEST) -> float:
-        return float(pitch_for_climb(self.nav, self.p, self.s, DT_S, climb_m_s, lowest, highest))
+        return float(pitch_for_climb(self.motion, self.p, self.s, DT_S, climb_m_s, lowest, highest))
 
 
 def level_pitch(airspeed_m_s: float, load_factor: float = 1.0) -> float:
@@ -95,13 +96,13 @@ def test_more_climb_is_never_less_pitch(first: float, second: float) -> None:
 
 def test_acceleration_is_limited_and_so_is_the_angle_of_attack() -> None:
     law = Law(pitch_rad=level_pitch(25.0))
-    pitch = float(pitch_for_climb(law.nav, law.p, law.s, 0.0, 20.0, -3.0, 3.0))
+    pitch = float(pitch_for_climb(law.motion, law.p, law.s, 0.0, 20.0, -3.0, 3.0))
     # the error of the pitch counts twice
     assert pitch - level_pitch(25.0) == pytest.approx(2.0 * 0.8 * PARAMETERS.lift_angle_rad)
     stalling = Law(airspeed_m_s=10.0, pitch_rad=0.0)  # below the stall speed: no more than the wing carries
     most = (PARAMETERS.airspeed_trim_m_s / PARAMETERS.airspeed_stall_m_s) ** 2
     highest = PARAMETERS.trim_pitch_rad + PARAMETERS.lift_angle_rad * (most - 1.0)
-    pitch = float(pitch_for_climb(stalling.nav, stalling.p, stalling.s, 0.0, 0.0, -3.0, 3.0))
+    pitch = float(pitch_for_climb(stalling.motion, stalling.p, stalling.s, 0.0, 0.0, -3.0, 3.0))
     assert pitch <= 2.0 * highest + 1e-9
 
 
