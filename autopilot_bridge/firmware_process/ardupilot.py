@@ -24,11 +24,13 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.firmware_process.airframes import airframe_parameters, ardupilot_outputs
+from autopilot_bridge.firmware_process.ardupilot_faults import ParameterChange, parameter_changes
 from autopilot_bridge.firmware_process.errors import FirmwareError
 from autopilot_bridge.firmware_process.process import FirmwareProcess
 from autopilot_bridge.firmware_process.relay import LOOPBACK, FirmwareLinks, FirmwarePort
 from autopilot_bridge.firmware_process.working_folder import WorkingFolder
-from autopilot_bridge.mavlink import Frame, decode_as, dialect
+from autopilot_bridge.mavlink import Frame, FrameEncoder, decode_as, dialect
+from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, SIMULATOR_COMPONENT
 from autopilot_bridge.sitl.backend import BackendSetup
 from flightsim import interface as i
 from flightsim import truth as t
@@ -86,6 +88,9 @@ class ArduPilotBackend:
         self._kind = setup.airframe.kind
         self._home = setup.world.place
         self._actuators = np.zeros(i.MAX_ACTUATORS)
+        self._encoder = FrameEncoder(setup.vehicle.system_id, SIMULATOR_COMPONENT)
+        self._boot_us = unix_us - setup.world.unix_epoch_us  # in the time of the world
+        self._changes = deque(parameter_changes(setup.world.faults, setup.vehicle.system_id))
         self._peer: tuple[str, int] | None = None
         self._folder = folder
         self._parts = _COPTER_PARTS if self._kind is AirframeKind.MULTICOPTER else 1
@@ -144,6 +149,8 @@ class ArduPilotBackend:
 
     def begin_step(self, time_us: int) -> None:
         """Send the motion of a step, and with it its time, or that of its first part."""
+        while self._changes and time_us >= self._changes[0].time_us - self._boot_us:
+            self._set(self._changes.popleft())
         motion = self._motion()
         part_us = (time_us - self._stepped_us) // self._parts
         times_us = [time_us - part_us * (self._parts - part) for part in range(1, self._parts + 1)]
@@ -166,6 +173,17 @@ class ArduPilotBackend:
         self._physics.close()
         self._links.close()
         self._folder.keep("logs/*.BIN")
+
+    def _set(self, change: ParameterChange) -> None:
+        """Set a parameter of its simulator."""
+        message = dialect.MAVLink_param_set_message(
+            target_system=self._encoder.system_id,
+            target_component=AUTOPILOT_COMPONENT,
+            param_id=change.name.encode(),
+            param_value=change.value,
+            param_type=dialect.MAV_PARAM_TYPE_REAL32,
+        )
+        self._links.send(self._encoder.encode(message))
 
     def _await_servos(self, time_us: int) -> None:
         if not self._servos(_ANSWER_LIMIT_S):

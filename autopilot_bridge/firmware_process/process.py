@@ -18,7 +18,7 @@ from autopilot_bridge.mavlink.plain_text import plain_text
 CONSOLE_NAME: Final = "console.txt"
 """What a firmware prints, in its working folder."""
 
-_ENDING_S: Final = 5.0  # after the request to end
+_ENDING_S: Final = 5.0  # after the request to end, or after it has closed its links
 _LOOK_S: Final = 0.25  # between looks whether it runs
 _LAST_LINES: Final = 3
 _TAIL_BYTES: Final = 4096
@@ -87,7 +87,7 @@ class FirmwareProcess:
             FirmwareError: always.
         """
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_LOOK_S)
+            self._process.wait(_ENDING_S)
         self.require_running()
         raise FirmwareError(f"{self.name} has closed {what}{self.last_words()}")
 

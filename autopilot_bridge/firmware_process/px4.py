@@ -28,6 +28,7 @@ from autopilot_bridge.firmware_process.px4_files import AIRFRAME_NUMBER, write_s
 from autopilot_bridge.firmware_process.relay import LOOPBACK, FirmwareLinks, ports_to
 from autopilot_bridge.firmware_process.working_folder import WorkingFolder
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, decode_as, dialect, wire_units
+from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.sitl.backend import BackendSetup
 from flightsim import interface as i
 from flightsim.airframe import AirframeKind
@@ -80,7 +81,7 @@ class Px4Backend:
         self._answered_us = -1  # newest time that PX4 has answered
         self._boot_until_s = wall_time_s() + _BOOT_LIMIT_S
         self._actuators = np.zeros(i.MAX_ACTUATORS)
-        self._encoder = FrameEncoder(setup.vehicle.system_id, dialect.MAV_COMP_ID_USER1)
+        self._encoder = FrameEncoder(setup.vehicle.system_id, SIMULATOR_COMPONENT)
         self._parser = FrameParser()
         instance, listener = _free_instance()
         ports = dict(zip(_ROLES, ports_to(len(_ROLES)), strict=True))

@@ -113,6 +113,10 @@ class FirmwareLinks:
             if each is channel:
                 self._ports[index].send(frame.raw)
 
+    def send(self, raw: bytes) -> None:
+        """Send a frame of the simulator to the firmware."""
+        self._ports[0].send(raw)
+
     def exchange(self) -> None:
         """Send what the firmware has sent on the channels."""
         for index, port in enumerate(self._ports):
