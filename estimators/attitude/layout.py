@@ -77,6 +77,10 @@ REST_SUM: Final = _at.place()
 """Total time at rest that is used for the bias, s."""
 MEAN_RATE: Final = _at.place(3)
 """Slow mean of the measured rate, rad/s."""
+MEAN_FORCE: Final = _at.place(3)
+"""Low pass of the specific force in a frame that does not turn, given in FRD, m/s^2; NaN: none."""
+SLOW_FORCE: Final = _at.place(3)
+"""Slow mean of the specific force, m/s^2, FRD."""
 
 # The newest correction
 REFERENCE: Final = _at.place(3)
@@ -98,6 +102,6 @@ STATE_SIZE: Final = _at.size
 
 # Forms of the filter
 STILL: Final = 0
-"""Without a model of motion: the specific force is taken as the direction up."""
+"""Without a model of motion (rovers, boats): the mean specific force is taken as the direction up."""
 WING: Final = 1
 ROTOR: Final = 2

@@ -63,6 +63,18 @@ class AttitudeParameters(Options):
     bias_gain_1_s2: float = option(
         0.003, least=0.0, most=10.0, help="Gain from the accelerometer to the gyro bias (k_I)."
     )
+    still_gain_1_s: float = option(
+        0.5, least=0.0, most=50.0, help="Gain k_p of rovers, boats and others without a model of motion."
+    )
+    still_bias_gain_1_s2: float = option(
+        0.005, least=0.0, most=10.0, help="Gain k_I of vehicles without a model of motion."
+    )
+    rate_mean_s: float = option(
+        0.005,
+        least=0.0,
+        most=1.0,
+        help="Time before a sample over which its rate is the mean, without a model of motion.",
+    )
     rest_gain_1_s: float = option(
         0.5, least=0.0, most=50.0, help="Gain k_p while disarmed; k_I is then a quarter of its square."
     )
@@ -194,6 +206,9 @@ def _index(name: str) -> int:
 
 GAIN: Final = _index("gain_1_s")
 BIAS_GAIN: Final = _index("bias_gain_1_s2")
+STILL_GAIN: Final = _index("still_gain_1_s")
+STILL_BIAS_GAIN: Final = _index("still_bias_gain_1_s2")
+RATE_MEAN: Final = _index("rate_mean_s")
 REST_GAIN: Final = _index("rest_gain_1_s")
 REST_BIAS_TIME: Final = _index("rest_bias_time_s")
 TOLERANCE: Final = _index("reference_tolerance_m_s2")

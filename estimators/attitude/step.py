@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimators.attitude import layout as at
 from estimators.attitude import parameters as par
-from estimators.attitude import rotor, tilt, uncertainty, wing
+from estimators.attitude import rotor, still, tilt, uncertainty, wing
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
@@ -25,6 +25,7 @@ def start(x: Array, p: Array) -> None:
     x[:] = 0.0
     x[at.DOWN + 2] = 1.0
     x[at.RATE] = math.nan
+    still.forget(x)
     x[at.LENGTH] = GRAVITY_M_S2
     x[at.AIRSPEED] = x[at.CLIMB] = x[at.THROTTLE] = x[at.SPEED] = math.nan
     rotor.start(x, p)
@@ -54,14 +55,13 @@ def step(x: Array, p: Array) -> bool:
         _first(x, wx, wy, wz, ax, ay, az)
         return True
     bx, by, bz = x[at.GYRO_BIAS], x[at.GYRO_BIAS + 1], x[at.GYRO_BIAS + 2]
-    # The rate between two samples is taken as the mean of both.
-    tilt.rotate(
-        x,
-        dt,
-        0.5 * (x[at.RATE] + wx) - bx,
-        0.5 * (x[at.RATE + 1] + wy) - by,
-        0.5 * (x[at.RATE + 2] + wz) - bz,
-    )
+    surface = x[at.FORM] == at.STILL and x[at.DISARMED] == 0.0
+    # The rate between two samples is taken as the mean of both; see `still.share_before`.
+    before = still.share_before(p, dt) if surface else 0.5
+    turn_x = before * x[at.RATE] + (1.0 - before) * wx - bx
+    turn_y = before * x[at.RATE + 1] + (1.0 - before) * wy - by
+    turn_z = before * x[at.RATE + 2] + (1.0 - before) * wz - bz
+    tilt.rotate(x, at.DOWN, dt, turn_x, turn_y, turn_z)
     x[at.RATE], x[at.RATE + 1], x[at.RATE + 2] = wx, wy, wz
     k_p, k_i, tolerance = p[par.GAIN], p[par.BIAS_GAIN], p[par.TOLERANCE]
     if x[at.DISARMED] != 0.0:
@@ -76,8 +76,15 @@ def step(x: Array, p: Array) -> bool:
     elif x[at.FORM] == at.ROTOR:
         tolerance = math.inf  # the length of its reference is g by construction, and contains no information
         rotor.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
+    elif surface:
+        k_p, k_i = p[par.STILL_GAIN], p[par.STILL_BIAS_GAIN]
+        tolerance = math.inf
+        still.reference(x, p, dt, turn_x, turn_y, turn_z, ax, ay, az)
+        still.pause(x, p, dt, wx, wy, wz, ax, ay, az)
     else:
         _still(x, ax, ay, az)
+    if not surface:
+        still.forget(x)
     gain = tilt.correct(x, dt, k_p, k_i, tolerance)
     error = _error(x, p, ax, ay, az)
     learn = k_i * x[at.WEIGHT] * dt
@@ -99,7 +106,7 @@ def _first(x: Array, wx: float, wy: float, wz: float, ax: float, ay: float, az: 
 
 @kernel
 def _still(x: Array, ax: float, ay: float, az: float) -> None:
-    """No motion, or no known motion: the specific force is taken as the direction up."""
+    """On the ground, or in the air without an airspeed: the specific force is taken as the direction up."""
     x[at.SPEED] = math.nan
     x[at.VELOCITY] = x[at.VELOCITY + 1] = x[at.VELOCITY + 2] = 0.0
     x[at.REFERENCE], x[at.REFERENCE + 1], x[at.REFERENCE + 2] = -ax, -ay, -az

@@ -29,24 +29,26 @@ _BIAS_MAX_RAD_S = 0.2
 
 
 @kernel
-def rotate(x: Array, dt: float, wx: float, wy: float, wz: float) -> None:
-    """Rotate the direction down by a constant rate over a time, exactly (Rodrigues).
+def rotate(x: Array, place: int, dt: float, wx: float, wy: float, wz: float) -> None:
+    """Keep a vector of the state, given in FRD, in its inertial direction while the body rotates at a
+    constant rate, exactly (Rodrigues).
 
     Args:
         x: state.
+        place: index of the vector.
         dt: s.
         wx, wy, wz: angular rate without bias, rad/s, FRD.
     """
-    dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
+    dx, dy, dz = x[place], x[place + 1], x[place + 2]
     angle = math.sqrt(wx * wx + wy * wy + wz * wz) * dt
     if angle > 1e-9:
         first, second = math.sin(angle) / angle * dt, (1.0 - math.cos(angle)) / (angle * angle) * dt * dt
     else:
         first, second = dt, 0.5 * dt * dt
     cx, cy, cz = wy * dz - wz * dy, wz * dx - wx * dz, wx * dy - wy * dx
-    x[at.DOWN] = dx - first * cx + second * (wy * cz - wz * cy)
-    x[at.DOWN + 1] = dy - first * cy + second * (wz * cx - wx * cz)
-    x[at.DOWN + 2] = dz - first * cz + second * (wx * cy - wy * cx)
+    x[place] = dx - first * cx + second * (wy * cz - wz * cy)
+    x[place + 1] = dy - first * cy + second * (wz * cx - wx * cz)
+    x[place + 2] = dz - first * cz + second * (wx * cy - wy * cx)
 
 
 @kernel

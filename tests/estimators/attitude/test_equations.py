@@ -28,6 +28,7 @@ def filter_state(**values):
     start(x, p)
     x[at.DOWN : at.DOWN + 3] = down_of(0.3, -0.2)
     x[at.AGE] = 1e9
+    x[at.FORM] = at.WING
     return x, p
 
 
@@ -35,7 +36,7 @@ def test_rotation_over_no_angle_and_over_a_small_one():
     for rate in (np.zeros(3), np.array([1e-8, 0.0, 0.0]), np.array([2e-3, -1e-3, 3e-3])):
         x, _ = filter_state()
         before = vector(x, at.DOWN)
-        tilt.rotate(x, DT_S, *rate)
+        tilt.rotate(x, at.DOWN, DT_S, *rate)
         # second order in the angle: d' = d - w dt x d + (w dt x (w dt x d)) / 2
         turn = rate * DT_S
         expected = before - np.cross(turn, before) + 0.5 * np.cross(turn, np.cross(turn, before))
@@ -409,7 +410,7 @@ def test_rate_between_samples_is_their_mean_less_the_bias():
     x[at.GYRO_BIAS : at.GYRO_BIAS + 3] = 0.01, -0.02, 0.03
     other = np.array([-0.4, 0.5, 0.1])
     turned, p = x.copy(), coefficients(AttitudeParameters(gain_1_s=1e-9, bias_gain_1_s2=0.0))
-    tilt.rotate(turned, DT_S, *(0.5 * (RATE + other) - [0.01, -0.02, 0.03]))
+    tilt.rotate(turned, at.DOWN, DT_S, *(0.5 * (RATE + other) - [0.01, -0.02, 0.03]))
     feed(x, p, other, FORCE)
     np.testing.assert_allclose(vector(x, at.DOWN), vector(turned, at.DOWN), atol=1e-9)
     np.testing.assert_array_equal(vector(x, at.RATE), other)
@@ -424,7 +425,7 @@ def test_each_form_has_its_reference_with_rates_less_bias(form, airspeed):
     bias = np.array([0.01, -0.02, 0.03])
     x[at.GYRO_BIAS : at.GYRO_BIAS + 3] = bias
     expected = x.copy()
-    tilt.rotate(expected, DT_S, *(RATE - bias))
+    tilt.rotate(expected, at.DOWN, DT_S, *(RATE - bias))
     (wing if form == at.WING else rotor).reference(expected, p, DT_S, *(RATE - bias), *FORCE)
     feed(x, p, RATE, FORCE)
     np.testing.assert_allclose(vector(x, at.REFERENCE), vector(expected, at.REFERENCE), rtol=1e-12)
@@ -432,7 +433,7 @@ def test_each_form_has_its_reference_with_rates_less_bias(form, airspeed):
 
 
 @pytest.mark.parametrize(
-    ("form", "disarmed"), [(at.STILL, 0.0), (at.WING, 0.0), (at.ROTOR, 1.0), (at.WING, 1.0)]
+    ("form", "disarmed"), [(at.STILL, 1.0), (at.WING, 0.0), (at.ROTOR, 1.0), (at.WING, 1.0)]
 )
 def test_without_a_model_of_motion_the_force_points_up(form, disarmed):
     x, p = filter_state()

@@ -26,7 +26,7 @@ def state(roll, pitch):
 def test_rotation_is_the_exponential_map(roll, pitch, rate, elapsed_s):
     """Authority: scipy's rotation vectors; the body turns by w dt, so what is fixed turns back in it."""
     x = state(roll, pitch)
-    rotate(x, elapsed_s, *rate)
+    rotate(x, at.DOWN, elapsed_s, *rate)
     expected = Rotation.from_rotvec(-np.array(rate) * elapsed_s).apply(down_of(roll, pitch))
     assert x[at.DOWN : at.DOWN + 3] == pytest.approx(expected, abs=1e-12)
 
@@ -37,7 +37,7 @@ def test_a_turn_about_down_changes_nothing(roll, pitch, turn_rate):
     x = state(roll, pitch)
     down = down_of(roll, pitch)
     for _ in range(50):
-        rotate(x, 0.02, *(turn_rate * down))
+        rotate(x, at.DOWN, 0.02, *(turn_rate * down))
     assert x[at.DOWN : at.DOWN + 3] == pytest.approx(down, abs=1e-12)
 
 
@@ -48,7 +48,7 @@ def test_euler_kinematics():
     for k in range(60_000):
         t = (k + 0.5) * elapsed_s
         p, q, r = 0.3 * math.cos(0.7 * t), 0.1 * math.cos(0.5 * t), 0.2
-        rotate(x, elapsed_s, p, q, r)
+        rotate(x, at.DOWN, elapsed_s, p, q, r)
         # Midpoint rule of the kinematic equations.
         half_roll = roll + 0.5 * elapsed_s * (p + math.tan(pitch) * (q * math.sin(roll) + r * math.cos(roll)))
         half_pitch = pitch + 0.5 * elapsed_s * (q * math.cos(roll) - r * math.sin(roll))
@@ -61,7 +61,7 @@ def test_euler_kinematics():
 
 def test_error_dies_away_with_the_gain():
     """Roll error d' = -k_p d for small errors, without bias learning."""
-    found = Filter(at.STILL, roll=0.02, gain_1_s=0.5, bias_gain_1_s2=0.0)
+    found = Filter(at.WING, roll=0.02, gain_1_s=0.5, bias_gain_1_s2=0.0)
     for _ in range(100):
         found.feed((0.0, 0.0, 0.0), (0.0, 0.0, -G))
     assert found.roll == pytest.approx(0.02 * math.exp(-0.5 * 100 * STEP_S), rel=0.01)
