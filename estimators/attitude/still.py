@@ -25,7 +25,8 @@ _MEAN_S = 0.5
 _PAUSE_RAD_S = 0.035
 _PAUSE_M_S2 = 0.5
 _PAUSE_AFTER_S = 1.5
-"""A pause: rate and force stay this close to their means for this long, and the rate is this small (VQF's)."""
+"""A pause: rate and force stay this close to their means for this long, and the rate is this small (as in
+VQF)."""
 _PRIOR_S = 0.5
 """Weight of the bias that was known before the first pause."""
 
@@ -105,8 +106,8 @@ def pause(
 def share_before(p: Array, dt: float) -> float:
     """Weight of the previous rate in the mean rate between two samples, 0..0.5.
 
-    A sample's rate is the mean over a time before it. Where the samples are as frequent as that, it is the mean
-    since the previous one.
+    A sample's rate is the mean over a time before it. Where the samples are as frequent as that, it is the
+    mean since the previous one.
     """
     mean_s = p[par.RATE_MEAN]
     return 0.5 * (1.0 - mean_s / dt) if dt > mean_s else 0.0

@@ -15,7 +15,7 @@ GAIN = 0.5
 
 @pytest.mark.parametrize("ratio", [0.25, 1.0, 4.0])
 def test_acceleration_is_attenuated_as_by_a_butterworth_filter(ratio):
-    """A level vehicle that accelerates to and fro: amplitude of the pitch error over that of the force's tilt."""
+    """A level vehicle that accelerates to and fro: amplitude of its pitch error."""
     found = Filter(at.STILL, still_gain_1_s=GAIN, still_bias_gain_1_s2=0.0)
     angular_frequency, tilt = ratio * GAIN, 0.01
     period = round(2.0 * math.pi / angular_frequency / STEP_S)
@@ -28,7 +28,7 @@ def test_acceleration_is_attenuated_as_by_a_butterworth_filter(ratio):
 
 
 def test_acceleration_of_a_turning_vehicle_averages_in_a_frame_that_does_not_turn():
-    """Constant in the body, as of a boat that circles in 4 s: without the frame, the roll error would be 0.1."""
+    """Constant in the body, as of a boat that circles in 4 s; a mean in the body has a roll error of 0.1."""
     found = Filter(at.STILL)
     for _ in range(round(60.0 / STEP_S)):
         found.feed((0.0, 0.0, 0.5 * math.pi), (0.0, 0.1 * G, -G))
