@@ -79,11 +79,11 @@ def inclination_rad(up: Array, trial: Trial) -> Array:
 def ours(trial: Trial) -> tuple[float, float]:
     """Inclination error, degrees; and its square over the stated variance, for each of the two axes."""
     estimator = AttitudeEstimator()
-    heartbeat = message_class(definition("HEARTBEAT"))
+    heartbeat: Any = message_class(definition("HEARTBEAT"))
     heartbeat_fields = {field.name: 0 for field in definition("HEARTBEAT").wire_fields}
     kind = {"type": dialect.MAV_TYPE_GROUND_ROVER, "base_mode": dialect.MAV_MODE_FLAG_SAFETY_ARMED}
     estimator.handle(0, heartbeat(1, 1, **(heartbeat_fields | kind)))
-    sample = message_class(definition("HIGHRES_IMU"))
+    sample: Any = message_class(definition("HIGHRES_IMU"))
     fields = {field.name: 0 for field in definition("HIGHRES_IMU").wire_fields} | {"fields_updated": 63}
     names = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
     up, variance = np.full((len(trial.force), 3), np.nan), np.full(len(trial.force), np.nan)
