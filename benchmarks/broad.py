@@ -55,8 +55,15 @@ def trials(folder: Path) -> Iterator[Trial]:
     """Read the records one by one."""
     for file in sorted(folder.glob("*.mat")):
         data = scipy.io.loadmat(file, squeeze_me=True)
-        columns = [np.ascontiguousarray(data[name]) for name in ("imu_acc", "imu_gyr", "imu_mag", "opt_quat")]
-        yield Trial(file.stem, *columns, data["movement"].astype(bool), float(data["sampling_rate"]))
+        yield Trial(
+            name=file.stem,
+            force=np.ascontiguousarray(data["imu_acc"]),
+            rate=np.ascontiguousarray(data["imu_gyr"]),
+            field=np.ascontiguousarray(data["imu_mag"]),
+            attitude=data["opt_quat"],
+            moves=data["movement"].astype(bool),
+            rate_hz=float(data["sampling_rate"]),
+        )
 
 
 def up_in_body(attitude: Array) -> Array:
