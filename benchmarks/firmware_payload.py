@@ -47,7 +47,8 @@ from flightsim.home import Home
 from flightsim.payload import Carrier, GroundTargets, Payload, magnetic_field_of
 from flightsim.payload.magnetic_spec import MagneticSpec
 from flightsim.world_spec import WorldSpec
-from missions.cli.fly import flight_of, fly
+from missions.cli.bodies.fly import flight_of
+from missions.cli.fly import fly
 from missions.embedded.sitl import publish
 
 FLIGHTS: Final = 2

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from autopilot_bridge.clock.pacing import wall_time_s
-from missions.cli.sweep import sweep_study
+from missions.cli.bodies.sweep import sweep_study
 from missions.studies import Inline, Pool, RayCluster, Study, grid, run_study
 from missions.studies.engine import Engine, Progress
 from missions.studies.rows import Outcome, TrialResult

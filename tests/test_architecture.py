@@ -48,6 +48,7 @@ FLOORS = (
     ("vehicle", "patterns"),
     ("errors", "gps_off", "how_left", "kind", "process"),
 )
+MOST_LAZY_IMPORTS = 20  # inside functions of `missions`; it goes down only
 # Where the wall clock, sockets and files may be met.
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")
 SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "threading", "subprocess", "time")
@@ -286,6 +287,32 @@ def test_no_modules_import_each_other():
 def test_the_test_sees_circles():
     assert in_circles({"a": {"b"}, "b": {"c", "d"}, "c": {"b"}, "d": set()}) == ["b", "c"]
     assert in_circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
+def lazy_imports(source):
+    """Lines of imports inside functions."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+    return sorted(
+        {
+            node.lineno
+            for function in ast.walk(parsed(source))
+            if isinstance(function, functions)
+            for node in ast.walk(function)
+            if isinstance(node, ast.Import | ast.ImportFrom)
+        }
+    )
+
+
+def test_missions_import_at_the_top_of_their_modules():
+    """A body of a command (`missions.cli.bodies`) is loaded when the command runs, with all that it needs.
+    What remains is a library that most runs do without (matplotlib, scikit-learn, PyAV), or a plug-in.
+    """
+    count = sum(map(len, found_by_module(lambda name: lazy_imports(source_of(name)), ("missions",)).values()))
+    assert count <= MOST_LAZY_IMPORTS
+
+
+def test_the_test_sees_lazy_imports():
+    assert lazy_imports("import a\ndef f():\n    if x:\n        from b import c\n    import d") == [4, 5]
 
 
 def sendings(source):

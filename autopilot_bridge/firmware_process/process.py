@@ -13,7 +13,7 @@ from typing import Final, NoReturn
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.firmware_process import launch
 from autopilot_bridge.firmware_process.errors import FirmwareError
-from autopilot_bridge.mavlink.plain_text import plain_text
+from flightsim.foundation.plain_text import plain_text
 
 CONSOLE_NAME: Final = "console.txt"
 """What a firmware prints, in its working folder."""

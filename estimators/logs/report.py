@@ -6,12 +6,12 @@ from typing import Any, Final
 import numpy as np
 
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.mavlink.plain_text import plain_text
 from autopilot_bridge.mavlink.wire_units import place_columns
 from estimators.logs.log import Log
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
 from estimators.received import GAP_US, received_positions, together
+from flightsim.foundation.plain_text import plain_text
 
 _MAX_INSTANCES: Final = 32
 _POSITIONS: Final = {"GLOBAL_POSITION_INT": ("time_boot_ms", 1000), "HIL_STATE_QUATERNION": ("time_usec", 1)}

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect, enum_name
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.mavlink.plain_text import plain_text
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names
 from estimators.logs.log import Log
 from estimators.logs.table import Table
+from flightsim.foundation.plain_text import plain_text
 
 _HEARTBEAT: Final = "HEARTBEAT"
 _STATUSTEXT: Final = "STATUSTEXT"

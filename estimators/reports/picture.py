@@ -6,17 +6,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from estimators.comparison import Comparison
 from estimators.references import AUTOPILOT, TRUTH, quantity_of
+from estimators.reports.figure import INK, blank_figure, save_figure, tidy
 from flightsim.foundation.vectors import wrap_pi
 
-_INK: Final = "#1f2937"
-_GRID: Final = "#e5e7eb"
 _ESTIMATE: Final = "#c2410c"
 _COLOURS: Final = {AUTOPILOT: "#1769aa", TRUTH: "#111827"}
 _IN_AIR: Final = "#f3f4f6"
@@ -25,17 +22,6 @@ _MOST_ALONE: Final = 9  # largest number of quantities without a reference
 _NOT_DRAWN: Final = ("target",)
 _POINTS: Final = 6000  # more cannot be distinguished in the picture
 _UNITS: Final = {"deg": "deg", "m": "m", "m_s": "m/s"}
-
-
-def tidy(axes: Any) -> None:
-    """Simple axes: thin grid, two spines."""
-    axes.tick_params(colors=_INK, labelsize=8)
-    axes.grid(True, color=_GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color("#9ca3af")
 
 
 def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
@@ -70,15 +56,9 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
     left_out = max(0, len(alone) - _MOST_ALONE)
     alone = alone[:_MOST_ALONE]
     heights = [1.9, 1.0] * len(shown) + [1.1] * (len(alone) + len(together)) or [1.1]
-    figure = Figure(
-        figsize=(10.0, 0.9 + 3.1 * len(shown) + 1.2 * max(1, len(alone) + len(together))),
-        dpi=120,
-        layout="constrained",
-        facecolor="white",
-    )
-    FigureCanvasAgg(figure)
+    figure = blank_figure(10.0, 0.9 + 3.1 * len(shown) + 1.2 * max(1, len(alone) + len(together)))
     more = f"\n{left_out} more columns are in estimates.csv" if left_out else ""
-    figure.suptitle(title + more, fontsize=12, fontweight="bold", color=_INK)
+    figure.suptitle(title + more, fontsize=12, fontweight="bold", color=INK)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     several = len({c.label for c, _ in [*shown, *alone]}) > 1
     below: Any = None
@@ -104,11 +84,10 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
         _draw_together(below, members, column, legend=k == 0)
         tidy(below)
     if below is None:
-        figure.text(0.5, 0.4, "no estimate was made", ha="center", fontsize=11, color=_INK)
+        figure.text(0.5, 0.4, "no estimate was made", ha="center", fontsize=11, color=INK)
     else:
-        below.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+        below.set_xlabel("vehicle time, s", fontsize=9, color=INK)
+    save_figure(figure, path)
 
 
 def _legend(axes: Any, compared: Comparison) -> None:
@@ -153,9 +132,9 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
     estimate = factor * _parted(c.estimates[column], breaks, column)
     above.plot(time_s[thin], estimate[thin], color=_ESTIMATE, linewidth=0.9)
     written = _UNITS.get(unit, unit)
-    above.set_ylabel(_axis_label(label, name, written), fontsize=9, color=_INK)
-    below.set_ylabel(f"error, {written}", fontsize=9, color=_INK)
-    below.axhline(0.0, color=_INK, linewidth=0.6)
+    above.set_ylabel(_axis_label(label, name, written), fontsize=9, color=INK)
+    below.set_ylabel(f"error, {written}", fontsize=9, color=INK)
+    below.axhline(0.0, color=INK, linewidth=0.6)
     _limit(below, c, column, factor)
     labels = [
         f"{reference}: RMS {figure.rms:.3g} {written}, at most {figure.max:.3g} {written}"
@@ -165,7 +144,7 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
     ]
     below.annotate(
         "   ".join(labels), (1.0, 1.0), xycoords="axes fraction", xytext=(-4, -3), textcoords="offset points",
-        ha="right", va="top", fontsize=8, color=_INK,
+        ha="right", va="top", fontsize=8, color=INK,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
     )  # fmt: skip
 
@@ -179,7 +158,7 @@ def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
     values = factor * _parted(c.estimates[column], _breaks(time_s), column)
     axes.plot(time_s[thin], values[thin], color=_ESTIMATE, linewidth=0.9)
     written = _UNITS.get(unit, unit)
-    axes.set_ylabel(_axis_label(label, name, written), fontsize=8, color=_INK)
+    axes.set_ylabel(_axis_label(label, name, written), fontsize=8, color=INK)
 
 
 def _axis_label(label: str, quantity: str, unit: str) -> str:
@@ -195,7 +174,7 @@ def _draw_together(axes: Any, members: Sequence[Comparison], column: str, *, leg
         values = factor * (wrap_pi(c.estimates[column]) if column.endswith("_rad") else c.estimates[column])
         axes.plot(_continuous_s(c), values, ".", markersize=5, label=c.label)
     written = _UNITS.get(unit, unit)
-    axes.set_ylabel(f"{name}{', ' if written else ''}{written}", fontsize=8, color=_INK)
+    axes.set_ylabel(f"{name}{', ' if written else ''}{written}", fontsize=8, color=INK)
     if legend:
         axes.legend(
             loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(6, len(members)), fontsize=8, frameon=False

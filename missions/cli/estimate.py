@@ -1,50 +1,17 @@
 """`flightstack estimate`: an estimator on a live link, in its own process."""
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import click
 
-from autopilot_bridge.errors import AddressError, BridgeError
-from estimators.errors import EstimatorError
 from estimators.names import ESTIMATORS
-from missions.cli.options import FiniteRange, in_options, report
-from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.status_line import StatusLine
-from missions.errors import PlanError
+from missions.cli.later import body_in
+from missions.cli.options import FiniteRange
+from missions.cli.signing import key_option
 
-if TYPE_CHECKING:
-    from missions.estimation.live import LiveProgress
-
-_FAILED, _INTERRUPTED = 1, 130
+_BODIES: Final = "missions.cli.bodies.estimate"
 _SECONDS = FiniteRange(min=0.0, min_open=True, max=1e9)
-
-
-class _LiveProgressLine:
-    """Reports missing inputs when they change and, on a terminal, the progress."""
-
-    def __init__(self) -> None:
-        self._line = StatusLine()
-        self._reported: tuple[str, ...] = ()
-
-    def __call__(self, progress: "LiveProgress") -> None:
-        # rates change all the time and are not compared
-        lacking = tuple(text.split(" at ")[0] for text in progress.lacking)
-        if lacking != self._reported:
-            self._reported = lacking
-            self._line.end()
-            for text in progress.lacking:
-                report(text)
-            if not lacking:
-                report("all that is needed comes now")
-        self._line.show(f"{progress.time_s:9.1f} s  {progress.estimates} estimates")
-
-    def end(self) -> None:
-        """End the progress line."""
-        self._line.end()
-
-
 _HELP: Final = f"""Run an estimator on a live link: {", ".join(ESTIMATORS)}, or a Python file.
 
 It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
@@ -85,45 +52,5 @@ are kept), 2 usage, 130 interrupted before --duration was over.
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/ESTIMATOR-N]")
 @click.option("--no-picture", is_flag=True, help="No picture errors.png.")
 @key_option()
-def estimate(**given: Any) -> int:
-    from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warnings_of
-    from missions.estimation.live import LiveRequest
-    from missions.estimation.live import estimate as run_estimator
-
-    progress = _LiveProgressLine()
-    try:
-        key = key_from(given["signing_key"])
-        result = run_estimator(
-            LiveRequest(
-                estimator=given["name"],
-                connect=given["connect"],
-                settings=given["settings"],
-                duration_s=given["duration"],
-                system_id=given["system_id"],
-                component_id=given["component_id"],
-                publish=given["publish"],
-                request_rates=not given["no_request"],
-                silence_s=given["silence"],
-                against=given["against"],
-                out=given["out"],
-                picture=not given["no_picture"],
-                command=" ".join(["flightstack", *sys.argv[1:]]),
-                signing_key=key,
-                on_open=lambda: warn_if_open((given["connect"],), key),
-            ),
-            progress,
-        )
-    except (AddressError, BridgeError, EstimatorError, PlanError) as error:
-        raise click.UsageError(in_options(error, own=True)) from error
-    finally:
-        progress.end()
-    for line in table_lines([(given["connect"], result.compared)]):
-        click.echo(line)
-    for warning in warnings_of(result.summary):
-        report(warning)
-    if result.outcome == FAILED:
-        report(f"{result.reason}; results in {result.folder} are partial")
-        return _FAILED
-    samples = result.summary["samples"]
-    click.echo(f"{result.outcome}: {samples} estimates; run: {result.folder}")
-    return _INTERRUPTED if result.outcome == INTERRUPTED else 0
+@body_in(_BODIES)
+def estimate() -> None: ...

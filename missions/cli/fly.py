@@ -1,48 +1,32 @@
 """`flightstack fly`: flies a mission with one command."""
 
-import math
-import sys
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import click
 
-from autopilot_bridge.errors import AddressError, BridgeError
 from estimators.names import ESTIMATORS
 from missions.catalogue import NAMES
-from missions.cli.confirm import confirmation
-from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
-from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
+from missions.cli.fly_command import FlyCommand, flight_option
+from missions.cli.later import body_in
 from missions.cli.mission_command import FlightOption, Scope
-from missions.cli.options import SECONDS, SPEEDUP, FiniteRange, in_options, report
-from missions.cli.params import STRICT_HELP, known_to_all
-from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.world import FIRMWARE_HELP, WORLD_HELP, firmware_of, world_of
-from missions.errors import MissionError, PlanError
+from missions.cli.options import FIRMWARE_HELP, SECONDS, SPEEDUP, STRICT_HELP, WORLD_HELP, FiniteRange
+from missions.cli.signing import key_option
 
-if TYPE_CHECKING:
-    from flightsim.world_spec import WorldSpec
-    from missions.base.mission import Mission
-    from missions.base.request import RunRequest
-    from missions.cli.mission_command import MissionCommand
-
+_BODIES: Final = "missions.cli.bodies.fly"
 _link = partial(flight_option, group="Vehicles")
 _embedded = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
 _elsewhere = partial(flight_option, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 _flight = partial(flight_option, group="The flight")
 _estimator = partial(flight_option, group="An estimator beside it")
 _results = partial(flight_option, group="Results")
-
 _HELP: Final = f"""Fly MISSION: {", ".join(NAMES)}, a mission file (.plan, .waypoints), or a Python file of
 your own.
 
 `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
 options)`. The run folder gets flight.tlog, summary.json and track.png.
 """
-_NAMES_SHOWN: Final = 20  # names of parameters that were left out; the summary has all
-_FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
 
 
 @click.command(cls=FlyCommand, help=_HELP, context_settings={"show_default": True})
@@ -155,155 +139,5 @@ _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile
 )
 @_results("--no-picture", is_flag=True, help="No picture track.png.")
 @key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
-def fly(**given: Any) -> int:
-    from missions.process.ending import signal_of
-
-    try:
-        return _fly(given)
-    except PlanError as error:
-        raise click.UsageError(in_options(error, own=True)) from error
-    except KeyboardInterrupt as interrupt:
-        click.echo("interrupted", err=True)
-        return KILLED + signal_of(interrupt)
-
-
-def _world(given: dict[str, Any], mission: "Mission[Any]", chosen: frozenset[str]) -> "WorldSpec | None":
-    """The embedded world without what the mission adds to it; None: the vehicles are connected by links."""
-    if given["connect"]:
-        return None
-    try:
-        return world_of(given, chosen, count=given["vehicles"], defaults=mission.world_defaults)
-    except ValueError as error:
-        raise click.UsageError(in_options(error)) from error
-
-
-def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
-    """Write the mission's file instead of flying it."""
-    from missions.runs.plan_export import export_plan
-
-    count = export_plan(mission, request, path)
-    click.echo(f"{count} items: {path}")
-    return 0
-
-
-def flight_of(context: click.Context) -> "tuple[Mission[Any], RunRequest]":
-    """The mission and the request that the options of a parsed command line `fly` make.
-
-    Raises:
-        click.UsageError, PlanError: a value is not accepted.
-    """
-    from missions.base.given_text import parameters_from_file
-    from missions.library import find_mission
-
-    given = context.params
-    refuse_idle_options(context, connected=bool(given["connect"]))
-    mission = find_mission(given["mission"])
-    declared: MissionCommand = context.meta["mission command"]
-    chosen = chosen_names(context)
-    world = _world(given, mission, chosen)
-    count = len(given["connect"]) if world is None else len(world.vehicles)
-    options = declared.build(given, chosen, vehicles=given["vehicles"] or count)
-    if world is not None:
-        world = declared.with_world(given, chosen, options, world)
-    for name in ("expect_wind", "max_error"):
-        value = given[name]
-        zero = name == "expect_wind" and value == 0.0
-        if value is not None and not zero and not (math.isfinite(value) and value > 0.0):
-            raise click.UsageError(
-                f"--{name.replace('_', '-')} {value:g} is not possible; ask for more than 0"
-            )
-    if given["system_id"] and len(given["system_id"]) != len(given["connect"]):
-        raise click.UsageError(
-            f"{len(given['system_id'])} --system-id for {len(given['connect'])} --connect; give one for each"
-        )
-    forecast_m_s = given["expect_wind"]
-    if forecast_m_s is None and given["wind"] is not None and world is not None:
-        height_m = max(options.altitude_m, _FORECAST_HEIGHT_M)
-        forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
-    parameters = {} if given["params"] is None else parameters_from_file(given["params"])
-    left_out_parameters: tuple[str, ...] = ()
-    if parameters and world is not None and given["firmware"] is None:
-        parameters, left_out_parameters = known_to_all(parameters, world, strict=given["strict_params"])
-    from autopilot_bridge.mavlink.components import GROUND_STATION
-    from missions.base.request import REGAIN_S, RunRequest
-    from missions.vehicle.connection import ONBOARD_COMPUTER
-    from missions.vehicle.firmware import Mode
-
-    request = RunRequest(
-        options=options,
-        connect=given["connect"],
-        system_ids=given["system_id"],
-        world=world,
-        firmware=firmware_of(given),
-        speedup=given["speedup"],
-        forecast_wind_m_s=forecast_m_s,
-        parameters=parameters,
-        strict_parameters=given["strict_params"],
-        left_out_parameters=left_out_parameters,
-        out=given["out"],
-        picture=not given["no_picture"],
-        identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
-        on_failure=Mode(given["on_failure"]),
-        max_error_m=given["max_error"],
-        regain_s=REGAIN_S if given["regain"] is None else given["regain"],
-        endurance_s=None if given["endurance"] is None else 60.0 * given["endurance"],
-        estimator=given["estimator"],
-        estimator_settings=given["settings"],
-    )
-    return mission, request
-
-
-def _fly(given: dict[str, Any]) -> int:
-    mission, request = flight_of(click.get_current_context())
-    if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
-        raise click.UsageError(
-            f"{given['out']} is not empty, and nothing is overwritten; choose another --out"
-        )
-
-    if request.left_out_parameters:
-        from autopilot_bridge.parameter_files import left_out
-
-        report(f"--params: {left_out(request.left_out_parameters, _NAMES_SHOWN)}")
-    from missions.runs.session import fly as fly_mission
-
-    line = ProgressLine()
-    if given["export_plan"] is None:
-        line.start(mission.name, given["connect"])
-    confirm = None
-    if given["connect"]:
-        try:
-            if given["export_plan"] is None:
-                confirm = confirmation(
-                    given["connect"], yes=given["yes"], check=given["check"], screen=line.held
-                )
-        except AddressError as error:
-            raise click.UsageError(in_options(error)) from error
-    try:
-        key = key_from(given["signing_key"])
-
-        def opened() -> None:
-            line.opened()
-            warn_if_open(given["connect"], key)
-
-        request = replace(
-            request,
-            confirm=confirm,
-            on_remark=line.say,
-            confirm_simulations=given["check"],
-            on_open=opened,
-            command=" ".join(["flightstack", *sys.argv[1:]]),
-            signing_key=key,
-        )
-        if given["export_plan"] is not None:
-            return _export(mission, request, given["export_plan"])
-        with line.running():
-            result = fly_mission(mission, request, line)
-    except (AddressError, BridgeError) as error:
-        raise click.UsageError(in_options(error)) from error
-    except MissionError as error:
-        raise click.ClickException(in_options(error)) from error
-    finally:
-        leave_closed_terminal()
-        line.end()
-    line.finish(result)
-    return print_result(result)
+@body_in(_BODIES)
+def fly() -> None: ...

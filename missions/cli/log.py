@@ -1,23 +1,17 @@
 """`flightstack log`: inspects logs, and makes other logs from them."""
 
-import json
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import click
 
 from autopilot_bridge.errors import BridgeError
-from estimators.errors import NothingThere
+from missions.cli.later import body_in
 from missions.cli.options import FiniteRange, in_options
-from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.status_line import StatusLine
+from missions.cli.signing import key_option
 
-if TYPE_CHECKING:
-    from estimators.logs import Log
-    from estimators.logs.iterate import Selection
-
+_BODIES: Final = "missions.cli.bodies.log"
 _FORMATS: Final = ("csv", "parquet", "npz", "mcap")
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -71,52 +65,6 @@ def _selection_options(command: Command) -> Command:
     return command
 
 
-def _open(path: Path, dialect: str | None) -> "Log":
-    """Open the log. A wrong path is a usage error; an error in the file's content is not."""
-    if path.is_dir():
-        raise click.UsageError(f"{path} is a directory; give the path of a log")
-    if not path.exists():
-        raise click.UsageError(f"{path} does not exist; give the path of a log")
-    from estimators.logs import open_log
-    from estimators.logs.dialect import load_dialect
-
-    try:
-        load_dialect(dialect)
-    except BridgeError as error:
-        raise click.UsageError(in_options(error)) from error
-    return open_log(path, dialect=dialect)
-
-
-def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
-    from estimators.logs.condition import Condition
-    from estimators.logs.raw_records import window
-
-    names = [name.strip() for group in given["types"] for name in group.split(",") if name.strip()]
-    if given["types"] and not names:
-        raise click.UsageError("--types names no message; give names such as ATTITUDE,GLOBAL_POSITION_INT")
-    try:
-        condition = None if given["condition"] is None else Condition(given["condition"])
-        selections = log.select(
-            names or None,
-            system_id=given["source_system"] or None,
-            component_id=given["source_component"] or None,
-            condition=condition,
-        )
-        there = {stream.name for stream, _ in selections}
-        missing = [name for name in names if name.upper() not in {key.name.upper() for key in log.keys}]
-        if there and missing:
-            click.echo(f"{log.path} has no {', '.join(missing)}", err=True)
-        timed = given["from_s"] is not None or given["to_s"] is not None
-        if timed and given["boot"] is None and len(boots := log.boots_at(given["from_s"], given["to_s"])) > 1:
-            several = ", ".join(map(str, boots))
-            click.echo(f"the times fit to boots {several}; all count, --boot chooses one", err=True)
-        return window(log, selections, given["from_s"], given["to_s"], given["boot"])
-    except NothingThere:
-        raise  # an error about the content of the log, not about the arguments
-    except BridgeError as error:
-        raise click.UsageError(in_options(error)) from error
-
-
 class _LogCommands(click.Group):
     """Commands whose errors about the content of a log end them with exit code 1."""
 
@@ -136,17 +84,9 @@ def log() -> None:
 @_log_argument
 @_dialect_option
 @click.option("--json", "as_json", is_flag=True, help="All figures as JSON.")
-def info(path: Path, dialect: str | None, as_json: bool) -> None:
+@body_in(_BODIES)
+def info() -> None:
     """Duration, boots, flights, vehicles, modes, rates, gaps, loss; where every byte went."""
-    from estimators.logs import report_of
-    from missions.cli.log_text import report_lines
-
-    report = report_of(_open(path, dialect))
-    if as_json:
-        click.echo(json.dumps(report.to_dict(), indent=2))
-        return
-    for line in report_lines(report):
-        click.echo(line)
 
 
 @log.command()
@@ -160,17 +100,9 @@ def info(path: Path, dialect: str | None, as_json: bool) -> None:
     type=click.Path(path_type=Path),
     help="Folder (csv, parquet: a file for each message) or file (npz, mcap). [default: beside the log]",
 )
-def export(path: Path, dialect: str | None, form: str, si: bool, out: Path | None, **given: Any) -> None:
+@body_in(_BODIES)
+def export() -> None:
     """Write messages to other tools' formats: Parquet, CSV, NumPy, MCAP."""
-    from estimators.logs.export import export as write
-
-    opened = _open(path, dialect)
-    target = out or path.with_name(
-        f"{path.stem}-{form}" if form in ("csv", "parquet") else f"{path.stem}.{form}"
-    )
-    written = write(opened, _select(opened, given), target, form, si=si)
-    what = f"{len(written)} files in {target}" if len(written) > 1 else str(written[0])
-    click.echo(f"written: {what}")
 
 
 @log.command()
@@ -178,13 +110,9 @@ def export(path: Path, dialect: str | None, form: str, si: bool, out: Path | Non
 @click.argument("out", type=click.Path(path_type=Path))
 @_dialect_option
 @_selection_options
-def cut(path: Path, out: Path, dialect: str | None, **given: Any) -> None:
+@body_in(_BODIES)
+def cut() -> None:
     """Write a part of a telemetry log to OUT, its records as they are."""
-    from estimators.logs.raw_records import positions, read_records, write_records
-
-    opened = _open(path, dialect)
-    count = write_records(out, read_records(opened, positions(_select(opened, given))))
-    click.echo(f"written: {out}, {count} of {len(opened)} messages")
 
 
 @log.command()
@@ -203,21 +131,9 @@ def cut(path: Path, out: Path, dialect: str | None, **given: Any) -> None:
     "VALUE in SI units; times as of --from. May be repeated.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-def mutate(
-    path: Path, out: Path, dialect: str | None, faults: Sequence[str], seed: int, **given: Any
-) -> None:
+@body_in(_BODIES)
+def mutate() -> None:
     """Write a telemetry log with faults to OUT: GPS off, spikes, noise, delays, lost messages, ..."""
-    from estimators.logs.faults import parse_fault
-    from estimators.logs.mutate import mutated_records
-    from estimators.logs.raw_records import write_records
-
-    try:
-        parsed = [parse_fault(text) for text in faults]
-    except BridgeError as error:
-        raise click.UsageError(in_options(error)) from error
-    opened = _open(path, dialect)
-    records = mutated_records(opened, _select(opened, given), parsed, seed=seed)
-    click.echo(f"written: {out}, {write_records(out, records)} of {len(opened)} messages")
 
 
 @log.command()
@@ -239,51 +155,6 @@ def mutate(
 )
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
 @key_option()
-def play(
-    path: Path, dialect: str | None, link: str, speed: str, loop: bool, signing_key: Path | None, **given: Any
-) -> None:
+@body_in(_BODIES)
+def play() -> None:
     """Play a telemetry log to a link, as if the vehicle were there; --from seeks."""
-    from autopilot_bridge.links import open_link, parse_address
-    from missions.runs.log_play import MIN_SPEED, Played
-    from missions.runs.log_play import play as send
-    from missions.vehicle.signing import client_signing
-
-    try:
-        factor = math.inf if speed == "max" else float(speed)
-    except ValueError:
-        factor = math.nan
-    if not factor >= MIN_SPEED:
-        raise click.UsageError(f"--speed {speed} is not accepted; give {MIN_SPEED:g} or more, or max")
-    try:
-        address = parse_address(link)
-        key = key_from(signing_key)
-    except BridgeError as error:
-        raise click.UsageError(in_options(error)) from error
-    opened = _open(path, dialect)
-    selections = _select(opened, given)
-    line = StatusLine()
-
-    def show(played: Played) -> None:
-        line.show(f"{played.log_s:8.1f} s  {played.frames} frames")
-
-    signing = client_signing(key)
-    connection = open_link(address)
-    warn_if_open((link,), key)
-    if not connection.peers:
-        click.echo(f"waiting for a client on {connection.description}", err=True)
-    try:
-        played = send(
-            opened,
-            selections,
-            connection,
-            speed=factor,
-            loop=loop,
-            on_progress=show,
-            sign=None if signing is None else signing.sign_again,
-        )
-    finally:
-        connection.close()
-        line.end()
-    lost = connection.counters.dropped
-    but = f" ({lost} dropped: no receiver, or a slow one)" if lost else ""
-    click.echo(f"played: {played.frames} frames{but}, {played.log_s:.1f} s of the log, to {address}")

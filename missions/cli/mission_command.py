@@ -18,7 +18,7 @@ from flightsim.foundation.options import (
     user_options,
     written,
 )
-from missions.cli.option_classes import named
+from missions.cli.later import named
 from missions.cli.options import DeclaredType, in_options
 from missions.errors import PlanError
 
@@ -30,8 +30,6 @@ T = TypeVar("T")
 
 Given = Mapping[str, Any]
 """Values of the command line's options by name, with _ in place of -."""
-
-
 _NONE: Final = ("none",)  # of an option that may be repeated: not even one of the default
 
 MISSION_GROUP: Final = "The mission's own"

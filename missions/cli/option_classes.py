@@ -1,9 +1,8 @@
 """The classes whose fields are the options of `flightstack fly`, by mission: module and name of each."""
 
-import importlib
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 PATTERN: Final = "pattern"
 """All search patterns, and a mission of the user's own."""
@@ -35,9 +34,3 @@ PARTS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     }
 )
 """What is true in their embedded worlds."""
-
-
-def named(place: tuple[str, str]) -> Any:
-    """The object of a module and a name."""
-    module, name = place
-    return getattr(importlib.import_module(module), name)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 import click
 
 from flightsim.foundation.options import UserOption, name_for_users, user_options
-from missions.cli.option_classes import OPTIONS, PARTS, named
+from flightsim.foundation.plain_text import plain_text
+from missions.cli.later import named
+from missions.cli.option_classes import OPTIONS, PARTS
 
 
 class FiniteRange(click.FloatRange):
@@ -30,6 +32,16 @@ SPEEDUP: Final = FiniteRange(min=SLOWEST, max=1e6)
 
 SECONDS: Final = FiniteRange(min=0.0, max=86_400.0)
 """A time of up to a day."""
+
+FIRMWARE_HELP: Final = (
+    "Real firmware that flies the vehicles in lockstep with the world: px4=FOLDER (with bin/px4 and etc) or "
+    "ardupilot=FILE. Without a build it is FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER or FLIGHTSTACK_ARDUPLANE. "
+    "[default: the emulated autopilot]"
+)
+WORLD_HELP: Final = (
+    "Description of the world (TOML, docs/world.md). An option that is also given overrides the file's value."
+)
+STRICT_HELP: Final = "Names in the --params file that the vehicle does not have are an error, not left out."
 
 
 if TYPE_CHECKING:
@@ -162,6 +174,4 @@ def in_options(message: object, *, own: bool = False) -> str:
 
 def report(message: object) -> None:
     """Print one line about the command on stderr."""
-    from autopilot_bridge.mavlink.plain_text import plain_text
-
     click.echo(f"flightstack: {plain_text(in_options(message))}", err=True)

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from missions.base.options import PlanOptions
+from missions.cli.later import later
 from missions.cli.mission_command import FlightOption, Given, declared_options, made
-from missions.cli.option_classes import named
 from missions.cli.study_command import StudyCommand
 from missions.studies.options import (
     HandoffStudyOptions,
@@ -18,21 +18,13 @@ from missions.studies.options import (
     VisionStudyOptions,
 )
 
-if TYPE_CHECKING:
-    from missions.studies.study import Study
-
-
 T = TypeVar("T")
 
 
-def _study(name: str, kind: type[PlanOptions]) -> "Callable[[Given], Study[Any, Any]]":
+def _study(name: str, kind: type[PlanOptions]) -> Callable[[Given], Any]:
     """What makes the study of a module of `missions.studies` from its options."""
-
-    def build(given: Given) -> "Study[Any, Any]":
-        study: Callable[[PlanOptions], Study[Any, Any]] = named((f"missions.studies.{name}", "study"))
-        return study(_made(kind, declared_options(kind), given))
-
-    return build
+    study = later(f"missions.studies.{name}", "study")
+    return lambda given: study(_made(kind, declared_options(kind), given))
 
 
 def _made(kind: type[T], options: Iterable[FlightOption], given: Given) -> T:

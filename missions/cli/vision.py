@@ -2,69 +2,17 @@
 messages of its camera.
 """
 
-import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Final
 
 import click
 
-from autopilot_bridge.errors import AddressError, BridgeError
-from estimators.errors import EstimatorError
-from missions.cli.fly_command import chosen_names
-from missions.cli.options import FiniteRange, in_options, report
-from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.status_line import StatusLine
-from missions.errors import PlanError
+from missions.cli.later import body_in
+from missions.cli.options import FiniteRange
+from missions.cli.signing import key_option
 
-if TYPE_CHECKING:
-    from estimators.handoff.motion_watch import MotionWatchParameters
-    from estimators.vision import TagDetectorParameters
-    from missions.estimation.vision import VisionProgress
-
-_FAILED, _INTERRUPTED = 1, 130
+_BODIES: Final = "missions.cli.bodies.vision"
 _SECONDS = FiniteRange(min=0.0, min_open=True, max=1e9)
-
-
-def _detector(given: Mapping[str, Any]) -> "TagDetectorParameters | MotionWatchParameters":
-    """Parameters of the detector; options of the other one are refused.
-
-    Raises:
-        click.UsageError: an option that has no effect.
-    """
-    from estimators.handoff.motion_watch import MotionWatchParameters
-    from estimators.vision import TagDetectorParameters
-
-    of_tags = given["detect"] == "tags"
-    chosen = chosen_names(click.get_current_context())
-    idle = chosen & ({"ground_altitude"} if of_tags else {"tag_size", "tag_ids"})
-    for name in sorted(idle):
-        option = {"tag_ids": "--tag-id"}.get(name, "--" + name.replace("_", "-"))
-        raise click.UsageError(f"{option} has no effect with --detect {given['detect']}")
-    if of_tags:
-        return TagDetectorParameters(size_m=given["tag_size"], tag_ids=given["tag_ids"])
-    return MotionWatchParameters(ground_altitude_m=given["ground_altitude"])
-
-
-class _ProgressLine:
-    """Reports trouble when it changes and, on a terminal, the progress."""
-
-    def __init__(self) -> None:
-        self._line = StatusLine()
-        self._trouble = ""
-
-    def __call__(self, progress: "VisionProgress") -> None:
-        if progress.trouble != self._trouble:
-            self._trouble = progress.trouble
-            self._line.end()
-            report(progress.trouble or "pictures are received again")
-        self._line.show(
-            f"{progress.time_s:9.1f} s  {progress.frames} pictures, {progress.detections} detections"
-        )
-
-    def end(self) -> None:
-        """End the progress line."""
-        self._line.end()
 
 
 @click.command()
@@ -109,7 +57,8 @@ class _ProgressLine:
 @click.option("--film", is_flag=True, help="Lossless video of the searched pictures of a stream; large.")
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/vision-N]")
 @key_option()
-def vision(**given: Any) -> int:
+@body_in(_BODIES)
+def vision() -> None:
     """Read the tags (AprilTag 36h11) in a vehicle's video, or find what moves: a stream next to its link, or
     a file with its log.
 
@@ -121,41 +70,3 @@ def vision(**given: Any) -> int:
     Exit codes: 0 done, 1 there was no video, or the link was silent, 2 usage, 130 interrupted before
     --duration was over.
     """
-    from missions.estimation.vision import FAILED, INTERRUPTED, VisionRequest, watch
-
-    progress = _ProgressLine()
-    connect = given["connect"]
-    try:
-        key = key_from(given["signing_key"])
-        result = watch(
-            VisionRequest(
-                video=given["video"],
-                camera=given["camera"],
-                connect=connect,
-                log=given["log"],
-                detector=_detector(given),
-                system_id=given["system_id"],
-                component_id=given["component_id"],
-                duration_s=given["duration"],
-                silence_s=given["silence"],
-                rate_hz=given["rate"],
-                film=given["film"],
-                out=given["out"],
-                command=" ".join(["flightstack", *sys.argv[1:]]),
-                signing_key=key,
-                on_open=lambda: warn_if_open((connect,), key),
-            ),
-            progress,
-        )
-    except (AddressError, BridgeError, EstimatorError, PlanError) as error:
-        raise click.UsageError(in_options(error)) from error
-    finally:
-        progress.end()
-    for warning in result.summary["warnings"]:
-        report(warning)
-    if result.outcome == FAILED:
-        report(f"{result.reason}; results in {result.folder} are partial")
-        return _FAILED
-    frames, detections = result.summary["frames"], result.summary["detections"]
-    click.echo(f"{result.outcome}: {detections} detections in {frames} pictures; run: {result.folder}")
-    return _INTERRUPTED if result.outcome == INTERRUPTED else 0

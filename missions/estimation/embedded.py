@@ -6,8 +6,10 @@ from contextlib import asynccontextmanager
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
+from autopilot_bridge.clock import Clock
+from autopilot_bridge.links import Link
 from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, Packet, dialect
 from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
 from estimators.fleet import Fleet
@@ -19,10 +21,6 @@ from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
 from missions.flown.run_folder import LOG_NAME
 from missions.vehicle.connection import Recorder
 from missions.vehicle.notes import FlightNotes
-
-if TYPE_CHECKING:
-    from autopilot_bridge.clock import Clock
-    from autopilot_bridge.links import Link
 
 _HEARTBEAT_PERIOD_S: Final = 1.0
 
@@ -107,7 +105,7 @@ class FlightEstimators:
 
     @asynccontextmanager
     async def on_board(
-        self, vehicles: Sequence[_Vehicle], links: Sequence["Link"], clock: "Clock"
+        self, vehicles: Sequence[_Vehicle], links: Sequence[Link], clock: Clock
     ) -> AsyncIterator[None]:
         """Publish estimates, and request the needed rates from the autopilots, while the block runs.
 
@@ -150,7 +148,7 @@ class FlightEstimators:
         failure = "" if self._tap is None else self._tap.failure
         return failure or ("" if self._watch is None else self._watch.starvation)
 
-    async def _serve(self, clock: "Clock") -> None:
+    async def _serve(self, clock: Clock) -> None:
         assert self._watch is not None
         looked_us = clock.time_us
         while True:

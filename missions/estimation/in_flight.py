@@ -2,17 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
+from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
 from estimators.errors import EstimatorError
 from missions.base.request import RunRequest
 from missions.errors import PlanError
-
-if TYPE_CHECKING:
-    from missions.estimation.embedded import FlightEstimators
+from missions.estimation.embedded import FlightEstimators
 
 
-def estimators_of(request: RunRequest, known: Mapping[str, float | str]) -> "FlightEstimators | None":
+def estimators_of(request: RunRequest, known: Mapping[str, float | str]) -> FlightEstimators | None:
     """The estimators of a flight; None when none is requested.
 
     Args:
@@ -28,8 +26,6 @@ def estimators_of(request: RunRequest, known: Mapping[str, float | str]) -> "Fli
                 f"{request.estimator_settings[0]!r} is for an estimator; name one with `estimator`"
             )
         return None
-    from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
-    from missions.estimation.embedded import FlightEstimators
 
     # A mission on board may itself use the first id of an onboard computer.
     component_id = ONBOARD_COMPUTER_COMPONENT + (request.identity[1] == ONBOARD_COMPUTER_COMPONENT)

@@ -5,14 +5,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar  # type: ignore[import-untyped]
 
 from estimators.received import broken_at_gaps
-from estimators.reports.picture import tidy
+from estimators.reports.figure import INK, blank_figure, save_figure, tidy
 from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.score import FlightScore, Track
 from missions.vehicle.notes import PATTERN, FlightNotes
@@ -20,7 +18,6 @@ from missions.vehicle.notes import PATTERN, FlightNotes
 _COMMANDED: Final = "#9aa3af"
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
 _TRUTH: Final = "#111827"
-_INK: Final = "#1f2937"
 _LEAST_SPAN_M: Final = 10.0
 _PHASE: Final = "#f3f4f6"
 
@@ -34,13 +31,12 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
         flights: notes and scores, one per vehicle. Tracks of a team are drawn around the first vehicle's
             home.
     """
-    figure = Figure(figsize=(9.0, 11.6), dpi=130, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(9.0, 11.6, dpi=130)
     scored = any(notes.commanded is not None for notes, _ in flights)
     ratios = (3.6, 1.0, 1.0) if scored else (4.6, 1.0)
     grid = figure.add_gridspec(len(ratios), 1, height_ratios=ratios)
     above, altitude, *rest = (figure.add_subplot(grid[k]) for k in range(len(ratios)))
-    figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
+    figure.suptitle(title, fontsize=13, fontweight="bold", color=INK)
     _draw_from_above(above, flights)
     _draw_altitude(altitude, flights)
     for error in rest:  # there is a path to compare with
@@ -49,9 +45,8 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
         altitude.tick_params(labelbottom=False)
     for axes in (above, altitude, *rest):
         tidy(axes)
-    (rest or [altitude])[0].set_xlabel("vehicle time, s", fontsize=9, color=_INK)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    (rest or [altitude])[0].set_xlabel("vehicle time, s", fontsize=9, color=INK)
+    save_figure(figure, path)
 
 
 def _shown(track: Track, notes: FlightNotes) -> Track:
@@ -110,14 +105,14 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
             ),
         )
     if not team and flights[0][1].truth is not None:
-        handles.append(Line2D([], [], **_truth_style(_INK, team), label="truth"))
-    handles.append(Line2D([], [], color=_INK, marker="$\u27a4$", markersize=9, linestyle="", label="heading"))
+        handles.append(Line2D([], [], **_truth_style(INK, team), label="truth"))
+    handles.append(Line2D([], [], color=INK, marker="$\u27a4$", markersize=9, linestyle="", label="heading"))
     handles.append(Line2D([], [], color="#15803d", marker="o", markersize=7, linestyle="", label="start"))
     handles.append(Line2D([], [], color="#b91c1c", marker="s", markersize=6, linestyle="", label="end"))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06, 0.08)
-    axes.set_xlabel("east of home, m", fontsize=9, color=_INK)
-    axes.set_ylabel("north of home, m", fontsize=9, color=_INK)
+    axes.set_xlabel("east of home, m", fontsize=9, color=INK)
+    axes.set_ylabel("north of home, m", fontsize=9, color=INK)
     one_row = len(handles) < 8
     axes.legend(
         handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07 if one_row else 1.1),
@@ -152,7 +147,7 @@ def _draw_marks(axes: Any, track: Track, north: float, east: float) -> None:
         yaw = track.yaw_rad[where]
         axes.quiver(
             track.pos_ned_m[where, 1] + east, track.pos_ned_m[where, 0] + north, np.sin(yaw), np.cos(yaw),
-            color=_INK, scale=48, width=0.0038, headwidth=4.2, headlength=5.0, headaxislength=4.4,
+            color=INK, scale=48, width=0.0038, headwidth=4.2, headlength=5.0, headaxislength=4.4,
             pivot="middle", zorder=6,
         )  # fmt: skip
     start, end = track.pos_ned_m[0], track.pos_ned_m[-1]
@@ -175,7 +170,7 @@ def _draw_scale(axes: Any, span_m: float) -> None:
     exponent = math.floor(math.log10(span_m / 4.0))
     length = max(m * 10.0**exponent for m in (1, 2, 5) if m * 10.0**exponent <= span_m / 4.0)
     bar = AnchoredSizeBar(
-        axes.transData, length, f"{length:g} m", "lower right", pad=0.4, sep=4, frameon=True, color=_INK,
+        axes.transData, length, f"{length:g} m", "lower right", pad=0.4, sep=4, frameon=True, color=INK,
         size_vertical=span_m * 0.004, label_top=True, fontproperties=FontProperties(size=8),
     )  # fmt: skip
     bar.patch.set(edgecolor="none", facecolor="white", alpha=0.8)
@@ -207,7 +202,7 @@ def _draw_altitude(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) ->
                 times, shown = _shown(track, notes).drawn()
                 style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
                 axes.plot(times, -shown[:, 2], **style)
-    axes.set_ylabel("height above\nhome, m", fontsize=9, color=_INK)
+    axes.set_ylabel("height above\nhome, m", fontsize=9, color=INK)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
@@ -228,8 +223,8 @@ def _draw_error(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> No
     if not any(len(score.error_m) for _, score in flights):
         axes.text(
             0.5, 0.5, "the path was not flown", transform=axes.transAxes, ha="center", va="center",
-            fontsize=9, color=_INK,
+            fontsize=9, color=INK,
         )  # fmt: skip
     axes.set_ylim(bottom=0.0)
     reference = flights[0][1].reference
-    axes.set_ylabel(f"distance to path, m\n({reference})", fontsize=9, color=_INK)
+    axes.set_ylabel(f"distance to path, m\n({reference})", fontsize=9, color=INK)

@@ -8,13 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from missions.errors import PlanError
-
-if TYPE_CHECKING:
-    from missions.flown.score import FlightScore
-    from missions.vehicle.notes import FlightNotes
+from missions.flown.score import FlightScore
+from missions.vehicle.notes import FlightNotes
 
 EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights give equal logs."""
@@ -90,7 +88,7 @@ WITHIN: Final = "within the acceptance radius"
 POOR: Final = "poor"
 
 
-def tracking(notes: "FlightNotes", score: "FlightScore") -> str | None:
+def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
     """How a commanded path was followed: everywhere within the acceptance radius, or not; None: not measured.
 
     A waypoint counts as reached within the acceptance radius, so the user accepts this error. A vehicle that
@@ -101,7 +99,7 @@ def tracking(notes: "FlightNotes", score: "FlightScore") -> str | None:
     return WITHIN if score.path_max_error_m <= notes.commanded.acceptance_m else POOR
 
 
-def vehicle_summary(notes: "FlightNotes", score: "FlightScore") -> dict[str, Any]:
+def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
     """The figures of one vehicle's flight."""
     block: dict[str, Any] = {
         "system_id": notes.system_id,

@@ -1,6 +1,6 @@
 """True places of the simulated targets, from the records of a flight."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,17 +8,13 @@ from numpy.typing import NDArray
 from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.records import FlightRecords, positions_ned_m
 
-if TYPE_CHECKING:
-    from missions.flown.records import FlightRecords
-
-
 Array = NDArray[np.float64]
 
 TARGET_SYSTEM: Final = 251
 """MAVLink system id of the simulated targets' truth; the first target is component 1."""
 
 
-def true_targets(records: "FlightRecords", frame: LocalFrame) -> list[tuple[Array, Array]]:
+def true_targets(records: FlightRecords, frame: LocalFrame) -> list[tuple[Array, Array]]:
     """Times (us) and places (n, 2) of each true target, from the truth in the log; empty: there is none."""
     found, component = [], 1
     while len(own := records.truth(TARGET_SYSTEM, component)):

@@ -5,18 +5,15 @@ of GLOBAL_POSITION_INT, which a mission receives from every vehicle; the truth i
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.received import GAP_S
-from missions.flown.score import path_errors_m
+from missions.flown.score import FlightScore, Track, path_errors_m
 from missions.kind import VehicleKind
 from missions.vehicle.notes import PATTERN, CutShort, FlightNotes, Phase
-
-if TYPE_CHECKING:
-    from missions.flown.score import FlightScore, Track
 
 Array = NDArray[np.float64]
 
@@ -30,7 +27,7 @@ _PLACES: Final = 100
 _NAMED: Final = 3
 
 
-def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | None = None) -> str:
+def path_verdict(notes: FlightNotes, score: FlightScore, max_error_m: float | None = None) -> str:
     """The reason why the commanded path was not flown; "" if it was flown or none was commanded.
 
     The track must stay within a bound of the path, and pass every waypoint (of a path without waypoints: 100
@@ -76,7 +73,7 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
 NO_TRACK: Final = "no position (GLOBAL_POSITION_INT) was received along the commanded path"
 
 
-def flown_track(score: "FlightScore", phase: Phase) -> "Track | None":
+def flown_track(score: FlightScore, phase: Phase) -> Track | None:
     """The vehicle's own track during a phase; None: there is none."""
     if score.estimate is None:
         return None
@@ -84,9 +81,7 @@ def flown_track(score: "FlightScore", phase: Phase) -> "Track | None":
     return track if len(track.time_s) > 1 else None
 
 
-def waypoint_verdict(
-    track: "Track", waypoints_ned_m: Array, near_m: float, cut_short: CutShort | None
-) -> str:
+def waypoint_verdict(track: Track, waypoints_ned_m: Array, near_m: float, cut_short: CutShort | None) -> str:
     """The reason why not all waypoints were flown; "" if they were."""
     missed = missed_places(track, waypoints_ned_m, near_m, cut_short)
     if not missed:
@@ -100,7 +95,7 @@ def waypoint_verdict(
 
 
 def missed_places(
-    track: "Track", places_ned_m: Array, near_m: float, cut_short: CutShort | None
+    track: Track, places_ned_m: Array, near_m: float, cut_short: CutShort | None
 ) -> list[tuple[int, float]]:
     """Places (index, nearest approach) that a track did not pass in order.
 

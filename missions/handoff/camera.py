@@ -1,14 +1,12 @@
 """Points the gimbal of one aircraft at a place of its level frame."""
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from estimators.tracking.line_of_sight import pointing_angles
 from flightsim.foundation.vectors import from_euler
 from missions.vehicle.telemetry import Attitude
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 GIMBAL_HZ: Final = 25.0
 _LEAD_S: Final = 0.15  # of gimbal and link
@@ -21,7 +19,7 @@ class GimbalPointing:
         vehicle: the aircraft; its gimbal is taken over.
     """
 
-    def __init__(self, vehicle: "Vehicle") -> None:
+    def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
         self._before: tuple[int, float] | None = None
         vehicle.payload.take_gimbal_control()

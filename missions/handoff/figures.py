@@ -3,22 +3,19 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.handoff import HandoffEstimate
 from estimators.received import GAP_US, interpolated
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions
-from missions.flown.records import place_of, positions_ned_m
+from missions.base.report import Debriefing
+from missions.flown.records import FlightRecords, place_of, positions_ned_m
 from missions.flown.targets import true_targets
-
-if TYPE_CHECKING:
-    from estimators.handoff import HandoffEstimate
-    from missions.base.report import Debriefing
-    from missions.flown.records import FlightRecords
-    from missions.handoff.team import HandoffTeam
+from missions.handoff.team import HandoffTeam
 
 __all__ = ["HandoffTruth", "handoff_figures", "handoff_truth", "handoff_verdict"]
 
@@ -43,7 +40,7 @@ class HandoffTruth:
         """Columns (n, k) at a time; NaN: not received."""
         return interpolated(time_us, self.time_us, columns, gap=GAP_US)
 
-    def placed(self, index: int, estimates: "Sequence[HandoffEstimate]") -> Array:
+    def placed(self, index: int, estimates: Sequence[HandoffEstimate]) -> Array:
         """North and east (n, 2) of the targets of estimates, by true place and heading of the aircraft."""
         found = np.full((len(estimates), 2), np.nan)
         for row, estimate in enumerate(estimates):
@@ -64,7 +61,7 @@ class HandoffTruth:
         return (int(off.argmin()), float(off.min())) if np.isfinite(off).all() else None
 
 
-def handoff_truth(records: "FlightRecords", system_ids: Sequence[int]) -> HandoffTruth | None:
+def handoff_truth(records: FlightRecords, system_ids: Sequence[int]) -> HandoffTruth | None:
     """The truth in the records; None without it."""
     tables = [records.truth(system_id) for system_id in system_ids]
     if any(len(table) < 2 for table in tables):
@@ -90,7 +87,7 @@ def handoff_truth(records: "FlightRecords", system_ids: Sequence[int]) -> Handof
     )
 
 
-def _is_right(team: "HandoffTeam", truth: HandoffTruth | None) -> tuple[bool | None, float | None]:
+def _is_right(team: HandoffTeam, truth: HandoffTruth | None) -> tuple[bool | None, float | None]:
     """Whether both aircraft have the same target when the decision is made, and how far their places of it
     are apart; None: not known.
     """
@@ -106,7 +103,7 @@ def _is_right(team: "HandoffTeam", truth: HandoffTruth | None) -> tuple[bool | N
     return found[0][0] == found[1][0], float(np.hypot(*(places[0] - places[1])))
 
 
-def handoff_figures(team: "HandoffTeam", debriefing: "Debriefing") -> dict[str, Any]:
+def handoff_figures(team: HandoffTeam, debriefing: Debriefing) -> dict[str, Any]:
     """Entries of `summary.json`."""
     watch, options = team.watch, team.options
     taker, keeper = watch.estimators
@@ -141,7 +138,7 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 2)
 
 
-def handoff_verdict(team: "HandoffTeam", debriefing: "Debriefing") -> str:
+def handoff_verdict(team: HandoffTeam, debriefing: Debriefing) -> str:
     """Why the target was not handed over, by the messages of the aircraft alone; "" if it was."""
     taker, keeper = team.watch.estimators
     if taker.decision is None or not taker.decision.decided:
@@ -151,7 +148,7 @@ def handoff_verdict(team: "HandoffTeam", debriefing: "Debriefing") -> str:
     return ""
 
 
-def marks_of(team: "HandoffTeam", debriefing: "Debriefing") -> Mapping[str, float]:
+def marks_of(team: HandoffTeam, debriefing: Debriefing) -> Mapping[str, float]:
     """Times of the flight for the picture, s of vehicle time."""
     marks = debriefing.flights[0][0].marks
     found = {}

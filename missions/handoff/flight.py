@@ -5,7 +5,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from estimators.handoff import HandoffEstimator
@@ -17,15 +17,13 @@ from missions.handoff.checks import check_vehicle
 from missions.handoff.operator import TrackOperator
 from missions.handoff.options import HandoffOptions
 from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
+from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.gps_switch import GpsSwitch
 from missions.vehicle.limits import FixedWingLimits
 from missions.vehicle.roll_flight import follow_rolls
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
-
-if TYPE_CHECKING:
-    from missions.vehicle.attitude_pilot import AttitudePilot
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 Place = tuple[float, float]
 
@@ -69,7 +67,7 @@ class HandoffAircraft(ABC):
     """
 
     def __init__(
-        self, vehicle: "Vehicle", options: HandoffOptions, estimator: HandoffEstimator, run: HandoffRun
+        self, vehicle: Vehicle, options: HandoffOptions, estimator: HandoffEstimator, run: HandoffRun
     ) -> None:
         self.vehicle = vehicle
         self.options = options
@@ -91,7 +89,7 @@ class HandoffAircraft(ABC):
         return self._limits
 
     @property
-    def pilot(self) -> "AttitudePilot":
+    def pilot(self) -> AttitudePilot:
         """Rolls and height; known after `prepare`."""
         assert self._pilot is not None
         return self._pilot
@@ -130,7 +128,7 @@ class HandoffAircraft(ABC):
         return self.estimator.target() or self.expected()
 
     @asynccontextmanager
-    async def looking(self) -> AsyncIterator["asyncio.Task[None]"]:
+    async def looking(self) -> AsyncIterator[asyncio.Task[None]]:
         """Keep the target, or the place where it is expected, in view."""
         task = asyncio.get_running_loop().create_task(self._keep_looking())
         try:
@@ -207,7 +205,7 @@ class TrackerFlight(HandoffAircraft):
 
     def __init__(
         self,
-        vehicle: "Vehicle",
+        vehicle: Vehicle,
         options: HandoffOptions,
         estimator: HandoffEstimator,
         run: HandoffRun,
@@ -281,7 +279,7 @@ class TakeoverFlight(HandoffAircraft):
     """The handoff aircraft: it arrives, loses GPS, and takes the target over."""
 
     def __init__(
-        self, vehicle: "Vehicle", options: HandoffOptions, estimator: HandoffEstimator, run: HandoffRun
+        self, vehicle: Vehicle, options: HandoffOptions, estimator: HandoffEstimator, run: HandoffRun
     ) -> None:
         super().__init__(vehicle, options, estimator, run)
         self._guidance: OrbitGuidance | None = None
@@ -311,7 +309,7 @@ class TakeoverFlight(HandoffAircraft):
             await self._without_gps(gps, task)
         await self.land()
 
-    async def _without_gps(self, gps: GpsSwitch | None, looking: "asyncio.Task[None]") -> None:
+    async def _without_gps(self, gps: GpsSwitch | None, looking: asyncio.Task[None]) -> None:
         vehicle, run = self.vehicle, self.run
         try:
             if gps is not None:

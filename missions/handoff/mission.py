@@ -10,6 +10,7 @@ from missions.base.report import Debriefing, Report
 from missions.handoff.checks import check_vehicle
 from missions.handoff.figures import handoff_figures, handoff_verdict
 from missions.handoff.options import HandoffOptions
+from missions.handoff.picture import camera_pictures, draw_handoff
 from missions.handoff.team import HandoffTeam
 from missions.kind import VehicleKind
 from missions.vehicle.limits import Limits
@@ -60,12 +61,10 @@ class HandoffFlight(MissionFlight[HandoffOptions]):
         figures = handoff_figures(team, debriefing)
 
         def draw(path: Path, title: str) -> None:
-            from missions.handoff.picture import draw_handoff
 
             draw_handoff(path, title, team, debriefing)
 
         def pictures() -> Mapping[str, bytes]:
-            from missions.handoff.picture import camera_pictures
 
             ids = [notes.system_id for notes, _ in debriefing.flights]
             return camera_pictures(team, ids, debriefing.pictures_of)

@@ -4,28 +4,23 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimators.received import broken_at_gaps
-from estimators.reports.picture import tidy
+from estimators.reports.figure import INK, blank_figure, save_figure, tidy
+from missions.base.report import Debriefing
 from missions.flown.camera_picture import CameraPicture, PicturesOf, clip, png
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
-
-if TYPE_CHECKING:
-    from missions.base.report import Debriefing
-    from missions.handoff.team import HandoffTeam
-    from missions.handoff.watch import Moment
+from missions.handoff.team import HandoffTeam
+from missions.handoff.watch import Moment
 
 Point = tuple[float, float]
 
 _CLIP_HZ: Final = 10  # four times as fast as the flight
 _AFTER_US: Final = 20_000_000
-_INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"
 _BLUE: Final = "#1769aa"
 _RED: Final = "#c2410c"
@@ -33,7 +28,7 @@ _GREEN: Final = "#15803d"
 _LINES: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b45309", "#0f766e", "#be185d", "#64748b")
 
 
-def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debriefing") -> None:
+def draw_handoff(path: Path, title: str, team: HandoffTeam, debriefing: Debriefing) -> None:
     """Draw `track.png`. Without truth (aircraft that are not embedded) the frame of the tracks is the handoff
     aircraft's own dead reckoning, which is not drawn; then only pose and scores are.
 
@@ -43,13 +38,12 @@ def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debri
     end_us = debriefing.flights[0][0].marks.get("gps_back_at_s", math.inf) * 1e6
     moments = [moment for moment in team.watch.moments if moment.time_us <= end_us] or team.watch.moments
     truth = handoff_truth(debriefing.records, [flight[0].system_id for flight in debriefing.flights])
-    figure = Figure(figsize=(12.0, 12.0), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(12.0, 12.0)
     grid = figure.add_gridspec(3, 2, height_ratios=(3.0, 1.2, 1.2))
     ground, pose = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
     bearing = figure.add_subplot(grid[1, :])
     score = figure.add_subplot(grid[2, :], sharex=bearing)
-    figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
+    figure.suptitle(title, fontsize=13, fontweight="bold", color=INK)
     marks = marks_of(team, debriefing)
     begin_s = marks.get("GPS lost", moments[0].time_us * 1e-6)
     if truth is not None:
@@ -62,15 +56,14 @@ def draw_handoff(path: Path, title: str, team: "HandoffTeam", debriefing: "Debri
             axes.axvline(time_s, color=_GREY, linewidth=1.0, linestyle="--")
             if axes is bearing:
                 height = 1.02 + 0.1 * (len(marks) - 1 - line)
-                axes.text(time_s, height, name, fontsize=8, color=_INK, transform=axes.get_xaxis_transform())
+                axes.text(time_s, height, name, fontsize=8, color=INK, transform=axes.get_xaxis_transform())
     for axes in (ground, pose, bearing, score):
         tidy(axes)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
 def camera_pictures(
-    team: "HandoffTeam", system_ids: Sequence[int], pictures_of: PicturesOf
+    team: HandoffTeam, system_ids: Sequence[int], pictures_of: PicturesOf
 ) -> dict[str, bytes]:
     """What each camera saw at the decision, or at the end without one, as a picture; and from the contact on,
     until some time after that, as a video. The found points and the tracks are drawn in; the decided track
@@ -85,8 +78,8 @@ def camera_pictures(
     for index, (system_id, seen) in enumerate(zip(system_ids, team.watch.seen, strict=True)):
 
         def drawn(
-            picture: CameraPicture, index: int = index, seen: "dict[int, dict[int, Point]]" = seen
-        ) -> "NDArray[np.uint8]":
+            picture: CameraPicture, index: int = index, seen: dict[int, dict[int, Point]] = seen
+        ) -> NDArray[np.uint8]:
             moment = moments[max(0, bisect_right(times_us, picture.time_us) - 1)]
             estimate = moment.tracker if index else moment.estimate
             marked = 0 if estimate is None else estimate.track
@@ -106,7 +99,7 @@ def camera_pictures(
 
 
 def _draw_ground(
-    axes: Any, truth: HandoffTruth, moments: "list[Moment]", begin_s: float, radius_m: float
+    axes: Any, truth: HandoffTruth, moments: list[Moment], begin_s: float, radius_m: float
 ) -> None:
     during = truth.time_us >= begin_s * 1e6
     during &= truth.time_us <= moments[-1].time_us
@@ -143,13 +136,13 @@ def _draw_ground(
         axes.set_xlim(places[:, 1].min() - margin, places[:, 1].max() + margin)
         axes.set_ylim(places[:, 0].min() - margin, places[:, 0].max() + margin)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_title("over ground, from the first aircraft's start", fontsize=10, color=_INK)
-    axes.set_xlabel("east, m", fontsize=9, color=_INK)
-    axes.set_ylabel("north, m", fontsize=9, color=_INK)
+    axes.set_title("over ground, from the first aircraft's start", fontsize=10, color=INK)
+    axes.set_xlabel("east, m", fontsize=9, color=INK)
+    axes.set_ylabel("north, m", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False, loc="best")
 
 
-def _draw_modes(axes: Any, moments: "list[Moment]", begin_s: float) -> None:
+def _draw_modes(axes: Any, moments: list[Moment], begin_s: float) -> None:
     """The modes of the pose in the first seconds without GPS, in the handoff aircraft's level frame."""
     angle = np.linspace(0.0, 2.0 * math.pi, 61)
     chosen = [moment for moment in moments if moment.modes and moment.time_us >= begin_s * 1e6][:60]
@@ -168,15 +161,15 @@ def _draw_modes(axes: Any, moments: "list[Moment]", begin_s: float) -> None:
             )
     axes.plot([], [], color=_RED, label="modes, not converged")
     axes.plot([], [], color=_BLUE, label="converged")
-    axes.plot(0.0, 0.0, "^", color=_INK, markersize=8, label="handoff aircraft")
+    axes.plot(0.0, 0.0, "^", color=INK, markersize=8, label="handoff aircraft")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title("tracker in the level frame, 2 sigma, first 30 s", fontsize=10, color=_INK)
-    axes.set_xlabel("right, m", fontsize=9, color=_INK)
-    axes.set_ylabel("forward, m", fontsize=9, color=_INK)
+    axes.set_title("tracker in the level frame, 2 sigma, first 30 s", fontsize=10, color=INK)
+    axes.set_xlabel("right, m", fontsize=9, color=INK)
+    axes.set_ylabel("forward, m", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False, loc="best")
 
 
-def _draw_bearing(axes: Any, truth: HandoffTruth | None, moments: "list[Moment]") -> None:
+def _draw_bearing(axes: Any, truth: HandoffTruth | None, moments: list[Moment]) -> None:
     for moment in moments:
         for mode in moment.modes:
             axes.plot(
@@ -195,12 +188,12 @@ def _draw_bearing(axes: Any, truth: HandoffTruth | None, moments: "list[Moment]"
             for a, b in zip(own, other, strict=True)
         ]
         axes.plot(times * 1e-6, true, ".", markersize=2.0, color=_GREY, label="true")
-    axes.set_ylabel("bearing of the\ntracker, degrees", fontsize=9, color=_INK)
+    axes.set_ylabel("bearing of the\ntracker, degrees", fontsize=9, color=INK)
     axes.set_ylim(-180.0, 180.0)
     axes.tick_params(labelbottom=False)
 
 
-def _draw_scores(axes: Any, moments: "list[Moment]", decision: float) -> None:
+def _draw_scores(axes: Any, moments: list[Moment], decision: float) -> None:
     numbers = sorted({number for moment in moments for number in moment.scores})
     for k, number in enumerate(numbers):
         own = [moment for moment in moments if number in moment.scores]
@@ -215,7 +208,7 @@ def _draw_scores(axes: Any, moments: "list[Moment]", decision: float) -> None:
         )
     axes.axhline(decision, color=_GREEN, linewidth=1.0, linestyle=":")
     axes.set_ylim(-0.02, 1.02)
-    axes.set_ylabel("probability", fontsize=9, color=_INK)
-    axes.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
+    axes.set_ylabel("probability", fontsize=9, color=INK)
+    axes.set_xlabel("vehicle time, s", fontsize=9, color=INK)
     if numbers:
         axes.legend(fontsize=7, frameon=False, ncols=min(8, len(numbers)), loc="center left")

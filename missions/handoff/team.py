@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from missions.handoff.flight import HandoffRun, TakeoverFlight, TrackerFlight
 from missions.handoff.options import HandoffOptions
 from missions.handoff.watch import HandoffWatch, RadioLink
 from missions.vehicle.concurrency import run_concurrently
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["HandoffTeam", "settings_of"]
 
@@ -50,7 +47,7 @@ class HandoffTeam:
         run: what both flights share.
     """
 
-    def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[HandoffOptions]) -> None:
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[HandoffOptions]) -> None:
         own = self.options = options[0]
         handoff, tracker = (vehicle.system_id for vehicle in vehicles)
         stream = RandomStreams(own.estimator.seed).child("handoff", "link")

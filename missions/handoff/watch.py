@@ -5,7 +5,7 @@ import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from autopilot_bridge.mavlink.handoff_messages import TrackDesignation, designat
 from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
 from estimators.relative_pose import PoseMode
 from estimators.runner import Runner
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["HandoffWatch", "Moment", "RadioLink"]
 
@@ -104,7 +102,7 @@ class HandoffWatch:
     """
 
     def __init__(
-        self, vehicles: "Sequence[Vehicle]", settings: Sequence[HandoffSettings], link: RadioLink
+        self, vehicles: Sequence[Vehicle], settings: Sequence[HandoffSettings], link: RadioLink
     ) -> None:
         self._vehicles = tuple(vehicles)
         self.estimators = [HandoffEstimator(own) for own in settings]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,9 @@ from estimators.tracking.association import assign
 from estimators.tracking.motion import MotionKind
 from estimators.tracking.ospa import Gospa, gospa, ospa
 from flightsim.foundation.geodesy import LocalFrame
+from missions.base.report import Debriefing
 from missions.flown.targets import true_targets
-
-if TYPE_CHECKING:
-    from missions.base.report import Debriefing
-    from missions.multi_target.team import TargetSearchTeam
+from missions.multi_target.team import TargetSearchTeam
 
 __all__ = ["SearchScore", "score_figures", "scored", "search_figures", "search_score", "search_verdict"]
 
@@ -59,7 +57,7 @@ class SearchScore:
     match_m: float
 
 
-def search_score(team: "TargetSearchTeam", debriefing: "Debriefing") -> SearchScore | None:
+def search_score(team: TargetSearchTeam, debriefing: Debriefing) -> SearchScore | None:
     """The score of a search, at the times of which the truth was received; None without truth or without a
     scan.
     """
@@ -137,7 +135,7 @@ def matched_m(found: Array, true: Array, match_m: float) -> Array:
     return distances
 
 
-def search_figures(team: "TargetSearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:
+def search_figures(team: TargetSearchTeam, debriefing: Debriefing) -> Mapping[str, Any]:
     """Figures of a finished search.
 
     Args:
@@ -207,7 +205,7 @@ def score_figures(score: SearchScore | None) -> Mapping[str, Any]:
     }
 
 
-def _mean_step_s(team: "TargetSearchTeam") -> float | None:
+def _mean_step_s(team: TargetSearchTeam) -> float | None:
     """Mean time between two decisions of a vehicle."""
     times: dict[int, list[int]] = {}
     for step in team.search.steps:
@@ -217,7 +215,7 @@ def _mean_step_s(team: "TargetSearchTeam") -> float | None:
     return round(sum(spans) / count, 3) if count else None
 
 
-def search_verdict(team: "TargetSearchTeam", debriefing: "Debriefing") -> str:
+def search_verdict(team: TargetSearchTeam, debriefing: Debriefing) -> str:
     """The reason, from the vehicles' reports, why a search was not flown; "" if it was."""
     search = team.search
     if not search.states:

@@ -11,6 +11,7 @@ from missions.base.report import Debriefing, Report
 from missions.multi_target.figures import search_figures, search_verdict
 from missions.multi_target.for_vehicle import check_vehicle, for_vehicle
 from missions.multi_target.options import MultiTargetOptions
+from missions.multi_target.picture import draw_search
 from missions.multi_target.team import TargetSearchTeam
 from missions.vehicle.limits import Limits
 from missions.vehicle.sensors import TARGET_SENSOR, Sensor
@@ -66,7 +67,6 @@ class MultiTargetFlight(MissionFlight[MultiTargetOptions]):
         figures = search_figures(team, debriefing)
 
         def draw(path: Path, title: str) -> None:
-            from missions.multi_target.picture import draw_search
 
             draw_search(path, title, team, debriefing)
 

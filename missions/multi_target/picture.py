@@ -3,31 +3,27 @@ over time.
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from estimators.received import broken_at_gaps
+from estimators.reports.figure import INK, blank_figure, save_figure
+from missions.base.report import Debriefing
 from missions.multi_target.figures import CUTOFF_M, SearchScore, search_score
-
-if TYPE_CHECKING:
-    from missions.base.report import Debriefing
-    from missions.multi_target.search import Moment
-    from missions.multi_target.team import TargetSearchTeam
+from missions.multi_target.search import Moment
+from missions.multi_target.team import TargetSearchTeam
 
 __all__ = ["draw_search"]
 
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
-_INK: Final = "#1f2937"
 _GRID: Final = "#e5e7eb"
 _TRUE: Final = "#dc2626"
 _FOUND: Final = "#15803d"
 _MOMENTS: Final = 4
 
 
-def draw_search(path: Path, title: str, team: "TargetSearchTeam", debriefing: "Debriefing") -> None:
+def draw_search(path: Path, title: str, team: TargetSearchTeam, debriefing: Debriefing) -> None:
     """Draw the search.
 
     Args:
@@ -37,9 +33,8 @@ def draw_search(path: Path, title: str, team: "TargetSearchTeam", debriefing: "D
         debriefing: debriefing of the run.
     """
     score = search_score(team, debriefing)
-    figure = Figure(figsize=(13.0, 9.6), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
+    figure = blank_figure(13.0, 9.6)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=INK)
     grid = figure.add_gridspec(3, 4, height_ratios=(3.0, 3.0, 2.2))
     _draw_way(figure, figure.add_subplot(grid[:2, :2]), team, score)
     for k, moment in enumerate(_four(team)):
@@ -47,11 +42,10 @@ def draw_search(path: Path, title: str, team: "TargetSearchTeam", debriefing: "D
         _draw_moment(axes, moment, team, score)
     _draw_found(figure.add_subplot(grid[2, :2]), team, score)
     _draw_metrics(figure.add_subplot(grid[2, 2:]), team, score)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
-def _four(team: "TargetSearchTeam") -> list["Moment"]:
+def _four(team: TargetSearchTeam) -> list[Moment]:
     """Intensities at four times, evenly spread from the begin until the last target was found; at the end of
     the search when none was.
     """
@@ -62,15 +56,15 @@ def _four(team: "TargetSearchTeam") -> list["Moment"]:
     return [min(moments, key=lambda moment: abs(moment.time_us - time_us)) for time_us in wanted]
 
 
-def _limits(axes: Any, team: "TargetSearchTeam") -> None:
+def _limits(axes: Any, team: TargetSearchTeam) -> None:
     layout = team.watch.belief.exploration.layout
     axes.set_xlim(layout.west_m, layout.east_m)
     axes.set_ylim(layout.south_m, layout.north_m)
     axes.set_aspect("equal")
-    axes.tick_params(labelsize=7, colors=_INK)
+    axes.tick_params(labelsize=7, colors=INK)
 
 
-def _draw_way(figure: Figure, axes: Any, team: "TargetSearchTeam", score: SearchScore | None) -> None:
+def _draw_way(figure: Any, axes: Any, team: TargetSearchTeam, score: SearchScore | None) -> None:
     exploration = team.watch.belief.exploration
     layout = exploration.layout
     shades = axes.imshow(
@@ -92,16 +86,16 @@ def _draw_way(figure: Figure, axes: Any, team: "TargetSearchTeam", score: Search
             axes.plot(east_m[0], north_m[0], "o", color=colour, markersize=5)
     _mark_targets(axes, team, score, size=7)
     _limits(axes, team)
-    axes.set_title("way over the exploration map", fontsize=10, color=_INK, loc="left")
-    axes.set_xlabel("east, m", fontsize=8, color=_INK)
-    axes.set_ylabel("north, m", fontsize=8, color=_INK)
+    axes.set_title("way over the exploration map", fontsize=10, color=INK, loc="left")
+    axes.set_xlabel("east, m", fontsize=8, color=INK)
+    axes.set_ylabel("north, m", fontsize=8, color=INK)
     axes.legend(fontsize=7, loc="upper right", framealpha=0.85)
     bar = figure.colorbar(shades, ax=axes, shrink=0.6, pad=0.02)
-    bar.set_label("probability that a target was never detected", fontsize=8, color=_INK)
-    bar.ax.tick_params(labelsize=7, colors=_INK)
+    bar.set_label("probability that a target was never detected", fontsize=8, color=INK)
+    bar.ax.tick_params(labelsize=7, colors=INK)
 
 
-def _mark_targets(axes: Any, team: "TargetSearchTeam", score: SearchScore | None, size: float) -> None:
+def _mark_targets(axes: Any, team: TargetSearchTeam, score: SearchScore | None, size: float) -> None:
     if score is not None:
         axes.plot(
             score.targets_ne_m[:, 1],
@@ -123,7 +117,7 @@ def _mark_targets(axes: Any, team: "TargetSearchTeam", score: SearchScore | None
     )
 
 
-def _draw_moment(axes: Any, moment: "Moment", team: "TargetSearchTeam", score: SearchScore | None) -> None:
+def _draw_moment(axes: Any, moment: Moment, team: TargetSearchTeam, score: SearchScore | None) -> None:
     north, east, mass = moment.points
     axes.set_facecolor("#f8fafc")
     if len(mass):
@@ -150,17 +144,17 @@ def _draw_moment(axes: Any, moment: "Moment", team: "TargetSearchTeam", score: S
     axes.set_title(
         f"intensity at {since_s:.0f} s: {float(np.sum(mass)):.1f} not found",
         fontsize=9,
-        color=_INK,
+        color=INK,
         loc="left",
     )
 
 
-def _times(team: "TargetSearchTeam") -> list[float]:
+def _times(team: TargetSearchTeam) -> list[float]:
     search = team.search
     return [(state.time_us - search.began_us) * 1e-6 for state in search.states]
 
 
-def _draw_found(axes: Any, team: "TargetSearchTeam", score: SearchScore | None) -> None:
+def _draw_found(axes: Any, team: TargetSearchTeam, score: SearchScore | None) -> None:
     states = team.search.states
     found = [sum(target.found for target in state.targets) for state in states]
     axes.step(_times(team), found, where="post", color=_FOUND, label="found")
@@ -170,7 +164,7 @@ def _draw_found(axes: Any, team: "TargetSearchTeam", score: SearchScore | None) 
     _style(axes, "number of targets")
 
 
-def _draw_metrics(axes: Any, team: "TargetSearchTeam", score: SearchScore | None) -> None:
+def _draw_metrics(axes: Any, team: TargetSearchTeam, score: SearchScore | None) -> None:
     if score is not None:
         axes.plot(score.time_s, score.ospa_m, color=_COLOURS[0], label=f"OSPA, cut-off {CUTOFF_M:g} m")
         axes.plot(score.time_s, [part.distance for part in score.gospa], color=_COLOURS[1], label="GOSPA")
@@ -182,10 +176,10 @@ def _draw_metrics(axes: Any, team: "TargetSearchTeam", score: SearchScore | None
 
 
 def _style(axes: Any, label: str) -> None:
-    axes.set_ylabel(label, fontsize=8, color=_INK)
-    axes.set_xlabel("time of the search, s", fontsize=8, color=_INK)
+    axes.set_ylabel(label, fontsize=8, color=INK)
+    axes.set_xlabel("time of the search, s", fontsize=8, color=INK)
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
     axes.grid(color=_GRID, linewidth=0.8)
-    axes.tick_params(labelsize=7, colors=_INK)
+    axes.tick_params(labelsize=7, colors=INK)
     axes.legend(fontsize=7, loc="best", frameon=False)

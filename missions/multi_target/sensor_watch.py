@@ -1,17 +1,14 @@
 """The estimator `multi-target` in a mission's own loop, fed with the messages that the mission receives."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
+from autopilot_bridge.mavlink import Frame
 from estimators.multi_target import MultiTargetEstimator, MultiTargetParameters
 from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.runner import Runner
-
-if TYPE_CHECKING:
-    from autopilot_bridge.mavlink import Frame
-    from flightsim.foundation.geodesy import GeodeticPosition
-    from missions.vehicle.vehicle import Vehicle
+from flightsim.foundation.geodesy import GeodeticPosition
+from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["SensorWatch"]
 
@@ -27,7 +24,7 @@ class SensorWatch:
 
     def __init__(
         self,
-        vehicles: "Sequence[Vehicle]",
+        vehicles: Sequence[Vehicle],
         parameters: MultiTargetParameters,
         on_scan: Callable[[int, tuple[TargetRow, ...]], None],
     ) -> None:
@@ -44,7 +41,7 @@ class SensorWatch:
         return self._estimator.belief
 
     @property
-    def origin(self) -> "GeodeticPosition | None":
+    def origin(self) -> GeodeticPosition | None:
         """The origin of places; None before the first scan from the air."""
         return self._estimator.origin
 
@@ -58,7 +55,7 @@ class SensorWatch:
         for vehicle in self._vehicles:
             connection, system_id = vehicle.link.connection, vehicle.system_id
 
-            def take(frame: "Frame", system_id: int = system_id) -> None:
+            def take(frame: Frame, system_id: int = system_id) -> None:
                 if frame.system_id == system_id:
                     self._take(frame)
 
@@ -70,7 +67,7 @@ class SensorWatch:
             stop()
         self._stops = []
 
-    def _take(self, frame: "Frame") -> None:
+    def _take(self, frame: Frame) -> None:
         self._runner.feed(frame)
         if self.belief.scans != self._scans:
             self._scans = self.belief.scans

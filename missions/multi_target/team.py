@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from estimators.multi_target.estimate import TargetRow
 from missions.multi_target.for_vehicle import check_vehicle
@@ -10,9 +9,7 @@ from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.search import TargetSearch
 from missions.multi_target.sensor_watch import SensorWatch
 from missions.search.team import SearchTeam
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["TargetSearchTeam"]
 
@@ -32,7 +29,7 @@ class TargetSearchTeam(SearchTeam[MultiTargetOptions]):
     search: TargetSearch
     watch: SensorWatch
 
-    def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[MultiTargetOptions]) -> None:
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[MultiTargetOptions]) -> None:
         super().__init__(vehicles, options, check=check_vehicle)
         centre = vehicles[0].system_id if len(vehicles) > 1 else 0
         parameters = replace(options[0].estimator, centre_vehicle=centre)

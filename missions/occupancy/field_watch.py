@@ -1,7 +1,7 @@
 """Compares the readings of a vehicle's survey magnetometer with the map, and reports anomalies."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import Frame, field_reader
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
@@ -9,9 +9,7 @@ from autopilot_bridge.mavlink.wire_units import place
 from estimators.occupancy.detection import Anomaly, AnomalyDetector
 from estimators.occupancy.placed_readings import PlacedReading, ReadingCheck, ReadingPlacer
 from estimators.occupancy.survey_map import SurveyMap
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 _read_position: Final = field_reader("GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt")
 
@@ -31,7 +29,7 @@ class FieldWatch:
 
     def __init__(
         self,
-        vehicle: "Vehicle",
+        vehicle: Vehicle,
         survey_map: SurveyMap,
         detector: AnomalyDetector,
         *,

@@ -2,22 +2,20 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from estimators.occupancy.detection import Anomaly
+from missions.base.report import Debriefing
+from missions.flown.score import FlightScore
+from missions.occupancy.candidate import Candidate
 from missions.occupancy.heading_score import HeadingScore, heading_score
+from missions.occupancy.search import Search
 from missions.occupancy.separation import least_separation_m
 from missions.occupancy.suspect import Suspect
-
-if TYPE_CHECKING:
-    from estimators.occupancy.detection import Anomaly
-    from missions.base.report import Debriefing
-    from missions.flown.score import FlightScore
-    from missions.occupancy.candidate import Candidate
-    from missions.occupancy.search import Search
-    from missions.occupancy.team import Searcher, SearchTeam
+from missions.occupancy.team import Searcher, SearchTeam
 
 
-def search_figures(team: "SearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:
+def search_figures(team: SearchTeam, debriefing: Debriefing) -> Mapping[str, Any]:
     """Figures of a finished search.
 
     Args:
@@ -66,7 +64,7 @@ HEADING_BOUND_RAD: Final = math.radians(30.0)
 _LEAST_S: Final = 30.0  # shortest search that is judged, s
 
 
-def search_verdict(team: "SearchTeam", debriefing: "Debriefing") -> str:
+def search_verdict(team: SearchTeam, debriefing: Debriefing) -> str:
     """The reason, from the vehicles' reports, why a search was not flown; "" if it was."""
     if team.stopped and team.search.found is None:
         return f"the search was given up: {team.stopped}"
@@ -90,7 +88,7 @@ def search_verdict(team: "SearchTeam", debriefing: "Debriefing") -> str:
     return ""
 
 
-def _heading(searcher: "Searcher", score: "FlightScore") -> HeadingScore:
+def _heading(searcher: Searcher, score: FlightScore) -> HeadingScore:
     track = score.truth if score.truth is not None else score.estimate
     if track is None:
         return HeadingScore(
@@ -104,7 +102,7 @@ def _heading(searcher: "Searcher", score: "FlightScore") -> HeadingScore:
 
 
 def _searcher_block(
-    searcher: "Searcher", system_id: int, kind: str, heading: HeadingScore, began_us: int
+    searcher: Searcher, system_id: int, kind: str, heading: HeadingScore, began_us: int
 ) -> dict[str, Any]:
     watch = searcher.watch
     return {
@@ -134,21 +132,21 @@ def _naming(named: bool, error_m: float | None) -> dict[str, bool]:
     return {"target_named": named and right, "false_anomaly_named": named and not right}
 
 
-def _judgement(candidate: "Candidate | Suspect") -> dict[str, Any]:
+def _judgement(candidate: Candidate | Suspect) -> dict[str, Any]:
     """What the identification decides about a candidate."""
     if isinstance(candidate, Suspect):
         return {"probability": round(candidate.probability, 4), "verdict": str(candidate.verdict)}
     return {}
 
 
-def _identification(search: "Search") -> dict[str, Any]:
+def _identification(search: Search) -> dict[str, Any]:
     investigation = search.investigation
     if investigation is None:
         return {}
     return {"identify": str(investigation.identify), "passes_assigned": investigation.passes_assigned}
 
 
-def _anomaly(anomaly: "Anomaly", began_us: int) -> dict[str, float]:
+def _anomaly(anomaly: Anomaly, began_us: int) -> dict[str, float]:
     return {
         "time_s": round((anomaly.time_us - began_us) * 1e-6, 3),
         "north_m": round(anomaly.north_m, 2),

@@ -2,15 +2,13 @@
 
 import asyncio
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from missions.errors import PlanError, VehicleTimeout
 from missions.occupancy.options import LEAST_SIGMAS
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 _READINGS: Final = 20
 _LONGEST_S: Final = 15.0
@@ -26,7 +24,7 @@ def white_noise_nt(readings_nt: list[float]) -> float:
     return float(np.sqrt(0.5 * np.mean(np.diff(np.array(readings_nt)) ** 2)))
 
 
-async def require_quiet(vehicle: "Vehicle", *, threshold_nt: float) -> float:
+async def require_quiet(vehicle: Vehicle, *, threshold_nt: float) -> float:
     """Measure the noise of a vehicle's survey magnetometer, and refuse a threshold that is within the noise.
 
     Returns:

@@ -5,38 +5,34 @@ result.
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from estimators.received import broken_at_gaps
+from estimators.reports.figure import INK, blank_figure, save_figure
+from missions.base.report import Debriefing
+from missions.occupancy.search import Search
+from missions.occupancy.snapshots import Snapshot
 from missions.occupancy.suspect import Suspect, Verdict
-
-if TYPE_CHECKING:
-    from missions.base.report import Debriefing
-    from missions.occupancy.search import Search
-    from missions.occupancy.snapshots import Snapshot
-    from missions.occupancy.team import SearchTeam
+from missions.occupancy.team import SearchTeam
 
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
-_INK: Final = "#1f2937"
 _GRID: Final = "#e5e7eb"
 _TARGET: Final = "#dc2626"
 _LETTERS: Final = "abcd"
 _BEFORE_US: Final = 2_000_000
 _MARK: Final[Mapping[str, Any]] = {"linestyle": "", "markeredgecolor": "white"}
 _VERDICT_MARKS: Final[Mapping[Verdict, Mapping[str, Any]]] = {
-    Verdict.DISMISSED: {**_MARK, "color": _INK, "marker": "X", "markersize": 8},
+    Verdict.DISMISSED: {**_MARK, "color": INK, "marker": "X", "markersize": 8},
     Verdict.OPEN: {**_MARK, "color": _TARGET, "marker": "D", "markersize": 6},
 }
 """Marks of suspects in the last map; the target has a mark of its own."""
 
 
-def four_moments(search: "Search", end_us: int) -> list["Snapshot"]:
+def four_moments(search: Search, end_us: int) -> list[Snapshot]:
     """Snapshots at four times: the start, before the target was first detected, after its scores were raised,
     and the end.
 
@@ -53,7 +49,7 @@ def four_moments(search: "Search", end_us: int) -> list["Snapshot"]:
     return [min(snapshots, key=lambda s: abs(s.time_us - time_us)) for time_us in times_us]
 
 
-def draw_search(path: Path, title: str, team: "SearchTeam", debriefing: "Debriefing") -> None:
+def draw_search(path: Path, title: str, team: SearchTeam, debriefing: Debriefing) -> None:
     """Draw the search.
 
     Args:
@@ -65,9 +61,8 @@ def draw_search(path: Path, title: str, team: "SearchTeam", debriefing: "Debrief
     search, target_ne_m = team.search, debriefing.target_ne_m
     end_us = max([search.snapshots[-1].time_us] + [s.track[-1][0] for s in team.searchers if s.track])
     moments = four_moments(search, end_us)
-    figure = Figure(figsize=(10.0, 12.6), dpi=130, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
+    figure = blank_figure(10.0, 12.6, dpi=130)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=INK)
     grid = figure.add_gridspec(3, 2, height_ratios=(4.0, 4.0, 2.0))
     cells = search.map.layout.rows * search.map.layout.columns
     highest = max(2.0, max(float(np.percentile(s.scores, 99.5)) for s in moments) * cells)
@@ -75,20 +70,19 @@ def draw_search(path: Path, title: str, team: "SearchTeam", debriefing: "Debrief
     for k, (axes, moment) in enumerate(zip(maps, moments, strict=True)):
         shades = _draw_moment(axes, moment, team, target_ne_m, highest)
         since_s = (moment.time_us - team.began_us) * 1e-6
-        axes.set_title(f"({_LETTERS[k]}) {max(0.0, since_s):.0f} s", fontsize=10, color=_INK, loc="left")
+        axes.set_title(f"({_LETTERS[k]}) {max(0.0, since_s):.0f} s", fontsize=10, color=INK, loc="left")
     bar = figure.colorbar(shades, ax=maps, shrink=0.5, pad=0.02, aspect=30)
-    bar.set_label("score of a cell, in mean prior scores", fontsize=9, color=_INK)
-    bar.ax.tick_params(labelsize=8, colors=_INK)
+    bar.set_label("score of a cell, in mean prior scores", fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8, colors=INK)
     _draw_probability(figure.add_subplot(grid[2, :]), team, end_us)
     figure.legend(
         handles=_handles(debriefing, search), loc="outside lower center", ncols=6, fontsize=8, frameon=False
     )
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
 def _draw_moment(
-    axes: Any, moment: "Snapshot", team: "SearchTeam", target_ne_m: tuple[float, float] | None, highest: float
+    axes: Any, moment: Snapshot, team: SearchTeam, target_ne_m: tuple[float, float] | None, highest: float
 ) -> Any:
     layout = team.search.map.layout
     shades = axes.imshow(
@@ -138,17 +132,17 @@ def _draw_moment(
     margin_m = 1.5 * layout.cell_m
     axes.set_xlim(layout.west_m - margin_m, layout.east_m + margin_m)
     axes.set_ylim(layout.south_m - margin_m, layout.north_m + margin_m)
-    axes.set_xlabel("east, m", fontsize=8, color=_INK)
-    axes.set_ylabel("north, m", fontsize=8, color=_INK)
-    axes.tick_params(labelsize=7, colors=_INK)
+    axes.set_xlabel("east, m", fontsize=8, color=INK)
+    axes.set_ylabel("north, m", fontsize=8, color=INK)
+    axes.tick_params(labelsize=7, colors=INK)
     return shades
 
 
-def _draw_probability(axes: Any, team: "SearchTeam", end_us: int) -> None:
+def _draw_probability(axes: Any, team: SearchTeam, end_us: int) -> None:
     search = team.search
     times_s = np.array([0] + [t - team.began_us for t, _ in search.detection_curve], dtype=np.float64) * 1e-6
     values = np.array([0.0] + [value for _, value in search.detection_curve])
-    axes.plot(times_s, values, color=_INK, linewidth=1.6)
+    axes.plot(times_s, values, color=INK, linewidth=1.6)
     for k, searcher in enumerate(team.searchers):
         for anomaly in searcher.anomalies:
             axes.axvline(
@@ -164,15 +158,15 @@ def _draw_probability(axes: Any, team: "SearchTeam", end_us: int) -> None:
         )  # fmt: skip
     axes.set_ylim(0.0, 1.0)
     axes.set_xlim(0.0, max(1.0, (end_us - team.began_us) * 1e-6))
-    axes.set_ylabel("cumulative probability\nof detection", fontsize=9, color=_INK)
-    axes.set_xlabel("time of search, s", fontsize=9, color=_INK)
-    axes.tick_params(labelsize=8, colors=_INK)
+    axes.set_ylabel("cumulative probability\nof detection", fontsize=9, color=INK)
+    axes.set_xlabel("time of search, s", fontsize=9, color=INK)
+    axes.tick_params(labelsize=8, colors=INK)
     axes.grid(True, color=_GRID, linewidth=0.6)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
 
 
-def _handles(debriefing: "Debriefing", search: "Search") -> list[Any]:
+def _handles(debriefing: Debriefing, search: Search) -> list[Any]:
     handles: list[Any] = [
         Line2D(
             [], [], color=_COLOURS[k % len(_COLOURS)], marker="x", markersize=7, markeredgewidth=2.0,
@@ -181,7 +175,7 @@ def _handles(debriefing: "Debriefing", search: "Search") -> list[Any]:
         for k, (notes, _) in enumerate(debriefing.flights)
     ]  # fmt: skip
     handles.append(
-        Line2D([], [], color=_INK, marker="o", markerfacecolor="none", linestyle="", label="anomaly")
+        Line2D([], [], color=INK, marker="o", markerfacecolor="none", linestyle="", label="anomaly")
     )
     if debriefing.target_ne_m is not None:
         handles.append(

@@ -1,16 +1,13 @@
 """Smallest distance between the vehicles of a team in the air, from the truth in the log."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.received import not_in_gaps
 from flightsim.foundation.geodesy import LocalFrame
-from missions.flown.records import place_of, positions_ned_m
-
-if TYPE_CHECKING:
-    from missions.flown.records import FlightRecords
+from missions.flown.records import FlightRecords, place_of, positions_ned_m
 
 Array = NDArray[np.float64]
 
@@ -18,7 +15,7 @@ _STEP_S: Final = 0.1
 _AIRBORNE_M: Final = 10.0  # height above the start; vehicles next to each other on the ground are not counted
 
 
-def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float | None:
+def least_separation_m(records: FlightRecords, system_ids: list[int]) -> float | None:
     """Smallest distance of two vehicles while both were above 10 m; None: never, or no truth in the log."""
     tracks: list[tuple[Array, Array]] = []
     frame: LocalFrame | None = None

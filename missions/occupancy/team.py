@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from estimators.magnetic_identification.estimator import field_direction
@@ -25,9 +25,7 @@ from missions.teams.layers import Layers
 from missions.teams.steering import Steering, steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.telemetry import Attitude, Position
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 SEARCH: Final = "search"
 """Name of the phase in which a vehicle searches."""
@@ -69,7 +67,7 @@ class SearchTeam:
     """
 
     def __init__(
-        self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions], survey_map: SurveyMap
+        self, vehicles: Sequence[Vehicle], options: Sequence[OccupancyOptions], survey_map: SurveyMap
     ) -> None:
         """Store the arguments; no message is sent.
 
@@ -143,7 +141,7 @@ class SearchTeam:
         self.search.leave(index)
         await self._layers.land(index)
 
-    async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
+    async def _check(self, vehicle: Vehicle, own: OccupancyOptions) -> None:
         """Check what needs a received vehicle, while the vehicle still stands on the ground."""
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
@@ -180,7 +178,7 @@ class SearchTeam:
             watch.stop()
             searcher.ended_us = clock.time_us
 
-    def _note_progress(self, vehicle: "Vehicle") -> None:
+    def _note_progress(self, vehicle: Vehicle) -> None:
         elapsed_s = (self._vehicles[0].clock.time_us - self.began_us) * 1e-6
         vehicle.notes.progress = min(1.0, max(0.0, elapsed_s / self._options[0].search_time_s))
 
@@ -215,7 +213,7 @@ class SearchTeam:
             on_anomaly=on_anomaly,
         )
 
-    def _motion(self, vehicle: "Vehicle") -> Motion:
+    def _motion(self, vehicle: Vehicle) -> Motion:
         place, attitude = vehicle.latest(Position), vehicle.latest(Attitude)
         if place is None or attitude is None:
             raise MissionError(f"the vehicle reports no position or attitude; {vehicle.link.last_received()}")

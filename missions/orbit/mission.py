@@ -11,6 +11,7 @@ from missions.kind import VehicleKind
 from missions.orbit.checks import check_vehicle
 from missions.orbit.flight import OrbitFlight
 from missions.orbit.options import WANDERING_M, OrbitOptions
+from missions.orbit.picture import draw_orbit
 from missions.orbit.score import ORBIT, orbit_figures
 from missions.vehicle.limits import FixedWingLimits, Limits
 from missions.vehicle.notes import FlightNotes
@@ -93,7 +94,6 @@ class OrbitMissionFlight(MissionFlight[OrbitOptions]):
         figures = orbit_figures(debriefing, self.options[0])
 
         def draw(path: Path, title: str) -> None:
-            from missions.orbit.picture import draw_orbit
 
             draw_orbit(path, title, debriefing, self.options[0])
 

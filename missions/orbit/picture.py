@@ -4,16 +4,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from estimators.reports.picture import tidy
+from estimators.reports.figure import INK, blank_figure, save_figure, tidy
 from missions.base.report import Debriefing
 from missions.flown.picture import draw_run
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import OrbitTruth, orbit_truth
 
-_INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"
 _BLUE: Final = "#1769aa"
 _RED: Final = "#c2410c"
@@ -36,13 +33,12 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing, options: OrbitOpt
         draw_run(path, title, list(debriefing.flights))
         return
     flown = truth.during(notes.phases[0].start_us, notes.phases[-1].end_us)
-    figure = Figure(figsize=(12.0, 11.0), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(12.0, 11.0)
     grid = figure.add_gridspec(3, 2, height_ratios=(3.0, 1.0, 1.0))
     ground, around = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
     distance = figure.add_subplot(grid[1, :])
     height = figure.add_subplot(grid[2, :], sharex=distance)
-    figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
+    figure.suptitle(title, fontsize=13, fontweight="bold", color=INK)
     phase = notes.phase("orbit")
     lost_s, back_s = notes.marks.get("gps_lost_at_s"), notes.marks.get("gps_back_at_s")
     orbit = None if phase is None else flown.during(phase.start_us, phase.end_us)
@@ -60,7 +56,7 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing, options: OrbitOpt
     distance.plot(shown.time_s, shown.radius_m, color=_BLUE, linewidth=1.0)
     distance.axhline(options.radius_m, color=_GREY, linewidth=3.0, alpha=0.6)
     distance.set_ylim(0.0, max(3.0 * options.radius_m, 1.2 * options.entry_distance_m))
-    distance.set_ylabel("distance to\ntarget, m", fontsize=9, color=_INK)
+    distance.set_ylabel("distance to\ntarget, m", fontsize=9, color=INK)
     distance.tick_params(labelbottom=False)
     if orbit is not None and len(orbit.time_s):
         error = 100.0 * (float(orbit.radius_m.mean()) / options.radius_m - 1.0)
@@ -69,17 +65,16 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing, options: OrbitOpt
             f"{orbit.radius_m.std():.1f} m; "
             "GPS off where red",
             fontsize=9,
-            color=_INK,
+            color=INK,
         )
     height.plot(shown.time_s, -shown.aircraft_ned_m[:, 2], color=_BLUE, linewidth=1.0)
     height.axhline(options.own_altitude_m, color=_GREY, linewidth=3.0, alpha=0.6)
     height.set_ylim(bottom=0.0)
-    height.set_ylabel("height, m", fontsize=9, color=_INK)
-    height.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
+    height.set_ylabel("height, m", fontsize=9, color=INK)
+    height.set_xlabel("vehicle time, s", fontsize=9, color=INK)
     for axes in (ground, around, distance, height):
         tidy(axes)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
 def _draw_ground(axes: Any, flown: OrbitTruth, orbit: OrbitTruth | None) -> None:
@@ -101,9 +96,9 @@ def _draw_ground(axes: Any, flown: OrbitTruth, orbit: OrbitTruth | None) -> None
         track[-1, 1], track[-1, 0], "s", color="#b91c1c", markersize=6, markeredgecolor="white", label="end"
     )
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title("over ground", fontsize=10, color=_INK)
-    axes.set_xlabel("east, m", fontsize=9, color=_INK)
-    axes.set_ylabel("north, m", fontsize=9, color=_INK)
+    axes.set_title("over ground", fontsize=10, color=INK)
+    axes.set_xlabel("east, m", fontsize=9, color=INK)
+    axes.set_ylabel("north, m", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False)
 
 
@@ -125,6 +120,6 @@ def _draw_around(
             axes.plot(offset[:, 1], offset[:, 0], color=colour, linewidth=width)
     axes.plot(0.0, 0.0, "o", color=_RED, markersize=7)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title("around the target", fontsize=10, color=_INK)
-    axes.set_xlabel("east of target, m", fontsize=9, color=_INK)
-    axes.set_ylabel("north of target, m", fontsize=9, color=_INK)
+    axes.set_title("around the target", fontsize=10, color=INK)
+    axes.set_xlabel("east of target, m", fontsize=9, color=INK)
+    axes.set_ylabel("north of target, m", fontsize=9, color=INK)

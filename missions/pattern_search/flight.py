@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Coroutine
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
 from missions.base.options import FlightOptions, Via
 from missions.errors import PlanError, VehicleTimeout
+from missions.pattern_search.tag_watch import TagWatch
 from missions.pattern_search.wings.pattern import check_wings, fly_pattern_with_wings, pattern_flight_of
 from missions.pattern_search.wings.waypoints import mission_items
 from missions.patterns.curve import ArcLengthTable, Array, Curve
@@ -34,9 +35,6 @@ from missions.vehicle.notes import PATTERN, CommandedPath, CutShort
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.telemetry import Attitude
 from missions.vehicle.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from missions.pattern_search.tag_watch import TagWatch
 
 _SETTLE_S: Final = 1.5
 _SAME_PLACE_M: Final = 0.3
@@ -92,7 +90,7 @@ def pattern_frequencies(curve: Curve, period_s: float) -> tuple[float, float]:
 
 
 async def fly_pattern(
-    vehicle: Vehicle, options: FlightOptions, curve: Curve, search: "TagWatch | None" = None
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, search: TagWatch | None = None
 ) -> None:
     """Fly a curve as the options specify, including takeoff and landing.
 
@@ -161,7 +159,7 @@ async def _fly_setpoints(
     limits: MulticopterLimits,
     trajectory: Trajectory,
     centre: Vector,
-    search: "TagWatch | None",
+    search: TagWatch | None,
 ) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     altitude_m = options.own_altitude_m
@@ -346,7 +344,7 @@ async def _fly_waypoints(
     curve: Curve,
     trajectory: Trajectory,
     centre: Vector,
-    search: "TagWatch | None",
+    search: TagWatch | None,
 ) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     length_m = _length_m(options)

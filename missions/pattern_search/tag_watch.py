@@ -4,9 +4,9 @@ import asyncio
 import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import Frame, dialect
 from autopilot_bridge.mavlink.camera_scan import CAMERA_SCAN_PAYLOAD, CameraScan, read_camera_scan
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT
 from estimators import wire
@@ -15,10 +15,7 @@ from estimators.vision import VehicleTrack, ground_place
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.vehicle.notes import CutShort
 from missions.vehicle.telemetry import Position
-
-if TYPE_CHECKING:
-    from autopilot_bridge.mavlink import Frame
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["FoundTag", "TagWatch"]
 
@@ -62,7 +59,7 @@ class TagWatch:
         other_tags: numbers of other tags that were detected.
     """
 
-    def __init__(self, vehicle: "Vehicle", *, tag_id: int, altitude_m: float, limit_s: float | None) -> None:
+    def __init__(self, vehicle: Vehicle, *, tag_id: int, altitude_m: float, limit_s: float | None) -> None:
         self._vehicle = vehicle
         self._tag_id = tag_id
         self._altitude_m = altitude_m
@@ -149,10 +146,10 @@ class TagWatch:
 
     # inside
 
-    def _own(self, frame: "Frame", component: int) -> bool:
+    def _own(self, frame: Frame, component: int) -> bool:
         return frame.system_id == self._vehicle.system_id and frame.component_id == component
 
-    def _on_attitude(self, frame: "Frame") -> None:
+    def _on_attitude(self, frame: Frame) -> None:
         if self._own(frame, AUTOPILOT_COMPONENT):
             self._track.handle(read_as(frame, wire.ATTITUDE))
 
@@ -166,7 +163,7 @@ class TagWatch:
         if self.over:
             self._ended.set()
 
-    def _on_detection(self, frame: "Frame") -> None:
+    def _on_detection(self, frame: Frame) -> None:
         if not self._own(frame, CAMERA_COMPONENT):
             return
         message = read_as(frame, wire.LANDING_TARGET)
@@ -178,7 +175,7 @@ class TagWatch:
             return
         self._seen = {int(message.time_usec): values}
 
-    def _on_scan(self, frame: "Frame") -> None:
+    def _on_scan(self, frame: Frame) -> None:
         if not self._own(frame, CAMERA_COMPONENT):
             return
         message = read_as(frame, wire.TUNNEL)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from autopilot_bridge.mission_plan import MissionItem
 from estimators.errors import LogError
+from estimators.logs.new_file import new_file
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -49,7 +50,6 @@ def write_mission_file(
         PlanError: the suffix is unknown, or the file exists or can't be written.
     """
     # imported only for writing, because the modules of logs are slow to load
-    from estimators.logs.new_file import new_file
 
     check_suffix(path)
     if path.suffix.lower() == PLAN:

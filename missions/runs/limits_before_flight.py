@@ -3,19 +3,18 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from flightsim.world_spec import VehicleSpec
 from missions.base.mission import Mission
 from missions.base.options import MissionOptions
 from missions.base.request import RunRequest
+from missions.embedded import EmbeddedSitl, alone
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.runs.vehicle_opening import Stage, VehicleOpener
 from missions.vehicle.firmware_records import FIRMWARES
 from missions.vehicle.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
-
-if TYPE_CHECKING:
-    from flightsim.world_spec import VehicleSpec
 
 _WIDEST: Mapping[VehicleKind, Limits] = {
     VehicleKind.MULTICOPTER: WIDEST_LIMITS,
@@ -89,7 +88,6 @@ def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage, opener
 
 def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> None:
     """Check with the limits of one embedded aircraft, without creating the world that the mission needs."""
-    from missions.embedded import EmbeddedSitl, alone
 
     world = request.embedded_world
     try:
@@ -133,7 +131,7 @@ def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptio
     raise PlanError(f"{refusals[0]} (that is for any vehicle; the limits of this one may ask for more)")
 
 
-def _kind_limits(spec: "VehicleSpec", kind: VehicleKind) -> Limits:
+def _kind_limits(spec: VehicleSpec, kind: VehicleKind) -> Limits:
     """Limits from the firmware's defaults and the specified parameters. For a fixed wing the widest limits
     are returned, because its own limits come with the aircraft.
     """

@@ -3,8 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.base.mission import Mission
 from missions.base.options import MissionOptions
 from missions.base.request import RunRequest
@@ -12,11 +13,9 @@ from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.plan_files.files import check_suffix, write_mission_file
 from missions.process.ending import EndedBySignal
+from missions.runs.session import COMPLETED, INTERRUPTED, fly
 from missions.vehicle.limits import Limits
-
-if TYPE_CHECKING:
-    from flightsim.foundation.geodesy import GeodeticPosition
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 
 def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
@@ -31,7 +30,6 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
         MissionError: no message is received from the vehicle, or it is not ready.
         KeyboardInterrupt: the user interrupted it.
     """
-    from missions.runs.session import COMPLETED, INTERRUPTED, fly
 
     check_suffix(path)
     if request.options.vehicles > 1:
@@ -75,10 +73,10 @@ class _Exported(Mission[MissionOptions]):
     def check(self, options: MissionOptions, limits: Limits) -> None:
         self._mission.check(options, limits)
 
-    def check_place(self, options: MissionOptions, limits: Limits, home: "GeodeticPosition") -> None:
+    def check_place(self, options: MissionOptions, limits: Limits, home: GeodeticPosition) -> None:
         self._mission.check_place(options, limits, home)
 
-    async def fly(self, vehicle: "Vehicle", options: MissionOptions) -> None:
+    async def fly(self, vehicle: Vehicle, options: MissionOptions) -> None:
         if vehicle.kind is VehicleKind.FIXED_WING:
             vehicle.wing.note_runway()
         items = await self._mission.plan_items(vehicle, options)

@@ -9,7 +9,7 @@ from contextlib import AsyncExitStack, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
@@ -21,6 +21,7 @@ from missions.base.options import MissionOptions
 from missions.base.report import Debriefing, Report
 from missions.base.request import RunRequest
 from missions.errors import MissionError, PlanError, TakenOver
+from missions.estimation.embedded import FlightEstimators
 from missions.estimation.in_flight import estimators_of, refused_in_plan
 from missions.flown.records import FlightRecorder, FlightRecords
 from missions.flown.run_folder import (
@@ -49,9 +50,6 @@ from missions.vehicle.connection import Connection, Recorder
 from missions.vehicle.notes import FLIGHT
 from missions.vehicle.signing import client_signing, require_key
 from missions.vehicle.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from missions.estimation.embedded import FlightEstimators
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
 
@@ -273,7 +271,7 @@ def _fly_interruptible(
 
 
 def _estimator_files(
-    mission: Mission[Any], request: RunRequest, estimators: "FlightEstimators", claimed: ClaimedFolder
+    mission: Mission[Any], request: RunRequest, estimators: FlightEstimators, claimed: ClaimedFolder
 ) -> dict[str, str]:
     """Write the files that the estimator reads; returns their paths by parameter.
 
@@ -300,7 +298,7 @@ async def _fly(
     stage: Stage,
     recorder: Recorder,
     flight: Flight,
-    estimators: "FlightEstimators | None",
+    estimators: FlightEstimators | None,
     on_progress: ProgressListener | None,
 ) -> None:
     async with AsyncExitStack() as stack:

@@ -4,21 +4,18 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
+from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.base.request import RunRequest
+from missions.embedded import EmbeddedSitl, model_kind
 from missions.errors import PlanError
 from missions.flown.camera_picture import PicturesOf
 from missions.flown.run_folder import EPOCH_UNIX_US
 from missions.kind import VehicleKind
 from missions.runs.claimed_folder import ClaimedFolder
-
-if TYPE_CHECKING:
-    from autopilot_bridge.links import Link
-    from missions.embedded import EmbeddedSitl
-
 
 MAP_NAME: Final = "magnetic_map.npz"
 """Name of the published magnetic map in a run folder."""
@@ -45,7 +42,7 @@ class Stage:
     """
 
     loop: asyncio.AbstractEventLoop
-    links: list["Link"]
+    links: list[Link]
     clocks: list[Clock]
     epoch_us: int | None
     time_us: Callable[[], int]
@@ -59,7 +56,7 @@ class Stage:
     pictures_of: PicturesOf = lambda _system_id: ()
 
 
-def embedded_stage(sitl: "EmbeddedSitl") -> Stage:
+def embedded_stage(sitl: EmbeddedSitl) -> Stage:
     """The links, clocks and event loop of an embedded SITL."""
     return Stage(
         loop=sitl.loop,
@@ -87,7 +84,6 @@ class VehicleOpener:
         Raises:
             PlanError: the model does not exist.
         """
-        from missions.embedded import model_kind
 
         try:
             return model_kind(model)
@@ -101,7 +97,6 @@ class VehicleOpener:
             PlanError: a value is not accepted; the message names it and what is accepted.
             MissionError: a file that the world publishes cannot be written.
         """
-        from missions.embedded import EmbeddedSitl
 
         folder.published.append(folder.path / MAP_NAME)
         try:
@@ -124,7 +119,6 @@ class VehicleOpener:
             PlanError: an address cannot be that of a vehicle.
             BridgeError: a link can't be opened.
         """
-        from autopilot_bridge.links import VEHICLE_FORMS, ReplayLog, open_link, parse_address
 
         addresses = [parse_address(text, VEHICLE_FORMS) for text in request.connect]
         for address in addresses:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
+from typing import Final, Generic, Protocol, TypeVar
 
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import LocalFrame
@@ -25,9 +25,7 @@ from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.limits import Limits, MulticopterLimits
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.telemetry import Position
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 HEADING_RAD: Final = 0.0
 """Heading of a multicopter while it searches (paper: the desired angles are 0)."""
@@ -168,7 +166,7 @@ class SearchTeam(Generic[Options]):
 
     def __init__(
         self,
-        vehicles: "Sequence[Vehicle]",
+        vehicles: Sequence[Vehicle],
         options: Sequence[Options],
         *,
         check: Callable[[Options, Limits], None],

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.reports.figure import blank_figure, save_figure
 from missions.studies.calibration import calibration_of, rounded, verdicts_of
 from missions.studies.design import listed
 from missions.studies.handoff_paired import PairedTrial
@@ -248,11 +249,8 @@ def draw(results: Results, folder: Path) -> None:
     """Draw `handoff.png`: correct decisions against the time that they take, beside the paper's point; and
     the share of runs that have decided over time.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 4.4), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(11.0, 4.4)
     left, right = figure.subplots(1, 2)
     colours = dict(zip((kind.value for kind in Comparison), _COLOURS, strict=True))
     times = results.values("time_s")
@@ -299,5 +297,4 @@ def draw(results: Results, folder: Path) -> None:
     for axes in (left, right):
         axes.grid(color="#e5e7eb", linewidth=0.8)
         axes.tick_params(labelsize=8)
-    with (folder / "handoff.png").open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, folder / "handoff.png")

@@ -4,10 +4,9 @@ The tracks do not depend on what is compared, so one flight serves all cells of 
 pose alone: a blend with a track (equation 45) would be that of one cell.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.handoff.process import WindowParameters
@@ -21,9 +20,6 @@ from missions.studies.handoff_trial import (
     comparison_of,
     outcome_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 __all__ = ["PairedTrial"]
 
@@ -39,7 +35,7 @@ class _Observers(TrackComparison):
         undecided: comparisons that have not decided, by cell.
     """
 
-    def __init__(self, cells: "Sequence[Cell]") -> None:
+    def __init__(self, cells: Sequence[Cell]) -> None:
         super().__init__()
         self.flight: TrialFlight | None = None
         self.undecided = {cell: comparison_of(cell) for cell in cells}

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from estimators.reports.figure import blank_figure, save_figure
+
 __all__ = ["draw_surface"]
 
 _COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
@@ -21,13 +23,10 @@ def draw_surface(
         timeout_s: time without a decision that is a failure.
         folder: of the picture.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     kinds = list(dict.fromkeys(cell["comparison"] for cell in cells))
     windows = sorted({cell["window"] for cell in cells})
-    figure = Figure(figsize=(4.2 * len(kinds), 6.4), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(4.2 * len(kinds), 6.4)
     grid = figure.subplots(2, len(kinds), squeeze=False)
     for column, kind in enumerate(kinds):
         shares, times = grid[0, column], grid[1, column]
@@ -61,5 +60,4 @@ def draw_surface(
     grid[0, 0].set_ylabel("share of runs that decide rightly, 95 %", fontsize=9)
     grid[1, 0].set_ylabel("mean time of a decision, s", fontsize=9)
     grid[0, 0].legend(fontsize=8, frameon=False)
-    with (folder / "trade_off.png").open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, folder / "trade_off.png")

@@ -25,6 +25,7 @@ from estimators.tracking.metrics import nees
 from estimators.tracking.recursive_ransac import RansacParameters, RecursiveRansac
 from flightsim.foundation.random_streams import RandomStreams
 from missions.planning.orbit_guidance import OrbitGuidance, OrbitParameters
+from missions.studies.handoff_pixels import PixelWorld
 from missions.studies.handoff_tracker import SEARCH_ROLL_RAD, Tracker, orbit_roll
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld, targets_of
 from missions.studies.handoff_worlds import HANDOFF_WORLDS
@@ -244,7 +245,6 @@ class HandoffTrial:
         true = HANDOFF_WORLDS[cell.world].setting.over(self.setting)
         if not self.pixels:
             return HandoffWorld(true, seed)
-        from missions.studies.handoff_pixels import PixelWorld
 
         return PixelWorld(true, seed)
 

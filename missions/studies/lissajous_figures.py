@@ -4,14 +4,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from estimators.reports.picture import tidy
+from estimators.reports.figure import INK, blank_figure, save_figure, tidy
 from missions.studies.lissajous_setting import DT, SAMPLE_CELL, START, STEPS
 from missions.studies.lissajous_trial import SampleRun
 
-_INK: Final = "#1f2937"
 _TARGET: Final = "#7c3aed"
 _TRUTH: Final = "#111827"
 _DRONES: Final = ("#111827", "#94a3b8")
@@ -54,7 +51,7 @@ def draw_paths(path: Path, run: SampleRun) -> None:
     axes.set_aspect("equal")
     _finish(axes, f"x {_UNIT}", "y")
     axes.legend(fontsize=9, loc="upper left", frameon=False)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def draw_target(path: Path, run: SampleRun) -> None:
@@ -92,18 +89,17 @@ def draw_target(path: Path, run: SampleRun) -> None:
     figure.legend(
         *place.get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3, frameon=False
     )
-    _save(figure, path)
+    save_figure(figure, path)
 
 
-def _figure(title: str, size_in: tuple[float, float]) -> Figure:
-    figure = Figure(figsize=size_in, dpi=130, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+def _figure(title: str, size_in: tuple[float, float]) -> Any:
+    figure = blank_figure(*size_in, dpi=130)
     epsilon, delta = SAMPLE_CELL
     figure.suptitle(
         f"{title}, one run with $\\delta$ = {delta:g}, $\\epsilon$ = {epsilon:g}\n",
         fontsize=13,
         fontweight="bold",
-        color=_INK,
+        color=INK,
     )
     figure.text(
         0.5,
@@ -111,7 +107,7 @@ def _figure(title: str, size_in: tuple[float, float]) -> Figure:
         "after Steckenrider, Leamy and Furukawa 2020, by the corrected equations",
         ha="center",
         fontsize=9,
-        color=_INK,
+        color=INK,
     )
     return figure
 
@@ -123,10 +119,5 @@ def _window(axes: Any, centre: Any, reach: Any) -> None:
 
 def _finish(axes: Any, x: str, y: str) -> None:
     tidy(axes)
-    axes.set_xlabel(x, fontsize=9, color=_INK)
-    axes.set_ylabel(y, fontsize=9, color=_INK)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    axes.set_xlabel(x, fontsize=9, color=INK)
+    axes.set_ylabel(y, fontsize=9, color=INK)

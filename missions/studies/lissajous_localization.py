@@ -5,6 +5,7 @@ IV).
 from pathlib import Path
 
 from missions.studies.design import listed
+from missions.studies.lissajous_figures import draw_paths, draw_target
 from missions.studies.lissajous_setting import CELLS, READINGS
 from missions.studies.lissajous_table import lines_of, summarise
 from missions.studies.lissajous_trial import Cell, Errors, LocalizationTrial, compile_study, sample_run
@@ -41,7 +42,6 @@ def study(options: LocalizationStudyOptions | None = None) -> Study[Cell, Errors
 
 def draw(results: Results, folder: Path) -> None:
     """Draw figures 6 and 7."""
-    from missions.studies.lissajous_figures import draw_paths, draw_target
 
     sample = sample_run(results.seed)
     draw_paths(folder / "figure_6.png", sample)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from estimators.reports.figure import blank_figure, save_figure
 from flightsim.world_spec import WorldSpec
 from missions.base.options import FlightOptions
 from missions.base.request import RunRequest
@@ -260,11 +261,8 @@ def lines_of(results: Results) -> list[str]:
 
 def draw(results: Results, folder: Path) -> None:
     """Draw `search.png`: the share of searches that have found the tag, over time."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(7.2, 4.2)
     axes = figure.subplots()
     for name in PATTERNS:
         time_s, found = _searches(results, name)
@@ -285,5 +283,4 @@ def draw(results: Results, folder: Path) -> None:
     axes.tick_params(labelsize=8)
     if axes.lines:
         axes.legend(fontsize=8, frameon=False)
-    with (folder / "search.png").open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, folder / "search.png")

@@ -3,23 +3,18 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from missions.studies.magnetic_passes import BEYOND_M, DIAGONAL_RAD, TARGET
-
-if TYPE_CHECKING:
-    from missions.studies.magnetic_passes import DiagonalPass
+from estimators.reports.figure import INK, blank_figure, save_figure
+from missions.studies.magnetic_passes import BEYOND_M, DIAGONAL_RAD, TARGET, DiagonalPass
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _COLOURS: Final = ("#9ca3af", "#c2410c", "#1769aa", "#15803d")
-_INK: Final = "#1f2937"
 _BINS: Final = 10
 _TARGET_COLOUR, _FALSE_COLOUR, _TRUTH_COLOUR = "#1769aa", "#c2410c", "#dc2626"
 _DOTS: Final = 4000  # particles that are drawn
@@ -37,34 +32,32 @@ def draw_curves(
         probability: likewise, of the methods that give one.
         passes: number of passes.
     """
-    figure = Figure(figsize=(12.0, 4.2), dpi=130, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(12.0, 4.2, dpi=130)
     panels = figure.subplots(1, 3)
     for number, axes in enumerate(panels[:2]):
         for (method, values), colour in zip(scores.items(), _COLOURS, strict=True):
             false_rate, true_rate = _roc(values[:, number], values[:, passes + number])
             axes.plot(false_rate, true_rate, color=colour, linewidth=1.6, label=method)
         axes.plot([0, 1], [0, 1], color="#e5e7eb", linewidth=1.0, zorder=0)
-        axes.set_title(("after one pass", "after two passes")[number], fontsize=10, loc="left", color=_INK)
+        axes.set_title(("after one pass", "after two passes")[number], fontsize=10, loc="left", color=INK)
         axes.set_xlabel("false anomalies named", fontsize=9)
         axes.set_ylabel("targets named", fontsize=9)
         axes.legend(fontsize=8, frameon=False, loc="lower right")
     for (method, values), colour in zip(probability.items(), _COLOURS[2:], strict=True):
         _draw_reliability(panels[2], method, values, passes, colour)
     panels[2].plot([0, 1], [0, 1], color="#e5e7eb", linewidth=1.0, zorder=0)
-    panels[2].set_title("reliability, all passes (area: their number)", fontsize=10, loc="left", color=_INK)
+    panels[2].set_title("reliability, all passes (area: their number)", fontsize=10, loc="left", color=INK)
     panels[2].set_xlabel("stated probability", fontsize=9)
     panels[2].set_ylabel("share of targets", fontsize=9)
     panels[2].legend(fontsize=8, frameon=False, loc="upper left")
     for axes in panels:
-        axes.tick_params(labelsize=8, colors=_INK)
+        axes.tick_params(labelsize=8, colors=INK)
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
-def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, Array]]) -> None:
+def draw_passes(path: Path, flown: DiagonalPass, traces: Sequence[tuple[bool, Array]]) -> None:
     """Draw figures 4 and 5 (the particles of a diagonal pass) and 6 (the confidence along passes).
 
     Args:
@@ -72,8 +65,7 @@ def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, 
         flown: the diagonal pass.
         traces: see `pass_traces`.
     """
-    figure = Figure(figsize=(12.0, 9.0), dpi=130, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(12.0, 9.0, dpi=130)
     in_target, in_vehicle, angles, confidence = figure.subplots(2, 2).ravel()
     rng = np.random.default_rng(0)
     count = len(flown.hypothesis.weights)
@@ -82,7 +74,7 @@ def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, 
     _draw_in_target(in_target, flown, shown, chosen)
     sources = flown.hypothesis.sources()[chosen]
     in_vehicle.plot(sources[:, 1], sources[:, 0], ".", color=_TARGET_COLOUR, markersize=2, alpha=0.4)
-    in_vehicle.plot(0.0, 0.0, "^", color=_INK, markersize=9)
+    in_vehicle.plot(0.0, 0.0, "^", color=INK, markersize=9)
     in_vehicle.plot(0.0, -BEYOND_M, "+", color=_TRUTH_COLOUR, markersize=12, markeredgewidth=1.8)
     in_vehicle.set_aspect("equal")
     in_vehicle.set_xlim(-1500.0, 1500.0)
@@ -104,11 +96,10 @@ def draw_passes(path: Path, flown: "DiagonalPass", traces: Sequence[tuple[bool, 
     confidence.set_ylim(0.0, 1.0)
     confidence.legend(fontsize=8, frameon=False, loc="lower right")
     _title(confidence, "confidence along first passes (7)", "time since the begin of the anomaly, s", "C")
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
-def _draw_in_target(axes: Any, flown: "DiagonalPass", shown: Indices, chosen: Indices) -> None:
+def _draw_in_target(axes: Any, flown: DiagonalPass, shown: Indices, chosen: Indices) -> None:
     """Figure 4: the particles at the first measurement and at the end, on the target's signature."""
     side = np.linspace(-_FAR_M, _FAR_M, 200)
     square = (side[:, None] / TARGET.sigma_along_m) ** 2 + (side / TARGET.sigma_across_m) ** 2
@@ -135,10 +126,10 @@ def _draw_in_target(axes: Any, flown: "DiagonalPass", shown: Indices, chosen: In
 
 
 def _title(axes: Any, title: str, x: str, y: str) -> None:
-    axes.set_title(title, fontsize=10, loc="left", color=_INK)
+    axes.set_title(title, fontsize=10, loc="left", color=INK)
     axes.set_xlabel(x, fontsize=9)
     axes.set_ylabel(y, fontsize=9)
-    axes.tick_params(labelsize=8, colors=_INK)
+    axes.tick_params(labelsize=8, colors=INK)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
 

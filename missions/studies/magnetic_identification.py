@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from estimators.magnetic_identification.classifier import FEATURES, shipped_classifier
 from estimators.tracking.metrics import calibration_error
 from missions.studies.design import grid
+from missions.studies.magnetic_figures import draw_curves, draw_passes
+from missions.studies.magnetic_passes import diagonal_pass, pass_traces
 from missions.studies.magnetic_training import fitted_tables, require_training, write_tables
 from missions.studies.magnetic_trial import CONDITIONS, PASSES, Cell, EncounterRow, trial
 from missions.studies.options import IdentificationStudyOptions
@@ -133,8 +135,6 @@ class Output:
     train: bool
 
     def __call__(self, results: Results, folder: Path) -> None:
-        from missions.studies.magnetic_figures import draw_curves, draw_passes
-        from missions.studies.magnetic_passes import diagonal_pass, pass_traces
 
         scores = {method: values[0] for method, values in scores_of(results).items()}
         probability = {"classifier": scores["classifier"], "bayes": _of_passes(results, "probability")[0]}

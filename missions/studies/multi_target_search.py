@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from estimators.multi_target.parameters import Belief
+from estimators.reports.figure import blank_figure, save_figure
 from missions.studies.calibration import rounded, verdicts_of
 from missions.studies.design import grid
 from missions.studies.multi_target_trial import EXPERIMENTS, Cell, Found, SearchTrial
@@ -324,11 +325,7 @@ def _lines_of_worlds(worlds: Mapping[str, Any]) -> list[str]:
 
 def draw(results: Results, folder: Path) -> None:
     """Draw `found.png`: found targets over time, in the first world and with the first filter."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 4.2), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(10.0, 4.2)
     world, belief = _values(results, "world")[0], _values(results, "belief")[0]
     names = _values(results, "experiment")
     for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
@@ -347,5 +344,4 @@ def draw(results: Results, folder: Path) -> None:
         axes.grid(color="#e5e7eb", linewidth=0.8)
         axes.tick_params(labelsize=8)
         axes.legend(fontsize=8, frameon=False)
-    with (folder / "found.png").open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, folder / "found.png")

@@ -5,11 +5,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from estimators.reports.picture import tidy
+from estimators.reports.figure import INK, blank_figure, save_figure, tidy
 from flightsim.foundation.random_streams import RandomStreams
 from missions.studies.results import Results
 from missions.studies.statistics import median_interval, rate_of
@@ -20,7 +18,6 @@ __all__ = ["PICTURE", "draw_study"]
 Array = NDArray[np.float64]
 
 PICTURE: Final = "study.png"
-_INK: Final = "#1f2937"
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b45309", "#0f766e", "#be185d", "#4b5563")
 _MOST: Final = 7  # largest number of quantities in one picture
 _MOST_SAMPLED: Final = 4
@@ -44,12 +41,9 @@ def draw_study(results: Results, folder: Path) -> None:
     columns = max(1, len(sampled)) if sampled else 2 if len(shown) else 1
     panels = 1 + len(shown) if not sampled else max(1, len(shown)) * columns
     rows = -(-panels // columns)
-    figure = Figure(
-        figsize=(1.0 + 5.0 * columns, 1.2 + 3.1 * rows), dpi=120, layout="constrained", facecolor="white"
-    )
-    FigureCanvasAgg(figure)
+    figure = blank_figure(1.0 + 5.0 * columns, 1.2 + 3.1 * rows)
     ended = f"{results.table.num_rows} trials" + ("" if results.complete else ", not complete")
-    figure.suptitle(f"{results.name}: {ended}", fontsize=12, fontweight="bold", color=_INK)
+    figure.suptitle(f"{results.name}: {ended}", fontsize=12, fontweight="bold", color=INK)
     axes = [figure.add_subplot(rows, columns, k + 1) for k in range(panels)]
     if sampled:
         for k, axis in enumerate(axes):
@@ -60,8 +54,7 @@ def draw_study(results: Results, folder: Path) -> None:
         for axis, name in zip(axes[1:], shown, strict=True):
             _draw_cells(axis, results, name, values[name])
         _legend(figure, axes[0])
-    with (folder / PICTURE).open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, folder / PICTURE)
 
 
 def _places(results: Results) -> tuple[list[float], list[int], Sequence[str], Sequence[str], str]:
@@ -134,19 +127,19 @@ def _draw_scatter(axes: Any, results: Results, parameter: str, name: str, placed
     for x in drawn[finished & ~succeeded]:
         axes.axvline(x, ymax=0.04, color=_COLOURS[1], linewidth=1.2)
     tidy(axes)
-    axes.set_xlabel(f"{parameter} (below: trials without success)", fontsize=9, color=_INK)
-    axes.set_ylabel(name or "success", fontsize=9, color=_INK)
+    axes.set_xlabel(f"{parameter} (below: trials without success)", fontsize=9, color=INK)
+    axes.set_ylabel(name or "success", fontsize=9, color=INK)
 
 
 def _finish(axes: Any, ticks: Sequence[str], label: str, title: str) -> None:
     tidy(axes)
     axes.set_xticks(range(len(ticks)), ticks)
     axes.set_xlim(-0.6, len(ticks) - 0.4)
-    axes.set_xlabel(label, fontsize=9, color=_INK)
-    axes.set_ylabel(title, fontsize=9, color=_INK)
+    axes.set_xlabel(label, fontsize=9, color=INK)
+    axes.set_ylabel(title, fontsize=9, color=INK)
 
 
-def _legend(figure: Figure, axes: Any) -> None:
+def _legend(figure: Any, axes: Any) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         figure.legend(

@@ -16,8 +16,10 @@ from missions.studies.engine import Engine, Progress
 from missions.studies.folder import SUMMARY, RowWriter, StudyFolder
 from missions.studies.inline import Inline
 from missions.studies.job import Job
+from missions.studies.picture import draw_study
 from missions.studies.results import Results
 from missions.studies.study import Study, Trial, Trials
+from missions.studies.summary import study_table, summary_of
 from missions.studies.trial_runner import KeepLogs, Scratch, parameters_of, succeeded
 
 __all__ = ["StudyResult", "read_results", "run_study", "run_trial"]
@@ -222,7 +224,6 @@ class _Session:
 
     def _concluded(self, outcome: str, reason: str, by_signal: int) -> StudyResult:
         """Write tables, summary and pictures of the rows that there are."""
-        from missions.studies.summary import study_table, summary_of
 
         found = self._folder.tables()
         if found is None:  # interrupted before the first row
@@ -254,7 +255,6 @@ class _Session:
         )
 
     def _draw(self, results: Results) -> None:
-        from missions.studies.picture import draw_study
 
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as made:
             (draw_study if self._study.draw is None else self._study.draw)(results, Path(made))

@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from missions.errors import PlanError
 from missions.studies.design import Design, Value
+from missions.studies.results import Results
 from missions.studies.rows import RowSchema
-
-if TYPE_CHECKING:
-    from missions.studies.results import Results
 
 __all__ = ["MAX_RUNS", "Study", "Trial", "Trials", "run_of"]
 
@@ -74,9 +72,9 @@ class Study(Generic[Parameters, Row]):
     options: Mapping[str, Value | None] = field(default_factory=dict)
     warm_up: Callable[[], object] | None = None
     command: Callable[[Mapping[str, Value], int], str] | None = None
-    summarise: "Callable[[Results], Mapping[str, Any]] | None" = None
-    report: "Callable[[Results], Sequence[str]] | None" = None
-    draw: "Callable[[Results, Path], None] | None" = None
+    summarise: Callable[[Results], Mapping[str, Any]] | None = None
+    report: Callable[[Results], Sequence[str]] | None = None
+    draw: Callable[[Results, Path], None] | None = None
     files: Sequence[Path] = ()
 
     def __post_init__(self) -> None:

@@ -4,10 +4,11 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from missions.studies.engine import Engine
 from missions.studies.results import Results
 from missions.studies.rows import Outcome
 from missions.studies.statistics import (
@@ -20,10 +21,7 @@ from missions.studies.statistics import (
     paired_rates,
     rate_of,
 )
-
-if TYPE_CHECKING:
-    from missions.studies.engine import Engine
-    from missions.studies.study import Study
+from missions.studies.study import Study
 
 __all__ = [
     "aligned",
@@ -183,10 +181,10 @@ def notes_of(
 
 
 def summary_of(
-    study: "Study[Any, Any] | None",
+    study: Study[Any, Any] | None,
     results: Results,
     *,
-    engine: "Engine | None" = None,
+    engine: Engine | None = None,
     outcome: str = "",
     reason: str = "",
     wall_time_s: float | None = None,
@@ -244,9 +242,7 @@ def _difference(difference: Difference) -> dict[str, Any]:
     return {**asdict(difference), "conclusive": difference.conclusive}
 
 
-def study_table(
-    study: "Study[Any, Any] | None", results: Results, summary: Mapping[str, Any]
-) -> Sequence[str]:
+def study_table(study: Study[Any, Any] | None, results: Results, summary: Mapping[str, Any]) -> Sequence[str]:
     """Lines of the table of a study: its own table, or that of every study."""
     if study is None or study.report is None:
         return table_of(summary)

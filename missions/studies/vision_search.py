@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.reports.figure import blank_figure, save_figure
 from estimators.tracking.camera_likelihood import ground_spread
 from estimators.tracking.camera_sight import CameraSight, DetectionRate, PoseErrors, SightModel
 from flightsim.foundation.vectors import from_euler, product
@@ -211,11 +212,8 @@ def lines_of(results: Results) -> list[str]:
 
 def draw(results: Results, folder: Path) -> None:
     """Draw `errors.png`: the errors of the three beliefs, and the consistency of the main one."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.0, 4.2), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(10.0, 4.2)
     left, right = figure.subplots(1, 2)
     cells = {cell["aircraft"]: index for index, cell in enumerate(results.cells)}
     for team, index in cells.items():
@@ -238,8 +236,7 @@ def draw(results: Results, folder: Path) -> None:
         axes.tick_params(labelsize=8)
         axes.legend(fontsize=8, frameon=False, loc="lower right")
     right.set_xlim(0.0, 12.0)
-    with (folder / "errors.png").open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, folder / "errors.png")
 
 
 def _finite(values: Array) -> Array:

@@ -18,6 +18,7 @@ from missions.survey.checks import check_reach, check_survey, for_vehicle
 from missions.survey.flight import fly_lines, fly_manoeuvres, mission_items, outline_of, planned_survey
 from missions.survey.options import SurveyOptions
 from missions.survey.outcome import Outcome, outcome_of, report_lines
+from missions.survey.picture import draw_calibration, draw_survey
 from missions.survey.plan import line_plan
 from missions.vehicle.limits import FixedWingLimits, Limits
 from missions.vehicle.sensors import SURVEY_MAGNETOMETER, Sensor
@@ -111,7 +112,6 @@ class SurveyFlight(MissionFlight[SurveyOptions]):
             outcome = outcome_of(debriefing, options, self._plan, self.vehicles[0].home)
 
         def draw(path: Path, title: str) -> None:
-            from missions.survey.picture import draw_calibration, draw_survey
 
             if outcome.calibration is not None:
                 draw_calibration(path, title, outcome.calibration)

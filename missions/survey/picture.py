@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimators.received import broken_at_gaps
+from estimators.reports.figure import INK, blank_figure, save_figure
 from estimators.survey.lines import LineKind
 from estimators.survey.processing import SurveyResult
 from missions.survey.records import Calibration
@@ -19,7 +18,6 @@ __all__ = ["draw_calibration", "draw_survey"]
 
 Array = NDArray[np.float64]
 
-_INK: Final = "#1f2937"
 _GRID: Final = "#e5e7eb"
 _LINE: Final = "#1769aa"
 _TIE: Final = "#c2410c"
@@ -41,18 +39,17 @@ def draw_survey(
         result: the processed survey.
         targets_ne_m: true places of targets, where they are known.
     """
-    figure = Figure(figsize=(12.0, 11.0), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
+    figure = blank_figure(12.0, 11.0)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=INK)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 0.75))
     _draw_lines(figure, figure.add_subplot(grid[0, 0]), result, targets_ne_m)
     _draw_map(figure, figure.add_subplot(grid[0, 1]), result)
     _draw_profiles(figure.add_subplot(grid[1, :]), result)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def _draw_lines(
-    figure: Figure, axes: Any, result: SurveyResult, targets_ne_m: Sequence[tuple[float, float]]
+    figure: Any, axes: Any, result: SurveyResult, targets_ne_m: Sequence[tuple[float, float]]
 ) -> None:
     r, on = result.readings, result.on_lines
     _, track_east_m, track_north_m = broken_at_gaps(r.time_s, r.east_m, r.north_m)
@@ -87,18 +84,18 @@ def _draw_lines(
     for k, anomaly in enumerate(result.anomalies):
         axes.plot(
             anomaly.east_m * _KILOMETRE, anomaly.north_m * _KILOMETRE, "o", markerfacecolor="none",
-            markeredgecolor=_INK, markersize=12, zorder=3, label="anomaly" if not k else None,
+            markeredgecolor=INK, markersize=12, zorder=3, label="anomaly" if not k else None,
         )  # fmt: skip
     if targets_ne_m or result.anomalies:
         axes.legend(loc="upper right", fontsize=8)
     _map_axes(axes, "lines, coloured by the differential measurement")
 
 
-def _draw_map(figure: Figure, axes: Any, result: SurveyResult) -> None:
+def _draw_map(figure: Any, axes: Any, result: SurveyResult) -> None:
     grid = result.grid
     if grid is None:
         axes.text(0.5, 0.5, f"no map: {result.no_grid}", ha="center", wrap=True, transform=axes.transAxes,
-                  color=_INK)  # fmt: skip
+                  color=INK)  # fmt: skip
         axes.set_axis_off()
         return
     low, high = np.nanpercentile(grid.values_nt, _LIMITS)
@@ -134,9 +131,9 @@ def _draw_profiles(axes: Any, result: SurveyResult) -> None:
         axes.text(-0.01, -row * step, line.name, fontsize=7, color=colour, ha="right", va="center",
                   transform=axes.get_yaxis_transform())  # fmt: skip
     axes.set_yticks([])
-    axes.set_xlabel("along the line, km", fontsize=9, color=_INK)
+    axes.set_xlabel("along the line, km", fontsize=9, color=INK)
     axes.set_title(
-        f"differential measurement; profiles are drawn {step:.1f} nT apart", fontsize=10, color=_INK
+        f"differential measurement; profiles are drawn {step:.1f} nT apart", fontsize=10, color=INK
     )
     axes.grid(True, axis="x", color=_GRID, linewidth=0.6)
     for side in ("top", "right", "left"):
@@ -151,10 +148,10 @@ def _beyond(values: Array, low: float, high: float) -> str:
 
 def _map_axes(axes: Any, title: str) -> None:
     axes.set_aspect("equal")
-    axes.set_title(title, fontsize=10, color=_INK)
-    axes.set_xlabel("east, km", fontsize=9, color=_INK)
-    axes.set_ylabel("north, km", fontsize=9, color=_INK)
-    axes.tick_params(labelsize=8, colors=_INK)
+    axes.set_title(title, fontsize=10, color=INK)
+    axes.set_xlabel("east, km", fontsize=9, color=INK)
+    axes.set_ylabel("north, km", fontsize=9, color=INK)
+    axes.tick_params(labelsize=8, colors=INK)
 
 
 def _number(name: str) -> int:
@@ -171,12 +168,11 @@ def _backwards(course_rad: float) -> bool:
 
 def draw_calibration(path: Path, title: str, made: Calibration) -> None:
     """Draw the readings of the twelve manoeuvres of the second box, before and after compensation."""
-    figure = Figure(figsize=(12.0, 8.0), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = blank_figure(12.0, 8.0)
     figure.suptitle(
         f"{title}\nfigure of merit {made.figure_of_merit_before_nt:.1f} nT before, "
         f"{made.figure_of_merit_nt:.2f} nT after; improvement ratio {made.improvement:.1f}",
-        fontsize=11, fontweight="bold", color=_INK,
+        fontsize=11, fontweight="bold", color=INK,
     )  # fmt: skip
     axes = figure.subplots(4, 3, sharey=True)
     for axis, label in zip(axes.ravel(), made.before_nt, strict=True):
@@ -186,10 +182,10 @@ def draw_calibration(path: Path, title: str, made: Calibration) -> None:
         ):
             axis.plot(0.1 * np.arange(len(values)), values - np.median(values), color=colour, label=name,
                       linewidth=1.0)  # fmt: skip
-        axis.set_title(label.partition(" heading ")[2], fontsize=9, color=_INK)
-        axis.tick_params(labelsize=7, colors=_INK)
+        axis.set_title(label.partition(" heading ")[2], fontsize=9, color=INK)
+        axis.tick_params(labelsize=7, colors=INK)
         axis.grid(True, color=_GRID, linewidth=0.6)
     axes[0, 0].legend(fontsize=8)
-    figure.supxlabel("time, s", fontsize=9, color=_INK)
-    figure.supylabel("reading less main field and level, nT", fontsize=9, color=_INK)
-    figure.savefig(path)
+    figure.supxlabel("time, s", fontsize=9, color=INK)
+    figure.supylabel("reading less main field and level, nT", fontsize=9, color=INK)
+    save_figure(figure, path)

@@ -2,12 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from missions.kind import VehicleKind
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 _TAKEOFF_S: Final = 300.0  # longest time of one vehicle's takeoff, for the vehicles that wait for it
 _LANDING_S: Final = 900.0
@@ -71,7 +69,7 @@ class Traffic:
 class Layers:
     """Takeoffs and landings of a team whose vehicles fly in layers."""
 
-    def __init__(self, vehicles: Sequence["Vehicle"], heights_m: Sequence[float], *, busy_s: float) -> None:
+    def __init__(self, vehicles: Sequence[Vehicle], heights_m: Sequence[float], *, busy_s: float) -> None:
         """Initialise with all vehicles on the ground.
 
         Args:
@@ -122,5 +120,5 @@ class Layers:
         traffic.down(index)
         vehicle.notes.end(vehicle.clock.stamp_us)
 
-    async def _wait(self, vehicle: "Vehicle", ready: Callable[[], bool], what: str, limit_s: float) -> None:
+    async def _wait(self, vehicle: Vehicle, ready: Callable[[], bool], what: str, limit_s: float) -> None:
         await vehicle.link.wait_until(ready, what=what, on=("HEARTBEAT",), timeout_s=limit_s)

@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import PlanError
@@ -12,9 +12,7 @@ from missions.kind import VehicleKind
 from missions.vehicle.limits import MulticopterLimits
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.telemetry import Attitude
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 _LONGEST_STEP_S: Final = 0.5
 _YAW_SHARE: Final = 0.7  # of the yaw rate, so that the yaw can follow
@@ -110,7 +108,7 @@ class _CourseFlight:
 
 @asynccontextmanager
 async def steering(
-    vehicle: "Vehicle", *, altitude_m: float, speed_m_s: float, rate_hz: float
+    vehicle: Vehicle, *, altitude_m: float, speed_m_s: float, rate_hz: float
 ) -> AsyncIterator[Steering]:
     """Fly headings at a height: `async with steering(...) as flight: await flight.turn_to(...)`.
 

@@ -10,9 +10,10 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Generic, Protocol, Self, TypeVar, cast, overload
+from typing import Final, Generic, Protocol, Self, TypeVar, cast, overload
 
 from autopilot_bridge.clock import Clock, TelemetryClock
+from autopilot_bridge.links import Link
 from autopilot_bridge.mavlink import (
     Frame,
     FrameEncoder,
@@ -32,9 +33,6 @@ from autopilot_bridge.mavlink.components import (
 from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 from missions.errors import LinkClosed
 from missions.vehicle.peers import NewestFrames
-
-if TYPE_CHECKING:
-    from autopilot_bridge.links import Link
 
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
@@ -89,7 +87,7 @@ class Connection:
 
     def __init__(
         self,
-        link: "Link",
+        link: Link,
         clock: Clock,
         recorder: Recorder | None = None,
         *,
@@ -194,7 +192,7 @@ class Connection:
             for listener in tuple(self._listeners.get(message_id, ())):
                 listener(frame)
 
-    def _look_up(self, message_ids: tuple[int, ...]) -> "Wanted | None":
+    def _look_up(self, message_ids: tuple[int, ...]) -> Wanted | None:
         """Which frames of such a packet have listeners. None: their order counts."""
         wanted = None
         if not self._recorder_acts and self._in_order.keys().isdisjoint(message_ids):

@@ -7,7 +7,7 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.mavlink.plain_text import plain_text
+from flightsim.foundation.plain_text import plain_text
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
 from missions.vehicle.limits import Limits
 from missions.vehicle.link import VehicleLink

@@ -1,18 +1,15 @@
 """Flight by streamed roll commands, whether the autopilot holds altitude and airspeed itself or not."""
 
 import asyncio
-from typing import TYPE_CHECKING
 
+from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.firmware import Mode
-
-if TYPE_CHECKING:
-    from missions.vehicle.attitude_pilot import AttitudePilot
-    from missions.vehicle.guided import GuidedSession, SetpointSource
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.guided import GuidedSession, SetpointSource
+from missions.vehicle.vehicle import Vehicle
 
 
 async def follow_rolls(
-    vehicle: "Vehicle", guided: "GuidedSession", pilot: "AttitudePilot", source: "SetpointSource"
+    vehicle: Vehicle, guided: GuidedSession, pilot: AttitudePilot, source: SetpointSource
 ) -> None:
     """Follow a source of roll commands to its end. An autopilot that holds altitude and airspeed itself
     receives both when it is in guided mode.

@@ -2,16 +2,13 @@
 
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from autopilot_bridge.clock.pacing import unix_time_us
 from autopilot_bridge.errors import SigningKeyError
 from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState, definition, dialect
 from autopilot_bridge.mavlink.signing import RADIO, signing_time
 from missions.errors import VehicleTimeout
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+from missions.vehicle.vehicle import Vehicle
 
 
 def now() -> int:
@@ -48,7 +45,7 @@ def client_signing(key: SigningKey | None, *, link_id: int = 0) -> LinkSigning |
     return None if key is None else LinkSigning(SigningState(key, clock=now), link_id=link_id, policy=RADIO)
 
 
-async def require_key(key: SigningKey | None, vehicle: "Vehicle") -> None:
+async def require_key(key: SigningKey | None, vehicle: Vehicle) -> None:
     """Check that a vehicle that signs its messages answers, before anything is set or uploaded.
 
     A vehicle that signs may still accept unsigned frames (PX4 and ArduPilot do on USB).

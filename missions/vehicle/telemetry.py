@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import Final, Generic, NamedTuple, TypeVar, cast
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage, dialect, field_reader
-from autopilot_bridge.mavlink.plain_text import plain_text
 from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, m_s, metres, place
+from flightsim.foundation.plain_text import plain_text
 
 T = TypeVar("T")
 

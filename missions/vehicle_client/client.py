@@ -28,7 +28,7 @@ from autopilot_bridge.links import (
 )
 from autopilot_bridge.mavlink import definition, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.mavlink.plain_text import plain_text
+from flightsim.foundation.plain_text import plain_text
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual

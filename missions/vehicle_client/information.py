@@ -6,8 +6,8 @@ from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.plugins.info import InfoError
 
 from autopilot_bridge.mavlink import dialect, enum_name
-from autopilot_bridge.mavlink.plain_text import plain_text
 from autopilot_bridge.mavlink.wire_units import degrees, metres
+from flightsim.foundation.plain_text import plain_text
 from missions.vehicle_client.client import WANTED, VehicleClient
 
 _WAIT_S: Final = 4.0

@@ -2,17 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from estimators.received import GAP_US, interpolated
 from estimators.vision_search import AreaEstimate
 from flightsim.foundation.geodesy import LocalFrame
+from missions.base.report import Debriefing
 from missions.flown.targets import true_targets
 from missions.vision_search.pose_errors import pose_errors
-
-if TYPE_CHECKING:
-    from missions.base.report import Debriefing
-    from missions.vision_search.team import VisionSearchTeam
+from missions.vision_search.team import VisionSearchTeam
 
 __all__ = ["ELLIPSE_95", "search_figures", "search_verdict", "true_place"]
 
@@ -21,9 +19,7 @@ ELLIPSE_95: Final = -2.0 * math.log(0.05)
 _LATE_SHARE: Final = 0.2
 
 
-def true_place(
-    team: "VisionSearchTeam", debriefing: "Debriefing", time_us: int
-) -> tuple[float, float] | None:
+def true_place(team: VisionSearchTeam, debriefing: Debriefing, time_us: int) -> tuple[float, float] | None:
     """The target's true place at a time, from the area's origin; None: not known."""
     origin = team.watch.origin
     if origin is None:
@@ -36,7 +32,7 @@ def true_place(
     return (north_m, east_m) if math.isfinite(north_m) else None
 
 
-def search_figures(team: "VisionSearchTeam", debriefing: "Debriefing") -> Mapping[str, Any]:
+def search_figures(team: VisionSearchTeam, debriefing: Debriefing) -> Mapping[str, Any]:
     """Figures of a finished search.
 
     Args:
@@ -117,7 +113,7 @@ def _apart(states: list[list[AreaEstimate]]) -> float | None:
     return round(max(math.dist(a, b) for k, a in enumerate(means) for b in means[:k]), 4)
 
 
-def search_verdict(team: "VisionSearchTeam", debriefing: "Debriefing") -> str:
+def search_verdict(team: VisionSearchTeam, debriefing: Debriefing) -> str:
     """The reason, from the vehicles' reports, why a search was not flown; "" if it was."""
     search = team.search
     if not any(search.states):

@@ -4,32 +4,28 @@ down.
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
 
 from estimators.received import broken_at_gaps
+from estimators.reports.figure import INK, blank_figure, save_figure
 from estimators.vision_search import AreaEstimate
+from missions.base.report import Debriefing
 from missions.vision_search.figures import ELLIPSE_95, true_place
-
-if TYPE_CHECKING:
-    from missions.base.report import Debriefing
-    from missions.vision_search.search import Moment
-    from missions.vision_search.team import VisionSearchTeam
+from missions.vision_search.search import Moment
+from missions.vision_search.team import VisionSearchTeam
 
 __all__ = ["draw_search"]
 
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
-_INK: Final = "#1f2937"
 _GRID: Final = "#e5e7eb"
 _TRUE: Final = "#dc2626"
 _WIDTHS: Final = 6.0  # half the side of the ellipses' view, in standard deviations
 
 
-def draw_search(path: Path, title: str, team: "VisionSearchTeam", debriefing: "Debriefing") -> None:
+def draw_search(path: Path, title: str, team: VisionSearchTeam, debriefing: Debriefing) -> None:
     """Draw the search.
 
     Args:
@@ -39,20 +35,18 @@ def draw_search(path: Path, title: str, team: "VisionSearchTeam", debriefing: "D
         debriefing: debriefing of the run.
     """
     place = true_place(team, debriefing, team.search.moments[-1].time_us)
-    figure = Figure(figsize=(14.0, 7.2), dpi=120, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
+    figure = blank_figure(14.0, 7.2)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=INK)
     grid = figure.add_gridspec(2, 4, height_ratios=(3.4, 2.8))
     for k, moment in enumerate(_four(team)):
         _draw_moment(figure.add_subplot(grid[0, k]), moment, team, place)
     _draw_detection(figure.add_subplot(grid[1, 0]), team)
     _draw_covariance(figure.add_subplot(grid[1, 1:3]), team, place)
     _draw_ellipses(figure.add_subplot(grid[1, 3]), team, place)
-    with path.open("xb") as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+    save_figure(figure, path)
 
 
-def _four(team: "VisionSearchTeam") -> list["Moment"]:
+def _four(team: VisionSearchTeam) -> list[Moment]:
     """Two moments of the search, the first after the target was localized, and the last."""
     search = team.search
     moments, end_us = search.moments, search.localized_us
@@ -70,7 +64,7 @@ def _times(states: list[AreaEstimate], began_us: int) -> list[float]:
 
 
 def _draw_moment(
-    axes: Any, moment: "Moment", team: "VisionSearchTeam", place: tuple[float, float] | None
+    axes: Any, moment: Moment, team: VisionSearchTeam, place: tuple[float, float] | None
 ) -> None:
     layout, search = team.search.layout, team.search
     density = moment.shares / max(moment.shares.max(), 1e-300)
@@ -97,18 +91,18 @@ def _draw_moment(
     axes.set_xlim(layout.west_m, layout.east_m)
     axes.set_ylim(layout.south_m, layout.north_m)
     axes.set_aspect("equal")
-    axes.tick_params(labelsize=7, colors=_INK)
+    axes.tick_params(labelsize=7, colors=INK)
     seconds = (moment.time_us - search.began_us) * 1e-6
     axes.set_title(
         f"{seconds:.0f} s: {moment.estimate.detections} detections, sigma {moment.estimate.sigma_m:.1f} m",
         fontsize=9,
-        color=_INK,
+        color=INK,
         loc="left",
     )
     axes.legend(fontsize=7, loc="upper right", framealpha=0.85)
 
 
-def _footprint(here: tuple[float, float, float], team: "VisionSearchTeam", index: int, colour: str) -> Any:
+def _footprint(here: tuple[float, float, float], team: VisionSearchTeam, index: int, colour: str) -> Any:
     """What a level camera sees from a place."""
     options = team.options[index]
     north_m, east_m, yaw_rad = here
@@ -144,7 +138,7 @@ def _ellipse(axes: Any, estimate: AreaEstimate, colour: str, label: str = "") ->
     )
 
 
-def _draw_detection(axes: Any, team: "VisionSearchTeam") -> None:
+def _draw_detection(axes: Any, team: VisionSearchTeam) -> None:
     for k, states in enumerate(team.search.states):
         pod = [state.probability_of_detection for state in states]
         colour = _COLOURS[k % len(_COLOURS)]
@@ -153,7 +147,7 @@ def _draw_detection(axes: Any, team: "VisionSearchTeam") -> None:
     _style(axes, "cumulative probability of detection")
 
 
-def _draw_covariance(axes: Any, team: "VisionSearchTeam", place: tuple[float, float] | None) -> None:
+def _draw_covariance(axes: Any, team: VisionSearchTeam, place: tuple[float, float] | None) -> None:
     for k, states in enumerate(team.search.states):
         colour = _COLOURS[k % len(_COLOURS)]
         times = _times(states, team.search.began_us)
@@ -164,7 +158,7 @@ def _draw_covariance(axes: Any, team: "VisionSearchTeam", place: tuple[float, fl
     _style(axes, "longest sigma and error, m")
 
 
-def _draw_ellipses(axes: Any, team: "VisionSearchTeam", place: tuple[float, float] | None) -> None:
+def _draw_ellipses(axes: Any, team: VisionSearchTeam, place: tuple[float, float] | None) -> None:
     last = [states[-1] for states in team.search.states if states]
     for k, estimate in enumerate(last):
         colour = _COLOURS[k % len(_COLOURS)]
@@ -177,14 +171,14 @@ def _draw_ellipses(axes: Any, team: "VisionSearchTeam", place: tuple[float, floa
         axes.set_xlim(last[0].east_m - half_m, last[0].east_m + half_m)
         axes.set_ylim(last[0].north_m - half_m, last[0].north_m + half_m)
     axes.set_aspect("equal")
-    axes.tick_params(labelsize=7, colors=_INK)
-    axes.set_title("95 % ellipses at the end, m", fontsize=9, color=_INK, loc="left")
+    axes.tick_params(labelsize=7, colors=INK)
+    axes.set_title("95 % ellipses at the end, m", fontsize=9, color=INK, loc="left")
 
 
 def _style(axes: Any, label: str) -> None:
-    axes.set_ylabel(label, fontsize=8, color=_INK)
-    axes.set_xlabel("time of the search, s", fontsize=8, color=_INK)
+    axes.set_ylabel(label, fontsize=8, color=INK)
+    axes.set_xlabel("time of the search, s", fontsize=8, color=INK)
     axes.set_xlim(left=0.0)
     axes.grid(color=_GRID, linewidth=0.8)
-    axes.tick_params(labelsize=7, colors=_INK)
+    axes.tick_params(labelsize=7, colors=INK)
     axes.legend(fontsize=7, loc="best", frameon=False)

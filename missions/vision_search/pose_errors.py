@@ -3,7 +3,7 @@ estimator.
 """
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,7 @@ from autopilot_bridge.mavlink.wire_units import metres
 from estimators.received import not_in_gaps, received_times
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.vectors import euler_from_quaternions, wrap_pi
-from missions.flown.records import positions_ned_m
-
-if TYPE_CHECKING:
-    from missions.flown.records import FlightRecords
+from missions.flown.records import FlightRecords, positions_ned_m
 
 __all__ = ["PoseErrorFigures", "pose_errors"]
 
@@ -28,7 +25,7 @@ _LEAST: Final = 40  # samples
 
 
 def pose_errors(
-    records: "FlightRecords", system_id: int, frame: LocalFrame, span_us: tuple[int, int]
+    records: FlightRecords, system_id: int, frame: LocalFrame, span_us: tuple[int, int]
 ) -> PoseErrorFigures | None:
     """Root mean squares of the errors of a vehicle's messages, and how long they last; None: not enough is
     known.

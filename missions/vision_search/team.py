@@ -2,20 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from estimators.vision_search import AreaEstimate
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.foundation.random_streams import RandomStreams
 from missions.search.team import SearchTeam
 from missions.vehicle.telemetry import Attitude, Position
+from missions.vehicle.vehicle import Vehicle
 from missions.vision_search.for_vehicle import check_vehicle
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.search import VisionSearch
 from missions.vision_search.watch import CameraWatch
-
-if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["VisionSearchTeam"]
 
@@ -38,7 +36,7 @@ class VisionSearchTeam(SearchTeam[VisionSearchOptions]):
     search: VisionSearch
     watch: CameraWatch
 
-    def __init__(self, vehicles: "Sequence[Vehicle]", options: Sequence[VisionSearchOptions]) -> None:
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[VisionSearchOptions]) -> None:
         super().__init__(vehicles, options, check=check_vehicle, rates_hz={"ATTITUDE": _ATTITUDE_HZ})
         alone = len(vehicles) == 1
         own = options[0]

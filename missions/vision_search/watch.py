@@ -3,7 +3,7 @@
 import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -11,11 +11,9 @@ from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
 from autopilot_bridge.mavlink.search_likelihood import search_likelihood_message
 from estimators.runner import Runner
 from estimators.vision_search import AreaEstimate, VisionSearchEstimator, VisionSearchParameters
+from flightsim.foundation.geodesy import GeodeticPosition
+from missions.vehicle.vehicle import Vehicle
 from missions.vision_search.options import LinkQuality
-
-if TYPE_CHECKING:
-    from flightsim.foundation.geodesy import GeodeticPosition
-    from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["CameraWatch"]
 
@@ -44,7 +42,7 @@ class CameraWatch:
 
     def __init__(
         self,
-        vehicles: "Sequence[Vehicle]",
+        vehicles: Sequence[Vehicle],
         parameters: Sequence[VisionSearchParameters],
         quality: LinkQuality,
         on_estimate: Callable[[int, AreaEstimate], None],
@@ -65,7 +63,7 @@ class CameraWatch:
         self.counts: Counter[str] = Counter()
 
     @property
-    def origin(self) -> "GeodeticPosition | None":
+    def origin(self) -> GeodeticPosition | None:
         """The origin of places; None before the first frame from the air."""
         return self.estimators[0].origin
 

@@ -12,7 +12,7 @@ from estimators.library import estimator_class
 from estimators.log_replay import replay
 from estimators.logs import open_log, report_of
 from estimators.references import Series, error_figures, errors, references
-from missions.cli.log_text import report_lines
+from missions.cli.bodies.log_text import report_lines
 
 
 def us(*seconds):

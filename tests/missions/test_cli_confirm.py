@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from click.testing import CliRunner
 
-from missions.cli.confirm import confirmation, leaves_this_machine
+from missions.cli.bodies.confirm import confirmation, leaves_this_machine
 from missions.cli.fly import fly
 from missions.errors import MissionError
 from missions.preflight.before_flight import Confirm, Look
@@ -89,5 +89,5 @@ def test_what_the_answers_do(
     async def typed(_question: str) -> str:
         return answer
 
-    monkeypatch.setattr("missions.cli.confirm.ask", typed)
+    monkeypatch.setattr("missions.cli.bodies.confirm.ask", typed)
     assert asyncio.run(confirm([look])) is flies

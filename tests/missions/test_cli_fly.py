@@ -12,8 +12,9 @@ from click.testing import CliRunner
 from autopilot_bridge.clock import Clock
 from missions.base.report import Report
 from missions.base.request import RunRequest
-from missions.cli.fly import flight_of, fly
-from missions.cli.fly_report import Pace, print_result
+from missions.cli.bodies.fly import flight_of
+from missions.cli.bodies.fly_report import Pace, print_result
+from missions.cli.fly import fly
 from missions.cli.mission_command import FlightOption
 from missions.errors import PlanError
 from missions.flown.run_folder import wind_words
@@ -201,7 +202,7 @@ def test_turns_are_planned_for_the_wind_the_user_expects(
         requested.append(request)
         raise PlanError("enough")
 
-    monkeypatch.setattr("missions.runs.session.fly", refuse)
+    monkeypatch.setattr("missions.cli.bodies.fly.fly_mission", refuse)
     assert CliRunner().invoke(fly, arguments).exit_code == 2
     assert [request.planning_wind_m_s for request in requested] == [planned_m_s]
 

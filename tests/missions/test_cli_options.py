@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 import pytest
 
+from missions.cli.bodies.status_line import StatusLine
 from missions.cli.fly_command import _COMMANDS
 from missions.cli.main import command_line
 from missions.cli.options import in_options
-from missions.cli.status_line import StatusLine
 
 ROOT = Path(__file__).parents[2]
 FIELD = re.compile(r"`[a-z]\w*(?:, [a-z]\w*)*(?:=[\w:]+)?`")

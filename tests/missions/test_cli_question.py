@@ -9,7 +9,7 @@ from tests.terminal import CTRL_C, END_OF_FILE, at_terminal
 
 FLY = """
 import asyncio, sys
-from missions.cli.confirm import confirmation
+from missions.cli.bodies.confirm import confirmation
 from missions.process.ending import EndingSignals
 from missions.errors import MissionError
 from missions.preflight.before_flight import Look, confirmed
@@ -39,8 +39,8 @@ with EndingSignals() as ending:
 FLY_WITH_PROGRESS = """
 import asyncio
 from types import SimpleNamespace
-from missions.cli.confirm import confirmation
-from missions.cli.fly_report import ProgressLine
+from missions.cli.bodies.confirm import confirmation
+from missions.cli.bodies.fly_report import ProgressLine
 from missions.preflight.before_flight import Look, confirmed
 
 async def flight():

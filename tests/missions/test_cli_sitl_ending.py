@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 
 from autopilot_bridge.sitl import Sitl, SitlServer
 from autopilot_bridge.tlog import TlogReader
+from missions.cli.bodies.storage import Losses
 from missions.cli.main import command_line, run_command_line
-from missions.cli.storage import Losses
 
 QUICK = ("sitl", "--speedup", "0", "--no-wait", "--link", "udpin:127.0.0.1:0")
 ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -81,7 +81,7 @@ def test_terminated_while_it_starts_it_leaves_nothing(
         assert list(cards.iterdir())
         os.kill(os.getpid(), number)
 
-    monkeypatch.setattr("autopilot_bridge.sitl.compile_flight_code", requested)
+    monkeypatch.setattr("missions.cli.bodies.sitl.compile_flight_code", requested)
     log = tmp_path / "said.tlog"
     assert run_command_line([*QUICK, "--duration", "3", "--log", str(log)]) == 130
     assert capsys.readouterr().err.endswith("interrupted\n")
@@ -101,7 +101,7 @@ def test_terminated_where_nothing_can_be_raised_it_does_not_start(
     def clean_up(_: Any) -> None:
         Dying()
 
-    monkeypatch.setattr("autopilot_bridge.sitl.compile_flight_code", clean_up)
+    monkeypatch.setattr("missions.cli.bodies.sitl.compile_flight_code", clean_up)
     assert run_command_line([*QUICK, "--duration", "3"]) == 130
     assert not list(cards.iterdir())
 
@@ -154,7 +154,7 @@ def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     path = tmp_path / "key"
     path.write_text("pass phrase\n")
     seconds = count(1_000_000)
-    monkeypatch.setattr("missions.vehicle.signing.now", lambda: next(seconds) * 100_000)
+    monkeypatch.setattr("missions.cli.bodies.signing.now", lambda: next(seconds) * 100_000)
     return "--signing-key", str(path), "--duration", "2"
 
 
@@ -189,7 +189,7 @@ def test_pictures_that_are_lost_are_reported_and_the_command_fails(monkeypatch: 
         assert rate_hz == 5.0
         on_loss("can't write photo IMG_0000.jpg: No space left on device")
 
-    monkeypatch.setattr("missions.cli.sitl.start_video", lose)
+    monkeypatch.setattr("missions.cli.bodies.sitl.start_video", lose)
     done = sitl("--duration", "1", "--video-rate", "5")
     assert done.return_value == 1 and "stopped at 1.0 s" in done.output
     assert "flightstack: can't write photo IMG_0000.jpg: No space left on device\n" in done.output

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from autopilot_bridge.storage import MemoryStore, Mode
-from missions.cli.storage import NONE, VehicleCards
+from missions.cli.bodies.storage import NONE, VehicleCards
 
 
 def test_a_folder_stays_and_is_gone_on_with(tmp_path: Path) -> None:

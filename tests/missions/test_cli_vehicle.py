@@ -12,9 +12,9 @@ import pytest
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
 from missions.cli import main as cli
-from missions.cli import vehicle_params as cli_vehicle_params
-from missions.cli.vehicle import DownloadLine, _verdict
-from missions.cli.vehicle_link import confirm
+from missions.cli.bodies import vehicle_params as cli_vehicle_params
+from missions.cli.bodies.vehicle import DownloadLine, _verdict
+from missions.cli.bodies.vehicle_link import confirm
 
 
 def test_half_a_parameter_file_does_not_stay_on_a_full_disk(

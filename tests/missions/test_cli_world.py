@@ -12,9 +12,9 @@ from flightsim.payload import GroundTargetParameters, MagneticSpec, Static
 from flightsim.wind_profile import WindLaw, WindProfile
 from flightsim.world_spec import HOMES, VehicleSpec, WorldSpec, team
 from missions.base.mission import WorldDefaults
+from missions.cli.bodies.world import world_of
 from missions.cli.fly import fly
 from missions.cli.sitl import sitl
-from missions.cli.world import world_of
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions

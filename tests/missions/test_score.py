@@ -9,7 +9,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.cli.fly_report import report_left_out
+from missions.cli.bodies.fly_report import report_left_out
 from missions.flown.picture import draw_run
 from missions.flown.records import FlightRecords
 from missions.flown.run_folder import team_figures, vehicle_summary, versions, write_summary

@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from autopilot_bridge.clock import LoopClock, run
-from missions.cli import vehicle_actions, vehicle_link
+from missions.cli.bodies import vehicle_actions, vehicle_link
 from missions.cli.main import run_command_line
 from missions.errors import CommandRejected, MissionError
 from missions.vehicle import Mode, Vehicle
@@ -88,7 +88,7 @@ def linked(make_sitl, monkeypatch):
             await vehicle.wait_heartbeat()
             yield vehicle
 
-    monkeypatch.setattr(actions, "connected_vehicle", connected_vehicle)
+    monkeypatch.setattr(vehicle_actions, "connected_vehicle", connected_vehicle)
     monkeypatch.setattr(vehicle_link.asyncio, "run", lambda work: run(work, sitl.loop))
     return sitl.autopilots[0]
 

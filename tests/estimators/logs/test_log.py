@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as dialect
 
 from estimators.logs import LogError, open_log, report_of
 from estimators.logs.condition import Condition
-from missions.cli.log_text import report_lines
+from missions.cli.bodies.log_text import report_lines
 from tests.estimators.logs.reference import EPOCH_US, build, pack, record, tlog
 from tests.recorded_logs import each_recorded_log
 

@@ -91,8 +91,8 @@ def test_a_vehicle_on_loopback_without_proof_is_checked_and_asked_for(
         asked.append(question)
         return answer
 
-    monkeypatch.setattr("missions.cli.confirm.ask", typed)
-    monkeypatch.setattr("missions.cli.confirm.can_ask", lambda: True)
+    monkeypatch.setattr("missions.cli.bodies.confirm.ask", typed)
+    monkeypatch.setattr("missions.cli.bodies.confirm.can_ask", lambda: True)
     elsewhere.version = BOARD
     code, printed = fly_on_loopback()
     assert len(asked) == 1 and "Fly?" in asked[0]

@@ -177,7 +177,7 @@ def test_the_engine_and_the_paths_are_not_taken_from_a_study_folder(
     with_arguments(out, ray="127.0.0.1:1", workers=4000, out=str(elsewhere), keep_logs="all", trial=0)
     engines: list[tuple[object, ...]] = []
     monkeypatch.setattr(
-        "missions.cli.study_command.engine_of",
+        "missions.cli.bodies.study.engine_of",
         lambda given: engines.append((given["ray"], given["workers"], given["out"], given["keep_logs"])),
     )
     assert ran("lissajous-localization", "--no-picture", "--resume", out)[0] == 0

@@ -7,8 +7,8 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from missions.cli.bodies.sweep import sweep_study
 from missions.cli.main import run_command_line
-from missions.cli.sweep import sweep_study
 from missions.studies.study import Trials
 
 HOP = """

@@ -5,17 +5,21 @@ import os
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
+from autopilot_bridge.clock.pacing import wall_time_s
+from estimators.received import counted_words
+from estimators.reports import warnings_of
+from missions.cli.bodies.status_line import StatusLine, announce_compiling
 from missions.cli.options import report
-from missions.cli.status_line import StatusLine, announce_compiling
+from missions.flown.run_folder import POOR, wind_words
 from missions.how_left import lines
-
-if TYPE_CHECKING:
-    from missions.runs.session import Flight, RunResult
-    from missions.vehicle.vehicle import Vehicle
+from missions.runs.session import Flight, RunResult
+from missions.vehicle.notes import FLIGHT
+from missions.vehicle.telemetry import Position
+from missions.vehicle.vehicle import Vehicle
 
 _FAILED: Final = 1
 _PACE_S: Final = 5.0
@@ -63,14 +67,13 @@ class ProgressLine:
             click.echo(self._start, err=True)
             self._start = ""
 
-    def __call__(self, flight: "Flight") -> None:
+    def __call__(self, flight: Flight) -> None:
         if flight.clock is None:
             return
         known = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
         if self._line.terminal:
             self._show(flight, known)
             return
-        from missions.vehicle.notes import FLIGHT
 
         for vehicle in known:
             phase = vehicle.notes.current
@@ -80,9 +83,7 @@ class ProgressLine:
                 self._phases.add(phase)
                 click.echo(f"{flight.elapsed_s:.1f} s: {phase}, {_state(known)[1]}", err=True)
 
-    def _show(self, flight: "Flight", known: "Sequence[Vehicle]") -> None:
-        from autopilot_bridge.clock.pacing import wall_time_s
-
+    def _show(self, flight: Flight, known: Sequence[Vehicle]) -> None:
         now_s = wall_time_s()
         if self._held or now_s - self._last_wall_s < 0.1:
             return
@@ -125,16 +126,14 @@ class ProgressLine:
         """End the progress line."""
         self._line.end()
 
-    def finish(self, result: "RunResult") -> None:
+    def finish(self, result: RunResult) -> None:
         """In a pipe, the end of a flight as the last line; a failure has its own."""
         if not self._line.terminal and result.outcome == "completed":
             click.echo(f"{result.summary['sim_time_s']:.1f} s: {result.outcome}", err=True)
 
 
-def _state(known: "Sequence[Vehicle]") -> tuple[str, str]:
+def _state(known: Sequence[Vehicle]) -> tuple[str, str]:
     """Modes and heights of the vehicles that were received, as text."""
-    from missions.vehicle.telemetry import Position
-
     if not known:
         return "waiting", ""
     mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in known))
@@ -144,14 +143,14 @@ def _state(known: "Sequence[Vehicle]") -> tuple[str, str]:
     return mode, "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
 
 
-def _phase(known: "Sequence[Vehicle]") -> str:
+def _phase(known: Sequence[Vehicle]) -> str:
     """The phases of the vehicles, with the flown share where their mission reports one."""
     phases = "/".join(dict.fromkeys(vehicle.notes.current for vehicle in known if vehicle.notes.current))
     progress = sum(vehicle.notes.progress for vehicle in known) / max(1, len(known))
     return f"{phases} {100.0 * progress:.0f} %" if progress > 0.0 else phases
 
 
-def _awaited(vehicles: Sequence["Vehicle"]) -> str:
+def _awaited(vehicles: Sequence[Vehicle]) -> str:
     """What the flight has been waiting for, with the newest text of a vehicle that does not fly yet; "" after
     a moment only.
     """
@@ -187,10 +186,8 @@ class Pace:
         return None if passed_s < _PACE_LEAST_S else (vehicle_s - looks[0][1]) / passed_s
 
 
-def print_result(result: "RunResult") -> int:
+def print_result(result: RunResult) -> int:
     """Print the result of a run; returns the exit code."""
-    from missions.flown.run_folder import POOR, wind_words
-
     summary = result.summary
     if result.outcome == "interrupted":
         report(f"{result.reason}; the log is in {result.folder}")
@@ -236,16 +233,13 @@ def print_result(result: "RunResult") -> int:
     return _print_estimator(summary["estimator"]) if "estimator" in summary else 0
 
 
-def _report_how_left(result: "RunResult") -> None:
-
+def _report_how_left(result: RunResult) -> None:
     for line in lines(result.left):
         report(line)
 
 
 def _print_estimator(summary: Mapping[str, Any]) -> int:
     """Print the result of the flight's estimator; returns the exit code."""
-    from estimators.reports import warnings_of
-
     name = summary["estimator"]
     for block in summary["vehicles"]:
         for subject in block["subjects"]:
@@ -273,8 +267,6 @@ def _whose(block: Mapping[str, Any], summary: Mapping[str, Any]) -> str:
 
 def report_left_out(summary: Mapping[str, Any]) -> None:
     """Print what the figures leave out: gaps, and positions and times that no vehicle can have."""
-    from estimators.received import counted_words
-
     for block in summary["vehicles"]:
         whose = _whose(block, summary)
         if block["gaps"]:

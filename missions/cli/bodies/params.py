@@ -1,20 +1,18 @@
 """`--params`: a parameter file for simulated vehicles, which may have fewer parameters than a real one."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import click
 
+from autopilot_bridge.firmware import get_flavour
+from autopilot_bridge.parameter_files import known_parameters
 from autopilot_bridge.parameters import ParameterError
-
-if TYPE_CHECKING:
-    from flightsim.world_spec import WorldSpec
-
-STRICT_HELP = "Names in the --params file that the vehicle does not have are an error, not left out."
+from flightsim.airframe import load_airframe
+from flightsim.world_spec import WorldSpec
 
 
 def known_to_all(
-    values: Mapping[str, float], world: "WorldSpec", *, strict: bool
+    values: Mapping[str, float], world: WorldSpec, *, strict: bool
 ) -> tuple[dict[str, float], tuple[str, ...]]:
     """The values of parameters that all emulated vehicles of a world have, and the other names.
 
@@ -26,10 +24,6 @@ def known_to_all(
     Raises:
         click.UsageError: a vehicle does not accept some values, or a model does not exist.
     """
-    from autopilot_bridge.firmware import get_flavour
-    from autopilot_bridge.parameter_files import known_parameters
-    from flightsim.airframe import load_airframe
-
     known = dict(values)
     if strict:
         return known, ()

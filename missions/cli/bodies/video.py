@@ -1,42 +1,18 @@
-"""Options of `flightstack sitl` for the images of its cameras."""
+"""Video and pictures of the cameras of `flightstack sitl`."""
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
-if TYPE_CHECKING:
-    from autopilot_bridge.sitl import Sitl
-    from autopilot_bridge.video import VideoService
-
-
-def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds --video, --video-rate and --pictures."""
-    command = click.option(
-        "--pictures",
-        type=click.Path(path_type=Path, file_okay=False),
-        metavar="DIR",
-        help="New folder for photos and videos that the cameras take.",
-    )(command)
-    command = click.option(
-        "--video-rate",
-        type=float,
-        default=20.0,
-        show_default=True,
-        metavar="HZ",
-        help="Pictures per second: of wall time in streams, of vehicle time in recordings.",
-    )(command)
-    return click.option(
-        "--video",
-        metavar="[HOST:]PORT|off",
-        help="Address of the cameras' video (RTSP). [default: 127.0.0.1, from port 8554 on]",
-    )(command)
+from autopilot_bridge.sitl import Sitl
+from autopilot_bridge.video import VideoParameters, VideoService
+from autopilot_bridge.video.for_sitl import show_cameras
 
 
 def start_video(
-    world: "Sitl", video: str | None, rate_hz: float, pictures: Path | None, on_loss: Callable[[str], None]
-) -> "VideoService | None":
+    world: Sitl, video: str | None, rate_hz: float, pictures: Path | None, on_loss: Callable[[str], None]
+) -> VideoService | None:
     """Serve video and keep pictures as the options specify; None: neither was requested.
 
     Args:
@@ -54,8 +30,6 @@ def start_video(
         return None
     if video == "off" and pictures is None:
         return None
-    from autopilot_bridge.video import VideoParameters
-    from autopilot_bridge.video.for_sitl import show_cameras
 
     if video == "off":
         parameters = VideoParameters(port=None, folder=pictures, rate_hz=rate_hz)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from autopilot_bridge.mavlink.plain_text import plain_text
+from flightsim.foundation.plain_text import plain_text
 
 
 @pytest.mark.parametrize(

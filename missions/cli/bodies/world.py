@@ -4,24 +4,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any
 
+from autopilot_bridge.firmware_process.build import FirmwareBuild
+from flightsim.environment import Environment
+from flightsim.home import Home
+from flightsim.payload import GaussianSignature, GroundTargetParameters, MagneticSpec
+from flightsim.wind_profile import WindLaw, WindProfile
+from flightsim.world_spec import VehicleSpec, WorldSpec, launched
+from missions.base.given_text import parse_wind
+from missions.base.mission import WorldDefaults
 from missions.cli.mission_command import Given
-
-if TYPE_CHECKING:
-    from autopilot_bridge.firmware_process import FirmwareBuild
-    from flightsim.payload import GroundTargetParameters
-    from flightsim.world_spec import VehicleSpec, WorldSpec
-    from missions.base.mission import WorldDefaults
-
-FIRMWARE_HELP: Final = (
-    "Real firmware that flies the vehicles in lockstep with the world: px4=FOLDER (with bin/px4 and etc) or "
-    "ardupilot=FILE. Without a build it is FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER or FLIGHTSTACK_ARDUPLANE. "
-    "[default: the emulated autopilot]"
-)
-WORLD_HELP: Final = (
-    "Description of the world (TOML, docs/world.md). An option that is also given overrides the file's value."
-)
+from missions.worlds.motion_kind import MotionKind
+from missions.worlds.motions import motion_of
+from missions.worlds.payloads import CAMERA, MAGNETOMETER, carrying
 
 
 def models_of(given: tuple[str, ...]) -> list[str]:
@@ -38,7 +34,7 @@ def models_of(given: tuple[str, ...]) -> list[str]:
     return models
 
 
-def firmware_of(given: Given) -> "FirmwareBuild | None":
+def firmware_of(given: Given) -> FirmwareBuild | None:
     """The real firmware that the option `firmware` names; None: the emulated autopilots.
 
     Raises:
@@ -46,14 +42,12 @@ def firmware_of(given: Given) -> "FirmwareBuild | None":
     """
     if given["firmware"] is None:
         return None
-    from autopilot_bridge.firmware_process.build import FirmwareBuild
-
     return FirmwareBuild.parse(given["firmware"])
 
 
 def world_of(
-    given: Given, chosen: frozenset[str], *, count: int | None, defaults: "WorldDefaults"
-) -> "WorldSpec":
+    given: Given, chosen: frozenset[str], *, count: int | None, defaults: WorldDefaults
+) -> WorldSpec:
     """The world of `fly` or `sitl`.
 
     Args:
@@ -66,9 +60,6 @@ def world_of(
     Raises:
         ValueError: a value is not accepted.
     """
-    from flightsim.home import Home
-    from flightsim.world_spec import VehicleSpec, WorldSpec
-
     build = firmware_of(given)
     if build is not None:
         if "autopilot" in chosen and given["autopilot"] != build.firmware:
@@ -109,12 +100,8 @@ def world_of(
     return replace(world, vehicles=_overridden(world.vehicles, given, chosen, models))
 
 
-def _air(given: Given, chosen: frozenset[str], file: "WorldSpec | None", defaults: "WorldDefaults") -> Any:
+def _air(given: Given, chosen: frozenset[str], file: WorldSpec | None, defaults: WorldDefaults) -> Any:
     """The air with the options' values; what no option gives is the file's."""
-    from flightsim.environment import Environment
-    from flightsim.wind_profile import WindLaw, WindProfile
-    from missions.base.given_text import parse_wind
-
     before = Environment() if file is None else file.air
     speed_m_s, from_deg = before.wind_speed_m_s, before.wind_from_deg
     if "wind" in chosen:
@@ -135,11 +122,9 @@ def _air(given: Given, chosen: frozenset[str], file: "WorldSpec | None", default
 
 
 def _overridden(
-    vehicles: "Sequence[VehicleSpec]", given: Given, chosen: frozenset[str], models: Sequence[str]
-) -> "tuple[VehicleSpec, ...]":
+    vehicles: Sequence[VehicleSpec], given: Given, chosen: frozenset[str], models: Sequence[str]
+) -> tuple[VehicleSpec, ...]:
     """The vehicles of a file with the values of options."""
-    from flightsim.world_spec import launched
-
     if models:
         count = len(vehicles)
         if len(models) not in (1, count):
@@ -153,16 +138,13 @@ def _overridden(
 
 
 def equipped(
-    world: "WorldSpec", camera: bool, targets: tuple[str, ...], map_file: str | None, map_target: str | None
-) -> "WorldSpec":
+    world: WorldSpec, camera: bool, targets: tuple[str, ...], map_file: str | None, map_target: str | None
+) -> WorldSpec:
     """The world of `sitl` with the payload and the targets of its options.
 
     Raises:
         ValueError: a target is impossible, or the vehicles carry nothing that can detect it.
     """
-    from flightsim.payload import GaussianSignature, MagneticSpec
-    from missions.worlds.payloads import CAMERA, MAGNETOMETER, carrying
-
     if camera:
         world = carrying(world, CAMERA)
     if targets and not any(vehicle.payload.camera for vehicle in world.vehicles):
@@ -183,11 +165,7 @@ def equipped(
     return replace(carrying(world, MAGNETOMETER), magnetic_field=field)
 
 
-def _target(text: str, tag: int) -> "GroundTargetParameters":
-    from flightsim.payload import GroundTargetParameters
-    from missions.worlds.motion_kind import MotionKind
-    from missions.worlds.motions import motion_of
-
+def _target(text: str, tag: int) -> GroundTargetParameters:
     numbers = _numbers(text, "--target", (2, 4))
     speed_m_s, heading_deg = numbers[2:] or (0.0, 0.0)
     motion = motion_of(

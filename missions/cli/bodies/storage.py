@@ -2,23 +2,15 @@
 
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-import click
-
+from autopilot_bridge.sitl import VehicleFailure
+from autopilot_bridge.storage import FOLDER_QUOTA, TEMPORARY_QUOTA
+from autopilot_bridge.storage.folder import FolderStore
+from autopilot_bridge.storage.memory import MemoryCard
 from missions.cli.options import report
 
-if TYPE_CHECKING:
-    from autopilot_bridge.sitl import VehicleFailure
-
 NONE: Final = "none"
-
-storage_option = click.option(
-    "--storage",
-    metavar="DIR|none",
-    help="Folder that keeps the vehicles' memory cards: logs, parameters, plans, files. "
-    "none: in memory, no logs. [default: a temporary folder, gone at the end]",
-)
 
 
 class VehicleCards:
@@ -36,10 +28,6 @@ class VehicleCards:
     """
 
     def __init__(self, storage: str | None, count: int) -> None:
-        from autopilot_bridge.storage import FOLDER_QUOTA, TEMPORARY_QUOTA
-        from autopilot_bridge.storage.folder import FolderStore
-        from autopilot_bridge.storage.memory import MemoryCard
-
         self._stores: list[FolderStore] = []
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
         if storage == NONE:
@@ -93,7 +81,7 @@ class Losses:
         """A photo, or the rest of a video, could not be written."""
         self._warn(why)
 
-    def vehicle_failed(self, failure: "VehicleFailure") -> None:
+    def vehicle_failed(self, failure: VehicleFailure) -> None:
         """A vehicle could not be simulated on."""
         self._warn(str(failure))
 

@@ -8,14 +8,14 @@ from typing import Any, TextIO, cast
 
 import click
 
+from flightsim.foundation.kernels import when_compiling
+
 __all__ = ["StatusLine", "announce_compiling"]
 
 
 @contextmanager
 def announce_compiling(say: Callable[[str], None]) -> Iterator[None]:
     """Context in which it is said once that flight code is compiled, if the cache does not have all of it."""
-    from flightsim.foundation.kernels import when_compiling
-
     with when_compiling(lambda: say("compiling the flight code: half a minute or so, the first time")):
         yield
 

@@ -5,14 +5,15 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 
+from autopilot_bridge.links import VEHICLE_FORMS, SerialPort, parse_address
+from autopilot_bridge.links.reach import Reach, reach_of
+from flightsim.foundation.plain_text import plain_text
 from missions.errors import MissionError
-
-if TYPE_CHECKING:
-    from missions.preflight.before_flight import Confirm, Look
+from missions.preflight.before_flight import Confirm, Look
 
 _AGAINST_ADVICE: Final = "fly anyway"
 _CHUNK_BYTES: Final = 4096
@@ -76,9 +77,6 @@ def leaves_this_machine(connections: Sequence[str]) -> bool:
     Raises:
         AddressError: a connection string is invalid.
     """
-    from autopilot_bridge.links import VEHICLE_FORMS, SerialPort, parse_address
-    from autopilot_bridge.links.reach import Reach, reach_of
-
     addresses = [parse_address(text, VEHICLE_FORMS) for text in connections]
     return any(isinstance(a, SerialPort) or reach_of(a) is Reach.NETWORK for a in addresses)
 
@@ -89,7 +87,7 @@ def confirmation(
     yes: bool,
     check: bool,
     screen: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> "Confirm":
+) -> Confirm:
     """Return how a flight is confirmed, unless its vehicles prove to be simulations.
 
     Args:
@@ -109,9 +107,7 @@ def confirmation(
     if (check or leaves_this_machine(connections)) and not yes and not can_ask():
         raise click.UsageError(must_ask)
 
-    async def confirm(looks: "Sequence[Look]") -> bool:
-        from autopilot_bridge.mavlink.plain_text import plain_text
-
+    async def confirm(looks: Sequence[Look]) -> bool:
         problems = sum(len(look.problems) for look in looks)
         with screen():
             for look in looks:

@@ -1,0 +1,66 @@
+"""What `flightstack replay` does."""
+
+import sys
+from typing import Any
+
+import click
+
+from estimators.errors import EstimatorError
+from estimators.logs import LogError
+from estimators.reports import notes_of, table_lines, warnings_of
+from missions.cli.options import in_options, report
+from missions.errors import PlanError
+from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
+from missions.estimation.report import EstimationResult
+
+_FAILED = 1
+
+
+def replay(**given: Any) -> int:
+    """`flightstack replay`."""
+    for path in given["logs"]:
+        if path.is_dir():
+            raise click.UsageError(f"{path} is a directory; give the path of a log")
+        if not path.exists():
+            raise click.UsageError(f"{path} does not exist; give the path of a log")
+    several = len(given["logs"]) > 1
+    terminal = sys.stderr.isatty()
+
+    def on_done(label: str, result: EstimationResult | str) -> None:
+        if isinstance(result, str):
+            report(result)
+        elif failed(result):
+            report(f"{label}: {result.reason}; results in {result.folder} are partial")
+        elif terminal and several:
+            click.echo(f"{label}: done", err=True)
+
+    try:
+        request = ReplayRequest(
+            logs=given["logs"],
+            estimator=given["estimator"],
+            settings=given["settings"],
+            system_id=given["system_id"],
+            against=given["against"],
+            from_s=given["from_s"],
+            to_s=given["to_s"],
+            boot=given["boot"],
+            dialect=given["dialect"],
+            out=given["out"],
+            picture=not given["no_picture"],
+            command=" ".join(["flightstack", *sys.argv[1:]]),
+        )
+        check_out(request)
+        results = replay_logs(request, on_done)
+    except (EstimatorError, LogError, PlanError) as error:
+        raise click.UsageError(in_options(error, own=True)) from error
+    done = [(label, result) for label, result in results if isinstance(result, EstimationResult)]
+    for line in table_lines([(label, result.compared) for label, result in done]):
+        click.echo(line)
+    for label, result in done:
+        for note in notes_of(result.summary):
+            click.echo(f"{label}: {note}")
+        for warning in warnings_of(result.summary):
+            report(f"{label}: {warning}")
+        samples, speed = result.summary["samples"], result.summary["wall_time_s"]
+        click.echo(f"{label}: {result.outcome}, {samples} estimates in {speed:.2f} s; run: {result.folder}")
+    return _FAILED if any(failed(result) for _, result in results) else 0
