@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from estimators.tracking.gaussian_phd import GaussianPhd
 from estimators.tracking.information import condensed, information_at
+from estimators.tracking.multi_bernoulli import MultiBernoulli
 from estimators.tracking.range_bearing import RangeBearingSensor, Viewpoint
 from estimators.tracking.smc_phd import SmcPhd, SmcPhdParameters, update_weights
 
@@ -205,6 +206,7 @@ def main() -> int:
     beliefs: dict[str, Any] = {
         "particles": SmcPhd(problem.sensor, None, parameters, seed=np.random.SeedSequence(1)),
         "Gaussians": GaussianPhd(problem.sensor),
+        "Bernoullis": MultiBernoulli(problem.sensor),
     }
     for name, belief in beliefs.items():
 

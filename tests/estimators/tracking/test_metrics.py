@@ -70,6 +70,39 @@ def test_set_metrics_of_sets_that_differ_by_one_target():
     assert ospa(moved, targets, cutoff=10.0, order=1.0) == pytest.approx(5.0)
 
 
+@pytest.mark.parametrize(
+    ("estimates", "targets", "cutoff", "order", "distance", "parts"),
+    [
+        ([], [(15.62, 12.12), (14.2, 1.78), (12.61, 19.62)], 10.0, 2.0, 12.24744871391589, (0.0, 3, 0)),
+        (
+            [(17.08, 13.98), (4.43, 3.7), (19.08, 6.81)],
+            [(8.83, 13.12), (8.81, 0.01), (5.21, 9.44)],
+            10.0,
+            2.0,
+            14.198683037521471,
+            (101.6026, 1, 1),
+        ),
+        (
+            [(15.23, 12.13), (8.6, 3.82), (15.69, 3.74), (14.48, 9.95), (11.04, 7.68)],
+            [(4.06, 3.4), (12.83, 5.52), (0.28, 3.85)],
+            10.0,
+            1.0,
+            27.36468448165082,
+            (7.364684481650817, 1, 3),
+        ),
+    ],
+)
+def test_gospa_is_that_of_stone_soup(estimates, targets, cutoff, order, distance, parts):
+    """Of its version 1.9.1, `GOSPAMetric(p=order, c=cutoff)`, which states missed and false ones as costs of
+    cutoff^order / 2 each.
+    """
+    found = gospa(
+        np.array(estimates).reshape(-1, 2), np.array(targets).reshape(-1, 2), cutoff=cutoff, order=order
+    )
+    assert found.distance == pytest.approx(distance, rel=1e-12)
+    assert (found.localization, found.missed, found.false) == pytest.approx(parts, rel=1e-12)
+
+
 @given(st.integers(1, 12), st.integers(0, 8), st.integers(0, 2**31))
 def test_assignment_is_that_of_scipy(rows, more, seed):
     cost = np.random.default_rng(seed).normal(size=(rows, rows + more))
