@@ -16,6 +16,7 @@ from missions.cli.fly import fly
 from missions.cli.fly_command import _COMMANDS, chosen_names
 from missions.cli.main import command_line
 from missions.cli.mission_command import DeclaredOption
+from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
 
 PAGE = Path(__file__).parents[1] / "docs/options.md"
 NO_NOUNS = re.compile(
@@ -100,6 +101,18 @@ def test_the_command_line_makes_the_defaults_of_python(name):
     for each in fields(plain):
         if each.name != "given":
             assert getattr(options, each.name) == getattr(plain, each.name), each.name
+
+
+@pytest.mark.parametrize(
+    ("words", "altitude_m"), [((), 800.0), (("--altitude", "300"), 300.0), (("--altitude", "80"), 80.0)]
+)
+def test_a_flight_of_calibration_is_as_high_from_python(words, altitude_m):
+    with fly.make_context("fly", ["survey", "--calibrate", *words]) as context:
+        chosen = chosen_names(context)
+        options = context.meta["mission command"].build(context.params, chosen, vehicles=1)
+    assert options.altitude_m == altitude_m
+    assert SurveyOptions(calibrate=True, altitude_m=altitude_m, given=options.given) == options
+    assert SurveyOptions(calibrate=True).altitude_m == CALIBRATION_ALTITUDE_M
 
 
 @pytest.mark.parametrize("name", MISSIONS)

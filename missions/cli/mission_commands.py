@@ -10,7 +10,6 @@ from missions.catalogue import PATTERNS
 from missions.cli.mission_command import Given, MissionCommand, option
 from missions.cli.option_classes import MISSION_FILE, OPTIONS, PARTS, PATTERN
 from missions.errors import PlanError
-from missions.survey.options import CALIBRATION_ALTITUDE_M
 
 _OF_LISSAJOUS: Final = ("pattern", "ratio", "phase", "period")
 _PATTERN_HAS_NOT: Final = ("allow-below-home",)
@@ -56,12 +55,6 @@ def _of_orbit(given: Given, _: Collection[str]) -> Mapping[str, Any]:
 def _of_handoff(given: Given, chosen: Collection[str]) -> Mapping[str, Any]:
     # with real aircraft a person confirms, or the user allows it
     return {"confirm_after_s": 0.0} if given["connect"] and "confirm_after" not in chosen else {}
-
-
-def _of_survey(_: Given, chosen: Collection[str]) -> Mapping[str, Any]:
-
-    high = "calibrate" in chosen and "altitude" not in chosen
-    return {"altitude_m": CALIBRATION_ALTITUDE_M} if high else {}
 
 
 def _of_occupancy(given: Given, chosen: Collection[str]) -> Mapping[str, Any]:
@@ -157,7 +150,6 @@ COMMANDS: Final[Mapping[str, MissionCommand]] = MappingProxyType(
             without=("rate", "allow-below-home"),
             world=("missions.survey.world", "survey_world"),
             part=PARTS["survey"],
-            values=_of_survey,
         ),
         "vision-search": MissionCommand(
             help=(

@@ -78,6 +78,11 @@ class SurveyOptions(MissionOptions):
         ProcessingParameters(), map_error="map_error_nt", grid="grid_m", no_levelling="level"
     )
 
+    def __post_init__(self) -> None:
+        if self.calibrate and not self.chosen("altitude_m"):
+            object.__setattr__(self, "altitude_m", CALIBRATION_ALTITUDE_M)
+        MissionOptions.__post_init__(self)
+
     def check_together(self) -> None:
         for name, span, step_m, what in (
             ("spacing_m", "width_m", self.spacing_m, "lines"),

@@ -32,7 +32,7 @@ from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
 from missions.survey.inputs import terrain_of
 from missions.survey.mission import SurveyMission
-from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
+from missions.survey.options import SurveyOptions
 from missions.survey.outcome import COMPENSATION, report_lines
 from missions.survey.records import flight_readings
 from missions.survey.surveyed_field import SurveyedField
@@ -281,7 +281,7 @@ def test_compensation_takes_out_the_aircraft_at_least_ten_times(seed, autopilot,
 
     The magnetometer's own noise makes 1.1 nT of the figure of merit, whatever the compensation.
     """
-    options = SurveyOptions(calibrate=True, altitude_m=CALIBRATION_ALTITUDE_M)
+    options = SurveyOptions(calibrate=True)
     result = fly(
         SurveyMission(),
         request(tmp_path / "run", options, picture=True, seed=seed, autopilot=autopilot, uncompensated=True),
@@ -321,7 +321,7 @@ def true_field_nt(cosines, strength_nt, seed):
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_compensated_survey_is_as_good_as_one_without_an_aircraft(tmp_path):
-    calibration = SurveyOptions(calibrate=True, altitude_m=CALIBRATION_ALTITUDE_M)
+    calibration = SurveyOptions(calibrate=True)
     made = fly(SurveyMission(), request(tmp_path / "calibration", calibration, uncompensated=True))
     raw = fly(SurveyMission(), request(tmp_path / "raw", uncompensated=True, exact_map=True))
     options = replace(SMALL, compensation_file=str(made.folder / COMPENSATION))
