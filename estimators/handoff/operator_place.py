@@ -2,7 +2,7 @@
 
 import math
 
-from autopilot_bridge.mavlink.wire_units import degrees, home_of, metres
+from autopilot_bridge.mavlink.wire_units import degrees, home_of
 from estimators import wire
 from estimators.interface import Need
 from estimators.messages import Message, is_a
@@ -41,7 +41,7 @@ class OperatorPlace:
                 self._frame = LocalFrame(home)
         elif is_a(message, wire.GLOBAL_POSITION_INT) and self._frame is not None:
             north_m, east_m, _ = self._frame.ned_from_geodetic(
-                degrees(message.lat), degrees(message.lon), metres(message.alt)
+                degrees(message.lat), degrees(message.lon), self._frame.origin.alt_m
             )
             self._own = (time_us, north_m, east_m)
         elif is_a(message, wire.ATTITUDE) and math.isfinite(message.yaw):

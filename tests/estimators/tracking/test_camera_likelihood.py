@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from estimators.errors import EstimatorError
-from estimators.tracking.camera_likelihood import FrameLikelihood, ground_spread
+from estimators.tracking.camera_likelihood import FrameLikelihood, _fold, ground_spread, image_spread
 from estimators.tracking.camera_sight import (
     CameraSight,
     DetectionRate,
@@ -141,6 +141,46 @@ def test_the_density_of_a_detection_is_that_of_drawn_poses():
             likelihood = float(frame.at(target[:1], target[1:])[0])
             area = 1280 * 720 / 914.0**2
             assert likelihood == pytest.approx(0.1 + 0.9 * density * area / 0.004, rel=0.12)
+
+
+@pytest.mark.parametrize("ray", [(0.0, 0.0), (0.4, -0.3), (-0.5, 0.2)])
+def test_the_ellipse_on_the_ground_is_that_of_the_picture(ray):
+    """The spread in the picture through the derivative of the place that a ray meets, with its sign of the
+    correlation: oblique cameras have long ellipses across neither axis.
+    """
+    seen = sight(ERRORS, (0.3, -0.2, 0.7))
+    r = rotation_matrix(seen.q_ned_from_mount)
+
+    def ground(a, b):
+        direction = r @ (1.0, a, b)
+        return 90.0 * direction[:2] / direction[2]
+
+    step = 1e-5
+    derivative = np.column_stack(
+        [
+            (ground(ray[0] + step, ray[1]) - ground(ray[0] - step, ray[1])) / (2.0 * step),
+            (ground(ray[0], ray[1] + step) - ground(ray[0], ray[1] - step)) / (2.0 * step),
+        ]
+    )
+    expected = derivative @ image_spread(ray, seen, SURE) @ derivative.T
+    assert abs(expected[0, 1]) > 0.05 * math.sqrt(expected[0, 0] * expected[1, 1])
+    assert ground_spread(ray, seen, SURE) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "distortion",
+    [
+        (-0.3, 0.0, 0.0, 0.0, 0.0), (-0.2, 0.05, 0.0, 0.0, -0.02), (-0.1, -0.05, 0.0, 0.0, 0.0),
+        (0.1, 0.0, 0.0, 0.0, -0.3), (0.1, -0.2, 0.0, 0.0, 0.01),
+    ],
+)  # fmt: skip
+def test_the_fold_is_where_the_distorted_radius_stops_growing(distortion):
+    """r (1 + k1 r^2 + k2 r^4 + k3 r^6) grows by less than a twentieth from there on."""
+    k1, k2, _, _, k3 = distortion
+    radius = np.linspace(0.0, 3.0, 30_001)
+    growth = np.gradient(radius * (1.0 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6), radius)
+    fold = radius[np.argmax(growth <= 0.05)]
+    assert math.sqrt(_fold(distortion)) == pytest.approx(fold, rel=0.021)
 
 
 def test_two_detections_share_the_chance_to_be_true():
