@@ -1,10 +1,12 @@
 """Checked access to tables of a vehicle description; errors name file, key and value."""
 
-import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from flightsim.airframe_types import AirframeError
+from flightsim.foundation.conversion import Conversion, Refused
+
+_CONVERSION: Final = Conversion()
 
 
 def listed(names: Any) -> str:
@@ -29,23 +31,27 @@ def table_of(data: dict[str, Any], name: str, path: Path) -> dict[str, Any]:
 
 def text(table: dict[str, Any], key: str, path: Path) -> str:
     """A text that must be there."""
-    value = table.get(key)
-    if not isinstance(value, str):
-        raise AirframeError(f"{path}: {key} is {value!r}; expected is a text")
+    value = _value(str, table.get(key), key, path)
     return value.removesuffix(".xml") if key == "jsbsim" else value
 
 
 def number(table: dict[str, Any], key: str, path: Path, default: float | None = None) -> float:
     """A number, or the default where there is none."""
-    value = table.get(key, default)
-    if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
-        raise AirframeError(f"{path}: {key} is {value!r}; expected is a number")
-    return float(value)
+    return float(_value(float, table.get(key, default), key, path))
 
 
 def names_of(table: dict[str, Any], key: str, path: Path) -> tuple[str, ...]:
     """A list of property names that must be there."""
-    names = table.get(key)
-    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-        raise AirframeError(f"{path}: {key} is {names!r}; expected is a list of JSBSim property names")
-    return tuple(names)
+    accepted = "a list of JSBSim property names"
+    names: tuple[str, ...] = _value(tuple[str, ...], table.get(key), key, path, accepted)
+    if not names:
+        raise AirframeError(f"{path}: {key} is []; expected is {accepted}")
+    return names
+
+
+def _value(kind: Any, value: Any, key: str, path: Path, accepted: str = "") -> Any:
+    try:
+        return _CONVERSION.value(kind, value)
+    except Refused as error:
+        reason = accepted or error.accepted
+        raise AirframeError(f"{path}: {key} is {value!r}; expected is {reason}") from None
