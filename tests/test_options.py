@@ -10,7 +10,8 @@ import pytest
 
 from estimators.library import estimator_class
 from estimators.names import ESTIMATORS
-from flightsim.foundation.options import Declared, Options, declared, user_options
+from flightsim.foundation.options import Declared, Options, declared
+from flightsim.foundation.user_options import user_options
 from missions.cli import options_page
 from missions.cli.fly import fly
 from missions.cli.fly_command import _COMMANDS, chosen_names

@@ -9,15 +9,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar, get_args, get_origin
 
 import click
 
-from flightsim.foundation.options import (
-    OptionError,
-    Options,
-    UserOption,
-    choices_of,
-    declared,
-    user_options,
-    written,
-)
+from flightsim.foundation.options import OptionError, Options, declared
+from flightsim.foundation.user_options import UserOption, choices_of, user_options, written
 from missions.cli.later import named
 from missions.cli.options import DeclaredType, in_options
 from missions.errors import PlanError

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 import click
 
-from flightsim.foundation.options import UserOption, name_for_users, user_options
+from flightsim.foundation.options import name_for_users
 from flightsim.foundation.plain_text import plain_text
+from flightsim.foundation.user_options import UserOption, user_options
 from missions.cli.later import named
 from missions.cli.option_classes import OPTIONS, PARTS
 

@@ -12,7 +12,8 @@ from typing import Final
 
 from estimators.library import estimator_class
 from estimators.names import ESTIMATORS
-from flightsim.foundation.options import Declared, choices_of, declared, unit_of, written
+from flightsim.foundation.options import Declared, declared, unit_of
+from flightsim.foundation.user_options import choices_of, written
 from missions.cli.mission_command import DeclaredOption, Scope
 from missions.cli.mission_commands import COMMANDS
 from missions.cli.options import in_options

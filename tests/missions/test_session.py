@@ -16,7 +16,7 @@ from pymavlink import mavutil
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
-from flightsim.foundation.options import user_options
+from flightsim.foundation.user_options import user_options
 from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parameters_from_file, parse_wind
 from missions.base.mission import Mission

@@ -17,8 +17,8 @@ from flightsim.foundation.options import (
     name_for_users,
     option,
     unit_of,
-    user_options,
 )
+from flightsim.foundation.user_options import user_options
 
 
 class Shape(StrEnum):
