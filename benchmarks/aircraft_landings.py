@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import Sitl, SitlVehicle
 from flightsim import truth as t
@@ -81,12 +81,12 @@ def plan_of(vehicle: SitlVehicle, course_rad: float) -> tuple[tuple[MissionItem,
         lat, lon, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
         return MissionItem(command=command, x=lat, y=lon, z=height_m, param1=param1, param4=math.nan)
 
-    takeoff = item(mavlink.MAV_CMD_NAV_TAKEOFF, climbed_m, HEIGHT_M, 10.0)
+    takeoff = item(dialect.MAV_CMD_NAV_TAKEOFF, climbed_m, HEIGHT_M, 10.0)
     items = [
         takeoff,
-        MissionItem(command=mavlink.MAV_CMD_DO_LAND_START, frame=mavlink.MAV_FRAME_MISSION),
-        item(mavlink.MAV_CMD_NAV_WAYPOINT, slope_starts_m, HEIGHT_M),
-        item(mavlink.MAV_CMD_NAV_LAND, lands_m, 0.0),
+        MissionItem(command=dialect.MAV_CMD_DO_LAND_START, frame=dialect.MAV_FRAME_MISSION),
+        item(dialect.MAV_CMD_NAV_WAYPOINT, slope_starts_m, HEIGHT_M),
+        item(dialect.MAV_CMD_NAV_LAND, lands_m, 0.0),
     ]
     if vehicle.autopilot.commander.policy.mission_first_item:  # item 0 is home
         items.insert(0, takeoff)

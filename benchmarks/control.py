@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.control.fixed_wing import FixedWingController
 from autopilot_bridge.control.fixed_wing import setpoint as fixed_wing_sp
@@ -26,6 +25,7 @@ from autopilot_bridge.flight.multicopter import (
     OffboardTask,
     OrbitTask,
 )
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.health import NavigationHealth
@@ -98,7 +98,7 @@ def main() -> None:
     assert ctx.frame is not None
     lat, lon, _ = ctx.frame.geodetic_from_ned(500.0, 0.0, 0.0)
     store = MissionStore()
-    store.replace((MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0),), 1)
+    store.replace((MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0),), 1)
     offboard = OffboardTask()
     offboard.set_trajectory((0.0, 0.0, -1.0))
     tasks: dict[str, Any] = {

@@ -18,10 +18,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Verdict
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import Sitl, SitlVehicle
 from autopilot_bridge.tlog import TlogWriter
@@ -45,14 +44,14 @@ def round_trip(vehicle: SitlVehicle) -> tuple[MissionItem, ...]:
     corners = ((side_m, 0.0), (side_m, side_m), (0.0, side_m), (0.0, 0.0))
     places = [frame.geodetic_from_ned(north_m, east_m, 0.0) for north_m, east_m in corners]
     waypoints = [
-        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=height_m, param4=math.nan)
+        MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=height_m, param4=math.nan)
         for lat, lon, _ in places
     ]
-    takeoff = MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, x=places[0][0], y=places[0][1], z=height_m)
+    takeoff = MissionItem(command=dialect.MAV_CMD_NAV_TAKEOFF, x=places[0][0], y=places[0][1], z=height_m)
     if vehicle.autopilot.commander.policy.mission_first_item:  # item 0 is home
         waypoints.insert(0, takeoff)
     again = MissionItem(
-        command=mavlink.MAV_CMD_DO_JUMP, frame=mavlink.MAV_FRAME_MISSION, param1=1.0, param2=1000.0
+        command=dialect.MAV_CMD_DO_JUMP, frame=dialect.MAV_FRAME_MISSION, param1=1.0, param2=1000.0
     )
     return (takeoff, *waypoints, again)
 

@@ -158,7 +158,7 @@ def test_a_derived_class_does_not_repeat_a_declaration():
             texts = {each.name: each.option.help for each in declared(base) if each.option.help}
             for each in fields(own):
                 mine = each.metadata.get("option")
-                inherited = each is base.__dataclass_fields__.get(each.name)
+                inherited = each is base.__dataclass_fields__.get(each.name)  # type: ignore[attr-defined]
                 if mine is not None and not inherited and mine.help == texts.get(each.name):
                     repeated.append((own.__name__, each.name))
     assert repeated == []

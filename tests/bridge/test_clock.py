@@ -287,7 +287,7 @@ def test_a_paced_loop_keeps_its_pace():
     world = World()
     wall = Wall()
     loop = world.loop(speedup=2.0, monotonic=wall)
-    real_sleep = type(loop._world_selector).__mro__[1].select
+    real_sleep = type(loop._world_selector).__mro__[1].select  # type: ignore[attr-defined]
     slept = []
 
     def select(selector, timeout=None):

@@ -182,7 +182,7 @@ def test_any_bytes_in_a_string_decode(text):
     raw = FrameEncoder(1, 1).encode_payload(253, b"\6" + text)
     (frame,) = FrameParser().feed(raw)
     message = decode(frame)
-    assert message.text == text.split(b"\0")[0].decode("ascii", errors="replace")
+    assert message.text == text.split(b"\0")[0].decode("ascii", errors="replace")  # type: ignore[attr-defined]
     assert message.to_dict()["severity"] == 6
 
 

@@ -118,7 +118,7 @@ def test_versions_and_signatures_are_reported():
         (2, False),
         (2, True),
     ]
-    assert decode(signed).roll == 0.5
+    assert decode(signed).roll == 0.5  # type: ignore[attr-defined]
     counters = parser.counters
     assert (counters.frames, counters.frames_v1, counters.frames_signed) == (3, 1, 1)
 
@@ -189,7 +189,7 @@ def test_longer_payload_of_a_newer_definition_is_cut():
     frame = FrameEncoder(1, 1).encode_payload(0, bytes(range(1, 13)))
     (parsed,) = FrameParser().feed(frame)
     assert parsed.payload == bytes(range(1, 10))
-    assert decode(parsed).custom_mode == int.from_bytes(bytes([1, 2, 3, 4]), "little")
+    assert decode(parsed).custom_mode == int.from_bytes(bytes([1, 2, 3, 4]), "little")  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("kind", [bytes, bytearray, memoryview])

@@ -173,4 +173,4 @@ def test_random_bytes_are_no_log_but_no_error_either(tmp_path):
 def test_frames_of_a_log_decode(tmp_path):
     path = tmp_path / "a.tlog"
     write(path, records(3))
-    assert [decode(frame).time_boot_ms for _, frame in TlogReader(path)] == [0, 1, 2]
+    assert [decode(frame).time_boot_ms for _, frame in TlogReader(path)] == [0, 1, 2]  # type: ignore[attr-defined]

@@ -42,7 +42,7 @@ def test_a_log_is_listed_downloaded_and_erased(flavour: str, tmp_path: Path) -> 
         data = folder.read_bytes()
         assert (tmp_path / "flight.tlog").read_bytes() == data
         armed = [
-            decode(frame).base_mode & 128
+            decode(frame).base_mode & 128  # type: ignore[attr-defined]
             for _, frame in TlogReader(tmp_path / "flight.tlog")
             if frame.definition.name == "HEARTBEAT"
         ]

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from autopilot_bridge.commander.battery import BatteryLevel
+from autopilot_bridge.commander.battery import BatteryLevel  # type: ignore[attr-defined]
 from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.geofence_parameters import AutoEnable, FenceParameters, FenceType
 from autopilot_bridge.commander.parameters import CommanderParameters

@@ -1,6 +1,7 @@
 """Attitude and rate control of a multicopter against their published laws, worked out with rotations."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -102,7 +103,7 @@ def test_attitude_of_every_thrust_axis() -> None:
         x = np.cross(right, z)
         x *= (1.0 if z[2] >= 0.0 else -1.0) / np.linalg.norm(x)
         q = np.zeros(4)
-        quaternion_from_thrust_axis(*z, yaw, q)
+        quaternion_from_thrust_axis(*z, yaw, q)  # type: ignore[call-arg]
         np.testing.assert_allclose(rotation_matrix(q), np.column_stack([x, np.cross(z, x), z]), atol=1e-9)
         assert np.linalg.norm(q) == pytest.approx(1.0)
 
@@ -112,7 +113,7 @@ def test_thrust_axis_along_the_right_hand_direction_turns_the_nose_down(side: fl
     yaw = 0.7
     z = side * np.array([-math.sin(yaw), math.cos(yaw), 0.0])
     q = np.zeros(4)
-    quaternion_from_thrust_axis(*z, yaw, q)
+    quaternion_from_thrust_axis(*z, yaw, q)  # type: ignore[call-arg]
     x = np.array([0.0, 0.0, 1.0])
     np.testing.assert_allclose(rotation_matrix(q), np.column_stack([x, np.cross(z, x), z]), atol=1e-9)
 
@@ -156,7 +157,7 @@ def of_axes(name: str) -> Array:
     return np.array([PID[f"rate_{axis}_{name}"] for axis in AXES])
 
 
-def rate_state() -> Array:
+def rate_state() -> Any:
     s = new_record(c.MulticopterState)
     s.rate_previous = 0.10, -0.20, 0.05
     s.rate_derivative = 2.0, -3.0, 1.5

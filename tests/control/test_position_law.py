@@ -40,7 +40,7 @@ def packed(**values: float | bool) -> MulticopterParameters:
     return the_record(records.packed(parameters), MulticopterParameters)
 
 
-def flying() -> tuple[Array, Array, Array]:
+def flying() -> tuple[Array, Array, c.MulticopterState]:
     """(navigation state, setpoint, controller state) of a hover 20 m up, nose to the east."""
     nav, setpoint, s = (
         np.zeros(n.NAV_SIZE),
@@ -61,7 +61,7 @@ def vector(s: Array, first: int) -> Array:
     return s[first : first + 3].copy()
 
 
-def thrust_vector(s: Array) -> Array:
+def thrust_vector(s: c.MulticopterState) -> Array:
     """NED, in units of the hover thrust: what the attitude and the collective give."""
     return -rotation_matrix(s.q_setpoint)[:, 2] * s.thrust_setpoint / s.hover
 
@@ -80,7 +80,7 @@ def test_cascade() -> None:
     s.vel_integral = 0.1, 0.25, -0.2
     s.drag[:2] = -0.5, 0.35
     s.bump = 0.05, -0.07, 0.09
-    before = s.copy()
+    before = s.copy()  # type: ignore[attr-defined]
     trajectory_control(nav, setpoint, p, s, DT_S, False)
 
     q = MulticopterParameters()

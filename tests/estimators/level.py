@@ -71,20 +71,23 @@ class LevelEstimator(Estimator[LevelParameters]):
     def handle(self, time_us: int, message: Message) -> Outcome:
         if message.name != "ATTITUDE":
             return Outcome.IGNORED
-        judged = self._guard.check(time_us, "ATTITUDE", (message.roll, message.pitch))
+        judged = self._guard.check(time_us, "ATTITUDE", (message.roll, message.pitch))  # type: ignore[attr-defined]
         if judged is Outcome.TIME_JUMP:
             self._level = None
         elif judged is not None:
             return judged
         w = self.parameters.weight
         before = self._level or Level(
-            time_us=time_us, subject=message.src_system, roll_rad=message.roll, pitch_rad=message.pitch
+            time_us=time_us,
+            subject=message.src_system,
+            roll_rad=message.roll,  # type: ignore[attr-defined]
+            pitch_rad=message.pitch,  # type: ignore[attr-defined]
         )
         self._level = Level(
             time_us=time_us,
             subject=message.src_system,
-            roll_rad=before.roll_rad + w * (message.roll - before.roll_rad),
-            pitch_rad=before.pitch_rad + w * (message.pitch - before.pitch_rad),
+            roll_rad=before.roll_rad + w * (message.roll - before.roll_rad),  # type: ignore[attr-defined]
+            pitch_rad=before.pitch_rad + w * (message.pitch - before.pitch_rad),  # type: ignore[attr-defined]
         )
         return judged or Outcome.UPDATED
 

@@ -181,9 +181,9 @@ def test_an_image_is_read_as_it_was_written(tmp_path):
     assert observations_beside(tmp_path / "flight.tlog") == path
     (first, one), (second, two) = read_observations(path, (Image,))
     assert (first, second) == (3, 4)
-    assert np.array_equal(one.pixels, sent.pixels)
-    assert np.array_equal(two.pixels, noise.pixels)
-    assert two.pixels.dtype == np.uint8
+    assert np.array_equal(one.pixels, sent.pixels)  # type: ignore[attr-defined]
+    assert np.array_equal(two.pixels, noise.pixels)  # type: ignore[attr-defined]
+    assert two.pixels.dtype == np.uint8  # type: ignore[attr-defined]
     others = [name for name in Image.__slots__ if name != "pixels"]
     assert [getattr(two, name) for name in others] == [getattr(noise, name) for name in others]
     assert list(read_observations(path, ())) == []

@@ -260,4 +260,4 @@ def test_what_can_not_be_published_is_the_estimators_failure(make):
 
 def test_remarks_that_fail_lose_nothing_else(make):
     runner = Runner(type("Odd", (type(make()),), {"remarks": lambda _: 1 / 0})())
-    assert "division by zero" in runner.remarks["remarks_failed"]
+    assert "division by zero" in runner.remarks["remarks_failed"]  # type: ignore[operator]

@@ -126,7 +126,7 @@ class AircraftFlight(Flight):
         lat, lon = self.geodetic(north_m, east_m)
         received = len(self.acks)
         self.send(
-            dialect.MAVLink_command_int_message(
+            dialect.MAVLink_command_int_message(  # type: ignore[call-arg]
                 SYSTEM_ID,
                 1,
                 _GLOBAL_RELATIVE_INT,
@@ -167,7 +167,7 @@ class AircraftFlight(Flight):
     def _send_item(self, seq: int, item: Item) -> None:
         lat, lon = (0.0, 0.0) if item.north_m is None else self.geodetic(item.north_m, item.east_m)
         self.send(
-            dialect.MAVLink_mission_item_int_message(
+            dialect.MAVLink_mission_item_int_message(  # type: ignore[call-arg]
                 SYSTEM_ID,
                 1,
                 seq,

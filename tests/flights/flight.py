@@ -130,14 +130,14 @@ class Flight:
             self.newest[name] = message
             if name == "HEARTBEAT" and frame.component_id == 1:
                 self.heartbeats.append(
-                    (self.time_s, message.custom_mode, message.base_mode, message.system_status)
+                    (self.time_s, message.custom_mode, message.base_mode, message.system_status)  # type: ignore[attr-defined]
                 )
             elif name == "STATUSTEXT":
                 whole = self._texts.add(message)
                 if whole is not None:
                     self.texts.append((self.time_s, whole.text.rstrip("\t")))
             elif name == "COMMAND_ACK":
-                self.acks.append((self.time_s, message.command, message.result))
+                self.acks.append((self.time_s, message.command, message.result))  # type: ignore[attr-defined]
 
     @property
     def time_s(self) -> float:

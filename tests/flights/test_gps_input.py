@@ -63,7 +63,7 @@ class Receiver:
         self._seen.append(self.fix())
         seen = self._seen[0]
         speeds = [round(100.0 * seen[name]) for name in ("vn", "ve", "vd")]
-        return dialect.MAVLink_hil_gps_message(
+        return dialect.MAVLink_hil_gps_message(  # type: ignore[call-arg]
             0, 3, seen["lat"], seen["lon"], round(1e3 * seen["alt"]), 80, 120, 0, *speeds, 65535, 13
         )
 

@@ -43,7 +43,7 @@ class Tracker:
         place = np.array(self.flight.position_ned_m) + self._rng.normal(0.0, 0.01, 3) + self.jump_m
         velocity = rotation_matrix(q).T @ truth[t.VEL_NED_M_S] + self._rng.normal(0.0, 0.02, 3)
         unknown = [math.nan] * 21
-        return dialect.MAVLink_odometry_message(
+        return dialect.MAVLink_odometry_message(  # type: ignore[call-arg]
             self.flight.sitl.time_us,
             dialect.MAV_FRAME_LOCAL_FRD,
             dialect.MAV_FRAME_BODY_FRD,
@@ -66,7 +66,7 @@ class Tracker:
         place = np.array(self.flight.position_ned_m) + self._rng.normal(0.0, 0.01, 3) + self.jump_m
         angles = math.atan2(r[2, 1], r[2, 2]), -math.asin(r[2, 0]), math.atan2(r[1, 0], r[0, 0])
         stamp_us = 1_700_000_000_000_000 + self.flight.sitl.time_us
-        return dialect.MAVLink_vision_position_estimate_message(stamp_us, *place, *angles, [math.nan] * 21, 0)
+        return dialect.MAVLink_vision_position_estimate_message(stamp_us, *place, *angles, [math.nan] * 21, 0)  # type: ignore[call-arg]
 
 
 def frame_at_home(flight: Flight) -> LocalFrame:

@@ -142,7 +142,7 @@ def test_only_a_magnetometer_alone_rests_between_its_readings() -> None:
 
 def test_one_target_more_changes_no_other() -> None:
     def of(log: dict[str, list[object]], tags: set[int]) -> list[object]:
-        return [d for frame in log["camera"] for d in frame.detections if d.target_id in tags]
+        return [d for frame in log["camera"] for d in frame.detections if d.target_id in tags]  # type: ignore[attr-defined]
 
     two, three = fly(*make(targets=2)), fly(*make(targets=3))
     assert of(two, {0, 1}) == of(three, {0, 1}) != []

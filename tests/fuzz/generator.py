@@ -312,9 +312,9 @@ class Generator:
         number = self._float
         whole = rng.getrandbits
         floats = [number() for _ in range(21)]
-        yield dialect.MAVLink_vision_position_estimate_message(whole(60), *floats[:6], floats)
-        yield dialect.MAVLink_att_pos_mocap_message(whole(60), floats[:4], *floats[4:7], floats)
-        yield dialect.MAVLink_follow_target_message(
+        yield dialect.MAVLink_vision_position_estimate_message(whole(60), *floats[:6], floats)  # type: ignore[call-arg]
+        yield dialect.MAVLink_att_pos_mocap_message(whole(60), floats[:4], *floats[4:7], floats)  # type: ignore[call-arg]
+        yield dialect.MAVLink_follow_target_message(  # type: ignore[call-arg]
             whole(60), 255, whole(31), -whole(31), *floats[:1], floats[1:4], floats[4:7], floats[7:11],
             floats[11:14], floats[14:17], whole(60),
         )  # fmt: skip
@@ -349,7 +349,7 @@ class Generator:
         honest = rng.random() < 0.6
         for k in range(min(count, rng.randrange(1, 12))):
             sequence = k if honest else self._count()
-            yield dialect.MAVLink_mission_item_int_message(
+            yield dialect.MAVLink_mission_item_int_message(  # type: ignore[call-arg]
                 VEHICLE, 1, sequence, rng.choice((0, 2, 3, 5, 6, 99)),
                 rng.choice((16, 17, 18, 19, 20, 21, 22, 82, 177, 189, 5001, 5002, 5003, 5004, 5100, 9999)),
                 rng.randrange(3), rng.randrange(2), *(self._float() for _ in range(4)),
@@ -397,7 +397,7 @@ class Generator:
             *(self._float() for _ in range(4)),
         )  # fmt: skip
         sticks = [rng.randrange(-32_768, 32_768) for _ in range(4)]
-        yield dialect.MAVLink_manual_control_message(VEHICLE, *sticks, rng.getrandbits(16))
+        yield dialect.MAVLink_manual_control_message(VEHICLE, *sticks, rng.getrandbits(16))  # type: ignore[call-arg]
         channels = [rng.choice((0, 1000, 2000, 65_535)) for _ in range(8)]
         yield dialect.MAVLink_rc_channels_override_message(VEHICLE, 1, *channels)
 
@@ -426,7 +426,7 @@ class Generator:
 
     def _command_int(self, target: int, command: int) -> MAVLinkMessage:
         rng = self._rng
-        return dialect.MAVLink_command_int_message(
+        return dialect.MAVLink_command_int_message(  # type: ignore[call-arg]
             target, rng.choice((0, 1)), rng.choice((0, 2, 3, 6, 11, 21, 255)), command, 0, 0,
             *(self._float() for _ in range(4)), rng.randint(-(2**31), 2**31 - 1),
             rng.randint(-(2**31), 2**31 - 1), self._float(),

@@ -297,7 +297,7 @@ class FakeAutopilot:
         elif name == "GLOBAL_POSITION_INT":
             lat, lon, alt = LocalFrame(self.home).geodetic_from_ned(n, e, down)
             self.send(
-                d.MAVLink_global_position_int_message(
+                d.MAVLink_global_position_int_message(  # type: ignore[call-arg]
                     t, round(lat * 1e7), round(lon * 1e7), round(alt * 1e3), round(-down * 1e3),
                     *(round(v * 100) for v in self.vel), 0xFFFF,
                 )
@@ -349,7 +349,7 @@ class FakeAutopilot:
         if self.on_truth is not None:
             lat, lon, alt = LocalFrame(self.home).geodetic_from_ned(*self.pos)
             q = [math.cos(0.5 * self.yaw), 0.0, 0.0, math.sin(0.5 * self.yaw)]
-            message = dialect.MAVLink_hil_state_quaternion_message(
+            message = dialect.MAVLink_hil_state_quaternion_message(  # type: ignore[call-arg]
                 time_us, q, 0.0, 0.0, 0.0, round(lat * 1e7), round(lon * 1e7), round(alt * 1e3),
                 *(round(v * 100) for v in self.vel), 0, 0, 0, 0, -1000,
             )  # fmt: skip

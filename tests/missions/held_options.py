@@ -16,4 +16,4 @@ def with_fields(options: T, **values: Any) -> T:
         if inner:
             changes[holder.name] = replace(held, **inner)
     assert not values, f"no such field: {', '.join(values)}"
-    return replace(options, **changes)
+    return replace(options, **changes)  # type: ignore[type-var]

@@ -212,7 +212,7 @@ def test_turns_are_planned_for_the_wind_the_user_expects(
 )
 def test_ratios(text: str, ratio: tuple[float, float]) -> None:
     context = fly.make_context("fly", ["lissajous", "--ratio", text])
-    assert flight_of(context)[1].options.ratio == ratio
+    assert flight_of(context)[1].options.ratio == ratio  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("text", ["0:0", "1:0", "-1:2", "0", "x:y", ""])

@@ -39,7 +39,7 @@ def all_options():
     waiting += _COMMANDS.values()
     while waiting:
         command = waiting.pop()
-        parameters = command.params if isinstance(command, click.Command) else command.options
+        parameters = command.params if isinstance(command, click.Command) else command.options  # type: ignore[attr-defined]
         for parameter in parameters:
             found.update(getattr(parameter, "opts", ()))
         if isinstance(command, click.Group):

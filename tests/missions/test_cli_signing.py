@@ -91,7 +91,7 @@ COMMANDS = {
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_link_that_does_not_open_is_not_warned_of(command: str) -> None:
     busy = open_link("udpin:0.0.0.0:0")
-    port = busy.port  # type: ignore[union-attr]
+    port = busy.port  # type: ignore[attr-defined, union-attr]
     unasked = ("--yes",) if command == "fly" else ()
     words = [word.replace("127.0.0.1:0", f"0.0.0.0:{port}") for word in COMMANDS[command]]
     done = flightstack(*words, *unasked)
@@ -134,7 +134,7 @@ def test_a_log_is_played_under_a_key(tmp_path: Path, key_file: Path) -> None:
     listening = open_link("udpin:127.0.0.1:0")
     arguments = (
         *("log", "play", str(tmp_path / "flight.tlog"), "--speed", "max"),
-        *("--link", f"udpout:127.0.0.1:{listening.port}", "--signing-key", str(key_file)),  # type: ignore[union-attr]
+        *("--link", f"udpout:127.0.0.1:{listening.port}", "--signing-key", str(key_file)),  # type: ignore[attr-defined, union-attr]
     )
     assert "played: 40 frames" in flightstack(*arguments).output
     parser = FrameParser()

@@ -236,7 +236,7 @@ def test_the_same_mission_flies_a_vehicle_elsewhere(make_sitl, tmp_path, kind, f
 def test_a_stranger_on_the_port_is_not_spoken_to():
     async def script():
         link = open_link("udpin:127.0.0.1:0")
-        vehicle, stranger = (open_link(f"udpout:127.0.0.1:{link.port}") for _ in range(2))
+        vehicle, stranger = (open_link(f"udpout:127.0.0.1:{link.port}") for _ in range(2))  # type: ignore[attr-defined]
         stranger.send(b"\xfd\x09 who is there? " * 4)
         vehicle.send(FrameEncoder(1, 1).encode(attitude(1)))
         async with Connection(link, TelemetryClock()) as connection:
@@ -258,7 +258,7 @@ def packet_order(*, acts):
         def record(self, packet, time_us):
             seen.extend(frame.message_id for frame in packet)
 
-    Recorder.acts = acts
+    Recorder.acts = acts  # type: ignore[attr-defined]
 
     async def script(connection, send):
         connection.listen("ATTITUDE", lambda _: seen.append("listener"), in_order=False)

@@ -17,7 +17,8 @@ from missions.handoff.options import HandoffOptions
 from missions.handoff.world import handoff_world
 from missions.library import find_mission
 from missions.multi_target.options import MultiTargetOptions
-from missions.multi_target.world import TargetField, multi_target_world
+from missions.multi_target.world import TargetField, multi_target_world  # type: ignore[attr-defined]
+from missions.occupancy.magnetic_target import MagneticTarget
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions
@@ -26,6 +27,7 @@ from missions.plan_files.options import FileOptions
 from missions.runs.session import RunResult, fly
 from missions.search.area import edges
 from missions.survey.options import SurveyOptions
+from missions.survey.surveyed_field import SurveyedField
 from missions.survey.world import survey_world
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.world import vision_search_world
@@ -98,11 +100,14 @@ def test_an_orbit(home: Home, tmp_path: Path) -> None:
 @pytest.mark.slow
 @both
 def test_an_occupancy_search(home: Home, tmp_path: Path) -> None:
-    options = OccupancyOptions(
-        vehicles=2, altitude_m=15.0, separation_m=6.0, width_m=400.0, height_m=400.0, cell_m=100.0,
-        detection_range_m=60.0, confirmations=1,
-    )  # fmt: skip
-    world = partial(occupancy_world, target_ne_m=(110.0, 30.0))
+    options = with_fields(
+        OccupancyOptions(
+            vehicles=2, altitude_m=15.0, separation_m=6.0, width_m=400.0, height_m=400.0, cell_m=100.0
+        ),
+        detection_range_m=60.0,
+        confirmations=1,
+    )
+    world = partial(occupancy_world, hidden=MagneticTarget(place_ne_m=(110.0, 30.0)))
     summary = flown("occupancy", options, tmp_path / "run", home, world).summary
     assert summary["target_found"] is True
     assert summary["target_error_m"] < 80.0
@@ -128,10 +133,10 @@ def test_a_search_for_several_targets(home: Home, tmp_path: Path) -> None:
 @pytest.mark.slow
 @both
 def test_a_survey(home: Home, tmp_path: Path) -> None:
-    options = SurveyOptions(
-        width_m=500.0, height_m=600.0, spacing_m=250.0, tie_spacing_m=500.0, map_error_nt=0.0
+    options = with_fields(
+        SurveyOptions(width_m=500.0, height_m=600.0, spacing_m=250.0, tie_spacing_m=500.0), map_error_nt=0.0
     )
-    world = partial(survey_world, targets=1, exact_map=True)
+    world = partial(survey_world, hidden=SurveyedField(targets=1, exact_map=True))
     result = flown("survey", options, tmp_path / "run", home, world, model="aerosonde", air=AIR)
     near_path(result, 20.0)
     assert result.summary["least_coverage"] > 0.98

@@ -16,7 +16,7 @@ from missions.handoff.options import HandoffOptions
 from missions.handoff.world import handoff_world
 from missions.library import MISSIONS, find_mission
 from missions.multi_target.options import MultiTargetOptions
-from missions.multi_target.world import TargetField, multi_target_world
+from missions.multi_target.world import TargetField, multi_target_world  # type: ignore[attr-defined]
 from missions.occupancy.options import OccupancyOptions
 from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions
@@ -71,7 +71,7 @@ def handoff(seed: int) -> tuple[MissionOptions, WorldSpec]:
 
 
 def survey(seed: int) -> tuple[MissionOptions, WorldSpec]:
-    options = SurveyOptions(width_m=300.0, height_m=300.0, spacing_m=300.0, map_error_nt=0.0)
+    options = with_fields(SurveyOptions(width_m=300.0, height_m=300.0, spacing_m=300.0), map_error_nt=0.0)
     return options, survey_world(team(1, seed, "aerosonde"), options)
 
 

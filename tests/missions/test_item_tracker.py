@@ -62,7 +62,7 @@ def messages(items: list[MissionItem], coalesced: bool) -> list[tuple[str, tuple
 
 def deliver(tracker: ItemTracker, kind: str, values: tuple[float, ...], time_us: int) -> None:
     if kind == "position":
-        tracker.on_position(*values, time_us)
+        tracker.on_position(*values, time_us)  # type: ignore[call-arg]
     elif kind == "current":
         tracker.on_current(int(values[0]), time_us)
     else:

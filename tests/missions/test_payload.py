@@ -10,7 +10,7 @@ from autopilot_bridge.mavlink.components import GIMBAL_COMPONENT
 from missions.errors import PlanError
 from missions.vehicle import AttitudeSetpoint
 from missions.vehicle.notes import FlightNotes
-from missions.vehicle.payload import Payload, detection, gimbal_attitude
+from missions.vehicle.payload import Payload, detection, gimbal_attitude  # type: ignore[attr-defined]
 
 d = dialect
 
@@ -77,7 +77,7 @@ class Rig:
     def latest(self, kind, system_id, component_id):
         if kind is not d.MAVLink_gimbal_manager_status_message or self.primary is None:
             return None
-        return d.MAVLink_gimbal_manager_status_message(0, 0, 0, *self.primary, 0, 0)
+        return d.MAVLink_gimbal_manager_status_message(0, 0, 0, *self.primary, 0, 0)  # type: ignore[call-arg]
 
     def send(self, message):
         self.sent.append(message)
@@ -121,8 +121,8 @@ def test_roll_and_pitch_leave_the_throttle():
 def test_a_complete_attitude_ignores_the_rates_only():
     setpoint = AttitudeSetpoint(roll_rad=0.4, pitch_rad=0.1, thrust=0.6, yaw_rad=1.0)
     message = setpoint.message(2_000_000, 1)
-    assert (message.type_mask, message.thrust) == (0x07, 0.6)
-    w, x, y, z = message.q
+    assert (message.type_mask, message.thrust) == (0x07, 0.6)  # type: ignore[attr-defined]
+    w, x, y, z = message.q  # type: ignore[attr-defined]
     assert math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)) == pytest.approx(0.4)
     assert math.asin(2 * (w * y - z * x)) == pytest.approx(0.1)
 

@@ -69,7 +69,7 @@ def flown(source, frames, *, seed=5):
         frame = camera.step(time_us)
         assert frame is not None
         component.update(frame)
-        car_n, car_e, _, _ = CAR.motion.at(time_us * 1e-6)
+        car_n, car_e, _, _ = CAR.motion.at(time_us * 1e-6)  # type: ignore[attr-defined]
         away = np.array([car_n - north_m, car_e - east_m, HEIGHT_M])
         c, s = math.cos(PITCH_RAD), math.sin(PITCH_RAD)
         ahead, right, below = c * away[0] - s * away[2], away[1], s * away[0] + c * away[2]

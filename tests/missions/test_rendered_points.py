@@ -105,7 +105,7 @@ class Flight:
                     component.update(scan)
                 if step % 2 == 0:
                     send(gimbal.encode(gimbal_status(now_us)))
-                car_n, car_e, _, _ = CAR.motion.at(now_us * 1e-6)
+                car_n, car_e, _, _ = CAR.motion.at(now_us * 1e-6)  # type: ignore[attr-defined]
                 away = np.array([car_n - north_m, car_e - east_m, HEIGHT_M])
                 c, s = math.cos(PITCH_RAD), math.sin(PITCH_RAD)
                 ahead, below = c * away[0] - s * away[2], s * away[0] + c * away[2]
@@ -225,7 +225,7 @@ def test_pictures_without_gimbal_or_height_are_counted_and_not_searched(flight):
     (warning,) = motion.warnings()
     assert "2 of 2 pictures have no attitude of the gimbal, or no height" in warning
     (message,) = motion.messages(2_000_000, ())
-    scan = read_moving_points(message.payload_type, message.payload_length, message.payload)
+    scan = read_moving_points(message.payload_type, message.payload_length, message.payload)  # type: ignore[attr-defined]
     assert (scan.scan, scan.total, scan.time_us) == (1, 0, 2_000_000)
 
 

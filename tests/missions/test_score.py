@@ -224,7 +224,7 @@ def make_flight(
 
 def test_a_perfect_flight_scores_zero():
     result = score(*make_flight())
-    assert result.path_rms_error_m < 0.01  # degE7 is a centimetre
+    assert result.path_rms_error_m < 0.01  # type: ignore[operator]  # degE7 is a centimetre
     assert result.distance_m == pytest.approx(110.0, abs=0.5)
     assert result.max_attitude_error_deg == pytest.approx(0.0, abs=1e-6)
     assert result.reference == "truth"
@@ -249,7 +249,7 @@ def test_a_known_error_is_found():
 
 def test_a_constant_receiver_error_moves_home_and_path_alike():
     result = score(*make_flight(gps_ned=(1.0, -2.0, 3.0)))
-    assert result.path_rms_error_m < 0.01
+    assert result.path_rms_error_m < 0.01  # type: ignore[operator]
     assert result.path_rms_error_absolute_m == pytest.approx(2.0, abs=0.1)
 
 

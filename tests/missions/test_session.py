@@ -408,7 +408,7 @@ def test_a_flight_from_the_command_line(scripted, tmp_path, capsys):
 
 
 def test_a_failed_flight_exits_1_with_one_line(scripted, tmp_path, capsys, make_sitl):
-    class Deaf(make_sitl):
+    class Deaf(make_sitl):  # type: ignore[valid-type]
         def advance(self):
             self.time_us += 20_000
 

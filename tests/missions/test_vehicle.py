@@ -477,7 +477,7 @@ def test_few_unfinished_texts_are_kept():
 @pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
 def test_numbers_that_are_none_make_no_telemetry(nothing):
     for angles in ((nothing, 0.0, 0.0), (0.0, nothing, 0.0), (0.0, 0.0, nothing)):
-        assert attitude(0, *angles, 0.0, 0.0, 0.0) is None
+        assert attitude(0, *angles, 0.0, 0.0, 0.0) is None  # type: ignore[call-arg]
     assert air_data(nothing, 0.0, 0) is None
     assert air_data(20.0, nothing, 0) is None
     assert local_position(0, nothing, 0, 0, 0, 0, 0) is None

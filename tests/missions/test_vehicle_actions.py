@@ -89,7 +89,7 @@ def linked(make_sitl, monkeypatch):
             yield vehicle
 
     monkeypatch.setattr(vehicle_actions, "connected_vehicle", connected_vehicle)
-    monkeypatch.setattr(vehicle_link.asyncio, "run", lambda work: run(work, sitl.loop))
+    monkeypatch.setattr(vehicle_link.asyncio, "run", lambda work: run(work, sitl.loop))  # type: ignore[attr-defined]
     return sitl.autopilots[0]
 
 
@@ -117,7 +117,7 @@ def test_a_refusal_is_one_line_and_exit_code_1(linked, capsys):
 def test_motors_in_the_air_are_stopped_only_by_typing_it(linked, monkeypatch, answer, code):
     up(linked)
     linked._command = lambda command, p: (
-        setattr(linked, "armed", False) if command == 400 and p[1] == 21196.0 else None,
+        setattr(linked, "armed", False) if command == 400 and p[1] == 21196.0 else None,  # type: ignore[func-returns-value]
         linked.ack(command, 0),
     )
     asked = []
@@ -153,7 +153,7 @@ def test_watching_prints_the_state_and_texts_until_ctrl_c(linked, monkeypatch, c
             raise KeyboardInterrupt
         await sleep(seconds)
 
-    monkeypatch.setattr(vehicle_actions.asyncio, "sleep", counted)
+    monkeypatch.setattr(vehicle_actions.asyncio, "sleep", counted)  # type: ignore[attr-defined]
     assert command("watch") == 0
     lines = capsys.readouterr().out.splitlines()
     assert "vehicle 1: mode Hold, 12.0 m above home, armed, in the air, battery 100 %" in lines

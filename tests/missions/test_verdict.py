@@ -69,7 +69,7 @@ def test_a_closed_path_is_flown_with_a_rest_before_and_after_it(seed) -> None:
     wander = np.random.default_rng(seed).normal(0.0, 0.3, circle.shape)
     times = 0.1 * np.arange(len(angle))
     notes = notes_of()
-    notes.commanded = replace(notes.commanded, points_ned_m=circle[30:330])
+    notes.commanded = replace(notes.commanded, points_ned_m=circle[30:330])  # type: ignore[type-var]
     track = Track(time_s=times, pos_ned_m=circle + wander, yaw_rad=np.zeros_like(times))
     assert path_verdict(notes, SimpleNamespace(estimate=track)) == ""
     still = Track(time_s=times, pos_ned_m=circle[:1] + wander, yaw_rad=np.zeros_like(times))

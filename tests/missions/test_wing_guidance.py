@@ -110,7 +110,7 @@ def test_setpoints_bend_as_tightly_as_the_aircraft_can_bank() -> None:
     )
     options = mission.adapted(chosen, limits)
     assert isinstance(limits, FixedWingLimits)
-    assert check_wings(mission.curve(options), options, limits) == limits.turn_radius_m(22.0)
+    assert check_wings(mission.curve(options), options, limits) == limits.turn_radius_m(22.0)  # type: ignore[attr-defined]
     with pytest.raises(PlanError, match=r"its path guidance \(NAVL1_PERIOD\)"):
         mission.check(replace(options, via=Via.WAYPOINTS), limits)
 

@@ -93,12 +93,12 @@ def fly_wing(duration_s: float, wing: Wing, *, seed: int = 0, rate_hz: int = RAT
 
     rate = np.zeros(n)
     for start, end, deg_s in wing.turns:
-        rate += np.radians(deg_s) * (smooth(time_s, start, 2.0) - smooth(time_s, end, 2.0))
+        rate += np.radians(deg_s) * (smooth(time_s, start, 2.0) - smooth(time_s, end, 2.0))  # type: ignore[operator]
     heading = wing.heading_rad + np.cumsum(rate) * dt
-    speed = 18.0 * off + (wing.speed_m_s - 18.0) * smooth(time_s, wing.launch_s + 3.0, 10.0)
+    speed = 18.0 * off + (wing.speed_m_s - 18.0) * smooth(time_s, wing.launch_s + 3.0, 10.0)  # type: ignore[operator]
     speed = speed + wing.swing_m_s * follow[:, 0] * np.sin(0.11 * time_s)
     climb = wing.height_m / 25.0 * (
-        smooth(time_s, wing.launch_s, 1.0) - smooth(time_s, wing.launch_s + 25.0, 4.0)
+        smooth(time_s, wing.launch_s, 1.0) - smooth(time_s, wing.launch_s + 25.0, 4.0)  # type: ignore[operator]
     ) + 0.5 * follow[:, 0] * np.sin(0.17 * time_s)
     level = np.sqrt(np.maximum(speed**2 - climb**2, 0.0)) * off
     own = np.stack([level * np.cos(heading), level * np.sin(heading), -climb * off], axis=1)

@@ -146,7 +146,7 @@ def test_position_and_velocity_agree_over_two_seconds(axis: int, sign: float) ->
         for k in range(count):
             place = [0.0, 0.0, 0.0]
             place[axis] = rate_m_s * k * 0.2
-            places.append(at(*place, tuple(velocity)))  # type: ignore[arg-type]
+            places.append(at(*place, tuple(velocity)))  # type: ignore[arg-type, call-arg]
         return places
 
     honest = GpsQuality(P)

@@ -40,9 +40,9 @@ class Talk:
         self.link.send(self.encoders[sender].encode(message))
         self.run(0.2)
         return [
-            ack.result
+            ack.result  # type: ignore[attr-defined]
             for ack in map(decode, self.of(dialect.MAVLINK_MSG_ID_COMMAND_ACK, 1, since=before))
-            if ack.command == number and (ack.target_system, ack.target_component) == sender
+            if ack.command == number and (ack.target_system, ack.target_component) == sender  # type: ignore[attr-defined]
         ]
 
     def of(self, message_id: int, component: int, since: int = 0) -> list:
@@ -53,7 +53,7 @@ class Talk:
         ]
 
     def pitch_deg(self) -> float:
-        w, x, y, z = decode(
+        w, x, y, z = decode(  # type: ignore[attr-defined]
             self.of(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS, GIMBAL_COMPONENT)[-1]
         ).q
         return math.degrees(math.asin(2.0 * (w * y - z * x)))
@@ -82,7 +82,7 @@ def test_control_by_the_autopilot_is_the_clients_own(talk):
     )
     assert talk.command(configure, -2.0, -2.0, -1.0, -1.0) == [dialect.MAV_RESULT_ACCEPTED]
     status = decode(talk.of(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS, GIMBAL_COMPONENT)[-1])
-    assert (status.primary_control_sysid, status.primary_control_compid) == GCS
+    assert (status.primary_control_sysid, status.primary_control_compid) == GCS  # type: ignore[attr-defined]
     assert talk.command(pitchyaw, -30.0, sender=OTHER) == [dialect.MAV_RESULT_DENIED]
     assert talk.command(pitchyaw, -30.0) == [dialect.MAV_RESULT_ACCEPTED]
     assert talk.command(configure, -3.0, -3.0, -1.0, -1.0, sender=OTHER) == [dialect.MAV_RESULT_ACCEPTED]

@@ -98,9 +98,9 @@ class World:
         assert len(acks) <= 1
         if not acks:
             return None
-        assert acks[0].command == command
-        assert (acks[0].target_system, acks[0].target_component) == sender
-        return acks[0].result
+        assert acks[0].command == command  # type: ignore[attr-defined]
+        assert (acks[0].target_system, acks[0].target_component) == sender  # type: ignore[attr-defined]
+        return acks[0].result  # type: ignore[attr-defined]
 
     def messages(self, message_id: int, component: int | None = None) -> list:
         return [
@@ -395,7 +395,7 @@ def test_extreme_values_never_raise(component, command, values, flags):
     world = SHARED
     world.deliver(dialect.MAVLink_command_long_message(SYSTEM, component, command, 0, *values))
     world.deliver(
-        dialect.MAVLink_command_int_message(
+        dialect.MAVLink_command_int_message(  # type: ignore[call-arg]
             SYSTEM, component, 6, command, 0, 0, *values[:4], 2**31 - 1, -(2**31), values[6]
         )
     )

@@ -124,7 +124,7 @@ def test_a_device_of_a_package_is_in_world_files_and_on_the_wire(tmp_path):
     for step in range(501):
         station.step(4000 * step)
     messages = [decode(frame) for frame in frames]
-    assert sum(m.get_type() == "HYGROMETER_SENSOR" and m.humidity == 5000 for m in messages) == 10
+    assert sum(m.get_type() == "HYGROMETER_SENSOR" and m.humidity == 5000 for m in messages) == 10  # type: ignore[attr-defined]
     assert {frame.component_id for frame in frames} == {84}
     assert "HEARTBEAT" in {m.get_type() for m in messages}
 

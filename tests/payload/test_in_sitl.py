@@ -76,9 +76,9 @@ def test_targets_are_in_the_truth_and_nowhere_else():
     frames = [f for _, raw in truth for f in parser.feed(raw) if f.system_id == TARGET_SYSTEM]
     newest = decode(frames[-1])
     home = HOMES["px4"]
-    north_m = (newest.lat * 1e-7 - home.lat_deg) * 111_180.0
-    assert north_m == pytest.approx(40.0 + 2.0 * newest.time_usec * 1e-6, abs=0.2)
-    assert (newest.vx, newest.vy) == (200, 0)
+    north_m = (newest.lat * 1e-7 - home.lat_deg) * 111_180.0  # type: ignore[attr-defined]
+    assert north_m == pytest.approx(40.0 + 2.0 * newest.time_usec * 1e-6, abs=0.2)  # type: ignore[attr-defined]
+    assert (newest.vx, newest.vy) == (200, 0)  # type: ignore[attr-defined]
 
 
 def test_magnetometer_measures_the_map():
@@ -92,7 +92,7 @@ def test_magnetometer_measures_the_map():
     client = sitl.connect(0)
     (received,) = frames_after(sitl, 2.0, client)
     values = [
-        decode(f).value
+        decode(f).value  # type: ignore[attr-defined]
         for f in received
         if f.component_id == SURVEY_MAGNETOMETER_COMPONENT and f.message_id == 251
     ]

@@ -55,7 +55,7 @@ def test_distance_has_the_noise_that_pixel_noise_implies() -> None:
     assert distances.mean() == pytest.approx(HEIGHT_M, abs=4.0 * expected_m / math.sqrt(1000) + 0.01)
     assert distances.std() == pytest.approx(expected_m, rel=0.1)
     assert found[0].size_rad == pytest.approx(2.0 * math.atan(0.5 * SIZE_M / found[0].distance_m))
-    assert landing_target(found[0]).distance == found[0].distance_m
+    assert landing_target(found[0]).distance == found[0].distance_m  # type: ignore[attr-defined]
 
 
 def test_without_it_or_without_a_tag_there_is_no_distance() -> None:

@@ -151,7 +151,7 @@ class ServiceRig(Rig):
             mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, p1, p2, p3, p4, x, y, z)
         )
 
-    def set_mode(self, base_mode: int, custom_mode: int) -> list[int]:
+    def set_mode(self, base_mode: int, custom_mode: int) -> list[int]:  # type: ignore[valid-type]
         return self._acks(mavlink.MAVLink_set_mode_message(1, base_mode, custom_mode))
 
     def _acks(self, message: Any) -> list:
@@ -162,11 +162,11 @@ class ServiceRig(Rig):
             self.status.follow(event)
         return [sent.result for sent in self.channel.sent if sent.get_msgId() == 77]
 
-    def _set_current(self, item: int) -> bool:
+    def _set_current(self, item: int) -> bool:  # type: ignore[valid-type]
         self.missions.current = item
         return True
 
-    def _inject(self, unit: int, kind: int, instance: int) -> Result:
+    def _inject(self, unit: int, kind: int, instance: int) -> Result:  # type: ignore[valid-type]
         self.failures.append((unit, kind, instance))
         return Result.ACCEPTED
 

@@ -98,7 +98,7 @@ class FtpRig:
         replies = []
         for message in sent:
             (frame,) = FrameParser().feed(FrameEncoder(1, 1).encode(message))
-            replies.append(Reply(bytes(decode(frame).payload)))
+            replies.append(Reply(bytes(decode(frame).payload)))  # type: ignore[attr-defined]
         return replies
 
     def put(self, name: bytes, data: bytes) -> None:

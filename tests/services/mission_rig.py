@@ -59,7 +59,7 @@ class Vehicle:
             home=lambda: self.home,
             progress=self.task,
             on_plan_changed=self.changes.append,
-            on_guided_item=lambda item: self.guided.append(item) is None,
+            on_guided_item=lambda item: self.guided.append(item) is None,  # type: ignore[func-returns-value]
         )
 
     @property

@@ -114,7 +114,7 @@ def test_choices_are_reported_with_the_parameters() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_parameters_are_described_in_their_own_words(kind: AirframeKind) -> None:
     """parameter.schema.json: shortDesc is the description where there is one, else the name."""
-    entries = {entry["name"]: entry for entry in parameter_metadata(table(kind))["parameters"]}
+    entries = {entry["name"]: entry for entry in parameter_metadata(table(kind))["parameters"]}  # type: ignore[attr-defined]
     assert len(entries) == len(table(kind))
     for definition in table(kind):
         assert entries[definition.name]["shortDesc"] == (definition.description or definition.name)

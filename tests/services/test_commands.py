@@ -480,7 +480,7 @@ def test_no_command_ever_raises(place: tuple[str, str], calls: list[tuple]) -> N
     rig = RIGS[place]()
     for command, parameters, x, y, z, frame, as_int in calls:
         if as_int:
-            acks = rig.int(command, *parameters, x, y, z, frame=frame)
+            acks = rig.int(command, *parameters, x, y, z, frame=frame)  # type: ignore[call-arg]
         else:
             acks = rig.long(command, *parameters, float(x), float(y), z)
         assert len(acks) <= 2

@@ -424,26 +424,26 @@ def pulses(vehicle: Vehicle) -> tuple[int, ...] | None:
 
 def test_overrides_are_shown_released_and_forgotten() -> None:
     vehicle = Vehicle("ardupilot")
-    assert pulses(vehicle)[:8] == (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
+    assert pulses(vehicle)[:8] == (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)  # type: ignore[index]
     vehicle.receive(override(1600, 65535, 1300, more=(1111, *(0,) * 9)))
-    assert pulses(vehicle)[:4] == (1600, 1500, 1300, 1500) and pulses(vehicle)[8] == 1111
+    assert pulses(vehicle)[:4] == (1600, 1500, 1300, 1500) and pulses(vehicle)[8] == 1111  # type: ignore[index]
     vehicle.receive(override(0, 65535, 65535, more=(65534, *(0,) * 9)))
-    assert pulses(vehicle)[0] == 1500 and pulses(vehicle)[2] == 1300 and pulses(vehicle)[8] == 0
+    assert pulses(vehicle)[0] == 1500 and pulses(vehicle)[2] == 1300 and pulses(vehicle)[8] == 0  # type: ignore[index]
     vehicle.run(3.1)  # RC_OVERRIDE_TIME
-    assert pulses(vehicle)[2] == 1000
+    assert pulses(vehicle)[2] == 1000  # type: ignore[index]
     assert vehicle.rig.context.sticks.simulated
 
 
 def test_ardupilot_listens_to_its_ground_station_alone() -> None:
     vehicle = Vehicle("ardupilot", SYSID_MYGCS=254)
     vehicle.receive(override(1900, 1900, 1900, 1900))
-    assert pulses(vehicle)[0] == 1500
+    assert pulses(vehicle)[0] == 1500  # type: ignore[index]
 
 
 def test_ardupilot_manual_control_is_an_override() -> None:
     vehicle = Vehicle("ardupilot")
     vehicle.receive(mavlink.MAVLink_manual_control_message(1, 500, 32767, 600, -200, 0))
-    assert pulses(vehicle)[:4] == (1500, 1250, 1600, 1400)
+    assert pulses(vehicle)[:4] == (1500, 1250, 1600, 1400)  # type: ignore[index]
 
 
 def test_px4_shows_a_radio_that_does_not_steer() -> None:
@@ -451,7 +451,7 @@ def test_px4_shows_a_radio_that_does_not_steer() -> None:
     assert pulses(vehicle) is None
     vehicle.receive(override(1600, 1500, 1300, 1500))
     vehicle.run(0.1)
-    assert pulses(vehicle)[:4] == (1600, 1500, 1300, 1500)
+    assert pulses(vehicle)[:4] == (1600, 1500, 1300, 1500)  # type: ignore[index]
     assert not vehicle.rig.context.sticks.valid  # COM_RC_IN_MODE 1
     vehicle.run(1.2)
     assert pulses(vehicle) is None

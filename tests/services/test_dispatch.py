@@ -36,7 +36,7 @@ def test_a_message_belongs_to_one_service(flavour: str, kind: AirframeKind) -> N
     """HEARTBEAT alone is of interest to several; a second owner of another message would answer it twice."""
     table = autopilot_of(flavour, kind)._receivers
     assert {message_id for message_id, receivers in table.items() if len(receivers) != 1} == {HEARTBEAT}
-    owners = [receiver.__self__ for receiver in table[HEARTBEAT]]
+    owners = [receiver.__self__ for receiver in table[HEARTBEAT]]  # type: ignore[attr-defined]
     assert [type(owner).__name__ for owner in owners] == [
         "ManualService",
         "PayloadCommands",

@@ -80,7 +80,7 @@ def angles(x: float = 0.0, y: float = 0.0, distance: float = 0.0, stamp_us: int 
 
 
 def place(frame: int, *offset: float, valid: int = 1) -> Any:
-    return dialect.MAVLink_landing_target_message(
+    return dialect.MAVLink_landing_target_message(  # type: ignore[call-arg]
         0, 0, frame, 0.1, 0.1, 0.0, 0.0, 0.0, *offset, (1.0, 0.0, 0.0, 0.0), 0, valid
     )
 

@@ -255,7 +255,7 @@ def test_a_receiver_without_the_extensions_understands_them() -> None:
 def test_ardupilot_mission_state(ardupilot: Vehicle) -> None:
     def state() -> tuple[int, int]:
         message = ardupilot.service.current_message()
-        return message.mission_state, message.mission_mode
+        return message.mission_state, message.mission_mode  # type: ignore[attr-defined]
 
     assert state() == (1, 0)
     upload(ardupilot, plan(3))

@@ -228,7 +228,7 @@ def test_a_partner_is_a_component_on_a_channel(vehicle: Vehicle, changed: dict[s
         assert vehicle.deliver(ack(mavlink.MAV_MISSION_UNSUPPORTED), other) == []
     for each in plan(3):
         (reply,) = vehicle.deliver(each)
-    assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0) and len(vehicle.stores[0].items) == 3
+    assert (reply.get_type(), reply.type) == ("MISSION_ACK", 0) and len(vehicle.stores[0].items) == 3  # type: ignore[index]
 
 
 def test_an_item_of_another_partner_is_refused_as_each_firmware_does(vehicle: Vehicle) -> None:

@@ -143,7 +143,7 @@ def test_records_are_written_whole_and_in_order() -> None:
         (frame,) = FrameParser().feed(data[8 : 8 + size])
         message = decode(frame)
         assert (frame.system_id, frame.component_id) == (7, 1)
-        found.append(message.text)
+        found.append(message.text)  # type: ignore[attr-defined]
         data = data[8 + size :]
     assert found == ["text 0", "text 1", "text 2", "the last"]
 

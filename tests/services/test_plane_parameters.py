@@ -17,7 +17,7 @@ from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane
 from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
 from autopilot_bridge.firmware.px4.plane import mapping as px4_plane_mapping
 from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
-from autopilot_bridge.flight.fixed_wing.parameters import (
+from autopilot_bridge.flight.fixed_wing.parameters import (  # type: ignore[attr-defined]
     FixedWingFlightParameters,
     LaunchKind,
     ReturnDestination,

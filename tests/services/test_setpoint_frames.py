@@ -86,7 +86,7 @@ def test_which_parts_of_a_target_are_controlled() -> None:
         for kind in range(3):
             chosen = parts.copy()
             chosen[kind] = tuple(one)
-            target = frames.Target(*chosen, 0.0, 0.0)
+            target = frames.Target(*chosen, 0.0, 0.0)  # type: ignore[call-arg]
             assert [target.has_position, target.has_velocity, target.has_acceleration] == [
                 k == kind for k in range(3)
             ]

@@ -82,7 +82,7 @@ def commands(
         if rng.random() < 0.5:
             message = dialect.MAVLink_command_long_message(target, rng.choice(components), command, 0, *p)
         else:
-            message = dialect.MAVLink_command_int_message(
+            message = dialect.MAVLink_command_int_message(  # type: ignore[call-arg]
                 target, components[-1], rng.choice((0, 2, 3, 6, 11, 21, 255)), command, 0, 0, *p[:4],
                 int(_value(rng, "i")), int(_value(rng, "i")), p[6],
             )  # fmt: skip

@@ -57,8 +57,8 @@ def modes(path: Path) -> list[str]:
     for _, frame in TlogReader(path):
         if frame.message_id == HEARTBEAT and frame.component_id == 1:
             heartbeat = decode(frame)
-            mode = heartbeat.custom_mode
-            ardupilot = ARDUPLANE_MODES if heartbeat.type == FIXED_WING else ARDUPILOT_MODES
+            mode = heartbeat.custom_mode  # type: ignore[attr-defined]
+            ardupilot = ARDUPLANE_MODES if heartbeat.type == FIXED_WING else ARDUPILOT_MODES  # type: ignore[attr-defined]
             name = PX4_MODES.get(mode) or ardupilot.get(mode) or str(mode)
             if names[-1:] != [name]:
                 names.append(name)

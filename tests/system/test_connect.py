@@ -104,8 +104,8 @@ def test_flies_a_sitl_in_another_process(
             run = started(tmp_path / flavour, *SHORT, "--via", via, "--connect", ends.mission)
             flights.append((flavour, via, stack.enter_context(run)))
         for flavour, via, run in flights:
-            run.finish()
-            summary = run.summary
+            run.finish()  # type: ignore[attr-defined]
+            summary = run.summary  # type: ignore[attr-defined]
             assert summary["outcome"] == "completed"
             assert summary["autopilot"] == flavour
             assert summary["seed"] is None

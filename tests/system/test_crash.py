@@ -39,9 +39,9 @@ def test_a_crash_ends_nothing_but_the_aircraft(flavour: str) -> None:
     assert wrecked.crashed and not other.crashed
     frames = FrameParser().feed(b"".join(received))
     texts = [
-        (frame.component_id, decode(frame).text)
+        (frame.component_id, decode(frame).text)  # type: ignore[attr-defined]
         for frame in frames
-        if frame.message_id == 253 and "Simulator" in decode(frame).text
+        if frame.message_id == 253 and "Simulator" in decode(frame).text  # type: ignore[attr-defined]
     ]
     assert [component for component, _ in texts] == [SIMULATOR_COMPONENT]
     assert "hit the ground at" in texts[0][1]

@@ -54,8 +54,8 @@ def test_the_tag_below_the_vehicle_is_reported_at_the_times_of_the_firmware():
     messages = [decode(frame) for frame in FrameParser().feed(b"".join(sent))]
     tags = [message for message in messages if message.get_type() == "LANDING_TARGET"]
     assert len(tags) >= 5
-    assert all(math.hypot(tag.angle_x, tag.angle_y) < 0.05 for tag in tags)
-    assert all(7_000_000 < tag.time_usec < 8_300_000 for tag in tags)
+    assert all(math.hypot(tag.angle_x, tag.angle_y) < 0.05 for tag in tags)  # type: ignore[attr-defined]
+    assert all(7_000_000 < tag.time_usec < 8_300_000 for tag in tags)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("vehicle", ["copter", "plane"])
@@ -67,7 +67,7 @@ def test_the_magnetometer_measures_the_target_below_it_beside_the_published_map(
     north_m, east_m = true_places(world)[0]
     hold(carried, north_m, east_m, height_m=80.0)
     messages = [decode(frame) for frame in FrameParser().feed(b"".join(sent))]
-    readings = [message.value for message in messages if message.get_type() == "NAMED_VALUE_FLOAT"]
+    readings = [message.value for message in messages if message.get_type() == "NAMED_VALUE_FLOAT"]  # type: ignore[attr-defined]
     assert len(readings) >= 5
     map_nt = carried.published_map.total_at_nt(north_m, east_m)
     assert all(abs(reading - map_nt - 30.0) < 10.0 for reading in readings)
@@ -84,7 +84,7 @@ def test_the_true_state_of_both_firmwares_has_the_time_of_the_vehicles_messages(
         message = dialect.MAVLink_sim_state_message(
             *quaternion, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8, *rates, 47.4, 8.5, 489.0, 0.0, 0.0, 1.0, -2.0, 0.0
         )
-        message.lat_int, message.lon_int = 474_000_000, 85_000_000
+        message.lat_int, message.lon_int = 474_000_000, 85_000_000  # type: ignore[attr-defined]
     clock = VehicleTime()
     assert state_of(frame_of(message), clock) is None  # the time is not known yet
     assert state_of(frame_of(dialect.MAVLink_attitude_message(5_000, 0, 0, 0, 0, 0, 0)), clock) is None

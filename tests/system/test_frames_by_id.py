@@ -29,7 +29,7 @@ def recorded(flavour, *, by_id):
     async def listen():
         async with Connection(sitl.links[0], LoopClock(), records):
             if not by_id:
-                sitl.links[0].on_packet = None
+                sitl.links[0].on_packet = None  # type: ignore[attr-defined]
             await asyncio.sleep(6.0)
 
     run(listen(), sitl.loop)

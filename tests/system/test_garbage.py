@@ -43,14 +43,14 @@ def memory(flying: Flying) -> Iterator[tuple[LinkChannel, Write]]:
 def udp(flying: Flying) -> Iterator[tuple[LinkChannel, Write]]:
     channel = flying.vehicle.open(open_link(parse_address("udpin:127.0.0.1:0")))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
-        client.connect(("127.0.0.1", channel.link.port))
+        client.connect(("127.0.0.1", channel.link.port))  # type: ignore[attr-defined]
         yield channel, client.send
 
 
 @contextmanager
 def tcp(flying: Flying) -> Iterator[tuple[LinkChannel, Write]]:
     channel = flying.vehicle.open(open_link(parse_address("tcpin:127.0.0.1:0")))
-    with socket.create_connection(("127.0.0.1", channel.link.port)) as client:
+    with socket.create_connection(("127.0.0.1", channel.link.port)) as client:  # type: ignore[attr-defined]
         client.setblocking(False)
 
         def write(data: bytes) -> int:

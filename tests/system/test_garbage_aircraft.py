@@ -111,7 +111,7 @@ def test_random_bytes_and_damaged_frames(flavour: str, damage: list[bytes]) -> N
 def test_garbage_on_the_payloads_own_line(damage: list[bytes]) -> None:
     """The components count it, and answer afterwards."""
     flying = circling("px4")
-    watch, station = Watch(flying), flying.vehicle.payload
+    watch, station = Watch(flying), flying.vehicle.station
     assert station is not None
     before = station.parser.counters.bytes_in
     sent = 0

@@ -56,7 +56,7 @@ class Scene:
         self.before = self.flying.true_position_m, self.flying.mode
         link = open_link(parse_address("udpin:127.0.0.1:0"))
         self.channel = self.flying.vehicle.open(link)
-        self.port = link.port  # type: ignore[union-attr]
+        self.port = link.port  # type: ignore[attr-defined, union-attr]
         self._stack = stack
         stack.callback(link.close)
         self.frames_of_step: list[int] = []

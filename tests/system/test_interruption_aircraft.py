@@ -36,7 +36,7 @@ def fly_until(run: Run, found: Callable[[Frame], bool]) -> None:
 def in_mode(custom_mode: int) -> Callable[[Frame], bool]:
     def found(frame: Frame) -> bool:
         heartbeat = frame.message_id == HEARTBEAT and frame.component_id == 1
-        return heartbeat and decode(frame).custom_mode == custom_mode
+        return heartbeat and decode(frame).custom_mode == custom_mode  # type: ignore[attr-defined]
 
     return found
 
@@ -45,11 +45,11 @@ def gps_switched_off(frame: Frame) -> bool:
     """By command (PX4) or by the simulator's parameter (ArduPilot)."""
     if frame.message_id == PARAM_SET:
         change = decode(frame)
-        return bool(change.param_id == "SIM_GPS_DISABLE" and change.param_value == 1.0)
+        return bool(change.param_id == "SIM_GPS_DISABLE" and change.param_value == 1.0)  # type: ignore[attr-defined]
     if frame.message_id != COMMAND_LONG:
         return False
     command = decode(frame)
-    return bool(command.command == dialect.MAV_CMD_INJECT_FAILURE and command.param2 == 1.0)
+    return bool(command.command == dialect.MAV_CMD_INJECT_FAILURE and command.param2 == 1.0)  # type: ignore[attr-defined]
 
 
 def last_modes(path: Path, systems: int) -> list[int]:
@@ -57,7 +57,7 @@ def last_modes(path: Path, systems: int) -> list[int]:
     reported: dict[int, int] = {}
     for _, frame in records(path):
         if frame.message_id == HEARTBEAT and frame.component_id == 1:
-            reported[frame.system_id] = decode(frame).custom_mode
+            reported[frame.system_id] = decode(frame).custom_mode  # type: ignore[attr-defined]
     return [reported[system] for system in range(1, systems + 1)]
 
 

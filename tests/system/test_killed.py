@@ -132,7 +132,7 @@ def act_on_it(link: str) -> None:
 
 
 def high_up(frame: Frame) -> bool:
-    return frame.message_id == POSITION and decode(frame).relative_alt > 3000
+    return frame.message_id == POSITION and decode(frame).relative_alt > 3000  # type: ignore[attr-defined]
 
 
 def check_card(folder: Path, flavour: str, parameters: dict[str, float], items: int) -> None:
@@ -168,7 +168,7 @@ def test_mission_and_vehicle_are_killed_in_one_flight(tmp_path: Path) -> None:
     os.utime(run.log, (0, 0))  # its run is over
     assert run_command_line(["report", str(run.log.parent), "--no-picture"]) == 0
     assert json.loads((run.log.parent / "summary.json").read_text())["outcome"] == "interrupted"
-    uploaded = {decode(f).seq for _, f in TlogReader(run.log) if f.message_id == ITEM and f.system_id == 255}
+    uploaded = {decode(f).seq for _, f in TlogReader(run.log) if f.message_id == ITEM and f.system_id == 255}  # type: ignore[attr-defined]
     assert len(uploaded) > 10
     check_card(cards / "vehicle1", "px4", {"MPC_XY_CRUISE": 4.5}, len(uploaded))
 

@@ -186,7 +186,7 @@ class Stalled:
         now_us = self._time_us()
         if self._until_us is None:
             for frame in FrameParser().feed(data):
-                if frame.message_id == ITEM and decode(frame).seq == self._seq:
+                if frame.message_id == ITEM and decode(frame).seq == self._seq:  # type: ignore[attr-defined]
                     self._until_us = now_us + self._us
         if self._until_us is not None and now_us < self._until_us:
             self._held.append(data)

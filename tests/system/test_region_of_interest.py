@@ -32,7 +32,9 @@ class Looking:
         self.flying.step(0.1)
         received = [decode(f) for _, data in self.link.receive() for f in self.parser.feed(data)]
         return next(
-            m.result for m in reversed(received) if m.get_type() == "COMMAND_ACK" and m.command == number
+            m.result  # type: ignore[attr-defined]
+            for m in reversed(received)
+            if m.get_type() == "COMMAND_ACK" and m.command == number  # type: ignore[attr-defined]
         )
 
     def look(self, number: int = ROI, east_deg: float = EAST_DEG) -> int:

@@ -32,7 +32,7 @@ def in_flight(run: Run, mode: str, height_m: float = 3.0) -> None:
 
 def highest_m(log: Path) -> float:
     return max(
-        (decode(frame).relative_alt * 1e-3 for _, frame in TlogReader(log) if frame.message_id == POSITION),
+        (decode(frame).relative_alt * 1e-3 for _, frame in TlogReader(log) if frame.message_id == POSITION),  # type: ignore[attr-defined]
         default=0.0,
     )
 
@@ -46,7 +46,7 @@ def pull(line: SerialLine) -> None:
 def longest_gap_s(log: Path, name: str) -> float:
     """Between two messages of the autopilot, by vehicle time."""
     times_ms = [
-        decode(frame).time_boot_ms
+        decode(frame).time_boot_ms  # type: ignore[attr-defined]
         for _, frame in TlogReader(log)
         if DEFINITIONS[frame.message_id].name == name and frame.component_id == 1
     ]

@@ -69,7 +69,7 @@ class World:
             self.sitl.share(link, role=role, reach=reach)
         else:
             self.sitl.vehicles[0].open(link, role=role, reach=reach)
-        return f"{'tcp' if kind == 'tcpin' else 'udpout'}:127.0.0.1:{link.port}"
+        return f"{'tcp' if kind == 'tcpin' else 'udpout'}:127.0.0.1:{link.port}"  # type: ignore[attr-defined]
 
     def client(self, url: str, system_id: int, component_id: int = 190) -> Client:
         self.clients.append(Client(url, system_id, component_id))

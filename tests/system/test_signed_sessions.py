@@ -221,7 +221,9 @@ class Keys:
 
     def receive(self, data: bytes) -> None:
         self.texts += [
-            decode(frame).text for frame in self.parser.feed(data) if frame.definition.name == "STATUSTEXT"
+            decode(frame).text  # type: ignore[attr-defined]
+            for frame in self.parser.feed(data)
+            if frame.definition.name == "STATUSTEXT"  # type: ignore[attr-defined]
         ]
 
     @property

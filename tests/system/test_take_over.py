@@ -55,7 +55,7 @@ async def _manual(pilot: Vehicle, x: int, until: Callable[[], bool]) -> None:
             pilot.link.connection.send(dialect.MAVLink_manual_control_message(1, x, 0, 500, 0, 0))
         else:
             pilot.link.connection.send(
-                dialect.MAVLink_rc_channels_override_message(1, 1, 1500, 1500, 1500, 1500, *[x] * 1, 0, 0, 0)
+                dialect.MAVLink_rc_channels_override_message(1, 1, 1500, 1500, 1500, 1500, *[x] * 1, 0, 0, 0)  # type: ignore[call-arg]
             )
         await asyncio.sleep(0.1)
         if until():
@@ -184,7 +184,7 @@ def sent_afterwards(log: Path, before: int) -> list[str]:
     names: list[str] = []
     for _, frame in TlogReader(log):
         if (frame.system_id, frame.component_id) == (1, 1) and frame.message_id == HEARTBEAT:
-            if decode(frame).custom_mode == before:
+            if decode(frame).custom_mode == before:  # type: ignore[attr-defined]
                 taken, names = False, []  # on the way to the pattern
             else:
                 taken = True

@@ -137,9 +137,9 @@ def test_a_flight_is_logged_listed_and_downloaded(
     assert reader.counters.bytes_skipped == 0
     names = {message.get_type() for message in messages}
     assert {"HEARTBEAT", "ATTITUDE", "PARAM_VALUE", "STATUSTEXT"} <= names
-    values = {message.param_id for message in messages if message.get_type() == "PARAM_VALUE"}
+    values = {message.param_id for message in messages if message.get_type() == "PARAM_VALUE"}  # type: ignore[attr-defined]
     assert len(values) >= client.vehicle.autopilot.parameters.count
-    armed = [message.base_mode & 128 for message in messages if message.get_type() == "HEARTBEAT"]
+    armed = [message.base_mode & 128 for message in messages if message.get_type() == "HEARTBEAT"]  # type: ignore[attr-defined]
     assert 128 in armed and armed[-1] == 0
     client.fly()
     assert len(memory.files.entries(path[:-1])) == 2  # another log; the first is as it was

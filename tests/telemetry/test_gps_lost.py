@@ -24,7 +24,7 @@ def test_a_silent_receiver_is_shown_as_none(flavour: str, timeout_s: float) -> N
             sitl.advance()
         frames = [frame for _, data in link.receive() for frame in parser.feed(data)]
         reported = [decode(f) for f in frames if f.message_id == mavlink.MAVLINK_MSG_ID_GPS_RAW_INT]
-        return [(message.fix_type, message.satellites_visible, message.lat) for message in reported]
+        return [(message.fix_type, message.satellites_visible, message.lat) for message in reported]  # type: ignore[attr-defined]
 
     command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, 200_000)
     assert fixes(12.0)[-1][0] >= 3

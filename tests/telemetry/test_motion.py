@@ -1,6 +1,7 @@
 """The compiled frames of the fastest messages are the encoder's own frames, byte for byte."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -44,7 +45,7 @@ def test_contents_are_the_navigation_state(flying: Sitl) -> None:
     motion = autopilot._streams._motion
     autopilot._view.advance(flying.time_us)
     parsed = FrameParser().feed(motion.packet(sum(motion.bits.values()), FrameEncoder(7, 1))[0])
-    messages = {message.get_type(): message for message in map(decode, parsed)}
+    messages: dict[str, Any] = {message.get_type(): message for message in map(decode, parsed)}
     state = autopilot.navigation.state
     assert messages["ATTITUDE"].roll == pytest.approx(state[25], abs=1e-6)
     assert messages["LOCAL_POSITION_NED"].z == pytest.approx(state[12], abs=1e-5)
@@ -71,7 +72,7 @@ def test_global_position_has_centimetres_per_second_and_centidegrees(flying: Sit
     finally:
         state[:] = before
         autopilot._view.advance(flying.time_us)
-    place = decode(frame)
+    place: Any = decode(frame)
     assert (place.vx, place.vy, place.vz) == (123, -456, 234)
     assert place.hdg == 33_000
     assert place.relative_alt == 17_500

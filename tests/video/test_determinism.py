@@ -60,7 +60,7 @@ def flight(tmp_path: Path | None, *, look: bool) -> bytes:
             camera.device.view(sitl.time_us)
     if service is not None:
         service.close()
-        kept = {path.name for path in (tmp_path / "pictures").rglob("*.*")}
+        kept = {path.name for path in (tmp_path / "pictures").rglob("*.*")}  # type: ignore[operator]
         assert {f"IMG_{n:04d}.jpg" for n in range(5)} | {"VID_0000.mp4"} == kept
         assert lost == []
     sitl.close()

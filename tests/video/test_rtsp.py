@@ -133,7 +133,7 @@ class Talk:
         """What was answered about the transport."""
         status, answer = await self.ask_for(connection, "SETUP", "camera1/trackID=0", transport=transport)
         assert status == 200
-        session = re.search(r"Session: (\w+)", answer)[1]
+        session = re.search(r"Session: (\w+)", answer)[1]  # type: ignore[index]
         assert (await self.ask_for(connection, "PLAY", session=session))[0] == 200
         return answer
 
@@ -234,7 +234,7 @@ def test_a_udp_player_that_is_received_goes_on(how, short_looks):
                 media.bind(("127.0.0.1", 0))
                 reader, _ = connection = await talk.connect()
                 answer = await talk.play(connection, UDP.format(port=media.getsockname()[1]))
-                control = int(re.search(r"server_port=\d+-(\d+)", answer)[1])
+                control = int(re.search(r"server_port=\d+-(\d+)", answer)[1])  # type: ignore[index]
                 loop = asyncio.get_running_loop()
                 long_after_s = loop.time() + 3 * 9 * 0.02
                 while loop.time() < long_after_s:

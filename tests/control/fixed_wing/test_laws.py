@@ -32,13 +32,13 @@ GUIDANCE_S = 0.02
 AIRSPEED = 15.0
 
 
-def parameters(**values: float | bool) -> Array:
+def parameters(**values: float | bool) -> FixedWingParameters:
     return packed(FixedWingParameters(**values))  # type: ignore[arg-type]
 
 
 def flying(
     *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, airspeed: float = AIRSPEED, climb: float = 0.0
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, c.FixedWingState]:
     """(navigation state, setpoint, controller state) of flight without wind, 100 m up."""
     nav, setpoint, s = np.zeros(n.NAV_SIZE), np.full(sp.SETPOINT_SIZE, math.nan), new_record(c.FixedWingState)
     quaternion_from_euler(roll, pitch, yaw, nav[n.Q_NED_FROM_FRD])
@@ -170,7 +170,7 @@ def of_axes(name: str) -> Array:
     return np.array([RATE_GAINS[f"rate_{axis}_{name}"] for axis in ("roll", "pitch", "yaw")])
 
 
-def rate_state() -> tuple[Array, Array]:
+def rate_state() -> tuple[Array, c.FixedWingState]:
     nav, _, s = flying()
     nav[n.RATES_FRD_RAD_S] = 0.3, -0.2, 0.1
     s.rate_setpoint = 0.8, 0.5, -0.4
@@ -193,7 +193,7 @@ def test_rate_law(airspeed: float, scaled_with: float | None) -> None:
     else:
         p, scale = parameters(**RATE_GAINS), 15.0 / scaled_with
     s.eas = airspeed
-    before, surfaces = s.copy(), np.zeros(3)
+    before, surfaces = s.copy(), np.zeros(3)  # type: ignore[attr-defined]
     rate_control(nav, p, s, surfaces, False)
     rates, wanted = nav[n.RATES_FRD_RAD_S], before.rate_setpoint
     error = wanted - rates
@@ -703,7 +703,7 @@ def test_trim_throttle_is_known_near_the_trim_airspeed_too() -> None:
         nav, setpoint, s = flying(airspeed=15.2)
         s.eas = wanted + 1e-12
         setpoint[sp.HEIGHT_RATE_M_S], setpoint[sp.AIRSPEED_M_S] = 0.0, wanted
-        p = near.copy()
+        p = near.copy()  # type: ignore[attr-defined]
         p.airspeed_stall_m_s = 7.0
         p.throttle_damping = p.throttle_integral_1_s = 0.0
         s.energy_rate_setpoint = 0.0

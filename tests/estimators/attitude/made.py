@@ -19,7 +19,7 @@ def made(name, system=1, component=1, **values):
     """A message with zeros where nothing is given."""
     found = definition(name)
     filled = {field.name: 0 for field in found.wire_fields}
-    return message_class(found)(system, component, **(filled | values))
+    return message_class(found)(system, component, **(filled | values))  # type: ignore[call-arg]
 
 
 def down_of(roll, pitch):

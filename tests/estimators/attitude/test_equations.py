@@ -217,7 +217,7 @@ def test_a_slow_wing_has_no_angles_of_flow():
 @pytest.mark.parametrize("force", [-200.0, 200.0])
 def test_sideslip_has_a_limit(force):
     x, p = wing_state(attack=False, side_force_time_s=0.01)
-    wing.reference(x, p, DT_S, *RATE, FORCE[0], force, FORCE[2])
+    wing.reference(x, p, DT_S, *RATE, FORCE[0], force, FORCE[2])  # type: ignore[call-arg]
     assert x[at.BETA] == pytest.approx(math.copysign(0.3, -force))
 
 
@@ -296,7 +296,7 @@ def test_lift_is_learned_by_least_squares():
     assert x[at.LIFT_SUM] == pytest.approx(total)
     assert x[at.LIFT_WEIGHT] == pytest.approx(weight)
     assert x[at.LIFT] == pytest.approx(total / weight)
-    wing.reference(x, p, DT_S, *RATE, FORCE[0], FORCE[1], 1e5)
+    wing.reference(x, p, DT_S, *RATE, FORCE[0], FORCE[1], 1e5)  # type: ignore[call-arg]
     assert x[at.LIFT] == 1e-4  # a wing lifts upwards
 
 
@@ -375,10 +375,10 @@ def test_drag_has_limits_and_is_not_learned_at_once(force_square, drag):
     x, p = rotor_state()
     x[at.FORCE_SQUARE], x[at.SPEED_SQUARE] = force_square, 1e3
     x[at.AGE] = 4.9
-    rotor.reference(x, p, DT_S, *RATE, 0.0, 0.0, FORCE[2])
+    rotor.reference(x, p, DT_S, *RATE, 0.0, 0.0, FORCE[2])  # type: ignore[call-arg]
     assert x[at.DRAG] == 0.45
     x[at.AGE] = 5.0
-    rotor.reference(x, p, DT_S, *RATE, 0.0, 0.0, FORCE[2])
+    rotor.reference(x, p, DT_S, *RATE, 0.0, 0.0, FORCE[2])  # type: ignore[call-arg]
     assert x[at.DRAG] == drag
 
 

@@ -50,7 +50,7 @@ def test_the_boards_trim_is_corrected(given):
     for k in range(51):
         found.handle(k * STEP_US, highres(k * STEP_US, force=force))
     assert (newest(found).roll_rad, newest(found).pitch_rad) == pytest.approx((ROLL, PITCH), abs=1e-6)
-    assert "roll +3.00 deg, pitch -2.00 deg" in found.remarks()["note"]
+    assert "roll +3.00 deg, pitch -2.00 deg" in found.remarks()["note"]  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(

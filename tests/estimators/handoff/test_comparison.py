@@ -94,12 +94,12 @@ def test_a_history_gives_windows_of_complete_tracks_only():
         eye.x_m = float(-k)
         history.add(k * STEP_US, eye, [(1, float(k), 0.0)] + ([(2, 0.0, float(k))] if k > 15 else []))
     times = STEP_US * np.arange(12, 21)
-    assert history.window(1, times)[:, 0].tolist() == list(range(12, 21))
-    assert history.window(1, times - STEP_US // 2)[:, 0] == pytest.approx(np.arange(12, 21) - 0.5)
+    assert history.window(1, times)[:, 0].tolist() == list(range(12, 21))  # type: ignore[index]
+    assert history.window(1, times - STEP_US // 2)[:, 0] == pytest.approx(np.arange(12, 21) - 0.5)  # type: ignore[index]
     assert history.window(2, times) is None and history.window(3, times) is None
     assert history.window(1, STEP_US * np.arange(5, 21)) is None  # older than it keeps
     assert history.numbers == [EYE, 1, 2]
-    assert history.window(EYE, times)[:, 0].tolist() == list(range(-12, -21, -1))
+    assert history.window(EYE, times)[:, 0].tolist() == list(range(-12, -21, -1))  # type: ignore[index]
     history.add(3 * STEP_US, DeadReckoning(), [(9, 0.0, 0.0)])  # late
     assert 9 not in history.numbers
 

@@ -82,7 +82,7 @@ def test_malformed_messages_are_dropped_and_counted(decided):
 def test_of_the_tracker_only_what_its_onboard_computer_sends_is_used(decided):
     handoff = decided.runners[HANDOFF]
     before = handoff.estimator.partner_motion.newest_us
-    imu = dialect.MAVLink_highres_imu_message(90_000_000, *[0.0] * 13, 0b1111111111111, 0)
+    imu = dialect.MAVLink_highres_imu_message(90_000_000, *[0.0] * 13, 0b1111111111111, 0)  # type: ignore[call-arg]
     assert handoff.feed(encoded(imu, TRACKER, 1)) is Outcome.IGNORED
     other = replace(
         handoff.estimator.pose.own.report(system=4, number=1, time_us=90_000_000), sums=(9e3, 9e3, 0.0, 1.0)
@@ -333,7 +333,7 @@ def test_messages_of_other_aircraft_change_nothing(decided):
             system=4, report=1, time_us=5_000_000, target=1, identity=1.0, released=True, tracks=[]
         ),
         decision(system=4),
-        dialect.MAVLink_highres_imu_message(5_000_000, *([math.nan] * 9), 900.0, 9.0, 90.0, 20.0, 0xFFFF, 0),
+        dialect.MAVLink_highres_imu_message(5_000_000, *([math.nan] * 9), 900.0, 9.0, 90.0, 20.0, 0xFFFF, 0),  # type: ignore[call-arg]
     ]
     rows = []
     for count, (to, frame) in enumerate(decided.frames):

@@ -25,7 +25,7 @@ def made(name: str, system: int = 1, component: int = 1, **values):
         field.name: (0,) * field.length if field.length and field.code != "s" else 0
         for field in found.wire_fields
     }
-    return kind(system, component, **(filled | values))
+    return kind(system, component, **(filled | values))  # type: ignore[call-arg]
 
 
 def home(system: int = 1, place: GeodeticPosition = HOME):
@@ -185,10 +185,10 @@ def test_every_source_says_the_same(source: str) -> None:
     assert e.course_rad == pytest.approx(math.atan2(east_m_s, north_m_s), abs=0.01)
     (published,) = estimator.publish()
     assert published.get_type() == "LOCAL_POSITION_NED_COV"
-    assert published.x == pytest.approx(north, abs=0.02) and published.vy == pytest.approx(east_m_s, abs=0.01)
-    assert published.covariance[0] == pytest.approx(POSITION_M**2)
-    assert published.covariance[30] == pytest.approx(VELOCITY_M_S**2)
-    assert math.isnan(published.z)
+    assert published.x == pytest.approx(north, abs=0.02) and published.vy == pytest.approx(east_m_s, abs=0.01)  # type: ignore[attr-defined]
+    assert published.covariance[0] == pytest.approx(POSITION_M**2)  # type: ignore[attr-defined]
+    assert published.covariance[30] == pytest.approx(VELOCITY_M_S**2)  # type: ignore[attr-defined]
+    assert math.isnan(published.z)  # type: ignore[attr-defined]
 
 
 def test_without_home_it_waits_and_a_given_centre_needs_only_its_height() -> None:
@@ -257,7 +257,7 @@ def test_a_pattern_that_is_not_flown_is_warned_of() -> None:
         t, w = 0.2 * k, 25.0 / 300.0
         c, s = math.cos(w * t), math.sin(w * t)
         estimator.handle(round(1e6 * t), gps(t, (400.0 + 300.0 * c, -25.0 * s, 300.0 * s, 25.0 * c)))
-    assert "check omega_x_rad_s" in estimator.remarks()["warning"]
+    assert "check omega_x_rad_s" in estimator.remarks()["warning"]  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(

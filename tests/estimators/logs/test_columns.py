@@ -58,7 +58,7 @@ def compare(path, limit=None):
     for stream in log.source.streams:
         table = log.stream_table(stream)
         if (
-            values_of_pymavlink(log.source.frame(int(stream.order[0]))).keys()
+            values_of_pymavlink(log.source.frame(int(stream.order[0]))).keys()  # type: ignore[attr-defined]
             == {"data"}
             != set(table.fields)
         ):
@@ -68,7 +68,7 @@ def compare(path, limit=None):
             rows = np.unique(np.linspace(0, len(table) - 1, limit).astype(np.int64))
         picked = {name: table[name][rows].tolist() for name in table.fields}
         for index, row in enumerate(rows.tolist()):
-            theirs = values_of_pymavlink(log.source.frame(int(stream.order[row])))
+            theirs = values_of_pymavlink(log.source.frame(int(stream.order[row])))  # type: ignore[attr-defined]
             assert list(theirs) == list(table.fields)
             for name, value in theirs.items():
                 ours = picked[name][index]
@@ -122,7 +122,7 @@ def test_messages_of_recorded_logs_are_those_of_the_frames(tmp_path, path, part)
 def test_record_dtype_reads_whole_payloads(every_message, name):
     log = open_log(every_message)
     table = log.table(name)
-    frames = FrameParser().feed(b"".join(log.source.frame(order) for order in table.order.tolist()))
+    frames = FrameParser().feed(b"".join(log.source.frame(order) for order in table.order.tolist()))  # type: ignore[attr-defined]
     dtype = record_dtype(table.description.definition)
     records = np.frombuffer(b"".join(frame.payload for frame in frames), dtype=dtype)
     for field in table.fields:

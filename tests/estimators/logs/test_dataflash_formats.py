@@ -82,7 +82,7 @@ def test_a_part_of_a_log_has_the_parameters_from_before_it(tmp_path):
     log = open_log(copter_of_2014(tmp_path / "1.bin"))
     done = replay(log, AttitudeEstimator, from_s=70.0, to_s=75.0)
     runner = done.fleet.runners[1]
-    assert "board trim corrected: roll +2.86 deg" in runner.remarks["note"]
+    assert "board trim corrected: roll +2.86 deg" in runner.remarks["note"]  # type: ignore[operator]
     times = runner.tables["AttitudeEstimate"].time_us
     assert times[0] >= 70_000_000 and times[-1] < 75_000_000
 

@@ -98,7 +98,7 @@ def test_log_in_a_dialect_of_the_users_own(own, tmp_path):
     assert table.si("bend")[0] == pytest.approx(-math.pi / 4)
     assert (table["label"].tolist(), table.time_us.tolist()) == ([b"oak"], [3_000_000])
     ((time_us, message),) = open_log(path, dialect=str(own)).messages("TEST_LEAF")
-    assert (time_us, message.name, message.label, message.force) == (
+    assert (time_us, message.name, message.label, message.force) == (  # type: ignore[attr-defined]
         3_000_000,
         "TEST_LEAF",
         "oak",

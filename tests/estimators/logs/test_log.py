@@ -206,7 +206,7 @@ def test_texts(tmp_path):
     path.write_bytes(tlog([pack(text), broken, pack(named), pack(other)]))
     log = open_log(path)
     assert log.table("STATUSTEXT")["text"].tolist()[0] == b"Takeoff"
-    assert [message.text for _, message in log.messages("STATUSTEXT")] == ["Takeoff", "caf\ufffd"]
+    assert [message.text for _, message in log.messages("STATUSTEXT")] == ["Takeoff", "caf\ufffd"]  # type: ignore[attr-defined]
     assert log.table("NAMED_VALUE_FLOAT", instance="gust")["value"].tolist() == [9.5]
     with pytest.raises(LogError, match="is a text"):
         log.table("STATUSTEXT").si("text")

@@ -207,7 +207,7 @@ def test_single_imus_are_turned_as_the_board_is(ulog, tmp_path):
     second = log.table("HIGHRES_IMU", instance=1)  # 0.2 about x of the board
     assert (second["xgyro"][0], second["ygyro"][0]) == pytest.approx((0.0, 0.2 * math.cos(math.radians(2.0))))
     assert second["zgyro"][0] == pytest.approx(0.2 * math.sin(math.radians(2.0)))
-    assert "SENS_BOARD_*_OFF 2 0 0 deg" in report_of(log).remarks["board"]
+    assert "SENS_BOARD_*_OFF 2 0 0 deg" in report_of(log).remarks["board"]  # type: ignore[operator]
     assert b"SENS_BOARD_ROT" in log.table("PARAM_VALUE")["param_id"].tolist()
 
 
@@ -229,7 +229,7 @@ def test_a_board_on_its_side_leaves_single_imus_out(ulog, tmp_path):
     ulog.parameter("SENS_BOARD_ROT", 16)
     log = open_log(ulog.save(tmp_path / "flight.ulg"))
     assert set(log.table("HIGHRES_IMU")["id"].tolist()) == {0}
-    assert "left out" in report_of(log).remarks["board"]
+    assert "left out" in report_of(log).remarks["board"]  # type: ignore[operator]
 
 
 def test_damaged_ulog(ulog, tmp_path):

@@ -331,8 +331,8 @@ def test_recorded_logs_as_the_one_by_one_reader_has_them(tmp_path, path, part):
     reader = TlogReader(path)
     read = [(time, frame.raw) for time, frame in reader]
     times = source.log_time_us(np.arange(source.count)).tolist()
-    assert [(time, source.frame(n)) for n, time in enumerate(times[:2000])] == read[:2000]
-    starts, ends = source.frame_spans(np.arange(source.count))
+    assert [(time, source.frame(n)) for n, time in enumerate(times[:2000])] == read[:2000]  # type: ignore[attr-defined]
+    starts, ends = source.frame_spans(np.arange(source.count))  # type: ignore[attr-defined]
     assert (ends - starts).tolist() == [len(raw) for _, raw in read]
     assert times == [time for time, _ in read]
     kinds = source.bytes_by_kind

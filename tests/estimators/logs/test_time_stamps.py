@@ -55,7 +55,7 @@ def test_a_damaged_date_is_not_that_of_the_log():
 def test_a_damaged_stamp_of_a_record_does_not_change_the_duration(tmp_path, place, fault):
     path = flight_log.write(tmp_path / "flight.tlog")
     whole = open_log(path)
-    starts, _ = whole.source.frame_spans(np.arange(len(whole)))
+    starts, _ = whole.source.frame_spans(np.arange(len(whole)))  # type: ignore[attr-defined]
     duration_s, count = whole.duration_s, len(whole)
     number = {"first": 0, "middle": count // 2, "last": count - 1}[place]
     data = bytearray(path.read_bytes())

@@ -46,14 +46,14 @@ def estimator(map_file, *settings):
 
 
 def reading(time_us, total_nt, *, component=158, name="MAG_NT"):
-    return READING(
+    return READING(  # type: ignore[call-arg]
         src_system=1, src_component=component, time_boot_ms=time_us // 1000, value=total_nt, name_=name
     )
 
 
 def position(time_us, north_m, east_m):
     lat, lon, alt = FRAME.geodetic_from_ned(north_m, east_m, -HEIGHT_M)
-    return POSITION(
+    return POSITION(  # type: ignore[call-arg]
         src_system=1, src_component=1, time_boot_ms=time_us // 1000, lat=round(lat * 1e7),
         lon=round(lon * 1e7), alt=round(alt * 1e3), relative_alt=0, vx=0, vy=0, vz=0, hdg=0,
     )  # fmt: skip

@@ -139,7 +139,7 @@ def test_a_gimbal_that_fell_silent_is_not_accepted():
     rig = Rig()
     rig.run(3.0)
     used = rig.tracker.target.accepted
-    rig.tracker.gimbal = lambda attitude: None
+    rig.tracker.gimbal = lambda attitude: None  # type: ignore[return-value]
     rig.run(2.0)
     assert rig.tracker.target.accepted <= used + 4
 

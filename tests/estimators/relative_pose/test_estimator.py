@@ -73,7 +73,7 @@ class Team:
         noise = self.rng.normal(0.0, 1.0, 9) * ([0.1] * 3 + [0.002] * 3 + [0.002] * 3)
         force = (0.0, 0.0, -G / math.cos(roll))
         self.say(
-            dialect.MAVLink_highres_imu_message(
+            dialect.MAVLink_highres_imu_message(  # type: ignore[call-arg]
                 time_us,
                 *(np.concatenate((force, rates, field)) + noise),
                 static,
@@ -176,11 +176,11 @@ def test_without_one_aircraft_there_is_no_estimate():
 def test_a_reboot_starts_anew():
     team = Team()
     team.fly(5.0)
-    before = team.runner.estimator.pose
+    before = team.runner.estimator.pose  # type: ignore[attr-defined]
     team.step = 0
     team.fly(0.2)
     (estimate,) = team.runner.estimator.estimates
-    assert team.runner.estimator.pose is not before
+    assert team.runner.estimator.pose is not before  # type: ignore[attr-defined]
     assert estimate.time_us == 200_000 and not estimate.converged
 
 

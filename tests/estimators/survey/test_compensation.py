@@ -104,7 +104,7 @@ def readings(attitudes, parameters, seed):
 def cosines_of(attitudes, error_rad=0.0):
     times = np.arange(len(attitudes)) / RATE_HZ
     reported = attitudes + error_rad
-    return times, direction_cosines(*reported.T, times, DIRECTION)
+    return times, direction_cosines(*reported.T, times, DIRECTION)  # type: ignore[call-arg]
 
 
 RAW = SurveyMagnetometerParameters(

@@ -178,7 +178,7 @@ def test_the_map_from_the_flight_agrees_with_the_field():
     result = processed(flown(1))
     grid = result.grid
     assert grid is not None and not result.against_map and not result.anomalies
-    true_nt = published().totals_nt(*np.meshgrid(grid.north_m, grid.east_m, indexing="ij"), HEIGHT_M)
+    true_nt = published().totals_nt(*np.meshgrid(grid.north_m, grid.east_m, indexing="ij"), HEIGHT_M)  # type: ignore[call-arg]
     inside = np.isfinite(grid.values_nt)
     assert inside.mean() > 0.95
     error_nt = grid.values_nt[inside] - true_nt[inside]

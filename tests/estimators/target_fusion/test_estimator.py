@@ -28,7 +28,7 @@ def made(name: str, system: int, component: int, **values):
         field.name: (0,) * field.length if field.length and field.code != "s" else 0
         for field in found.wire_fields
     }
-    return message_class(found)(system, component, **(filled | values))
+    return message_class(found)(system, component, **(filled | values))  # type: ignore[call-arg]
 
 
 def motion(t: float, system: int):
@@ -193,7 +193,7 @@ def test_without_noise_the_place_is_right(heading: str, camera: str) -> None:
     off = run(estimator, flight.messages(20.0))
     assert len(off) > 300
     assert np.abs(off).max() < 0.3  # cog in hundredths of a degree, vel in cm/s
-    assert estimator.remarks()["detections_not_placed"] <= 6.0
+    assert estimator.remarks()["detections_not_placed"] <= 6.0  # type: ignore[operator]
 
 
 def test_yaw_serves_where_the_nose_does_not_lead() -> None:
@@ -297,10 +297,10 @@ def test_estimates_are_published_as_a_target_to_follow() -> None:
     (message,) = estimator.publish()
     (e,) = estimator.estimates
     assert message.get_type() == "FOLLOW_TARGET"
-    assert message.est_capabilities == 1
-    north, east, down = FRAME.ned_from_geodetic(1e-7 * message.lat, 1e-7 * message.lon, message.alt)
+    assert message.est_capabilities == 1  # type: ignore[attr-defined]
+    north, east, down = FRAME.ned_from_geodetic(1e-7 * message.lat, 1e-7 * message.lon, message.alt)  # type: ignore[attr-defined]
     assert (north, east, down) == pytest.approx((e.north_m, e.east_m, 0.0), abs=0.02)
-    assert message.position_cov[0] > 0.0 and message.timestamp == e.time_us // 1000
+    assert message.position_cov[0] > 0.0 and message.timestamp == e.time_us // 1000  # type: ignore[attr-defined]
     assert dict(zip(e.COLUMNS, e.row(), strict=True))["target"] == TAG
 
 
@@ -308,7 +308,7 @@ def test_same_messages_same_bits_and_reset_forgets() -> None:
     messages = Flight().messages(5.0)
     first, second = station(), station()
     assert np.array_equal(run(first, messages), run(second, messages))
-    again = run(first, messages) if first.reset() is None else None
+    again = run(first, messages) if first.reset() is None else None  # type: ignore[func-returns-value]
     assert np.array_equal(again, run(station(), messages))
 
 

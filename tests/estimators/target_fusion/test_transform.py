@@ -44,7 +44,7 @@ def test_ground_target_is_the_first_order_transform(seed: int, heading: float) -
     full[:2, :2], full[2, 2], full[3:, 3:] = own, variance, camera
     expected = slope @ full @ slope.T
     out = np.zeros(5)
-    ground_target(*drone, own[0, 0], own[0, 1], own[1, 1], heading, variance, seen, camera, out)
+    ground_target(*drone, own[0, 0], own[0, 1], own[1, 1], heading, variance, seen, camera, out)  # type: ignore[call-arg]
     assert out == pytest.approx(packed(place(at), expected), rel=1e-6, abs=1e-6)
 
 

@@ -107,7 +107,7 @@ def test_without_detections_it_agrees_with_drawn_targets(belief):
     assert belief.probability_of_detection == pytest.approx(1.0 - missed.mean(), abs=4.0 * sigma + 2e-3)
     assert evidence == pytest.approx(1.0 - belief.probability_of_detection)
     edges = [low + 20.0 * np.arange(count + 1) for low, count in ((COARSE.south_m, 10), (COARSE.west_m, 15))]
-    drawn = np.histogram2d(*targets[missed].T, bins=edges)[0] / missed.sum()
+    drawn = np.histogram2d(*targets[missed].T, bins=edges)[0] / missed.sum()  # type: ignore[call-overload]
     found = belief.shares(COARSE)
     assert found.sum() == pytest.approx(1.0)
     noise = np.sqrt(drawn / missed.sum()) + 1e-4

@@ -220,11 +220,11 @@ def test_a_camera_that_sees_the_horizon_is_bounded_by_its_resolution():
     rising = DetectionRate.rising(half_px=12.0, width_px=1.0, peak=0.97)
     model = SightModel(rate=rising, target_size_m=2.0)
     frame = FrameLikelihood.of(sight(ERRORS, (0.0, 1.3, 0.0)), model, 1e5)
-    assert 100.0 < frame.box[2] < 2000.0
-    places = np.linspace(frame.box[2], 1e5, 1000)
+    assert 100.0 < frame.box[2] < 2000.0  # type: ignore[index]
+    places = np.linspace(frame.box[2], 1e5, 1000)  # type: ignore[index]
     assert frame.at(places, np.zeros(1000)).min() > 1.0 - 1e-4
     far = FrameLikelihood.of(sight(ERRORS, (0.0, 1.3, 0.0)), SURE, 5000.0)
-    assert far.box[2] == 5000.0
+    assert far.box[2] == 5000.0  # type: ignore[index]
 
 
 def test_a_camera_on_the_ground_says_nothing():

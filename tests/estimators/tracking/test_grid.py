@@ -46,7 +46,7 @@ def test_probability_of_detection_and_belief_are_those_of_drawn_targets():
     missed = np.ones(len(places), dtype=bool)
     for start, end in passes:
         belief.update(1.0 - model.probability(*LAYOUT.centres(), start, end))
-        missed &= rng.uniform(size=len(places)) >= model.probability(*places.T, start, end)
+        missed &= rng.uniform(size=len(places)) >= model.probability(*places.T, start, end)  # type: ignore[call-arg]
     assert belief.probability_of_detection == pytest.approx(1.0 - missed.mean(), abs=0.01)
     mean, covariance = belief.moments()
     assert mean == pytest.approx(places[missed].mean(axis=0), abs=5.0)

@@ -146,8 +146,8 @@ def test_parallax_is_that_of_projection():
     for _ in range(20):
         h = rng.uniform(30.0, 300.0)
         poses = [
-            CameraAxes.towards(*(rng.uniform(0.3, 1.0, 2) * h).tolist(), h).axes,
-            CameraAxes.towards(*(rng.uniform(0.3, 1.0, 2) * h).tolist(), h).axes,
+            CameraAxes.towards(*(rng.uniform(0.3, 1.0, 2) * h).tolist(), h).axes,  # type: ignore[call-arg]
+            CameraAxes.towards(*(rng.uniform(0.3, 1.0, 2) * h).tolist(), h).axes,  # type: ignore[call-arg]
         ]
         eyes = [np.array([0.0, 0.0, -h]), np.array([*(rng.uniform(-0.15, 0.15, 2) * h), -h * 1.02])]
         places = np.column_stack((rng.uniform(0.2, 1.1, (9, 2)) * h, np.zeros(9)))

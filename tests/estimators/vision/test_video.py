@@ -76,7 +76,7 @@ def test_tags_of_other_numbers_are_not_reported(taken):
 def test_an_empty_picture_is_reported_as_such(taken):
     watch = PictureWatch(CAMERA, TagDetectorParameters(tag_ids=(300,)))
     (message,) = watch.messages(7, watch.detect(7, taken[0][1]))
-    scan = read_camera_scan(message.payload_type, message.payload_length, message.payload)
+    scan = read_camera_scan(message.payload_type, message.payload_length, message.payload)  # type: ignore[attr-defined]
     assert (scan.number, scan.time_us, scan.detections) == (0, 7, 0)
     assert (scan.width_px, scan.height_px) == (320, 240)
 

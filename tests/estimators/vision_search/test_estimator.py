@@ -112,7 +112,7 @@ def test_a_sweep_finds_the_tag(belief):
     assert table["probability_of_detection"][0] < table["probability_of_detection"][-1] < 1.0
     assert table["entropy_nats"][-1] < table["entropy_nats"][0] - 5.0
     (message,) = runner.estimator.publish()
-    north_m, east_m, _ = FRAME.ned_from_geodetic(message.lat * 1e-7, message.lon * 1e-7, HOME.alt_m)
+    north_m, east_m, _ = FRAME.ned_from_geodetic(message.lat * 1e-7, message.lon * 1e-7, HOME.alt_m)  # type: ignore[attr-defined]
     assert (north_m, east_m) == pytest.approx(TAG, abs=0.3)
     assert runner.estimator.publish() == []
     assert "warning" not in runner.remarks
@@ -225,10 +225,10 @@ def test_frames_are_thinned_and_those_near_the_ground_are_not_used():
     runner = Runner(VisionSearchEstimator(parameters(frame_period_s=1.0)))
     flight = Flight(runner)
     flight.look(0.0, 0.0, height_m=1.0)
-    assert runner.estimator.frames == 0
+    assert runner.estimator.frames == 0  # type: ignore[attr-defined]
     for _ in range(16):
         flight.look(-80.0, 80.0)
-    assert runner.estimator.frames == 4
+    assert runner.estimator.frames == 4  # type: ignore[attr-defined]
     assert runner.remarks["frames_too_low"] == 1
 
 
@@ -247,7 +247,7 @@ def test_clocks_that_are_apart_are_reported(apart_s):
     flight.clock_s = apart_s
     for _ in flight.sweep():
         pass
-    assert "clocks of camera and autopilot of vehicle 1 are 0.30 s apart" in runner.remarks["warning"]
+    assert "clocks of camera and autopilot of vehicle 1 are 0.30 s apart" in runner.remarks["warning"]  # type: ignore[operator]
     assert runner.remarks["exposure_to_attitude_s"] == pytest.approx(-apart_s)
 
 
@@ -255,9 +255,9 @@ def test_a_tag_of_another_id_is_counted_only():
     runner = Runner(VisionSearchEstimator(parameters()))
     for _ in Flight(runner).sweep(tags=((7, TAG),)):
         pass
-    assert runner.estimator.detections == 0
-    assert runner.remarks["detections_of_other_tags"] >= 4
-    assert runner.estimator.belief.shares(layout_of(parameters(cell_m=50.0)))[2, 1] < 0.01
+    assert runner.estimator.detections == 0  # type: ignore[attr-defined]
+    assert runner.remarks["detections_of_other_tags"] >= 4  # type: ignore[operator]
+    assert runner.estimator.belief.shares(layout_of(parameters(cell_m=50.0)))[2, 1] < 0.01  # type: ignore[attr-defined]
 
 
 def test_two_tags_of_the_id_leave_both_places():
@@ -267,7 +267,7 @@ def test_two_tags_of_the_id_leave_both_places():
     flight = Flight(runner)
     for k in range(6):
         flight.look(12.0, -8.0 + k, tags=((0, TAG), (0, other)))
-    shares = runner.estimator.belief.shares(layout_of(parameters(cell_m=20.0)))
+    shares = runner.estimator.belief.shares(layout_of(parameters(cell_m=20.0)))  # type: ignore[attr-defined]
     places = [((np.array(p) + 100.0) / 20.0).astype(int) for p in (TAG, other)]
     assert all(0.2 < shares[row - 1 : row + 2, column - 1 : column + 1].sum() < 0.8 for row, column in places)
 
@@ -277,8 +277,8 @@ def test_a_reset_discards_the_belief():
     for _ in Flight(runner).sweep():
         pass
     runner.estimator.reset()
-    assert runner.estimator.frames == 0
-    assert runner.estimator.belief.probability_of_detection == 0.0
+    assert runner.estimator.frames == 0  # type: ignore[attr-defined]
+    assert runner.estimator.belief.probability_of_detection == 0.0  # type: ignore[attr-defined]
     assert runner.estimator.origin is None
 
 
@@ -304,13 +304,13 @@ def test_a_frame_whose_detections_were_lost_is_not_one_without_the_target():
     runner = Runner(VisionSearchEstimator(parameters()))
     flight = Flight(runner)
     flight.look(*TAG)
-    before = runner.estimator.belief.probability_of_detection
+    before = runner.estimator.belief.probability_of_detection  # type: ignore[attr-defined]
     flight.time_s += 0.25
     flight.number += 1
     flight.pose(*TAG)
     assert flight.end(detections=1) is Outcome.IGNORED
     assert runner.remarks["frames_incomplete"] == 1
-    assert runner.estimator.belief.probability_of_detection == before
+    assert runner.estimator.belief.probability_of_detection == before  # type: ignore[attr-defined]
     flight.time_s += 0.25
     flight.number += 1
     flight.pose(*TAG)

@@ -53,7 +53,7 @@ def without_position(mass: PointMass, known: bool) -> None:
 @pytest.mark.parametrize("name", list(TASKS))
 def test_no_position_from_the_start(name: str) -> None:
     mass = PointMass()
-    task: FlightTask = TASKS[name]()
+    task: FlightTask = TASKS[name]()  # type: ignore[operator]
     without_position(mass, known=False)
     observe = mass.observe
 
@@ -87,7 +87,7 @@ def test_no_height_flies_the_trim(name: str) -> None:
     health = mass.ctx.health
     assert health is not None
     health.position_vertical_absolute = False
-    mass.fly(TASKS[name]())
+    mass.fly(TASKS[name]())  # type: ignore[operator]
     mass.run(1.0)
     s = mass.ctx.setpoint
     assert math.isnan(s[sp.DOWN_M]) and math.isnan(s[sp.HEIGHT_RATE_M_S])
@@ -109,6 +109,6 @@ def test_after_a_while_without_a_position_it_sinks() -> None:
 def test_disarmed_everything_is_off(name: str) -> None:
     mass = PointMass()
     mass.ctx.armed = False
-    mass.fly(TASKS[name]())
+    mass.fly(TASKS[name]())  # type: ignore[operator]
     mass.run(0.1)
     assert mass.ctx.setpoint[sp.LEVEL] == sp.OFF

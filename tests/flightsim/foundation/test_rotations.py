@@ -34,7 +34,7 @@ def test_quaternions_of_euler_angles_and_back(angles):
     assert vectors.euler_of(q) == pytest.approx(angles)
     assert vectors.yaw_of(q) == rotations.yaw_of(np.array(q)) == vectors.euler_of(q)[2]
     out = np.zeros(4)
-    rotations.quaternion_from_euler(*angles, out)
+    rotations.quaternion_from_euler(*angles, out)  # type: ignore[call-arg]
     assert tuple(out) == q
     assert compiled(rotations.euler_from_quaternion, q, size=3) == vectors.euler_of(q)
 

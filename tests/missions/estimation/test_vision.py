@@ -84,7 +84,7 @@ def test_the_log_gets_the_messages_of_the_pictures_when_they_would_have_come(rec
     assert [frame.raw for _, frame in found] == messages_of(taken)[0]  # in place of the camera's own
     scans = [(sent_us, read_message(frame)) for sent_us, frame in found if frame.definition.name == "TUNNEL"]
     ends = [
-        (sent_us - EPOCH_US, read_camera_scan(m.payload_type, m.payload_length, m.payload).time_us)
+        (sent_us - EPOCH_US, read_camera_scan(m.payload_type, m.payload_length, m.payload).time_us)  # type: ignore[attr-defined]
         for sent_us, m in scans
     ]
     assert [exposed_us for _, exposed_us in ends] == [time_us for time_us, _ in taken]

@@ -88,4 +88,4 @@ def test_the_tag_below_a_hovering_vehicle_is_reported_and_a_stream_that_stops_is
     for name in ("angle_x", "angle_y"):
         expected, found = (np.median([getattr(m, name) for m in messages]) for messages in (own, seen))
         assert found == pytest.approx(expected, abs=0.02), name
-    assert np.median([m.distance for m in seen]) == pytest.approx(math.hypot(HEIGHT_M, *TARGET), rel=0.05)
+    assert np.median([m.distance for m in seen]) == pytest.approx(math.hypot(HEIGHT_M, *TARGET), rel=0.05)  # type: ignore[attr-defined]

@@ -26,7 +26,7 @@ def test_in_a_gap_of_the_link_nothing_is_known_of_aircraft_and_targets(lost):
     assert truth is not None
 
     def placed(time_us):
-        return truth.placed(1, [SimpleNamespace(time_us=time_us, target_m=(-46.0, 0.0))])[0]
+        return truth.placed(1, [SimpleNamespace(time_us=time_us, target_m=(-46.0, 0.0))])[0]  # type: ignore[list-item]
 
     assert truth.nearest(20e6, placed(20e6)) == (0, pytest.approx(1.0, abs=0.05))
     assert truth.nearest(35e6, placed(35e6)) is None

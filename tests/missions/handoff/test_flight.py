@@ -15,7 +15,8 @@ from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
 from missions.handoff.mission import HandoffMission
 from missions.handoff.options import HandoffOptions
-from missions.handoff.world import WalkingTargets, handoff_world
+from missions.handoff.walking_targets import PointSource, WalkingTargets
+from missions.handoff.world import handoff_world
 from missions.runs.session import fly
 
 
@@ -55,9 +56,8 @@ def test_the_target_is_handed_over_and_the_tracker_released(run):
 def pixel_run(tmp_path_factory):
     """A handoff whose points are found in rendered pictures, which are kept."""
     out = tmp_path_factory.mktemp("runs") / "pixels"
-    return flown(
-        out, picture=True, walking=WalkingTargets(pixels=True, film=True), timeout_s=90.0, takeover_s=5.0
-    )
+    walking = WalkingTargets(camera=PointSource.PIXELS, film=True)
+    return flown(out, picture=True, walking=walking, timeout_s=90.0, takeover_s=5.0)
 
 
 @pytest.mark.slow

@@ -65,8 +65,8 @@ def test_the_world_has_walking_targets_and_what_both_aircraft_need():
         assert payload.gimbal and payload.moving_points and payload.range_radio and not payload.camera
     for target in world.targets:
         walk = target.motion
-        assert (walk.north_m - walk.south_m, walk.east_m - walk.west_m) == pytest.approx((140.0, 270.0))
-        assert 0.8 <= walk.speed_m_s <= 2.0
+        assert (walk.north_m - walk.south_m, walk.east_m - walk.west_m) == pytest.approx((140.0, 270.0))  # type: ignore[attr-defined]
+        assert 0.8 <= walk.speed_m_s <= 2.0  # type: ignore[attr-defined]
     assert handoff_world(world, options).targets == world.targets
     with pytest.raises(PlanError, match="`count` 0"):
         WalkingTargets(count=0)

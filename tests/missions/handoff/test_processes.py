@@ -40,7 +40,7 @@ def points_in(path):
 def decisions_in(path):
     """The decisions that were sent in a flight."""
     tunnels = (decode(frame) for _, frame in TlogReader(path) if frame.definition.name == "TUNNEL")
-    read = (read_decision(m.payload_type, m.payload_length, m.payload) for m in tunnels)
+    read = (read_decision(m.payload_type, m.payload_length, m.payload) for m in tunnels)  # type: ignore[attr-defined]
     return [decision for decision in read if decision is not None]
 
 

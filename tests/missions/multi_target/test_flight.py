@@ -18,7 +18,7 @@ from missions.base.request import RunRequest
 from missions.cli.main import run_command_line
 from missions.multi_target.mission import MultiTargetMission
 from missions.multi_target.options import MultiTargetOptions
-from missions.multi_target.world import TargetField, multi_target_world
+from missions.multi_target.world import TargetField, multi_target_world  # type: ignore[attr-defined]
 from missions.runs.session import fly
 from missions.search.area import edges
 from missions.search.options import StepLawKind

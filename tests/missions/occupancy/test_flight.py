@@ -31,6 +31,7 @@ from missions.occupancy.parameters import Identify, SearchParameters
 from missions.occupancy.world import occupancy_world
 from missions.runs.session import fly
 from missions.runs.vehicle_opening import MAP_NAME
+from tests.missions.held_options import with_fields
 
 SMALL = OccupancyOptions(
     vehicles=2,
@@ -98,7 +99,7 @@ def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_rep
 @pytest.mark.slow
 def test_a_search_that_identifies_names_the_target_and_its_log_gives_the_same_estimates(tmp_path):
     """Quadrotors; the estimator runs beside the flight, and over its log."""
-    options = replace(SMALL, identify=Identify.BAYES, particles=1000)
+    options = with_fields(SMALL, identify=Identify.BAYES, particles=1000)
     first, again = (
         fly(
             OccupancyMission(),
@@ -128,7 +129,7 @@ def true_field(found, *, target=True, moment_a_m2=None):
     """The field of the flown world, made again, with its target or without."""
     spec = world_of(moment_a_m2=moment_a_m2).magnetic_field
     if not target:
-        spec = replace(spec, signatures=())
+        spec = replace(spec, signatures=())  # type: ignore[type-var]
     home = MagneticMap.load(found.folder / MAP_NAME).home
     return magnetic_field_of(spec, home=home, seed=1, decimal_year=2026.0)[0]
 
@@ -152,9 +153,9 @@ def flown_readings(folder, home, system_id):
             truth["alt"] * 1e-3 - home.alt_m,
         )
     )
-    time_us = [m.time_boot_ms * 1e3 for m in sent]
+    time_us = [m.time_boot_ms * 1e3 for m in sent]  # type: ignore[attr-defined]
     at = np.column_stack([np.interp(time_us, truth["time_usec"], axis) for axis in places.T])
-    return np.column_stack((at, [m.value for m in sent]))[at[:, 2] > 12.0]
+    return np.column_stack((at, [m.value for m in sent]))[at[:, 2] > 12.0]  # type: ignore[attr-defined]
 
 
 @pytest.mark.slow
@@ -178,7 +179,7 @@ def test_the_field_is_not_the_published_map(found):
         away = np.hypot(readings[:, 0] - 110.0, readings[:, 1] - 30.0) > 250.0
         away_nt.append((readings[:, 3] - on_map_nt)[away])
     error_nt = np.sqrt(np.mean(np.concatenate(map_errors_nt) ** 2))
-    assert 0.3 * published.error_nt < error_nt < 3.0 * published.error_nt
+    assert 0.3 * published.error_nt < error_nt < 3.0 * published.error_nt  # type: ignore[operator]
     differential_nt = np.concatenate(away_nt)
     assert len(differential_nt) > 100
     assert differential_nt.std() > 1.0  # the magnetometer's own noise is 0.2 nT
@@ -226,7 +227,7 @@ def test_a_map_of_another_place_keeps_everybody_on_the_ground(found, tmp_path):
 
 @pytest.mark.slow
 def test_a_search_that_finds_nothing_ends_in_time(found, tmp_path):
-    options = replace(SMALL, vehicles=1, confirmations=50, search_time_s=60.0)
+    options = with_fields(SMALL, vehicles=1, confirmations=50, search_time_s=60.0)
     result = fly(OccupancyMission(), request(tmp_path / "run", options))
     assert result.outcome == "completed"
     assert result.summary["target_found"] is False

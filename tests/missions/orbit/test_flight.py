@@ -51,7 +51,7 @@ def gps_times(folder, *spans):
             time_s = (stamp_us - EPOCH_UNIX_US) * 1e-6
             for times, (begin_s, end_s) in zip(found, spans, strict=True):
                 if begin_s < time_s < end_s:
-                    times.add(decode(frame).time_usec)
+                    times.add(decode(frame).time_usec)  # type: ignore[attr-defined]
     return found
 
 

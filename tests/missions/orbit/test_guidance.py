@@ -8,7 +8,7 @@ import pytest
 from estimators.orbit_target.attitude import AutopilotAttitude
 from estimators.orbit_target.relative_target import RelativeState
 from estimators.orbit_target.tracker import TargetStatus, TargetTracker
-from missions.planning.orbit_guidance import (
+from missions.planning.orbit_guidance import (  # type: ignore[attr-defined]
     GRAVITY_M_S2,
     OrbitGuidance,
     OrbitParameters,

@@ -71,7 +71,8 @@ def test_the_model_s_endurance_is_that_of_its_flights():
     """Hovering takes 13 to 14 A by SYS_STATUS of embedded flights (3.5 Ah)."""
     assert hover_endurance_s("iris") == pytest.approx(3.5 / 13.5 * 3600.0, rel=0.05)
     assert hover_endurance_s("iris", battery_ah=1.75) == pytest.approx(
-        0.5 * hover_endurance_s("iris"), rel=0.01
+        0.5 * hover_endurance_s("iris"),  # type: ignore[operator]
+        rel=0.01,  # type: ignore[operator]
     )
     assert hover_endurance_s("aerosonde") is None
 

@@ -169,7 +169,7 @@ def test_rows_without_a_column_are_refused(row: type, words: str) -> None:
 def test_values_of_a_row_are_plain() -> None:
     row = Row(
         error_m=np.float64(1.5), count=np.int64(3), found=np.bool_(True), text="t", path=np.array([1, 2]),
-        figures={"a": np.float32(2.0)}, maybe=None,
+        figures={"a": np.float32(2.0)}, maybe=None,  # type: ignore[dict-item]
     )  # fmt: skip
     values = RowSchema.of(Row).values(row)
     assert values == (1.5, 3, True, "t", [1.0, 2.0], {"a": 2.0}, None)

@@ -146,7 +146,7 @@ class Unloadable:
 def test_a_study_that_can_not_start_says_why(tmp_path: Path) -> None:
     with pytest.raises(MissionError, match="study small can't start: ValueError: invalid literal for int"):
         run_study(replace(STUDY, trial=Unloadable()), engine=Pool(2), out=tmp_path / "a", picture=False)
-    nested = replace(STUDY, trial=lambda parameters, seed: None)
+    nested = replace(STUDY, trial=lambda parameters, seed: None)  # type: ignore[return-value]
     with pytest.raises(PlanError, match="define its functions and classes at the top of a module"):
         run_study(nested, engine=Pool(2), out=tmp_path / "b", picture=False)
 

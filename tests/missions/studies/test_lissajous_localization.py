@@ -183,7 +183,7 @@ def test_a_run_is_the_equations_one_after_the_other() -> None:
             predict(states[d], spreads[d], axes, setting.PROCESS[d], np.diag(variance[d]), np.zeros((2, 2)))
             correct(states[d], spreads[d], measured, setting.SENSOR[d], np.zeros((4, 12)))
             p = spreads[d]
-            ground_target(
+            ground_target(  # type: ignore[call-arg]
                 *states[d, [0, 2]],
                 *(p[0, 0], p[0, 2], p[2, 2]),
                 course(states[d]),

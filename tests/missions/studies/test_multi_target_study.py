@@ -26,7 +26,7 @@ OPTIONS = E2.options(PlannerKind.SWEEP, MultiTargetOptions().planning)
 
 def places(seed):
     world = terrain_targets_world(WorldSpec(seed=seed), OPTIONS, counts=E2.counts, clusters=E2.groups)
-    return np.array([(t.motion.north_m, t.motion.east_m) for t in world.targets])
+    return np.array([(t.motion.north_m, t.motion.east_m) for t in world.targets])  # type: ignore[attr-defined]
 
 
 def test_targets_lie_low_or_high_on_the_terrain_of_their_run():
@@ -144,7 +144,7 @@ def test_a_world_deviates_in_what_its_name_says():
     sensor = base.vehicles[0].payload.target_sensor
     double = deviating_world(base, OPTIONS, WORLDS["detection-double"].setting.deviation)
     changed = double.vehicles[0].payload.target_sensor
-    assert changed == replace(sensor, forward_scale_m=30.0, right_scale_m=30.0)
+    assert changed == replace(sensor, forward_scale_m=30.0, right_scale_m=30.0)  # type: ignore[type-var]
     assert double.targets == base.targets
     biased = deviating_world(base, OPTIONS, WORLDS["bias-double"].setting.deviation)
     changed = biased.vehicles[0].payload.target_sensor

@@ -98,7 +98,7 @@ def test_frames_that_are_not_rendered_have_the_same_detections():
     camera = search_camera(0.3)
     given = {"model": camera.model, "imager": camera.imager, "blur_px_m": camera.blur_px_m, "seed": 1}
     quick = camera.reader.start(**given)
-    whole = replace(camera.reader, skip=False).start(**given)
+    whole = replace(camera.reader, skip=False).start(**given)  # type: ignore[type-var]
     rng = np.random.default_rng(4)
     detected = 0
     for number in range(14):
@@ -126,7 +126,7 @@ def test_frames_that_are_not_rendered_have_the_same_detections():
 def test_the_target_starts_outside_the_middle():
     options = FlightOptions(search=True)
     rng = np.random.default_rng(1)
-    starts = np.array([motion_of(TagTarget(), options, rng).start_m for _ in range(500)])
+    starts = np.array([motion_of(TagTarget(), options, rng).start_m for _ in range(500)])  # type: ignore[attr-defined]
     assert np.abs(starts).max() < 50.0 and (np.abs(starts).max(axis=1) > 5.0).all()
     assert np.abs(starts.mean(axis=0)).max() < 5.0
 

@@ -23,7 +23,7 @@ from missions.runs.session import fly
 from missions.search.area import edges
 from missions.vision_search.mission import VisionSearchMission
 from missions.vision_search.options import VisionSearchOptions
-from missions.vision_search.world import HiddenTag, vision_search_world
+from missions.vision_search.world import HiddenTag, vision_search_world  # type: ignore[attr-defined]
 from missions.worlds.payloads import carrying
 from missions.worlds.search_camera import search_camera
 from tests.clients.sent_again import send_again
@@ -150,10 +150,10 @@ def test_what_each_vehicle_received_of_the_others_is_in_the_log(tmp_path):
     result = flown(tmp_path / "run", flights=flights, vehicles=2, passes=2, link_loss=0.3, link_delay_s=0.5)
     log = result.folder / "flight.tlog"
     received = [
-        (message.src_system, message.target_system, read_search_likelihood(
-            message.payload_type, message.payload_length, message.payload))
+        (message.src_system, message.target_system, read_search_likelihood(  # type: ignore[attr-defined]
+            message.payload_type, message.payload_length, message.payload))  # type: ignore[attr-defined]
         for _, frame in TlogReader(log) if frame.definition.name == "TUNNEL"
-        for message in [read_message(frame)] if message.payload_type == SEARCH_LIKELIHOOD_PAYLOAD
+        for message in [read_message(frame)] if message.payload_type == SEARCH_LIKELIHOOD_PAYLOAD  # type: ignore[attr-defined]
     ]  # fmt: skip
     assert len(received) == result.summary["likelihoods"]["delivered"] > 100
     assert {(sender, target) for sender, target, _ in received} == {(1, 2), (2, 1)}

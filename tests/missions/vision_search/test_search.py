@@ -105,7 +105,7 @@ def test_the_planner_of_an_aircraft_turns_by_90_degrees_at_most():
     for _ in range(10):
         there = planner.next_place(belief, here, direction, frame(here, direction, options))
         new = math.atan2(there[1] - here[1], there[0] - here[0])
-        at_edge = max(map(abs, here)) > 600.0 - options.step_m
+        at_edge = max(map(abs, here)) > 600.0 - options.step_m  # type: ignore[operator]
         assert at_edge or abs(math.remainder(new - direction, math.tau)) < math.pi / 2 + 1e-6
         belief.update(frame(there, new, options))
         here, direction = there, new

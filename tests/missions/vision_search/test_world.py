@@ -10,7 +10,7 @@ from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.search.area import edges
 from missions.vision_search.options import VisionSearchOptions
-from missions.vision_search.world import HiddenTag, vision_search_world
+from missions.vision_search.world import HiddenTag, vision_search_world  # type: ignore[attr-defined]
 from tests.missions.held_options import with_fields
 
 OPTIONS = with_fields(VisionSearchOptions(), **edges((0.0, -50.0, 100.0, 50.0)))
