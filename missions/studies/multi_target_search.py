@@ -239,8 +239,10 @@ def _verdicts(results: Results, cells: Sequence[int]) -> dict[str, Any]:
                 ("_ci95", [rounded(value) for value in mean_interval(values)]),
             )
         },
-        "gospa_missed": rounded(float(np.mean(results.values("gospa_missed")[cells][known]))),
-        "gospa_false": rounded(float(np.mean(results.values("gospa_false")[cells][known]))),
+        **{
+            name: rounded(float(results.values(name)[cells][known].mean())) if known.any() else None
+            for name in ("gospa_missed", "gospa_false")
+        },
         "false_per_run": rounded(float(wrong.mean())) if len(wrong) else None,
     }
 
