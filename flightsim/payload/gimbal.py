@@ -261,15 +261,15 @@ class Gimbal(Device[Literal[True]]):
         k.body_euler(self._truth, state.error, self._euler)
         heading_rad = float(self._euler[2])
         if math.isnan(yaw_rad):
-            yaw_rad = float(state.setpoint[2])
+            yaw_rad = float(state.commanded[2])
             given_in_earth = bool(state.yaw_locked)
         if math.isnan(pitch_rad):
-            pitch_rad = float(state.setpoint[1])
+            pitch_rad = float(state.commanded[1])
         if given_in_earth and not locked:
             yaw_rad -= heading_rad
         elif locked and not given_in_earth:
             yaw_rad += heading_rad
-        state.setpoint[:] = (roll_rad, pitch_rad, yaw_rad)
+        state.commanded[:] = (roll_rad, pitch_rad, yaw_rad)
         state.pitch_rate, state.yaw_rate = rates
         state.levelled = float(bool(flags & GimbalFlags.PITCH_LOCK))
         state.yaw_locked = float(locked)

@@ -52,8 +52,8 @@ class GimbalConstants:
 class GimbalState(Record):
     """What a gimbal carries from step to step."""
 
-    setpoint: Vector3  # roll, pitch, yaw
-    pitch_rate: float  # of the setpoint
+    commanded: Vector3  # roll, pitch, yaw
+    pitch_rate: float  # of the commanded angles
     yaw_rate: float
     levelled: float
     yaw_locked: float
@@ -148,7 +148,7 @@ def _demand(body: Array, c: GimbalConstants, s: GimbalState, out: Array) -> None
         return
     euler = np.zeros(3)
     euler_from_quaternion(body, euler)
-    roll, pitch, yaw = s.setpoint[0], s.setpoint[1], s.setpoint[2]
+    roll, pitch, yaw = s.commanded[0], s.commanded[1], s.commanded[2]
     wanted, relative, inverse = np.zeros(4), np.zeros(4), np.zeros(4)
     if s.levelled > 0.0:
         if s.yaw_locked <= 0.0:
@@ -198,10 +198,10 @@ def advance(
     steer = np.zeros(3)
     for axis in range(3):
         steer[axis] = c.gain * (before[axis] - held[axis])
-    s.setpoint[_PITCH] += s.pitch_rate * interval_s
+    s.commanded[_PITCH] += s.pitch_rate * interval_s
     if s.pitch_rate != 0.0:
-        s.setpoint[_PITCH] = min(c.high[_PITCH], max(c.low[_PITCH], s.setpoint[_PITCH]))
-    s.setpoint[_YAW] = wrap_pi(s.setpoint[_YAW] + s.yaw_rate * interval_s)
+        s.commanded[_PITCH] = min(c.high[_PITCH], max(c.low[_PITCH], s.commanded[_PITCH]))
+    s.commanded[_YAW] = wrap_pi(s.commanded[_YAW] + s.yaw_rate * interval_s)
     _demand(body, c, s, demand)
     _limited(demand, c, before[_YAW], at_limit)
     rates = np.zeros(3)
