@@ -11,6 +11,7 @@ from typing import Final
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.vectors import NorthEast
 
 RETURN_POINT: Final = 5000
 POLYGON_INCLUSION: Final = 5001
@@ -19,18 +20,15 @@ CIRCLE_INCLUSION: Final = 5003
 CIRCLE_EXCLUSION: Final = 5004
 """MAV_CMD_NAV_FENCE_*."""
 
-Point = tuple[float, float]
-"""North and east, m, in a local frame."""
-
 
 @dataclass(frozen=True, slots=True)
 class FencePolygon:
     """A polygon to stay in (`inclusion`), or out of."""
 
-    vertices: tuple[Point, ...]
+    vertices: tuple[NorthEast, ...]
     inclusion: bool
 
-    def allows(self, point: Point) -> bool:
+    def allows(self, point: NorthEast) -> bool:
         """The shape allows a point."""
         return inside_polygon(point, self.vertices) == self.inclusion
 
@@ -46,7 +44,7 @@ class UnwrappedPolygon(FencePolygon):
     vertices_deg: tuple[tuple[float, float], ...]
     frame: LocalFrame
 
-    def allows(self, point: Point) -> bool:
+    def allows(self, point: NorthEast) -> bool:
         """The shape allows a point."""
         lat_deg, lon_deg, _ = self.frame.geodetic_from_ned(*point, 0.0)
         return inside_polygon((lat_deg, lon_deg), self.vertices_deg) == self.inclusion
@@ -56,11 +54,11 @@ class UnwrappedPolygon(FencePolygon):
 class FenceCircle:
     """A circle to stay in (`inclusion`), or out of. Nothing is inside of a circle of radius 0."""
 
-    centre: Point
+    centre: NorthEast
     radius_m: float
     inclusion: bool
 
-    def allows(self, point: Point) -> bool:
+    def allows(self, point: NorthEast) -> bool:
         """The shape allows a point."""
         return (math.dist(point, self.centre) < self.radius_m) == self.inclusion
 
@@ -105,13 +103,13 @@ def _polygon(items: Sequence[MissionItem], frame: LocalFrame, *, unwrapped: bool
     return UnwrappedPolygon(vertices, inclusion, tuple((item.x, item.y) for item in items), frame)
 
 
-def fence_point(item: MissionItem, frame: LocalFrame) -> Point:
+def fence_point(item: MissionItem, frame: LocalFrame) -> NorthEast:
     """Position of a fence item."""
     north_m, east_m, _ = frame.ned_from_geodetic(item.x, item.y, frame.origin.alt_m)
     return north_m, east_m
 
 
-def outside_shapes(shapes: tuple[FenceShape, ...], point: Point, *, join: bool) -> bool:
+def outside_shapes(shapes: tuple[FenceShape, ...], point: NorthEast, *, join: bool) -> bool:
     """Whether the shapes forbid a point.
 
     A point must be outside every exclusion shape.
@@ -127,7 +125,7 @@ def outside_shapes(shapes: tuple[FenceShape, ...], point: Point, *, join: bool) 
     return any(not shape.allows(point) for shape in shapes if not shape.inclusion)
 
 
-def inside_polygon(point: Point, vertices: tuple[Point, ...]) -> bool:
+def inside_polygon(point: NorthEast, vertices: tuple[NorthEast, ...]) -> bool:
     """Even-odd rule: does a ray from the point cross an odd number of edges?"""
     north, east = point
     inside = False

@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
+from flightsim.foundation.vectors import NorthEast
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.planner import SearchPlanner
 from missions.multi_target.search import planner_of
 from missions.multi_target.world_searchers import search_with_point
-from missions.search.area import Place
 from missions.search.planner_parameters import Exploration
 from missions.studies.multi_target_trial import EXPERIMENTS
 from missions.studies.statistics import paired_difference
@@ -70,8 +70,8 @@ class Timed:
         self.total_s = 0.0
 
     def next_place(
-        self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
-    ) -> Place:
+        self, belief: SearchBelief, here: NorthEast, direction_rad: float | None, others: Sequence[Viewpoint]
+    ) -> NorthEast:
         began_s = time.perf_counter()
         there = self._planner.next_place(belief, here, direction_rad, others)
         self.total_s += time.perf_counter() - began_s

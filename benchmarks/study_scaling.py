@@ -27,7 +27,7 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from missions.cli.bodies.sweep import sweep_study
 from missions.studies import Inline, Pool, RayCluster, Study, grid, run_study
 from missions.studies.engine import Engine, Progress
-from missions.studies.rows import Outcome, TrialResult
+from missions.studies.rows import TrialOutcome, TrialResult
 from tests.missions.studies.ray_nodes import two_nodes
 
 WORKERS = 2
@@ -110,7 +110,9 @@ def _processor_s() -> float:
 def message_bytes(study: Study[Any, Any]) -> int:
     """Bytes of a result on its way to the parent."""
     row = study.schema.values(compute({"steps": 1}, 0))
-    result = TrialResult(index=0, outcome=Outcome.DONE, values=row, versions="x" * 170, worker="host:12345")
+    result = TrialResult(
+        index=0, outcome=TrialOutcome.DONE, values=row, versions="x" * 170, worker="host:12345"
+    )
     sink = io.BytesIO()
     pickle.dump(result, sink)
     return len(sink.getvalue())

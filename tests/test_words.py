@@ -31,3 +31,28 @@ def test_words_of_the_field() -> None:
 def test_the_test_sees_words() -> None:
     """Parts of names count, parts of other words do not."""
     assert avoided("x = _heard_us\nthreshold\nIs told so.\nsatellite") == ["x = _heard_us", "Is told so."]
+
+
+def test_one_name_is_for_one_thing() -> None:
+    """The names of the page's table are defined once; those that say too little are not defined."""
+    page = (ROOT / "docs/contributing.md").read_text(encoding="utf-8")
+    table = page.split("One name is for one thing.")[1].split("`tests/test_words.py`")[0]
+    rows, refused = table.split("alone say too little")[0].rsplit("\n\n", 1)
+    names = {
+        name
+        for row in re.findall(r"^\| (`.*?) \|", rows, re.MULTILINE)
+        for name in re.findall(r"`(\w+)`", row)
+    }
+    assert len(names) > 8
+    defined = [
+        name
+        for file in FILES
+        if file.endswith(".py") and "handoff" not in file  # its places have no names of their own yet
+        for name in re.findall(
+            r"^(?:class (\w+)|(\w+) = tuple\[)", (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE
+        )
+        for name in name
+        if name
+    ]
+    assert {name: defined.count(name) for name in names if defined.count(name) != 1} == {"HandoffCell": 0}
+    assert not set(re.findall(r"`(\w+)`", refused)) & set(defined)

@@ -8,22 +8,22 @@ import numpy as np
 
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.fence_watch import FenceWatch
-from autopilot_bridge.commander.geofence import Place as Point
 from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.situation import Situation
-from autopilot_bridge.commander.vehicle_tasks import Place
+from autopilot_bridge.commander.vehicle_tasks import TargetPosition
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.return_place import nearest_rally
 from autopilot_bridge.navigation import layout as nav
+from flightsim.foundation.vectors import Vector
 
 _RADII_AHEAD: Final = 2.0  # in radii of an aircraft's loiter circle
 _AIRCRAFT_DOWN_M: Final = 5.0
 _MOVING_M_S: Final = 0.5
 
 
-def place_ahead(context: FlightContext, place_ned_m: Point) -> Point:
+def place_ahead(context: FlightContext, place_ned_m: Vector) -> Vector:
     """The position that the vehicle can't avoid reaching: a multicopter brakes, an aircraft circles."""
     north, east, down = place_ned_m
     v_north, v_east, v_down = context.nav[nav.VEL_NED_M_S].tolist()
@@ -50,7 +50,7 @@ def _braking_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> 
 
 def fence_return_place(
     context: FlightContext, watch: FenceWatch, parameters: FenceParameters
-) -> Place | None:
+) -> TargetPosition | None:
     """The target of ArduPlane's GUIDED action: the return point, a rally point or home; None: not known."""
     home = context.home_ned_m
     if not math.isfinite(float(home.sum())) or context.frame is None:
@@ -59,8 +59,8 @@ def fence_return_place(
     if parameters.return_to_rally:
         rally = nearest_rally(context, p.rally)
         if rally is not None:
-            return Place(ned_m=np.array([rally.ned_m[0], rally.ned_m[1], rally.altitude_down_m]))
-        return Place(ned_m=np.array([home[0], home[1], home[2] - p.return_altitude_m]))
+            return TargetPosition(ned_m=np.array([rally.ned_m[0], rally.ned_m[1], rally.altitude_down_m]))
+        return TargetPosition(ned_m=np.array([home[0], home[1], home[2] - p.return_altitude_m]))
     low_m = parameters.height_min_m + parameters.margin_m
     high_m = parameters.height_max_m - parameters.margin_m
     height_m = parameters.return_height_m
@@ -68,7 +68,7 @@ def fence_return_place(
         height_m = p.return_altitude_m if low_m >= high_m else 0.5 * (low_m + high_m)
     point = watch.geofence.return_point(context.frame)
     north, east = (float(home[0]), float(home[1])) if point is None else point
-    return Place(ned_m=np.array([north, east, float(home[2]) - height_m]))
+    return TargetPosition(ned_m=np.array([north, east, float(home[2]) - height_m]))
 
 
 class FenceKeeper:
@@ -127,6 +127,6 @@ class FenceKeeper:
         north, east, down = place_ned_m.tolist()
         return self._watch.allows((north, east, down), self._context.frame, self._parameters())
 
-    def return_place(self) -> Place | None:
+    def return_place(self) -> TargetPosition | None:
         """The target of a breach whose action is to fly to a point; None: not known."""
         return fence_return_place(self._context, self._watch, self._parameters())

@@ -7,10 +7,11 @@ import math
 from typing import Final
 
 from autopilot_bridge.commander.events import Event, FenceBreached, FenceSwitched
-from autopilot_bridge.commander.geofence import Geofence, Place
+from autopilot_bridge.commander.geofence import Geofence
 from autopilot_bridge.commander.geofence_parameters import AutoEnable, FenceParameters, FenceType
 from autopilot_bridge.mission_plan import MissionStore
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.vectors import Vector
 
 _NOTHING: Final = FenceType(0)
 _MAX_COUNT: Final = 65500  # ArduPilot's counter stops there
@@ -42,7 +43,7 @@ class FenceWatch:
         self._above_floor = False
         self._armed = False
         self._backup_m: dict[FenceType, float] = {}
-        self._home: Place | None = None
+        self._home: Vector | None = None
 
     def present(self, parameters: FenceParameters) -> bool:
         """A geofence is set up, enabled or not."""
@@ -67,15 +68,15 @@ class FenceWatch:
         self._off = _NOTHING
         self._auto_on = False
 
-    def allows(self, place_ned_m: Place, frame: LocalFrame | None, parameters: FenceParameters) -> bool:
+    def allows(self, place_ned_m: Vector, frame: LocalFrame | None, parameters: FenceParameters) -> bool:
         """True when a position is inside all enabled walls."""
         walls = self.active(parameters)
         return not self.geofence.broken(place_ned_m, self._home, frame, parameters, walls)
 
     def update(
         self,
-        place_ned_m: Place | None,
-        home_ned_m: Place | None,
+        place_ned_m: Vector | None,
+        home_ned_m: Vector | None,
         frame: LocalFrame | None,
         parameters: FenceParameters,
         *,
@@ -170,7 +171,7 @@ class FenceWatch:
 
 
 def _beyond(
-    place: Place, home: Place | None, parameters: FenceParameters, broken: FenceType
+    place: Vector, home: Vector | None, parameters: FenceParameters, broken: FenceType
 ) -> dict[FenceType, float]:
     """How far outside each breached wall of the cylinder a position is, m."""
     if home is None:

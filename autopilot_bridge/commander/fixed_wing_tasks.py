@@ -20,7 +20,7 @@ from autopilot_bridge.commander.events import (
 )
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place, VehicleTasks
+from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, TargetPosition, VehicleTasks
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing import (
@@ -175,7 +175,7 @@ class FixedWingTasks(VehicleTasks):
         """Circle at the present position."""
         return LoiterTask()
 
-    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
+    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: TargetPosition) -> FlightTask:
         """Take off straight ahead; the heading is that of the runway or launcher."""
         known = bool(np.isfinite(place.ned_m[0:2]).all())
         return TakeoffTask(height_m, place_ned_m=place.ned_m if known else None)
@@ -184,11 +184,11 @@ class FixedWingTasks(VehicleTasks):
         """Circle at the target position and height of the take-off."""
         return LoiterTask(task.place_ned_m) if isinstance(task, TakeoffTask) else LoiterTask()
 
-    def reposition(self, place: Place) -> FlightTask:
+    def reposition(self, place: TargetPosition) -> FlightTask:
         """Fly to a position and circle there."""
         return LoiterTask(place.ned_m, place.radius_m, place.speed_m_s)
 
-    def guide_to(self, context: FlightContext, place: Place) -> None:
+    def guide_to(self, context: FlightContext, place: TargetPosition) -> None:
         """Set the position at which the guided task circles."""
         self.guided.set_position(context, place.ned_m, radius_m=place.radius_m, airspeed_m_s=place.speed_m_s)
 

@@ -7,15 +7,13 @@ from autopilot_bridge.fence_shapes import (
     RETURN_POINT,
     FenceCircle,
     FenceShape,
-    Point,
     fence_point,
     fence_shapes,
     outside_shapes,
 )
 from autopilot_bridge.mission_plan import MissionStore
 from flightsim.foundation.geodesy import LocalFrame
-
-Place = tuple[float, float, float]
+from flightsim.foundation.vectors import NorthEast, Vector
 
 
 class Geofence:
@@ -30,7 +28,7 @@ class Geofence:
         self._version = -1
         self._frame: LocalFrame | None = None
         self._shapes: tuple[FenceShape, ...] = ()
-        self._return_point: Point | None = None
+        self._return_point: NorthEast | None = None
 
     @property
     def uploaded(self) -> bool:
@@ -42,7 +40,7 @@ class Geofence:
         """Changes with every upload."""
         return self._plan.version
 
-    def return_point(self, frame: LocalFrame) -> Point | None:
+    def return_point(self, frame: LocalFrame) -> NorthEast | None:
         """ArduPlane's return point: that of the plan, else the centre of its first inclusion."""
         self._compile(frame, unwrapped=False)
         if self._return_point is not None:
@@ -61,8 +59,8 @@ class Geofence:
 
     def broken(
         self,
-        place_ned_m: Place,
-        home_ned_m: Place | None,
+        place_ned_m: Vector,
+        home_ned_m: Vector | None,
         frame: LocalFrame | None,
         parameters: FenceParameters,
         walls: FenceType,

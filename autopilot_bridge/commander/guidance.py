@@ -8,7 +8,7 @@ import numpy as np
 from autopilot_bridge.commander.commanded_vehicle import CommandedVehicle
 from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
-from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
+from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, TargetPosition
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
 from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, Vector
@@ -152,7 +152,7 @@ class Guidance:
         speed_m_s: float | None = None,
     ) -> None:
         """Give the guided task (the one `guided` returned) a target position."""
-        place = Place(
+        place = TargetPosition(
             ned_m=np.array(position_ned_m),
             yaw_rad=yaw_rad,
             yaw_rate_rad_s=yaw_rate_rad_s,
@@ -160,7 +160,7 @@ class Guidance:
         )
         self._vehicle.guide_to(self._commander.context, place)
 
-    def go_to_place(self, place: Place | None) -> None:
+    def go_to_place(self, place: TargetPosition | None) -> None:
         """Make the guided task fly to a position, in GUIDED; None: no change."""
         if place is not None and self.guided() is not None:
             self._vehicle.guide_to(self._commander.context, place)
@@ -323,7 +323,7 @@ def _within(value: float, limit: float) -> float:
     return value if abs(value) <= limit else math.nan
 
 
-def _place(north_m: float, east_m: float, down_m: float, **how: Any) -> Place:
+def _place(north_m: float, east_m: float, down_m: float, **how: Any) -> TargetPosition:
     """A position; coordinates that are too large become NaN."""
     ned_m = np.array([_within(value, _MAX_DISTANCE_M) for value in (north_m, east_m, down_m)])
-    return Place(ned_m=ned_m, **how)
+    return TargetPosition(ned_m=ned_m, **how)

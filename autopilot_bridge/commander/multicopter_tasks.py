@@ -9,7 +9,7 @@ import numpy as np
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place, VehicleTasks
+from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, TargetPosition, VehicleTasks
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.heading import Turn
@@ -99,7 +99,7 @@ class MulticopterTasks(VehicleTasks):
         """Brake and hold the position."""
         return HoldTask()
 
-    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
+    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: TargetPosition) -> FlightTask:
         """Climb straight up."""
         return TakeoffTask(height_m, yaw_rad=yaw_rad)
 
@@ -107,11 +107,11 @@ class MulticopterTasks(VehicleTasks):
         """Hold the target position of the climb."""
         return HoldTask(task.place_ned_m) if isinstance(task, TakeoffTask) else HoldTask()
 
-    def reposition(self, place: Place) -> FlightTask:
+    def reposition(self, place: TargetPosition) -> FlightTask:
         """Fly to a position and hold it."""
         return RepositionTask(place.ned_m, yaw_rad=place.yaw_rad, speed_m_s=place.speed_m_s)
 
-    def guide_to(self, context: FlightContext, place: Place) -> None:
+    def guide_to(self, context: FlightContext, place: TargetPosition) -> None:
         """Set the target position of the guided task."""
         self._target[:] = place.ned_m
         self.guided.set_position(

@@ -72,7 +72,7 @@ class SetpointStream:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class TargetPosition:
     """A target position, with its heading, speed and radius.
 
     Attributes:
@@ -184,7 +184,7 @@ class VehicleTasks(ABC):
         """Hold the present position."""
 
     @abstractmethod
-    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
+    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: TargetPosition) -> FlightTask:
         """Take off.
 
         Args:
@@ -198,11 +198,11 @@ class VehicleTasks(ABC):
         """The task after a take-off: it holds the commanded height, not the height that was reached."""
 
     @abstractmethod
-    def reposition(self, place: Place) -> FlightTask:
+    def reposition(self, place: TargetPosition) -> FlightTask:
         """Fly to a position and stay there."""
 
     @abstractmethod
-    def guide_to(self, context: FlightContext, place: Place) -> None:
+    def guide_to(self, context: FlightContext, place: TargetPosition) -> None:
         """Set the target position of the guided task."""
 
     @abstractmethod

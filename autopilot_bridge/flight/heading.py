@@ -3,10 +3,7 @@
 import math
 from typing import Final
 
-from flightsim.foundation.vectors import wrap_pi
-
-Point = tuple[float, float, float]
-"""A place in local NED, m."""
+from flightsim.foundation.vectors import Vector, wrap_pi
 
 _TURNED_RAD: Final = math.radians(1.0)
 SAME_PLACE_M: Final = 0.1
@@ -58,7 +55,7 @@ class Turn:
         return abs(self._left_rad) < _TURNED_RAD
 
 
-def turn_angle(before: Point, corner: Point, after: Point) -> float:
+def turn_angle(before: Vector, corner: Vector, after: Vector) -> float:
     """Horizontal change of course at a corner, 0 (straight) to pi; 0 next to a vertical leg."""
     n1, e1 = corner[0] - before[0], corner[1] - before[1]
     n2, e2 = after[0] - corner[0], after[1] - corner[1]

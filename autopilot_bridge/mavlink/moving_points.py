@@ -11,6 +11,7 @@ from typing import Annotated, Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.tunnel import Many, Tunnel, Wire
+from flightsim.foundation.vectors import ImagePoint
 
 __all__ = [
     "MAX_POINTS",
@@ -33,8 +34,6 @@ _POINT: Final = Wire(
     most=_LARGEST,
 )
 
-Point = tuple[float, float]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingPoints:
@@ -47,7 +46,7 @@ class MovingPoints:
     sigma: Annotated[
         float, Wire("f", "standard deviation of a point per axis, as a tangent, above 0", above=0.0)
     ]
-    points: Annotated[tuple[Point, ...], Many(_POINT, "points in this message, up to 13")]
+    points: Annotated[tuple[ImagePoint, ...], Many(_POINT, "points in this message, up to 13")]
 
     @property
     def last(self) -> bool:
@@ -64,7 +63,7 @@ read_moving_points = MOVING_POINTS.read
 
 
 def moving_points_messages(
-    scan: int, time_us: int, points: Sequence[Point], sigma: float
+    scan: int, time_us: int, points: Sequence[ImagePoint], sigma: float
 ) -> list[dialect.MAVLink_tunnel_message]:
     """The TUNNEL messages of a scan, to all systems and components; one when nothing moves.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, Point, moving_points_messages
+from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, moving_points_messages
 from estimators import wire
 from estimators.attitude.air import pressure_pa
 from estimators.handoff.sight import GroundHeight, armed_of
@@ -30,12 +30,12 @@ from estimators.vision import (
 )
 from estimators.vision.ground_points import CameraAxes
 from flightsim.foundation.atmosphere import pressure_altitude_m
-from flightsim.foundation.vectors import rotate
+from flightsim.foundation.vectors import ImagePoint, rotate
 
 __all__ = ["MotionWatch", "MotionWatchParameters"]
 
 T = TypeVar("T")
-Points = tuple[Point, ...]
+Points = tuple[ImagePoint, ...]
 
 _LEAST_HEIGHT_M: Final = 5.0  # a camera that is lower has no ground in view that it could be compared with
 _STALE_US: Final = 500_000

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink.moving_points import MovingPoints
 from estimators.tracking.line_of_sight import GimbalAttitude, gimbal_from_camera
 from estimators.vision.ground_points import on_ground
-from flightsim.foundation.vectors import between, conjugate, from_euler, rotate
+from flightsim.foundation.vectors import ImagePoint, between, conjugate, from_euler, rotate
 
 Array = NDArray[np.float64]
-Point = tuple[float, float]
 
 _GIMBALS_KEPT: Final = 64
 _STALE_US: Final = 200_000
@@ -40,7 +39,7 @@ class PointScan:
     time_us: int
     sigma: float
     total: int
-    points: dict[int, Point] = field(default_factory=dict)
+    points: dict[int, ImagePoint] = field(default_factory=dict)
 
 
 class ScanAssembler:
@@ -125,7 +124,9 @@ class GimbalHistory:
         )
 
 
-def image_point(place_m: Point, gimbal: GimbalAttitude, heading_rad: float, height_m: float) -> Point | None:
+def image_point(
+    place_m: tuple[float, float], gimbal: GimbalAttitude, heading_rad: float, height_m: float
+) -> ImagePoint | None:
     """Image point of a place on level ground, forward and right; None: it is behind the camera. It is the
     inverse of `level_places`.
     """

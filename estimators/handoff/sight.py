@@ -10,12 +10,13 @@ from autopilot_bridge.mavlink.moving_points import MOVING_POINTS_PAYLOAD, read_m
 from estimators import wire
 from estimators.handoff.aircraft_tracks import AircraftTracks
 from estimators.handoff.dead_reckoning import ReckonedPath
-from estimators.handoff.scans import GimbalHistory, Point, PointScan, ScanAssembler, image_point, level_places
+from estimators.handoff.scans import GimbalHistory, PointScan, ScanAssembler, image_point, level_places
 from estimators.interface import Outcome
 from estimators.messages import Message, is_a
 from estimators.relative_pose.aircraft import AircraftState
 from estimators.tracking.line_of_sight import gimbal_attitude
 from estimators.tracking.recursive_ransac import RecursiveRansac
+from flightsim.foundation.vectors import ImagePoint
 
 _PATH_S: Final = 5.0  # time in which scans and reports may be late
 _GROUND_SHARE: Final = 0.05  # of a new height on the ground
@@ -85,7 +86,7 @@ class AircraftSight:
         self._gimbal = GimbalHistory()
         self._scans = ScanAssembler()
         self.counts: Counter[str] = self._scans.counts
-        self.seen: dict[int, Point] = {}
+        self.seen: dict[int, ImagePoint] = {}
         state.on_motion = self.path.advance
 
     @property

@@ -27,7 +27,7 @@ from estimators.magnetic_identification.particle_hypotheses import (
     GaussianHypothesis,
     ParticleHypothesis,
 )
-from estimators.magnetic_identification.samples import Place, Sample, TracePoint
+from estimators.magnetic_identification.samples import LikelyPlace, Sample, TracePoint
 from estimators.occupancy.detection import MapError
 from estimators.tracking.modes import Mode, find_modes
 
@@ -232,7 +232,7 @@ class Anomaly:
                 self._place_ne_m = self._in_map(float(forward_m), float(right_m))
         return self._place_ne_m
 
-    def likeliest_place(self, radius_m: float) -> Place:
+    def likeliest_place(self, radius_m: float) -> LikelyPlace:
         """Where the anomaly is if it is the most probable target: the place with the largest share of the
         belief within a radius. It is found by mean shift from each mode (Fukunaga and Hostetler 1975), so
         mirror modes are not averaged to a place where the target is not.
@@ -240,7 +240,7 @@ class Anomaly:
         best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
         hypothesis = self._hypotheses[best]
         if not isinstance(hypothesis, ParticleHypothesis):
-            return Place(north_m=self._loudest.north_m, east_m=self._loudest.east_m, share=0.0)
+            return LikelyPlace(north_m=self._loudest.north_m, east_m=self._loudest.east_m, share=0.0)
         sources, weights = hypothesis.sources(), hypothesis.weights
         found = []
         for mode in find_modes(sources, weights):
@@ -256,7 +256,7 @@ class Anomaly:
             found.append((share, *centre.tolist()))
         share, forward_m, right_m = max(found, default=(0.0, 0.0, 0.0))
         north_m, east_m = self._in_map(forward_m, right_m)
-        return Place(north_m=north_m, east_m=east_m, share=share)
+        return LikelyPlace(north_m=north_m, east_m=east_m, share=share)
 
     def modes(self) -> list[Mode]:
         """The modes under the most probable target: north and east from the map's home, axis from north."""

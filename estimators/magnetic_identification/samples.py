@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-__all__ = ["Place", "Sample", "TracePoint"]
+__all__ = ["LikelyPlace", "Sample", "TracePoint"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class TracePoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class LikelyPlace:
     """A place from the map's home.
 
     Attributes:

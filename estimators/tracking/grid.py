@@ -14,7 +14,7 @@ from estimators.tracking.cell_count import MAX_CELLS, cells_over
 
 Array = NDArray[np.float64]
 
-Cell = tuple[int, int]
+GridCell = tuple[int, int]
 """(row, column): row 0 is the southernmost, column 0 the westernmost."""
 
 
@@ -72,13 +72,13 @@ class GridLayout:
         """Whether a place is on the map."""
         return self.south_m <= north_m < self.north_m and self.west_m <= east_m < self.east_m
 
-    def cell_at(self, north_m: float, east_m: float) -> Cell:
+    def cell_at(self, north_m: float, east_m: float) -> GridCell:
         """The cell that contains a place; for places off the map the nearest cell."""
         row = math.floor((north_m - self.south_m) / self.cell_m)
         column = math.floor((east_m - self.west_m) / self.cell_m)
         return min(max(row, 0), self.rows - 1), min(max(column, 0), self.columns - 1)
 
-    def centre_of(self, cell: Cell) -> tuple[float, float]:
+    def centre_of(self, cell: GridCell) -> tuple[float, float]:
         """North and east of a cell's centre."""
         return self.south_m + (cell[0] + 0.5) * self.cell_m, self.west_m + (cell[1] + 0.5) * self.cell_m
 

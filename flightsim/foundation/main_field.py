@@ -16,7 +16,7 @@ _REACH_M: Final = 20_000.0
 _REACH_UP_M: Final = 500.0
 
 
-class Place(Protocol):
+class GeodeticPlace(Protocol):
     """A point of the Earth: degrees, degrees, metres above mean sea level."""
 
     @property
@@ -41,7 +41,7 @@ class MainField:
     """
 
     def __init__(
-        self, home: Place, decimal_year: float = 2026.0, *, model: FieldModel = FieldModel.WMM
+        self, home: GeodeticPlace, decimal_year: float = 2026.0, *, model: FieldModel = FieldModel.WMM
     ) -> None:
         """Evaluate the model.
 

@@ -13,12 +13,12 @@ from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate
 from flightsim.foundation.records import record_array, the_record
 from flightsim.foundation.rotations import multiply, quaternion_from_euler, rotate
-from flightsim.foundation.vectors import Quaternion, conjugate, product
+from flightsim.foundation.vectors import Quaternion, Vector, conjugate, product
 from flightsim.foundation.vectors import rotate as rotate_vector
 from flightsim.home import Home
 from flightsim.payload import camera_kernel as k
 from flightsim.payload.camera_model import PinholeModel
-from flightsim.payload.camera_view import CameraView, TargetView, Vector
+from flightsim.payload.camera_view import CameraView, TargetView
 from flightsim.payload.detection import (
     CameraFrame,
     Detection,

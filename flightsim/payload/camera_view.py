@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
+from flightsim.foundation.vectors import Vector
 from flightsim.payload.target_shape import TargetShape
-
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.foundation.checks import NotNegative, Positive, Rate, Share
-from flightsim.foundation.vectors import conjugate, from_euler, product, rotate
+from flightsim.foundation.vectors import ImagePoint, conjugate, from_euler, product, rotate
 from flightsim.home import Home
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_view import CameraView
@@ -27,13 +27,12 @@ from flightsim.payload.targets import GroundTargets
 from flightsim.sensors.suite import steps_per_sample
 
 Array = NDArray[np.float64]
-Point = tuple[float, float]
 
 
 class PointReader(Protocol):
     """Finds what moves in the pictures of one camera."""
 
-    def read(self, view: CameraView) -> tuple[Point, ...] | None:
+    def read(self, view: CameraView) -> tuple[ImagePoint, ...] | None:
         """The moving points in the picture of a view, from left to right; None: it was not searched."""
 
 
@@ -109,7 +108,7 @@ class MovingPointScan:
 
     time_us: int
     number: int
-    points: tuple[Point, ...]
+    points: tuple[ImagePoint, ...]
 
 
 class MovingPointCamera(Device[MovingPointScan]):
@@ -190,7 +189,7 @@ class MovingPointCamera(Device[MovingPointScan]):
             return self._waiting.popleft()
         return None
 
-    def _points(self, time_us: int) -> tuple[Point, ...] | None:
+    def _points(self, time_us: int) -> tuple[ImagePoint, ...] | None:
         if self._camera is not None and self.reader is not None:
             return self.reader.read(self._camera.view(time_us))
         p, targets, gimbal = self.parameters, self._targets, self._gimbal
@@ -204,7 +203,7 @@ class MovingPointCamera(Device[MovingPointScan]):
             mount = (a, b, c, d)
         q_mount_from_ned = conjugate(product((w, x, y, z), mount))
         speeds = np.hypot(targets.velocities_ned_m_s[:, 0], targets.velocities_ned_m_s[:, 1]).tolist()
-        found: list[Point] = []
+        found: list[ImagePoint] = []
         for rng, place, speed_m_s in zip(
             self._generators, targets.positions_ned_m.tolist(), speeds, strict=True
         ):

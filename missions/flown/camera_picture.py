@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final
 
+from flightsim.foundation.vectors import ImagePoint
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CameraPicture", "PicturesOf", "clip", "png"]
 
-Point = tuple[float, float]
 
 _JPEG_QUALITY: Final = 80  # noise does not compress: a picture of 640 x 480 pixels has some 100 kB
 
@@ -32,11 +33,15 @@ class CameraPicture:
     time_us: int
     jpeg: bytes
     camera: "CameraGeometry"
-    points: tuple[Point, ...]
+    points: tuple[ImagePoint, ...]
 
     @classmethod
     def of(
-        cls, time_us: int, pixels: "NDArray[np.uint8]", camera: "CameraGeometry", points: tuple[Point, ...]
+        cls,
+        time_us: int,
+        pixels: "NDArray[np.uint8]",
+        camera: "CameraGeometry",
+        points: tuple[ImagePoint, ...],
     ) -> "CameraPicture":
         """Of pixels (height, width, 3), BGR."""
         import cv2
@@ -44,7 +49,7 @@ class CameraPicture:
         _, data = cv2.imencode(".jpg", pixels, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))
         return cls(time_us=time_us, jpeg=bytes(data), camera=camera, points=points)
 
-    def drawn(self, tracks: Sequence[tuple[Point, str, bool]]) -> "NDArray[np.uint8]":
+    def drawn(self, tracks: Sequence[tuple[ImagePoint, str, bool]]) -> "NDArray[np.uint8]":
         """The picture (height, width, 3), BGR, with a circle around each point, and a cross with a text at
         each track.
 
@@ -56,7 +61,7 @@ class CameraPicture:
 
         picture: Any = cv2.imdecode(np.frombuffer(self.jpeg, np.uint8), cv2.IMREAD_COLOR)
 
-        def place(point: Point) -> tuple[int, int]:
+        def place(point: ImagePoint) -> tuple[int, int]:
             x, y = self.camera.pixels(np.array([[*point, 1.0]]))[0] - 0.5
             return round(float(x)), round(float(y))
 

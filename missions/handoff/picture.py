@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from estimators.received import broken_at_gaps
 from estimators.reports.figure import INK, blank_figure, save_figure, tidy
+from flightsim.foundation.vectors import ImagePoint
 from missions.base.report import Debriefing
 from missions.flown.camera_picture import CameraPicture, PicturesOf, clip, png
 from missions.handoff.figures import HandoffTruth, handoff_truth, marks_of
 from missions.handoff.team import HandoffTeam
 from missions.handoff.watch import Moment
-
-Point = tuple[float, float]
 
 _CLIP_HZ: Final = 10  # four times as fast as the flight
 _AFTER_US: Final = 20_000_000
@@ -78,7 +77,7 @@ def camera_pictures(
     for index, (system_id, seen) in enumerate(zip(system_ids, team.watch.seen, strict=True)):
 
         def drawn(
-            picture: CameraPicture, index: int = index, seen: dict[int, dict[int, Point]] = seen
+            picture: CameraPicture, index: int = index, seen: dict[int, dict[int, ImagePoint]] = seen
         ) -> NDArray[np.uint8]:
             moment = moments[max(0, bisect_right(times_us, picture.time_us) - 1)]
             estimate = moment.tracker if index else moment.estimate

@@ -15,11 +15,11 @@ from autopilot_bridge.mavlink.handoff_messages import TrackDesignation, designat
 from estimators.handoff import HandoffEstimate, HandoffEstimator, HandoffSettings
 from estimators.relative_pose import PoseMode
 from estimators.runner import Runner
+from flightsim.foundation.vectors import ImagePoint
 from missions.vehicle.vehicle import Vehicle
 
 __all__ = ["HandoffWatch", "Moment", "RadioLink"]
 
-Point = tuple[float, float]
 
 _ONBOARD: Final = 191
 _EVERY_US: Final = 500_000
@@ -110,7 +110,7 @@ class HandoffWatch:
         self.link = link
         self.contact = False
         self.moments: list[Moment] = []
-        self.seen: tuple[dict[int, dict[int, Point]], ...] = tuple({} for _ in vehicles)
+        self.seen: tuple[dict[int, dict[int, ImagePoint]], ...] = tuple({} for _ in vehicles)
         self._encoders = [FrameEncoder(vehicle.system_id, _ONBOARD) for vehicle in vehicles]
         self._parsers = [FrameParser() for _ in vehicles]
         self._stops: list[Callable[[], None]] = []

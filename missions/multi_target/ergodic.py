@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from missions.search.area import Area, Place
+from flightsim.foundation.vectors import NorthEast
+from missions.search.area import Area
 
 __all__ = ["ErgodicPlanner"]
 
@@ -55,8 +56,8 @@ class ErgodicPlanner:
         self._total = 0.0
 
     def next_place(
-        self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
-    ) -> Place:
+        self, belief: SearchBelief, here: NorthEast, direction_rad: float | None, others: Sequence[Viewpoint]
+    ) -> NorthEast:
         for place in (here, *((view.north_m, view.east_m) for view in others)):
             self._flown += self._waves(*place)
             self._total += 1.0

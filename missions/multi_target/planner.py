@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
+from flightsim.foundation.vectors import NorthEast
 from missions.multi_target.objective import Outlook, SearchObjective
-from missions.search.area import Area, Place
+from missions.search.area import Area
 from missions.search.planner_parameters import PlannerParameters
 
 __all__ = ["ExploringPlanner", "SearchPlanner"]
@@ -29,8 +30,8 @@ class SearchPlanner(Protocol):
     """Chooses the next place of one vehicle."""
 
     def next_place(
-        self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
-    ) -> Place:
+        self, belief: SearchBelief, here: NorthEast, direction_rad: float | None, others: Sequence[Viewpoint]
+    ) -> NorthEast:
         """The place of the next scan.
 
         Args:
@@ -47,8 +48,8 @@ class _Branch:
     """A sequence of steps."""
 
     value: float
-    first: Place
-    here: Place
+    first: NorthEast
+    here: NorthEast
     direction_rad: float
     outlook: Outlook
 
@@ -73,8 +74,8 @@ class ExploringPlanner:
         self._rng = np.random.default_rng(np.random.SeedSequence(seed))
 
     def next_place(
-        self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
-    ) -> Place:
+        self, belief: SearchBelief, here: NorthEast, direction_rad: float | None, others: Sequence[Viewpoint]
+    ) -> NorthEast:
         p = self._parameters
         objective = SearchObjective(
             belief.sensor,
@@ -116,7 +117,7 @@ class ExploringPlanner:
         return Viewpoint(north_m=branch.here[0], east_m=branch.here[1], heading_rad=heading_rad)
 
     def _grown(
-        self, objective: SearchObjective, outlook: Outlook, here: Place, direction_rad: float | None
+        self, objective: SearchObjective, outlook: Outlook, here: NorthEast, direction_rad: float | None
     ) -> list[_Branch]:
         """One step to each neighbour."""
         p = self._parameters
@@ -142,6 +143,6 @@ class ExploringPlanner:
         ]
 
 
-def _turn(direction_rad: float, here: Place, there: Place) -> float:
+def _turn(direction_rad: float, here: NorthEast, there: NorthEast) -> float:
     bearing = math.atan2(there[1] - here[1], there[0] - here[0])
     return abs(math.remainder(bearing - direction_rad, math.tau))

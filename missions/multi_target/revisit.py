@@ -6,8 +6,8 @@ from typing import Final
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
+from flightsim.foundation.vectors import NorthEast
 from missions.patterns.polyline import Polyline
-from missions.search.area import Place
 from missions.search.sweep import SweepPlanner
 
 __all__ = ["RevisitPlanner"]
@@ -30,11 +30,11 @@ class RevisitPlanner:
     def __init__(self, path: Polyline, step_m: float) -> None:
         self._sweep = SweepPlanner(path, step_m)
         self._step_m = step_m
-        self._looked: list[Place] = []
+        self._looked: list[NorthEast] = []
 
     def next_place(
-        self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
-    ) -> Place:
+        self, belief: SearchBelief, here: NorthEast, direction_rad: float | None, others: Sequence[Viewpoint]
+    ) -> NorthEast:
         detected = [(cluster.north_m, cluster.east_m) for cluster in belief.candidates]
         near = [place for place in detected if math.dist(here, place) <= _NEAR * self._step_m]
         near = [place for place in near if self._visits(place) < _TRIES]
@@ -48,6 +48,6 @@ class RevisitPlanner:
         share = self._step_m / away_m
         return here[0] + share * (target[0] - here[0]), here[1] + share * (target[1] - here[1])
 
-    def _visits(self, place: Place) -> int:
+    def _visits(self, place: NorthEast) -> int:
         """Number of scans that were taken at a place."""
         return sum(math.dist(place, looked) <= 0.5 * self._step_m for looked in self._looked)

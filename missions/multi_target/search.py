@@ -12,11 +12,11 @@ from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.information import condensed
 from estimators.tracking.range_bearing import Viewpoint
+from flightsim.foundation.vectors import NorthEast
 from missions.multi_target.ergodic import ErgodicPlanner
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.planner import ExploringPlanner, SearchPlanner
 from missions.multi_target.revisit import RevisitPlanner
-from missions.search.area import Place
 from missions.search.sweep import SweepPlanner, sweep_path
 from missions.search.team import HEADING_RAD
 
@@ -42,8 +42,8 @@ class Step:
 
     time_us: int
     vehicle: int
-    here: Place
-    there: Place
+    here: NorthEast
+    there: NorthEast
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,7 @@ class TargetSearch:
         self.reason = ""
         self._options = tuple(options)
         self._planners = tuple(planners or (planner_of(own) for own in options))
-        self._goals: list[Place | None] = [None] * len(options)
+        self._goals: list[NorthEast | None] = [None] * len(options)
         self._taken = [0] * len(options)
         self._directions: list[float | None] = [None] * len(options)
         self._scans_at_step = [0] * len(options)
@@ -132,7 +132,7 @@ class TargetSearch:
         """Share of the steps that were taken, 0..1."""
         return min(1.0, max(self._taken, default=0) / self._options[0].steps)
 
-    def begin(self, index: int, time_us: int) -> Place:
+    def begin(self, index: int, time_us: int) -> NorthEast:
         """A vehicle begins; returns the place of its first scan."""
         if self.began_us < 0:
             self.began_us = time_us
@@ -167,7 +167,7 @@ class TargetSearch:
         """
         return self.belief.scans > self._scans_at_step[index]
 
-    def step(self, index: int, time_us: int, here: Place) -> Place:
+    def step(self, index: int, time_us: int, here: NorthEast) -> NorthEast:
         """A vehicle has reached its goal; returns its next one."""
         self._taken[index] += 1
         if self._taken[index] > self._options[index].steps:

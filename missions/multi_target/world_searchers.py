@@ -16,6 +16,7 @@ from estimators.tracking.range_bearing import Viewpoint
 from flightsim import truth as t
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.foundation.rotations import quaternion_from_euler
+from flightsim.foundation.vectors import NorthEast
 from flightsim.payload import GroundTargets, TerrainSpec
 from flightsim.payload.target_sensor import TargetSensor
 from flightsim.world_spec import WorldSpec
@@ -23,7 +24,6 @@ from missions.multi_target.figures import SearchScore, scored
 from missions.multi_target.options import MultiTargetOptions
 from missions.multi_target.planner import SearchPlanner
 from missions.multi_target.search import planner_of
-from missions.search.area import Place
 from missions.search.team import HEADING_RAD
 
 __all__ = ["PointSearch", "search_with_point"]
@@ -44,7 +44,7 @@ class PointSearch:
 
     belief: SearchBelief
     score: SearchScore
-    places: tuple[Place, ...]
+    places: tuple[NorthEast, ...]
 
 
 def search_with_point(

@@ -5,7 +5,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from estimators.occupancy.occupancy_map import OccupancyMap
-from estimators.tracking.grid import Cell
+from estimators.tracking.grid import GridCell
 from missions.errors import PlanError
 from missions.occupancy.parameters import DecisionParameters
 
@@ -20,7 +20,7 @@ class Decision:
         utility: J of equation 9, in mean prior scores.
     """
 
-    cell: Cell
+    cell: GridCell
     heading_rad: float
     utility: float
 
@@ -32,7 +32,7 @@ def decide(
     east_m: float,
     heading_rad: float,
     parameters: DecisionParameters,
-    taken: Collection[Cell] = (),
+    taken: Collection[GridCell] = (),
 ) -> Decision:
     """The neighbouring cell of greatest utility J = B_i - alpha |psi - psi_i| (heading difference wrapped).
 

@@ -5,7 +5,7 @@ from typing import Final
 from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.classifier import shipped_classifier, trace_features
 from estimators.magnetic_identification.identifier import Identifier, Progress
-from estimators.magnetic_identification.samples import Place, Sample
+from estimators.magnetic_identification.samples import LikelyPlace, Sample
 from estimators.occupancy import detection
 from estimators.occupancy.detection import MapError
 from estimators.occupancy.placed_readings import PlacedReading
@@ -164,7 +164,7 @@ class Investigation:
         elif suspect.probability >= _REOPEN:
             suspect.verdict = Verdict.OPEN
 
-    def _placed(self, place: Place) -> bool:
+    def _placed(self, place: LikelyPlace) -> bool:
         """Whether a place is known well enough. The target is in the searched area: a place outside may be
         that of its mirror image.
         """

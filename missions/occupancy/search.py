@@ -14,7 +14,7 @@ from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.occupancy_map import OccupancyMap
 from estimators.occupancy.placed_readings import PlacedReading
-from estimators.tracking.grid import Cell, GridLayout
+from estimators.tracking.grid import GridCell, GridLayout
 from missions.occupancy.candidate import Candidate
 from missions.occupancy.decision import Decision, decide
 from missions.occupancy.investigation import Investigation
@@ -73,7 +73,7 @@ class Search:
         self.found_us = -1
         self.detection_curve: list[tuple[int, float]] = []
         self._decisions = tuple(decisions)
-        self._targets: list[Cell | None] = [None] * len(self._decisions)
+        self._targets: list[GridCell | None] = [None] * len(self._decisions)
         self._places: list[tuple[float, float]] = [(math.nan, math.nan)] * len(self._decisions)
         self._searched: list[tuple[float, float] | None] = [None] * len(self._decisions)
         self._snapshots = Snapshots(snapshot_interval_s)

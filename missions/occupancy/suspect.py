@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Final
 
 from estimators.magnetic_identification.anomaly import Anomaly
-from estimators.magnetic_identification.samples import Place
+from estimators.magnetic_identification.samples import LikelyPlace
 from estimators.occupancy import detection
 
 __all__ = ["ACCEPT", "Suspect", "Verdict"]
@@ -36,7 +36,7 @@ class Suspect:
     """
 
     identified: Anomaly
-    likeliest: Place
+    likeliest: LikelyPlace
     verdict: Verdict = Verdict.OPEN
     probability: float = 0.5
     anomalies: list[tuple[int, detection.Anomaly]] = field(default_factory=list)

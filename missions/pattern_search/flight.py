@@ -12,6 +12,7 @@ from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.vectors import Vector
 from missions.base.options import FlightOptions, Via
 from missions.errors import PlanError, VehicleTimeout
 from missions.pattern_search.tag_watch import TagWatch
@@ -32,7 +33,7 @@ from missions.planning.waypoints import leg_speeds, waypoints_along
 from missions.vehicle.guided import GuidedSession
 from missions.vehicle.limits import FixedWingLimits, Limits, MulticopterLimits
 from missions.vehicle.notes import PATTERN, CommandedPath, CutShort
-from missions.vehicle.setpoint import Setpoint, Vector
+from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.telemetry import Attitude
 from missions.vehicle.vehicle import Vehicle
 

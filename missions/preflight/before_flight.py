@@ -6,9 +6,10 @@ from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from autopilot_bridge.fence_shapes import FenceShape, Point, fence_shapes, outside_shapes
+from autopilot_bridge.fence_shapes import FenceShape, fence_shapes, outside_shapes
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.vectors import NorthEast
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.planning.outline import Outline
@@ -45,7 +46,9 @@ _PARAMETERS_AT_ONCE: Final = 4
 _STEP_M: Final = 5.0
 
 
-def first_outside(shapes: tuple[FenceShape, ...], way: Iterable[Point], *, join: bool) -> Point | None:
+def first_outside(
+    shapes: tuple[FenceShape, ...], way: Iterable[NorthEast], *, join: bool
+) -> NorthEast | None:
     """The first point of a path (straight between its points) that a fence forbids; None: the whole path is
     inside.
 
@@ -54,7 +57,7 @@ def first_outside(shapes: tuple[FenceShape, ...], way: Iterable[Point], *, join:
         way: points of the path, north and east of home, m.
         join: whether being inside one of several inclusion shapes is enough.
     """
-    last: Point | None = None
+    last: NorthEast | None = None
     for point in way:
         start = point if last is None else last
         steps = 1 if last is None else max(1, math.ceil(math.dist(start, point) / _STEP_M))

@@ -5,11 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from flightsim.foundation.options import Shown
+from flightsim.foundation.vectors import NorthEast
 from missions.errors import PlanError
-
-Place = tuple[float, float]
-"""North and east of the origin, metres."""
-
 
 EDGES: Final = Shown(
     fields=("south_m", "west_m", "north_m", "east_m"),
@@ -70,7 +67,7 @@ class Area:
         """Whether a place is inside, edges included."""
         return self.south_m <= north_m <= self.north_m and self.west_m <= east_m <= self.east_m
 
-    def nearest(self, north_m: float, east_m: float) -> Place:
+    def nearest(self, north_m: float, east_m: float) -> NorthEast:
         """The place inside that is nearest to a place."""
         return (min(max(north_m, self.south_m), self.north_m), min(max(east_m, self.west_m), self.east_m))
 
@@ -85,7 +82,7 @@ class Area:
         return replace(self, west_m=west_m, east_m=west_m + side_m)
 
     @property
-    def centre_ne_m(self) -> Place:
+    def centre_ne_m(self) -> NorthEast:
         return 0.5 * (self.south_m + self.north_m), 0.5 * (self.west_m + self.east_m)
 
     @property

@@ -9,9 +9,10 @@ import math
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from flightsim.foundation.vectors import Vector
 from missions.errors import PlanError
 from missions.vehicle.limits import MulticopterLimits
-from missions.vehicle.setpoint import Setpoint, Vector
+from missions.vehicle.setpoint import Setpoint
 
 __all__ = ["BacksteppingGains", "BacksteppingLaw", "StepLaw", "TrajectoryLaw"]
 

@@ -8,15 +8,16 @@ import numpy as np
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
+from flightsim.foundation.vectors import NorthEast
 from missions.patterns.iamsar import parallel_sweep
 from missions.patterns.polyline import Polyline
-from missions.search.area import Area, Place
+from missions.search.area import Area
 
 _LEAST_LEGS: Final = 2
 _MOST_LEGS: Final = 200
 
 
-def sweep_path(area: Area, start: Place, length_m: float, spacing_m: float | None) -> Polyline:
+def sweep_path(area: Area, start: NorthEast, length_m: float, spacing_m: float | None) -> Polyline:
     """A parallel sweep of the area that begins at the corner nearest to a place.
 
     Args:
@@ -24,7 +25,7 @@ def sweep_path(area: Area, start: Place, length_m: float, spacing_m: float | Non
         spacing_m: track spacing; None: the smallest with which one pass is not longer than the flight.
     """
 
-    def made(spacing: float) -> list[Place]:
+    def made(spacing: float) -> list[NorthEast]:
         north_m, east_m = area.centre_ne_m
         path = parallel_sweep(width_m=area.width_m, height_m=area.height_m, spacing_m=spacing)
         forth = [(north_m + n, east_m + e) for n, e in path.vertices_m]
@@ -65,11 +66,11 @@ class SweepPlanner:
         self._next = 0
 
     def next_place(
-        self, belief: SearchBelief, here: Place, direction_rad: float | None, others: Sequence[Viewpoint]
-    ) -> Place:
+        self, belief: SearchBelief, here: NorthEast, direction_rad: float | None, others: Sequence[Viewpoint]
+    ) -> NorthEast:
         return self.along(here)
 
-    def along(self, here: Place) -> Place:
+    def along(self, here: NorthEast) -> NorthEast:
         """The next place from a place."""
         target = self._places[self._next % len(self._places)]
         away_m = math.dist(here, target)

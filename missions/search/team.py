@@ -13,17 +13,16 @@ from typing import Final, Generic, Protocol, TypeVar
 
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import LocalFrame
-from flightsim.foundation.vectors import wrap_pi
+from flightsim.foundation.vectors import NorthEast, Vector, wrap_pi
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.search.area import Place
 from missions.search.options import StepLawKind
 from missions.search.steps import BacksteppingLaw, StepLaw, TrajectoryLaw
 from missions.teams.layers import Layers
 from missions.teams.steering import steering
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.limits import Limits, MulticopterLimits
-from missions.vehicle.setpoint import Setpoint, Vector
+from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.telemetry import Position
 from missions.vehicle.vehicle import Vehicle
 
@@ -56,7 +55,7 @@ class Searcher:
     track: list[tuple[int, float, float]] = field(default_factory=list)
     began_us: int = -1
     ended_us: int = -1
-    goal: Place = (0.0, 0.0)
+    goal: NorthEast = (0.0, 0.0)
     goal_us: int = 0
     late_steps: int = 0
 
@@ -114,7 +113,7 @@ class StepSearch(Protocol):
         """Share of the search that is done, 0..1."""
         ...
 
-    def begin(self, index: int, time_us: int) -> Place:
+    def begin(self, index: int, time_us: int) -> NorthEast:
         """A vehicle begins; returns its first place."""
         ...
 
@@ -122,7 +121,7 @@ class StepSearch(Protocol):
         """Whether enough is known for the vehicle's next decision."""
         ...
 
-    def step(self, index: int, time_us: int, here: Place) -> Place:
+    def step(self, index: int, time_us: int, here: NorthEast) -> NorthEast:
         """A vehicle has reached its goal; returns its next one."""
         ...
 
@@ -240,7 +239,7 @@ class SearchTeam(Generic[Options]):
         searcher.began_us = searcher.goal_us = now_us
         searcher.goal = self.search.begin(index, vehicle.clock.stamp_us)
 
-    def _advance(self, index: int, here: Place) -> bool:
+    def _advance(self, index: int, here: NorthEast) -> bool:
         """Process a position: decide when the goal is reached. Returns whether the goal has changed."""
         search, searcher, own = self.search, self.searchers[index], self._options[index]
         vehicle = self._vehicles[index]
@@ -286,7 +285,7 @@ class SearchTeam(Generic[Options]):
         own_frame = LocalFrame(home)
         down_m = -own.own_altitude_m
 
-        def from_home(place: Place) -> Vector:
+        def from_home(place: NorthEast) -> Vector:
             return place[0] - north_m, place[1] - east_m, down_m
 
         def measured() -> tuple[Vector, Vector]:

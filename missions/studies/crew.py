@@ -13,7 +13,7 @@ from typing import Final
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.errors import MissionError
 from missions.studies.job import Job
-from missions.studies.rows import Outcome, TrialResult
+from missions.studies.rows import TrialOutcome, TrialResult
 
 __all__ = ["Broken", "Crew", "Died", "Event", "Ready", "Worker", "supervise"]
 
@@ -239,7 +239,7 @@ def _lost(state: _Progress, batch: Iterable[int], reason: str) -> Iterator[Trial
         state.alone.append(index)
         return
     error = f"its worker process was killed ({reason}) in each of {attempts} attempts"
-    yield TrialResult(index=index, outcome=Outcome.LOST, error=error, attempts=attempts)
+    yield TrialResult(index=index, outcome=TrialOutcome.LOST, error=error, attempts=attempts)
 
 
 def _overdue(crew: Crew, state: _Progress) -> Iterator[TrialResult]:
@@ -264,7 +264,7 @@ def timed_out(index: int, limit_s: float, attempts: int = 1) -> TrialResult:
     """The result of a trial that was terminated at the time limit."""
     return TrialResult(
         index=index,
-        outcome=Outcome.TIMED_OUT,
+        outcome=TrialOutcome.TIMED_OUT,
         error=f"it did not end within the time limit of {limit_s:g} s",
         wall_time_s=limit_s,
         attempts=attempts,

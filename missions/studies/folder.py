@@ -20,7 +20,7 @@ from pyarrow import fs
 
 from missions.errors import MissionError, PlanError
 from missions.flown.run_folder import create_run_folder, finite
-from missions.studies.rows import FIGURES, TIMING, Outcome, TrialResult
+from missions.studies.rows import FIGURES, TIMING, TrialOutcome, TrialResult
 from missions.studies.study import Trials
 
 __all__ = ["RowWriter", "StudyFolder", "columns_of"]
@@ -359,7 +359,7 @@ def _flat(table: pa.Table) -> pa.Table:
 
 def lost_outcomes() -> tuple[str, ...]:
     """Outcomes of trials without a row."""
-    return tuple(outcome.value for outcome in Outcome if outcome is not Outcome.DONE)
+    return tuple(outcome.value for outcome in TrialOutcome if outcome is not TrialOutcome.DONE)
 
 
 def _is_uri(place: Path | str) -> bool:

@@ -15,7 +15,7 @@ from missions.studies.calibration import calibration_of, rounded, verdicts_of
 from missions.studies.design import listed
 from missions.studies.handoff_paired import PairedTrial
 from missions.studies.handoff_surface import draw_surface
-from missions.studies.handoff_trial import Cell, Comparison, Handoff, HandoffTrial
+from missions.studies.handoff_trial import Comparison, Handoff, HandoffCell, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting
 from missions.studies.handoff_worlds import HANDOFF_WORLDS
 from missions.studies.options import Comparisons, HandoffStudyOptions, Operator, Points
@@ -46,7 +46,7 @@ _BINS: Final = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.995, 0.999, 1.0)
 _COLOURS: Final = ("#c2410c", "#1769aa", "#15803d")
 
 
-def study(options: HandoffStudyOptions | None = None) -> Study[Cell, Handoff]:
+def study(options: HandoffStudyOptions | None = None) -> Study[HandoffCell, Handoff]:
     """The study.
 
     Args:
@@ -57,7 +57,7 @@ def study(options: HandoffStudyOptions | None = None) -> Study[Cell, Handoff]:
     rate_hz = o.rate_hz or (PIXELS_HZ if pixels else HandoffSetting().rate_hz)
     kinds = tuple(Comparison) if o.comparison is Comparisons.ALL else (Comparison(o.comparison.value),)
     cells = [
-        Cell(
+        HandoffCell(
             operator=operator.value,
             world=world,
             comparison=kind.value,
@@ -80,7 +80,7 @@ def study(options: HandoffStudyOptions | None = None) -> Study[Cell, Handoff]:
             "(Tolman et al. 2021)."
         ),
         trial=PairedTrial(trial=trial, cells=tuple(cells)) if o.trade_off else trial,
-        parameters=Cell,
+        parameters=HandoffCell,
         row=Handoff,
         design=listed([asdict(cell) for cell in cells]),
         runs=500,

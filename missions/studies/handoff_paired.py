@@ -12,9 +12,9 @@ from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.handoff.process import WindowParameters
 from estimators.relative_pose import PoseMode
 from missions.studies.handoff_trial import (
-    Cell,
     Early,
     Handoff,
+    HandoffCell,
     HandoffTrial,
     TrialFlight,
     comparison_of,
@@ -35,7 +35,7 @@ class _Observers(TrackComparison):
         undecided: comparisons that have not decided, by cell.
     """
 
-    def __init__(self, cells: Sequence[Cell]) -> None:
+    def __init__(self, cells: Sequence[HandoffCell]) -> None:
         super().__init__()
         self.flight: TrialFlight | None = None
         self.undecided = {cell: comparison_of(cell) for cell in cells}
@@ -70,21 +70,21 @@ class PairedTrial:
     """
 
     trial: HandoffTrial
-    cells: tuple[Cell, ...]
+    cells: tuple[HandoffCell, ...]
 
-    def __call__(self, cell: Cell, seed: int) -> Handoff:
+    def __call__(self, cell: HandoffCell, seed: int) -> Handoff:
         shared = (cell.operator, cell.world)
         cells = tuple(other for other in self.cells if (other.operator, other.world) == shared)
         return _flown(self.trial, cells, seed)[cell]
 
 
 @lru_cache(maxsize=1)  # the trials of a run follow one another
-def _flown(trial: HandoffTrial, cells: tuple[Cell, ...], seed: int) -> dict[Cell, Handoff]:
+def _flown(trial: HandoffTrial, cells: tuple[HandoffCell, ...], seed: int) -> dict[HandoffCell, Handoff]:
     """The outcomes of all cells on one flight."""
     observers = _Observers(cells)
     flight = trial.flight(max(cells, key=lambda cell: cell.window), seed, observers)
     observers.flight = flight
-    early: dict[Cell, Early | None] = dict.fromkeys(cells)
+    early: dict[HandoffCell, Early | None] = dict.fromkeys(cells)
     rows = {}
     while flight.world.time_us < 1e6 * trial.timeout_s and observers.undecided:
         flight.step()

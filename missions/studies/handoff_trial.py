@@ -51,7 +51,7 @@ class Comparison(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class HandoffCell:
     """Parameters of a trial.
 
     Attributes:
@@ -220,7 +220,7 @@ class HandoffTrial:
     timeout_s: float = TIMEOUT_S
     pixels: bool = False
 
-    def __call__(self, cell: Cell, seed: int) -> Handoff:
+    def __call__(self, cell: HandoffCell, seed: int) -> Handoff:
         comparison = comparison_of(cell)
         flight = self.flight(cell, seed, comparison)
         early: Early | None = None
@@ -230,7 +230,7 @@ class HandoffTrial:
         return outcome_of(flight, comparison, early)
 
     def flight(
-        self, cell: Cell, seed: int, comparison: TrackComparison, world: HandoffWorld | None = None
+        self, cell: HandoffCell, seed: int, comparison: TrackComparison, world: HandoffWorld | None = None
     ) -> TrialFlight:
         """The flight at its start, with the windows of a cell; `world` None: that of the cell."""
         windows = WindowParameters(samples=cell.window, every_s=max(_EVERY_S, 1.0 / self.setting.rate_hz))
@@ -241,7 +241,7 @@ class HandoffTrial:
             world or self._world(cell, seed), tracks[0], process, Operator(cell.operator), seed
         )
 
-    def _world(self, cell: Cell, seed: int) -> HandoffWorld:
+    def _world(self, cell: HandoffCell, seed: int) -> HandoffWorld:
         true = HANDOFF_WORLDS[cell.world].setting.over(self.setting)
         if not self.pixels:
             return HandoffWorld(true, seed)
@@ -267,7 +267,7 @@ class HandoffTrial:
             )
         )
 
-    def _belief(self, cell: Cell, seed: int) -> RelativePoseBelief:
+    def _belief(self, cell: HandoffCell, seed: int) -> RelativePoseBelief:
         s = self.setting
         parameters = RelativePoseParameters(
             range_sigma_m=s.range_sigma_m,
@@ -283,7 +283,7 @@ class HandoffTrial:
         )
 
 
-def comparison_of(cell: Cell) -> TrackComparison:
+def comparison_of(cell: HandoffCell) -> TrackComparison:
     """What decides."""
     kind = Comparison(cell.comparison)
     if kind is Comparison.EVIDENCE:

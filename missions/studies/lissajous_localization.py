@@ -8,13 +8,19 @@ from missions.studies.design import listed
 from missions.studies.lissajous_figures import draw_paths, draw_target
 from missions.studies.lissajous_setting import CELLS, READINGS
 from missions.studies.lissajous_table import lines_of, summarise
-from missions.studies.lissajous_trial import Cell, Errors, LocalizationTrial, compile_study, sample_run
+from missions.studies.lissajous_trial import (
+    Errors,
+    LissajousCell,
+    LocalizationTrial,
+    compile_study,
+    sample_run,
+)
 from missions.studies.options import LocalizationStudyOptions
 from missions.studies.results import Results
 from missions.studies.study import Study
 
 
-def study(options: LocalizationStudyOptions | None = None) -> Study[Cell, Errors]:
+def study(options: LocalizationStudyOptions | None = None) -> Study[LissajousCell, Errors]:
     """The study.
 
     Args:
@@ -27,7 +33,7 @@ def study(options: LocalizationStudyOptions | None = None) -> Study[Cell, Errors
             "Two drones on Lissajous paths localise a target: Tables II to V of Steckenrider et al. 2020."
         ),
         trial=LocalizationTrial(equations=READINGS[equations]),
-        parameters=Cell,
+        parameters=LissajousCell,
         row=Errors,
         design=listed([{"epsilon": epsilon, "delta": delta} for epsilon, delta in CELLS]),
         runs=1000,

@@ -26,7 +26,15 @@ from missions.studies.results import Results
 from missions.studies.statistics import paired_difference, rate_of
 from missions.studies.study import Study
 
-__all__ = ["PAPER", "PATTERNS", "Cell", "SearchTrial", "Searched", "restricted_mean_s", "study"]
+__all__ = [
+    "PAPER",
+    "PATTERNS",
+    "LissajousSearchCell",
+    "SearchTrial",
+    "Searched",
+    "restricted_mean_s",
+    "study",
+]
 
 Array = NDArray[np.float64]
 
@@ -60,7 +68,7 @@ _BATTERY_AH: Final = 12.0  # for half an hour of flight: the battery of the pape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class LissajousSearchCell:
     """Parameters of a trial."""
 
     pattern: str
@@ -103,7 +111,7 @@ class SearchTrial:
     target_speed_m_s: float = 0.3
     limit_s: float = LIMIT_S
 
-    def __call__(self, cell: Cell, seed: int) -> Searched:
+    def __call__(self, cell: LissajousSearchCell, seed: int) -> Searched:
         """Fly the search. The same seed has the same walk of the target for all patterns."""
         mission, pattern = PATTERNS[cell.pattern]
         options = FlightOptions(
@@ -125,7 +133,7 @@ class SearchTrial:
         )
 
 
-def study(options: LissajousStudyOptions | None = None) -> Study[Cell, Searched]:
+def study(options: LissajousStudyOptions | None = None) -> Study[LissajousSearchCell, Searched]:
     """The study.
 
     Args:
@@ -136,7 +144,7 @@ def study(options: LissajousStudyOptions | None = None) -> Study[Cell, Searched]
         name="lissajous-search",
         description="Seven patterns search for a walking tag: Table I of Steckenrider et al. 2020.",
         trial=SearchTrial(speed_m_s=o.speed_m_s, target_speed_m_s=o.target_speed_m_s),
-        parameters=Cell,
+        parameters=LissajousSearchCell,
         row=Searched,
         design=grid(pattern=tuple(PATTERNS)),
         runs=100,

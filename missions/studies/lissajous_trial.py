@@ -31,7 +31,7 @@ _TARGET: Final = setting.target_places()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class LissajousCell:
     """Parameters of a trial: epsilon and delta of the paper's Table II."""
 
     epsilon: float
@@ -81,7 +81,7 @@ class LocalizationTrial:
 
     equations: tuple[Equations, ...]
 
-    def __call__(self, cell: Cell, seed: int) -> Errors:
+    def __call__(self, cell: LissajousCell, seed: int) -> Errors:
         """Errors of all estimators. Those that share a truth process the same flight."""
         study_seed, run = run_of(seed)
         index = CELLS.index((cell.epsilon, cell.delta))

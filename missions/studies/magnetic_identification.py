@@ -19,7 +19,7 @@ from missions.studies.design import grid
 from missions.studies.magnetic_figures import draw_curves, draw_passes
 from missions.studies.magnetic_passes import diagonal_pass, pass_traces
 from missions.studies.magnetic_training import fitted_tables, require_training, write_tables
-from missions.studies.magnetic_trial import CONDITIONS, PASSES, Cell, EncounterRow, trial
+from missions.studies.magnetic_trial import CONDITIONS, PASSES, EncounterRow, MagneticCell, trial
 from missions.studies.options import IdentificationStudyOptions
 from missions.studies.results import Results
 from missions.studies.study import Study
@@ -156,7 +156,7 @@ class Output:
             )
 
 
-def study(options: IdentificationStudyOptions | None = None) -> Study[Cell, EncounterRow]:
+def study(options: IdentificationStudyOptions | None = None) -> Study[MagneticCell, EncounterRow]:
     """The study.
 
     Args:
@@ -172,7 +172,7 @@ def study(options: IdentificationStudyOptions | None = None) -> Study[Cell, Enco
         name="magnetic-identification",
         description="Targets and false anomalies after one and two passes: Lum et al. 2005, figure 6.",
         trial=trial,
-        parameters=Cell,
+        parameters=MagneticCell,
         row=EncounterRow,
         design=grid(condition=tuple(CONDITIONS)),
         runs=200,

@@ -26,14 +26,14 @@ from missions.studies.results import Results
 from missions.studies.study import Study
 from missions.worlds.defaults import default_world
 
-__all__ = ["Cell", "SearchRow", "study"]
+__all__ = ["MagneticSearchCell", "SearchRow", "study"]
 
 VEHICLES: Final = 3
 FALSE_ANOMALIES: Final = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class MagneticSearchCell:
     """A cell of the design.
 
     Attributes:
@@ -64,7 +64,7 @@ class SearchRow:
     reason: str = ""
 
 
-def trial(cell: Cell, seed: int) -> SearchRow:
+def trial(cell: MagneticSearchCell, seed: int) -> SearchRow:
     """One search by points."""
     options = _options(cell)
     done = search_with_points(options, seed, false_count=FALSE_ANOMALIES)
@@ -78,7 +78,7 @@ def trial(cell: Cell, seed: int) -> SearchRow:
     )
 
 
-def flight(cell: Cell, seed: int) -> SearchRow:
+def flight(cell: MagneticSearchCell, seed: int) -> SearchRow:
     """One search by aircraft."""
     options = _options(cell)
     world = default_world(OccupancyMission.world_defaults, count=VEHICLES, seed=seed)
@@ -96,7 +96,7 @@ def flight(cell: Cell, seed: int) -> SearchRow:
     )
 
 
-def _options(cell: Cell) -> OccupancyOptions:
+def _options(cell: MagneticSearchCell) -> OccupancyOptions:
     return OccupancyOptions(vehicles=VEHICLES, identify=Identify(cell.identify))
 
 
@@ -169,7 +169,7 @@ def report(results: Results) -> list[str]:
     ]
 
 
-def study(options: MagneticStudyOptions | None = None) -> Study[Cell, SearchRow]:
+def study(options: MagneticStudyOptions | None = None) -> Study[MagneticSearchCell, SearchRow]:
     """The study.
 
     Args:
@@ -181,7 +181,7 @@ def study(options: MagneticStudyOptions | None = None) -> Study[Cell, SearchRow]
         name="magnetic-search",
         description="A team names a magnetic target among false anomalies: Lum et al. 2005, figure 8.",
         trial=flight if o.flights else trial,
-        parameters=Cell,
+        parameters=MagneticSearchCell,
         row=SearchRow,
         design=grid(identify=compared),
         runs=100,

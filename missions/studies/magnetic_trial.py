@@ -16,7 +16,7 @@ from estimators.magnetic_identification.parameters import IdentificationParamete
 from estimators.occupancy.survey_map import map_error_of
 from missions.embedded.magnetic_encounters import Encounter, EncounterConditions, encounters
 
-__all__ = ["CONDITIONS", "PASSES", "Cell", "EncounterRow", "anomalies_of", "trial"]
+__all__ = ["CONDITIONS", "PASSES", "EncounterRow", "MagneticCell", "anomalies_of", "trial"]
 
 CONDITIONS: Final[Mapping[str, EncounterConditions]] = MappingProxyType(
     {
@@ -39,7 +39,7 @@ _PARTICLES: Final = 3000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class MagneticCell:
     """A cell of the design.
 
     Attributes:
@@ -73,7 +73,7 @@ class EncounterRow:
     features: tuple[float, ...]
 
 
-def trial(cell: Cell, seed: int) -> EncounterRow:
+def trial(cell: MagneticCell, seed: int) -> EncounterRow:
     """One map, one target, one false anomaly."""
     conditions = CONDITIONS[cell.condition]
     figures = [

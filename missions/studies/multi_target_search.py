@@ -17,7 +17,7 @@ from estimators.multi_target.parameters import Belief
 from estimators.reports.figure import blank_figure, save_figure
 from missions.studies.calibration import rounded, verdicts_of
 from missions.studies.design import grid
-from missions.studies.multi_target_trial import EXPERIMENTS, Cell, Found, SearchTrial
+from missions.studies.multi_target_trial import EXPERIMENTS, Found, MultiTargetCell, SearchTrial
 from missions.studies.multi_target_worlds import WORLDS, SearchWorlds
 from missions.studies.options import Experiments, MultiTargetStudyOptions, Planners
 from missions.studies.results import Results
@@ -40,7 +40,7 @@ _COLOURS: Final[Mapping[str, str]] = {
 }
 
 
-def study(options: MultiTargetStudyOptions | None = None) -> Study[Cell, Found]:
+def study(options: MultiTargetStudyOptions | None = None) -> Study[MultiTargetCell, Found]:
     """The study.
 
     Args:
@@ -55,7 +55,7 @@ def study(options: MultiTargetStudyOptions | None = None) -> Study[Cell, Found]:
             "planner, the paper's, and baselines."
         ),
         trial=SearchTrial(planning=o.planning, points=o.points),
-        parameters=Cell,
+        parameters=MultiTargetCell,
         row=Found,
         design=grid(experiment=[e.value for e in Experiments if e in o.experiment], world=worlds)
         * grid(belief=[belief.value for belief in Belief if belief in o.belief])

@@ -28,7 +28,7 @@ from missions.studies.multi_target_worlds import WORLDS
 from missions.studies.options import Experiments, Planners
 from missions.studies.study import run_of
 
-__all__ = ["EXPERIMENTS", "STEP_S", "Cell", "Experiment", "Found", "SearchTrial"]
+__all__ = ["EXPERIMENTS", "STEP_S", "Experiment", "Found", "MultiTargetCell", "SearchTrial"]
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ _KINDS: Final[Mapping[Planners, PlannerKind]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class MultiTargetCell:
     """Parameters of a trial: values of `Experiments`, `SearchWorlds`, `Belief` and `Planners`."""
 
     experiment: str
@@ -173,7 +173,7 @@ class SearchTrial:
     planning: PlannerParameters = MultiTargetOptions().planning
     points: bool = False
 
-    def __call__(self, cell: Cell, seed: int) -> Found:
+    def __call__(self, cell: MultiTargetCell, seed: int) -> Found:
         """Search. The same seed has the same targets and the same sensor noise for all planners."""
         experiment, planner = EXPERIMENTS[cell.experiment], Planners(cell.planner)
         setting = WORLDS[cell.world].setting

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from missions.studies.rows import Outcome
+from missions.studies.rows import TrialOutcome
 
 __all__ = ["Results"]
 
@@ -56,13 +56,13 @@ class Results:
         """Whether every trial has ended."""
         return self.table.num_rows == self.runs * len(self.cells)
 
-    def count(self, outcome: Outcome) -> int:
+    def count(self, outcome: TrialOutcome) -> int:
         """Number of trials that ended so."""
         return int(pc.sum(pc.equal(self.table["outcome"], outcome.value)).as_py() or 0)
 
     def without_row(self) -> list[dict[str, Any]]:
         """The trials without a row: number, outcome, error and command."""
-        chosen = self.table.filter(pc.not_equal(self.table["outcome"], Outcome.DONE.value))
+        chosen = self.table.filter(pc.not_equal(self.table["outcome"], TrialOutcome.DONE.value))
         found: list[dict[str, Any]] = chosen.select(["trial", "outcome", "error", "command"]).to_pylist()
         return found
 
@@ -92,7 +92,7 @@ class Results:
     def succeeded(self) -> NDArray[np.bool_]:
         """(cells, runs) of the trials that were successful."""
         done = np.zeros((len(self.cells), self.runs), dtype=np.bool_)
-        good = pc.equal(self.table["outcome"], Outcome.DONE.value)
+        good = pc.equal(self.table["outcome"], TrialOutcome.DONE.value)
         if self.success:
             good = pc.and_(good, pc.fill_null(self.table[self.success], False))
         done[self._cell, self._run] = good.to_numpy(zero_copy_only=False)

@@ -12,10 +12,10 @@ from flightsim.foundation.options import without_none
 from missions.errors import PlanError
 from missions.studies.design import Value
 
-__all__ = ["FIGURES", "NUMBERS", "Outcome", "RowSchema", "TrialResult"]
+__all__ = ["FIGURES", "NUMBERS", "RowSchema", "TrialOutcome", "TrialResult"]
 
 
-class Outcome(StrEnum):
+class TrialOutcome(StrEnum):
     """How a trial ended."""
 
     DONE = "done"
@@ -45,7 +45,7 @@ class TrialResult:
     """
 
     index: int
-    outcome: Outcome
+    outcome: TrialOutcome
     error: str = ""
     values: tuple[Any, ...] | None = None
     versions: str = ""

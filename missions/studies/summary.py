@@ -10,7 +10,7 @@ import numpy as np
 
 from missions.studies.engine import Engine
 from missions.studies.results import Results
-from missions.studies.rows import Outcome
+from missions.studies.rows import TrialOutcome
 from missions.studies.statistics import (
     FEW,
     Difference,
@@ -114,7 +114,7 @@ def failures_of(results: Results) -> list[dict[str, Any]]:
     rows = results.table.to_pylist()
     for row in rows:
         error = row["error"]
-        if row["outcome"] == Outcome.DONE.value:
+        if row["outcome"] == TrialOutcome.DONE.value:
             if not results.success or row[results.success]:
                 continue
             error = row.get("reason") or f"{results.success} is False"
@@ -211,9 +211,9 @@ def summary_of(
         "runs": results.runs,
         "seed": results.seed,
         "trials": results.table.num_rows,
-        "failed": results.count(Outcome.FAILED),
-        "timed_out": results.count(Outcome.TIMED_OUT),
-        "lost": results.count(Outcome.LOST),
+        "failed": results.count(TrialOutcome.FAILED),
+        "timed_out": results.count(TrialOutcome.TIMED_OUT),
+        "lost": results.count(TrialOutcome.LOST),
         "engine": None if engine is None else engine.name,
         "workers": None if engine is None else engine.workers,
         "wall_time_s": None if wall_time_s is None else round(wall_time_s, 3),

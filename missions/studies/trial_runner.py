@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.errors import MissionError
-from missions.studies.rows import Outcome, TrialResult
+from missions.studies.rows import TrialOutcome, TrialResult
 from missions.studies.study import Study, Trial, Trials
 from missions.studies.versions import software_versions
 
@@ -100,7 +100,7 @@ class TrialRunner:
                 files = scratch.files()
         return TrialResult(
             index=index,
-            outcome=Outcome.FAILED if values is None else Outcome.DONE,
+            outcome=TrialOutcome.FAILED if values is None else TrialOutcome.DONE,
             error=error,
             values=values,
             versions=self._versions,

@@ -21,7 +21,14 @@ from missions.studies.options import VisionStudyOptions
 from missions.studies.results import Results
 from missions.studies.statistics import figures_of, paired_difference, rate_of
 from missions.studies.study import Study
-from missions.studies.vision_search_trial import BELIEFS, MOMENTS_S, TEAMS, Cell, Localized, VisionSearchTrial
+from missions.studies.vision_search_trial import (
+    BELIEFS,
+    MOMENTS_S,
+    TEAMS,
+    Localized,
+    VisionSearchCell,
+    VisionSearchTrial,
+)
 
 __all__ = ["error_budget", "study"]
 
@@ -49,7 +56,7 @@ _POSE: Final = (
 _COLOURS: Final = {"one": "#1769aa", "two": "#c2410c"}
 
 
-def study(options: VisionStudyOptions | None = None) -> Study[Cell, Localized]:
+def study(options: VisionStudyOptions | None = None) -> Study[VisionSearchCell, Localized]:
     """The study.
 
     Args:
@@ -63,7 +70,7 @@ def study(options: VisionStudyOptions | None = None) -> Study[Cell, Localized]:
             "2008, with a fine grid, a coarse grid and particles over the same flights."
         ),
         trial=VisionSearchTrial(model=o.model, side_m=o.side_m, passes=o.passes),
-        parameters=Cell,
+        parameters=VisionSearchCell,
         row=Localized,
         design=grid(aircraft=tuple(TEAMS)),
         runs=50,

@@ -27,7 +27,7 @@ from missions.vision_search.figures import ELLIPSE_95
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.world import vision_search_world
 
-__all__ = ["BELIEFS", "MOMENTS_S", "TEAMS", "Cell", "Localized", "VisionSearchTrial"]
+__all__ = ["BELIEFS", "MOMENTS_S", "TEAMS", "Localized", "VisionSearchCell", "VisionSearchTrial"]
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ _ANGLES_AND_PLACE: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class VisionSearchCell:
     """Parameters of a trial."""
 
     aircraft: str
@@ -116,7 +116,7 @@ class VisionSearchTrial:
     side_m: float = 1000.0
     passes: int = 4
 
-    def __call__(self, cell: Cell, seed: int) -> Localized:
+    def __call__(self, cell: VisionSearchCell, seed: int) -> Localized:
         """Fly the search. The same seed has the same place of the target for both teams."""
         _, run = run_of(seed)
         half_m = 0.5 * self.side_m

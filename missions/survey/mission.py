@@ -17,7 +17,7 @@ from missions.planning.outline import Outline
 from missions.survey.checks import check_reach, check_survey, for_vehicle
 from missions.survey.flight import fly_lines, fly_manoeuvres, mission_items, outline_of, planned_survey
 from missions.survey.options import SurveyOptions
-from missions.survey.outcome import Outcome, outcome_of, report_lines
+from missions.survey.outcome import SurveyFindings, outcome_of, report_lines
 from missions.survey.picture import draw_calibration, draw_survey
 from missions.survey.plan import line_plan
 from missions.vehicle.limits import FixedWingLimits, Limits
@@ -107,7 +107,7 @@ class SurveyFlight(MissionFlight[SurveyOptions]):
 
     def report(self, debriefing: Debriefing) -> Report:
         options = self.options[0]
-        outcome = Outcome()
+        outcome = SurveyFindings()
         if self._begun:
             outcome = outcome_of(debriefing, options, self._plan, self.vehicles[0].home)
 

@@ -20,7 +20,7 @@ from missions.survey.inputs import compensation_of, survey_map_of
 from missions.survey.options import SurveyOptions
 from missions.survey.records import Calibration, calibrated, flight_readings
 
-__all__ = ["COMPENSATION", "Outcome", "outcome_of", "report_lines"]
+__all__ = ["COMPENSATION", "SurveyFindings", "outcome_of", "report_lines"]
 
 COMPENSATION: Final = "compensation.json"
 LEAST_COVERAGE: Final = 0.97
@@ -32,7 +32,7 @@ _FOUND_LEAST_M: Final = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Outcome:
+class SurveyFindings:
     """The outcome of a flight.
 
     Attributes:
@@ -78,7 +78,7 @@ class Outcome:
 
 def outcome_of(
     debriefing: Debriefing, options: SurveyOptions, plan: LinePlan | None, home: GeodeticPosition
-) -> Outcome:
+) -> SurveyFindings:
     """Process the readings of a flight.
 
     Args:
@@ -98,7 +98,7 @@ def outcome_of(
         attitude=options.calibrate or compensation is not None,
     )
     if len(readings) < 2:
-        return Outcome(
+        return SurveyFindings(
             failure=f"vehicle {notes.system_id} sent no readings of the magnetic field with a place"
         )
     if plan is None:
@@ -106,8 +106,8 @@ def outcome_of(
         try:
             made = calibrated(readings, notes, options.direction_rad, main)
         except EstimatorError as error:
-            return Outcome(failure=str(error))
-        return Outcome(
+            return SurveyFindings(failure=str(error))
+        return SurveyFindings(
             calibration=made,
             figures=_calibration_figures(made),
             files={COMPENSATION: compensation_bytes(made.compensation)},
@@ -121,7 +121,7 @@ def outcome_of(
         parameters=options.processing_parameters,
     )
     coverage = covered(result)
-    return Outcome(
+    return SurveyFindings(
         survey=result,
         figures=_survey_figures(result, coverage, debriefing.targets_ne_m),
         files=survey_files(result),

@@ -8,10 +8,11 @@ from typing import Final
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import home_of
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.vectors import Vector
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
-from missions.vehicle.setpoint import AnySetpoint, Setpoint, Vector
+from missions.vehicle.setpoint import AnySetpoint, Setpoint
 from missions.vehicle.telemetry import LocalPosition, Position
 
 SetpointSource = Callable[[float], AnySetpoint | None]

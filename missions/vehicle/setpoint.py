@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
-from flightsim.foundation.vectors import from_euler
+from flightsim.foundation.vectors import Vector, from_euler
 from missions.errors import PlanError
-
-Vector = tuple[float, float, float]
 
 _IGNORE_POSITION: Final = 0x007
 _IGNORE_VELOCITY: Final = 0x038

@@ -18,10 +18,10 @@ from estimators.tracking.camera_sight import CameraSight, SightModel
 from estimators.tracking.grid import GridLayout
 from estimators.vision_search.estimate import AreaEstimate
 from estimators.vision_search.models import sight_model_of
-from flightsim.foundation.vectors import from_euler, product
+from flightsim.foundation.vectors import NorthEast, from_euler, product
 from missions.patterns.lissajous import named_lissajous
 from missions.patterns.polyline import Polyline
-from missions.search.area import Area, Place
+from missions.search.area import Area
 from missions.search.planner_parameters import PlannerParameters
 from missions.search.sweep import SweepPlanner, sweep_path
 from missions.vision_search.options import LocalizeKind, SearchPlannerKind, VisionSearchOptions
@@ -30,7 +30,7 @@ __all__ = ["AreaPlanner", "HorizonPlanner", "Localizer", "PathPlanner", "planner
 
 Array = NDArray[np.float64]
 
-Way = tuple[Place, float]
+Way = tuple[NorthEast, float]
 """A goal, and the direction in which it is flown to."""
 
 _GOLDEN_RAD: Final = math.pi * (math.sqrt(5.0) - 1.0) / 2.0  # between passes: any number is evenly spread
@@ -46,11 +46,11 @@ class AreaPlanner(Protocol):
     def next_place(
         self,
         belief: AreaBelief,
-        here: Place,
+        here: NorthEast,
         direction_rad: float | None,
         camera: CameraSight | None,
         others: Sequence[Way] = (),
-    ) -> Place:
+    ) -> NorthEast:
         """The next place.
 
         Args:
@@ -72,11 +72,11 @@ class PathPlanner:
     def next_place(
         self,
         belief: AreaBelief,
-        here: Place,
+        here: NorthEast,
         direction_rad: float | None,
         camera: CameraSight | None,
         others: Sequence[Way] = (),
-    ) -> Place:
+    ) -> NorthEast:
         return self._sweep.along(here)
 
 
@@ -85,8 +85,8 @@ class _Branch:
     """A sequence of steps, and the probability in each cell that the target is there and was not detected."""
 
     value: float
-    first: Place
-    here: Place
+    first: NorthEast
+    here: NorthEast
     direction_rad: float
     left: Array
 
@@ -121,11 +121,11 @@ class HorizonPlanner:
     def next_place(
         self,
         belief: AreaBelief,
-        here: Place,
+        here: NorthEast,
         direction_rad: float | None,
         camera: CameraSight | None,
         others: Sequence[Way] = (),
-    ) -> Place:
+    ) -> NorthEast:
         if camera is None:
             return self._area.nearest(*here)
         shares = belief.shares(self._layout).ravel()
@@ -149,7 +149,7 @@ class HorizonPlanner:
         peak = belief.mode_ne_m
         return min(best, key=lambda branch: math.dist(branch.here, peak)).first
 
-    def _inward(self, here: Place) -> Place:
+    def _inward(self, here: NorthEast) -> NorthEast:
         centre = self._area.centre_ne_m
         away_m = math.dist(here, centre)
         share = min(1.0, self._parameters.step_m / away_m) if away_m > 0.0 else 0.0
@@ -178,7 +178,7 @@ class HorizonPlanner:
             grown.append(_Branch(value, first, there, direction, left))
         return grown
 
-    def _missed(self, place: Place, direction_rad: float, camera: CameraSight) -> Array:
+    def _missed(self, place: NorthEast, direction_rad: float, camera: CameraSight) -> Array:
         """Probability in each cell that a frame of a level camera, which flies ahead, does not detect the
         target.
         """
@@ -223,7 +223,7 @@ class Localizer:
             return max(0, self._places - 2)
         return max(0, self._places - 1) // 2
 
-    def next_place(self, estimate: AreaEstimate, here: Place) -> Place:
+    def next_place(self, estimate: AreaEstimate, here: NorthEast) -> NorthEast:
         """The next place; the vehicle is at the one before."""
         self._places += 1
         target = estimate.north_m, estimate.east_m
@@ -245,7 +245,7 @@ class Localizer:
         return entry
 
 
-def _at(place: Place, direction_rad: float, distance_m: float) -> Place:
+def _at(place: NorthEast, direction_rad: float, distance_m: float) -> NorthEast:
     return place[0] + distance_m * math.cos(direction_rad), place[1] + distance_m * math.sin(direction_rad)
 
 

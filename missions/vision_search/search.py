@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimators.tracking.camera_sight import CameraSight
 from estimators.tracking.grid import GridLayout
 from estimators.vision_search import AreaEstimate, BeliefKind, VisionSearchEstimator
-from missions.search.area import Place
+from flightsim.foundation.vectors import NorthEast
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.planner import Localizer, planner_of
 
@@ -88,7 +88,7 @@ class VisionSearch:
         self._planners = [planner_of(own) for own in options]
         self._localizers = [Localizer(own) for own in options]
         self._localizing = [False] * count
-        self._goals: list[Place | None] = [None] * count
+        self._goals: list[NorthEast | None] = [None] * count
         self.directions: list[float | None] = [None] * count
         self._frames_at_step = [0] * count
         self._flying = [False] * count
@@ -115,7 +115,7 @@ class VisionSearch:
             return 0.0
         return 0.5 * min(1.0, (self.states[0][-1].time_us - self.began_us) * 1e-6 / limit_s)
 
-    def begin(self, index: int, time_us: int) -> Place:
+    def begin(self, index: int, time_us: int) -> NorthEast:
         """A vehicle begins; returns its first place."""
         if self.began_us < 0:
             self.began_us = time_us
@@ -132,7 +132,7 @@ class VisionSearch:
         """The vehicle's newest frame."""
         return self._estimators[index].newest.get(self._system_ids[index])
 
-    def _others(self, index: int) -> list[tuple[Place, float]]:
+    def _others(self, index: int) -> list[tuple[NorthEast, float]]:
         """Ways of the other vehicles in the air."""
         return [
             (goal, direction)
@@ -187,7 +187,7 @@ class VisionSearch:
         """
         return self._estimators[index].frames > self._frames_at_step[index]
 
-    def step(self, index: int, time_us: int, here: Place) -> Place:
+    def step(self, index: int, time_us: int, here: NorthEast) -> NorthEast:
         """A vehicle has reached its goal; returns its next one."""
         options, estimator = self._options[index], self._estimators[index]
         self.steps[index] += 1

@@ -33,10 +33,10 @@ _OldMessage = (
 _RETURN_POINT: Final = dialect.MAV_CMD_NAV_FENCE_RETURN_POINT
 _VERTEX: Final = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 
-Point = tuple[float, float]
+LatLon = tuple[float, float]
 
 
-def old_fence(items: tuple[MissionItem, ...]) -> list[Point] | None:
+def old_fence(items: tuple[MissionItem, ...]) -> list[LatLon] | None:
     """A fence as points of the old messages; None for a fence that these messages can't represent."""
     head = [item for item in items if item.command == _RETURN_POINT]
     ring = [item for item in items if item.command == _VERTEX]
@@ -65,7 +65,7 @@ class OldPoints(Microservice):
         self._fence = stores[MissionType.FENCE]
         self._rally = stores[MissionType.RALLY]
         self._announce = announce
-        self._fence_points: dict[int, Point] = {}
+        self._fence_points: dict[int, LatLon] = {}
         self._rally_points: dict[int, MissionItem] = {}
         self._warned: set[str] = set()
         self._versions = [0, 0]
@@ -130,7 +130,7 @@ class OldPoints(Microservice):
             if len(self._fence_points) == total:
                 self._finish_fence([self._fence_points[k] for k in range(total)])
 
-    def _finish_fence(self, points: list[Point]) -> None:
+    def _finish_fence(self, points: list[LatLon]) -> None:
         self._fence_points.clear()
         ring = points[1:-1]
         if points[-1] != points[1]:

@@ -8,14 +8,12 @@ from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParamet
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.state import AircraftState, FlightCommand
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.foundation.vectors import wrap_pi
+from flightsim.foundation.vectors import Vector, wrap_pi
 
 _TURN_BANK_RAD: Final = math.radians(30.0)  # of the turn towards a waypoint beside the aircraft
 _RIGHT_ANGLE_RAD: Final = 0.5 * math.pi
 _SAME_PLACE_M: Final = 1.0
 _SLOPE_LONGER_THAN_M: Final = 20.0
-
-Place = tuple[float, float, float]
 
 
 class Leg:
@@ -32,8 +30,8 @@ class Leg:
 
     def __init__(
         self,
-        start: Place,
-        target: Place,
+        start: Vector,
+        target: Vector,
         *,
         ramps: bool,
         radius_m: float,
@@ -51,7 +49,7 @@ class Leg:
         self._line = Line()
         self._set_line(start)
 
-    def _set_line(self, start: Place) -> None:
+    def _set_line(self, start: Vector) -> None:
         north, east = self.target[0] - start[0], self.target[1] - start[1]
         self.length_m = math.hypot(north, east)
         self.course_rad = math.atan2(east, north)

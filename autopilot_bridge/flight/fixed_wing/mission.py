@@ -12,7 +12,7 @@ from autopilot_bridge.flight.fixed_wing.base import GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle_item import CircleItem
 from autopilot_bridge.flight.fixed_wing.descend import PositionLost
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
-from autopilot_bridge.flight.fixed_wing.leg import Leg, Place
+from autopilot_bridge.flight.fixed_wing.leg import Leg
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
@@ -22,6 +22,7 @@ from autopilot_bridge.flight.heading import turn_angle
 from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus, clear_setpoint
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from flightsim.foundation.vectors import Vector
 
 _CIRCLES: Final = frozenset(
     {
@@ -260,11 +261,11 @@ class MissionTask(PlanTask):
             self._set_sub(ctx, self._circle.task)
 
 
-def _place(v: Array) -> Place:
+def _place(v: Array) -> Vector:
     return float(v[0]), float(v[1]), float(v[2])
 
 
-def _beyond(start: Place, place: Place, distance_m: float) -> Place:
+def _beyond(start: Vector, place: Vector, distance_m: float) -> Vector:
     """So far behind a place, on the line from `start`."""
     north, east = place[0] - start[0], place[1] - start[1]
     length = math.hypot(north, east)

@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from autopilot_bridge.flight.heading import SAME_PLACE_M, Point, turn_angle
+from autopilot_bridge.flight.heading import SAME_PLACE_M, turn_angle
 from autopilot_bridge.flight.multicopter.trajectory import braking_speed
 from autopilot_bridge.flight.parameters import FlightParameters
+from flightsim.foundation.vectors import Vector
 
 _STRAIGHT_RAD: Final = 1e-3
 _REVERSAL_RAD: Final = math.radians(150.0)
@@ -52,7 +53,7 @@ def turn_speed(angle_rad: float, distance_m: float, acceleration_m_s2: float, je
     )
 
 
-def turn_room(path: Sequence[Point], radii_m: Sequence[float], index: int) -> float:
+def turn_room(path: Sequence[Vector], radii_m: Sequence[float], index: int) -> float:
     """How far before corner `index` of a path its turn may begin: inside the acceptance radius, and at most
     half of either leg.
     """
@@ -65,7 +66,7 @@ def turn_room(path: Sequence[Point], radii_m: Sequence[float], index: int) -> fl
 
 
 def turn_in_distance(
-    path: Sequence[Point], radii_m: Sequence[float], speed_m_s: float, parameters: FlightParameters
+    path: Sequence[Vector], radii_m: Sequence[float], speed_m_s: float, parameters: FlightParameters
 ) -> float:
     """Distance before the first corner of a path at which its turn begins, at the speed `speed_m_s`."""
     p = parameters
@@ -75,7 +76,7 @@ def turn_in_distance(
     return min(wanted, turn_room(path, radii_m, 1))
 
 
-def passing_speed(path: Sequence[Point], radii_m: Sequence[float], parameters: FlightParameters) -> float:
+def passing_speed(path: Sequence[Vector], radii_m: Sequence[float], parameters: FlightParameters) -> float:
     """Speed at which the first corner may be passed so that every later corner can be met too.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight import plan_reading as plans
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
-from autopilot_bridge.flight.heading import Point, Turn
+from autopilot_bridge.flight.heading import Turn
 from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_in_distance
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
@@ -27,7 +27,7 @@ from autopilot_bridge.flight.surroundings_parameters import Precision
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
-from flightsim.foundation.vectors import wrap_pi
+from flightsim.foundation.vectors import Vector, wrap_pi
 
 _LOOK_AHEAD_ITEMS: Final = 40
 _LOOK_AHEAD_M: Final = 150.0
@@ -244,7 +244,7 @@ class MissionTask(PlanTask):
         """(speed at which the waypoint may be passed, distance before it at which the turn begins)."""
         if not plans.is_passed_through(self._store.items[seq]):
             return 0.0, 0.0
-        path: list[Point] = [_point(start), _point(target)]
+        path: list[Vector] = [_point(start), _point(target)]
         radii = [radius, radius]
         length_m = 0.0
         for number, later in enumerate(self._store.items[seq + 1 : seq + 1 + _LOOK_AHEAD_ITEMS], seq + 1):
@@ -368,5 +368,5 @@ def _flat_distance(a: Array, b: Array) -> float:
     return math.hypot(float(a[0] - b[0]), float(a[1] - b[1]))
 
 
-def _point(v: Array) -> Point:
+def _point(v: Array) -> Vector:
     return float(v[0]), float(v[1]), float(v[2])

@@ -192,14 +192,14 @@ def test_workers_end_with_the_process_they_work_for(tmp_path: Path, ending: sign
 def test_parts_are_written_after_a_second_or_a_hundredth_of_the_time(tmp_path: Path) -> None:
     """The writer's rule on a clock of the test: rows of a killed study are in the parts."""
     from missions.studies.folder import StudyFolder
-    from missions.studies.rows import Outcome, TrialResult
+    from missions.studies.rows import TrialOutcome, TrialResult
     from missions.studies.study import Trials
 
     folder = StudyFolder.created(tmp_path / "study", "small")
     writer = RowWriter(folder, Trials(STUDY, 12, 0), lambda trial: "")
     written = []
     for index, now_s in enumerate((0.0, 0.4, 1.1, 1.2, 2.2, 1000.0, 1005.0, 1011.0)):
-        writer.add(TrialResult(index=index, outcome=Outcome.FAILED, error="x"))
+        writer.add(TrialResult(index=index, outcome=TrialOutcome.FAILED, error="x"))
         writer.tick(now_s)
         written.append(len(folder.part_names()))
     assert written == [0, 0, 1, 1, 2, 3, 3, 4]

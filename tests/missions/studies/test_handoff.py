@@ -12,7 +12,7 @@ from missions.studies import Inline, run_study, run_trial
 from missions.studies.handoff import study
 from missions.studies.handoff_pixels import PixelWorld
 from missions.studies.handoff_surface import draw_surface
-from missions.studies.handoff_trial import Cell, HandoffTrial
+from missions.studies.handoff_trial import HandoffCell, HandoffTrial
 from missions.studies.handoff_world import HandoffSetting, HandoffWorld
 from missions.studies.options import Comparisons, HandoffStudyOptions, Operator, Points
 
@@ -62,7 +62,7 @@ def test_a_frame_shows_the_targets_where_they_are():
 
 @pytest.mark.slow
 def test_a_trial_decides_for_the_target_and_repeats_itself():
-    rows = [HandoffTrial(timeout_s=120.0)(Cell(belief="gaussians"), 1) for _ in range(2)]
+    rows = [HandoffTrial(timeout_s=120.0)(HandoffCell(belief="gaussians"), 1) for _ in range(2)]
     assert rows[0] == rows[1]
     assert rows[0].correct and not rows[0].wrong and not rows[0].timeout
     assert rows[0].track_error_m < 15.0 and rows[0].score >= 0.99  # type: ignore[operator]
@@ -70,7 +70,7 @@ def test_a_trial_decides_for_the_target_and_repeats_itself():
 
 
 def test_a_trial_that_is_too_short_is_a_timeout():
-    row = HandoffTrial(timeout_s=1.0)(Cell(belief="gaussians"), 1)
+    row = HandoffTrial(timeout_s=1.0)(HandoffCell(belief="gaussians"), 1)
     assert row.timeout and not row.decided and row.time_s is None
     assert row.cause == "pose never converged"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from missions.studies.handoff_operator import Person, PersonParameters, slip
-from missions.studies.handoff_trial import Cell, HandoffTrial, comparison_of
+from missions.studies.handoff_trial import HandoffCell, HandoffTrial, comparison_of
 from missions.studies.handoff_world import HandoffWorld, SeenTarget
 from missions.studies.handoff_worlds import HANDOFF_WORLDS
 from missions.studies.options import HandoffWorlds, Operator
@@ -79,7 +79,7 @@ def flown(cell, seed, seconds, change):
 )
 def test_poisoned_truth_changes_no_decision_and_no_command(operator, seed, seconds):
     record: dict[str, list] = {}
-    cell = Cell(operator=operator)
+    cell = HandoffCell(operator=operator)
     true = flown(cell, seed, seconds, lambda world: recorded(world, record))
     poisoned = flown(cell, seed, seconds, lambda world: replayed(world, record))
     assert len(true) > 100 and poisoned == true
@@ -89,7 +89,7 @@ def test_poisoned_truth_changes_no_decision_and_no_command(operator, seed, secon
 def test_the_operator_who_watches_does_read_the_truth():
     """So the test above notices a tracker that does."""
     record: dict[str, list] = {}
-    cell = Cell(operator="watches")
+    cell = HandoffCell(operator="watches")
     true = flown(cell, 1, 4.0, lambda world: recorded(world, record))
     poisoned = flown(cell, 1, 4.0, lambda world: replayed(world, record))
     assert [row[1] for row in true] != [row[1] for row in poisoned]
@@ -158,7 +158,7 @@ def test_every_world_of_the_option_is_there_and_says_what_differs_and_where_that
 
 def test_the_deviations_are_in_what_the_aircraft_measure():
     def sensed(name, seed=3):
-        world = HandoffTrial()._world(Cell(world=name), seed)
+        world = HandoffTrial()._world(HandoffCell(world=name), seed)
         headings, ranges = [], []
         for _ in range(400):
             world.advance((0.3, -0.2))

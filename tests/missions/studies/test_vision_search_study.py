@@ -11,7 +11,7 @@ from missions.studies.design import grid
 from missions.studies.options import VisionStudyOptions
 from missions.studies.study import Study, run_of
 from missions.studies.vision_search import draw, error_budget, lines_of, study, summarise
-from missions.studies.vision_search_trial import BELIEFS, Cell, Localized, VisionSearchTrial
+from missions.studies.vision_search_trial import BELIEFS, Localized, VisionSearchCell, VisionSearchTrial
 
 
 def drawn(cell, seed):
@@ -48,7 +48,7 @@ def results(tmp_path_factory):
     made = Study(
         name="vision-search",
         trial=drawn,
-        parameters=Cell,
+        parameters=VisionSearchCell,
         row=Localized,
         design=grid(aircraft=("one", "two")),
         runs=40,
