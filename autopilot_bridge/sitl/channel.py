@@ -103,6 +103,9 @@ class LinkChannel:
     @property
     def _packet_link(self) -> MemoryLink | None:
         """The link, if its other end is in this process and receives packets that need not be parsed."""
+        # An embedded mission receives thousands of frames a second. Their ids and lengths are known here, so
+        # parsing the bytes again at the other end would only cost time. Signed frames go as bytes:
+        # the receiver has to see the signature.
         memory = self._memory
         if memory is None or not memory.takes_packets or (self._signs is not None and self._signs.signs):
             return None

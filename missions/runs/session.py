@@ -337,12 +337,12 @@ async def _fly(
 
 
 async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
-    wanted = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
+    requested_id = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
     try:
         await vehicle.wait_heartbeat()
     except MissionError as error:
         where = f" on {', '.join(request.connect)}" if request.connect else ""
-        which = "" if wanted is None else f" with system id {wanted}"
+        which = "" if requested_id is None else f" with system id {requested_id}"
         others = ", ".join(map(str, vehicle.link.connection.autopilots_received))
         received = f" (received: vehicle {others})" if others else ""
         signing = vehicle.link.connection.signing
@@ -405,6 +405,8 @@ async def _fly_all(mission: Mission[Any], flight: Flight, request: RunRequest, s
             ]
         )
         return
+    # One flight of all vehicles inside the contexts of each, the last vehicle outermost: whatever ends the
+    # flight leaves every vehicle safe.
     flying = made.fly()
     for vehicle in vehicles:
         flying = _fly_one(flying, vehicle, request, watched=not mission.lands_without_sensors)
@@ -448,10 +450,10 @@ async def _remark_endurance(
     outline = await mission.outline(vehicle, options)
     if outline is None or (outline.duration_s or 0.0) < _LOOKED_AT_S:
         return
-    known = _given_endurance(request)
-    if known is None and (seconds := stage.endurance_s(options.index)) is not None:
-        known = Endurance(seconds=seconds, source="by the model, in hover")
-    if text := too_long(outline, known):
+    endurance = _given_endurance(request)
+    if endurance is None and (seconds := stage.endurance_s(options.index)) is not None:
+        endurance = Endurance(seconds=seconds, source="by the model, in hover")
+    if text := too_long(outline, endurance):
         vehicle.notes.warn(text)
         request.on_remark(f"vehicle {vehicle.system_id}: {text}")
 
@@ -465,6 +467,7 @@ async def _fly_one(
         watched: whether a sensor that stops ends the flight.
     """
     vehicle.notes.begin(FLIGHT, vehicle.clock.stamp_us)  # until the mission begins its own phase
+    # The guard is inside: a sensor that stops ends `flying` only, and the vehicle is still left safe.
     async with vehicle.safe_on_exit(request.on_failure):
         async with vehicle.sensors.guard() if watched else nullcontext():
             await flying
