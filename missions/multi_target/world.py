@@ -25,7 +25,7 @@ from missions.multi_target.target_field import Deviation, TargetField
 from missions.search.area import Area
 from missions.worlds.payloads import carrying
 
-__all__ = ["deviating_world", "multi_target_world", "places_of", "terrain_targets_world"]
+__all__ = ["world_deviating", "multi_target_world", "places_of", "terrain_targets_world"]
 
 MAX_TARGETS: Final = 250
 _APART_M: Final = 6.0  # least distance of two targets of a cluster
@@ -137,7 +137,7 @@ def _motion(place_ne_m: tuple[float, float], area: Area, speed_m_s: float) -> Ta
     )
 
 
-def deviating_world(world: WorldSpec, options: MultiTargetOptions, deviation: Deviation) -> WorldSpec:
+def world_deviating(world: WorldSpec, options: MultiTargetOptions, deviation: Deviation) -> WorldSpec:
     """The world of a search with what the estimator does not expect.
 
     Args:

@@ -19,7 +19,7 @@ from missions.base.request import RunRequest
 from missions.multi_target.figures import score_figures
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.target_field import TargetField
-from missions.multi_target.world import deviating_world, multi_target_world, terrain_targets_world
+from missions.multi_target.world import world_deviating, multi_target_world, terrain_targets_world
 from missions.multi_target.world_searchers import search_with_point
 from missions.search.area import edges
 from missions.search.planner_parameters import Exploration, PlannerParameters
@@ -184,7 +184,7 @@ class SearchTrial:
             clutter_per_scan=setting.expected_clutter,
             seed=run_of(seed)[1],
         )
-        world = deviating_world(experiment.world(options, seed), options, setting.deviation)
+        world = world_deviating(experiment.world(options, seed), options, setting.deviation)
         if not self.points:
             result = fly_trial("multi-target", RunRequest(options=options, world=world))
             return _row(experiment, result.summary, result.outcome == "completed", result.reason)

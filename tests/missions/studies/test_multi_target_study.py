@@ -11,7 +11,7 @@ from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.target_field import Deviation
-from missions.multi_target.world import deviating_world, terrain_targets_world
+from missions.multi_target.world import world_deviating, terrain_targets_world
 from missions.multi_target.world_searchers import search_with_point
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.multi_target_search import study
@@ -142,22 +142,22 @@ def test_the_summary_has_curves_intervals_differences_terrains_and_worlds(tmp_pa
 def test_a_world_deviates_in_what_its_name_says():
     base = E2.world(OPTIONS, 5)
     sensor = base.vehicles[0].payload.target_sensor
-    double = deviating_world(base, OPTIONS, WORLDS["detection-double"].setting.deviation)
+    double = world_deviating(base, OPTIONS, WORLDS["detection-double"].setting.deviation)
     changed = double.vehicles[0].payload.target_sensor
     assert changed == replace(sensor, forward_scale_m=30.0, right_scale_m=30.0)  # type: ignore[type-var]
     assert double.targets == base.targets
-    biased = deviating_world(base, OPTIONS, WORLDS["bias-double"].setting.deviation)
+    biased = world_deviating(base, OPTIONS, WORLDS["bias-double"].setting.deviation)
     changed = biased.vehicles[0].payload.target_sensor
     assert changed.range_bias_m == pytest.approx(1.166, abs=1e-3)
     assert np.degrees(changed.bearing_bias_rad) == pytest.approx(4.1, abs=0.05)
-    assert deviating_world(base, OPTIONS, Deviation()) == base
+    assert world_deviating(base, OPTIONS, Deviation()) == base
     with pytest.raises(PlanError, match="clutter-half"):
         study(MultiTargetStudyOptions(world=("windy",)))
 
 
 def test_targets_that_walk_spread_by_what_is_stated():
     base = E2.world(OPTIONS, 5)
-    walking = deviating_world(base, OPTIONS, Deviation(walk_m_sqrt_s=0.5))
+    walking = world_deviating(base, OPTIONS, Deviation(walk_m_sqrt_s=0.5))
     moves = []
     for target in walking.targets:
         for seed in range(20):
