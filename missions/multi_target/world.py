@@ -25,7 +25,7 @@ from missions.multi_target.target_field import Deviation, TargetField
 from missions.search.area import Area
 from missions.worlds.payloads import carrying
 
-__all__ = ["world_deviating", "multi_target_world", "places_of", "terrain_targets_world"]
+__all__ = ["multi_target_world", "places_of", "terrain_targets_world", "world_deviating"]
 
 MAX_TARGETS: Final = 250
 _APART_M: Final = 6.0  # least distance of two targets of a cluster

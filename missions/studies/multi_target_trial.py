@@ -19,7 +19,7 @@ from missions.base.request import RunRequest
 from missions.multi_target.figures import score_figures
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.target_field import TargetField
-from missions.multi_target.world import world_deviating, multi_target_world, terrain_targets_world
+from missions.multi_target.world import multi_target_world, terrain_targets_world, world_deviating
 from missions.multi_target.world_searchers import search_with_point
 from missions.search.area import edges
 from missions.search.planner_parameters import Exploration, PlannerParameters

@@ -11,7 +11,7 @@ from flightsim.world_spec import WorldSpec
 from missions.errors import PlanError
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.target_field import Deviation
-from missions.multi_target.world import world_deviating, terrain_targets_world
+from missions.multi_target.world import terrain_targets_world, world_deviating
 from missions.multi_target.world_searchers import search_with_point
 from missions.studies import Inline, run_study, run_trial
 from missions.studies.multi_target_search import study
