@@ -525,7 +525,13 @@ class ScriptedWorlds(list, VehicleOpener):
 @pytest.fixture
 def fly_with(monkeypatch):
     """Makes flights open their vehicles with an opener, those of the command line too."""
-    return lambda opener: monkeypatch.setattr(session, "fly", partial(session.fly, opener=opener))
+
+    def use(opener):
+        flown = partial(session.fly, opener=opener)
+        monkeypatch.setattr(session, "fly", flown)
+        monkeypatch.setattr("missions.cli.bodies.fly.fly_mission", flown)  # has its own name for it
+
+    return use
 
 
 @pytest.fixture
