@@ -11,7 +11,7 @@ from typing import Final
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 
 RETURN_POINT: Final = 5000
 POLYGON_INCLUSION: Final = 5001

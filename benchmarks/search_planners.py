@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.planner import SearchPlanner
 from missions.multi_target.search import planner_of

@@ -13,7 +13,8 @@ from autopilot_bridge.fence_shapes import (
 )
 from autopilot_bridge.mission_plan import MissionStore
 from flightsim.foundation.geodesy import LocalFrame
-from flightsim.foundation.vectors import NorthEast, Vector
+from flightsim.foundation.geodetic_position import NorthEast
+from flightsim.foundation.vectors import Vector
 
 
 class Geofence:

@@ -3,6 +3,9 @@
 import math
 from dataclasses import dataclass
 
+NorthEast = tuple[float, float]
+"""North and east of an origin, metres."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeodeticPosition:

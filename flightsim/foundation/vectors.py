@@ -15,8 +15,6 @@ Array = NDArray[np.float64]
 Angle = TypeVar("Angle", float, Array)
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-NorthEast = tuple[float, float]
-"""North and east of an origin, metres."""
 ImagePoint = tuple[float, float]
 """Normalized image coordinates: to the right and down, over the distance along the optical axis."""
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.search.area import Area
 
 __all__ = ["ErgodicPlanner"]

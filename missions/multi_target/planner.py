@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.multi_target.objective import Outlook, SearchObjective
 from missions.search.area import Area
 from missions.search.planner_parameters import PlannerParameters

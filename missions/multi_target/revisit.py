@@ -6,7 +6,7 @@ from typing import Final
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.patterns.polyline import Polyline
 from missions.search.sweep import SweepPlanner
 

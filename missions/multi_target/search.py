@@ -12,7 +12,7 @@ from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.information import condensed
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.multi_target.ergodic import ErgodicPlanner
 from missions.multi_target.options import MultiTargetOptions, PlannerKind
 from missions.multi_target.planner import ExploringPlanner, SearchPlanner

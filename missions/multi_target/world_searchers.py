@@ -14,9 +14,9 @@ import numpy as np
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
 from flightsim import truth as t
+from flightsim.foundation.geodetic_position import NorthEast
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.foundation.rotations import quaternion_from_euler
-from flightsim.foundation.vectors import NorthEast
 from flightsim.payload import GroundTargets, TerrainSpec
 from flightsim.payload.target_sensor import TargetSensor
 from flightsim.world_spec import WorldSpec

@@ -9,7 +9,7 @@ from typing import Any, Final
 from autopilot_bridge.fence_shapes import FenceShape, fence_shapes, outside_shapes
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from flightsim.foundation.geodesy import LocalFrame
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.planning.outline import Outline

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
+from flightsim.foundation.geodetic_position import NorthEast
 from flightsim.foundation.options import Shown
-from flightsim.foundation.vectors import NorthEast
 from missions.errors import PlanError
 
 EDGES: Final = Shown(

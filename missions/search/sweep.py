@@ -8,7 +8,7 @@ import numpy as np
 
 from estimators.multi_target.search_belief import SearchBelief
 from estimators.tracking.range_bearing import Viewpoint
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.patterns.iamsar import parallel_sweep
 from missions.patterns.polyline import Polyline
 from missions.search.area import Area

@@ -13,7 +13,8 @@ from typing import Final, Generic, Protocol, TypeVar
 
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import LocalFrame
-from flightsim.foundation.vectors import NorthEast, Vector, wrap_pi
+from flightsim.foundation.geodetic_position import NorthEast
+from flightsim.foundation.vectors import Vector, wrap_pi
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.search.options import StepLawKind

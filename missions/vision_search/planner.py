@@ -18,7 +18,8 @@ from estimators.tracking.camera_sight import CameraSight, SightModel
 from estimators.tracking.grid import GridLayout
 from estimators.vision_search.estimate import AreaEstimate
 from estimators.vision_search.models import sight_model_of
-from flightsim.foundation.vectors import NorthEast, from_euler, product
+from flightsim.foundation.geodetic_position import NorthEast
+from flightsim.foundation.vectors import from_euler, product
 from missions.patterns.lissajous import named_lissajous
 from missions.patterns.polyline import Polyline
 from missions.search.area import Area

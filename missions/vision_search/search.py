@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimators.tracking.camera_sight import CameraSight
 from estimators.tracking.grid import GridLayout
 from estimators.vision_search import AreaEstimate, BeliefKind, VisionSearchEstimator
-from flightsim.foundation.vectors import NorthEast
+from flightsim.foundation.geodetic_position import NorthEast
 from missions.vision_search.options import VisionSearchOptions
 from missions.vision_search.planner import Localizer, planner_of
 

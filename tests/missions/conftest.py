@@ -9,7 +9,6 @@ import struct
 import sys
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 
 import pytest
 
@@ -526,12 +525,7 @@ class ScriptedWorlds(list, VehicleOpener):
 def fly_with(monkeypatch):
     """Makes flights open their vehicles with an opener, those of the command line too."""
 
-    def use(opener):
-        flown = partial(session.fly, opener=opener)
-        monkeypatch.setattr(session, "fly", flown)
-        monkeypatch.setattr("missions.cli.bodies.fly.fly_mission", flown)  # has its own name for it
-
-    return use
+    return lambda opener: monkeypatch.setattr(session, "VehicleOpener", lambda: opener)
 
 
 @pytest.fixture
