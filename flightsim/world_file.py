@@ -93,7 +93,8 @@ def made_from(kind: type[T], table: Any, path: Path) -> T:
     """
     try:
         devices = {
-            name: plug_in_class(DEVICES_GROUP, name, DeviceParameters) for name in plug_ins(DEVICES_GROUP)
+            name: plug_in_class(DEVICES_GROUP, name, DeviceParameters)  # type: ignore[type-abstract]  # a base
+            for name in plug_ins(DEVICES_GROUP)
         }
         conversion = Conversion(
             folder=path.parent,

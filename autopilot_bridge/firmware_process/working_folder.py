@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from autopilot_bridge.firmware_process.process import CONSOLE_NAME
@@ -13,16 +14,20 @@ class WorkingFolder:
     Args:
         name: of the vehicle's files among those that are kept: "vehicle1".
         kept_in: existing folder for what is kept; None: nothing is kept.
+        on_kept: called with each file that is kept.
 
     Attributes:
         path: the folder; it is removed with this object.
     """
 
-    def __init__(self, name: str, kept_in: Path | None) -> None:
+    def __init__(
+        self, name: str, kept_in: Path | None, on_kept: Callable[[Path], object] = lambda _path: None
+    ) -> None:
         self._temporary = tempfile.TemporaryDirectory(prefix="flightstack-", ignore_cleanup_errors=True)
         self.path = Path(self._temporary.name)
         self._name = name
         self._kept_in = kept_in
+        self._on_kept = on_kept
         self._kept = 0
 
     def keep(self, pattern: str) -> None:
@@ -36,7 +41,11 @@ class WorkingFolder:
         for log in sorted(self.path.glob(pattern)):
             self._kept += 1
             part = "" if self._kept == 1 else f"-{self._kept}"
-            shutil.move(log, self._kept_in / f"{self._name}{part}{log.suffix.lower()}")
+            kept = self._kept_in / f"{self._name}{part}{log.suffix.lower()}"
+            shutil.move(log, kept)
+            self._on_kept(kept)
         console = self.path / CONSOLE_NAME
         if console.exists():
-            shutil.copyfile(console, self._kept_in / f"{self._name}-{CONSOLE_NAME}")
+            kept = self._kept_in / f"{self._name}-{CONSOLE_NAME}"
+            shutil.copyfile(console, kept)
+            self._on_kept(kept)

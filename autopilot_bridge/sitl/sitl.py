@@ -74,12 +74,17 @@ class Sitl:
             )
         terrain = spec.terrain.made(spec.seed) if isinstance(spec.terrain, TerrainSpec) else spec.terrain
         cards = [MemoryCard() for _ in spec.vehicles] if cards is None else cards
-        self.vehicles = tuple(
-            SitlVehicle(
-                vehicle, index, spec, self.world, self.targets, field, terrain, signing, card, backend
-            )
-            for index, (vehicle, card) in enumerate(zip(spec.vehicles, cards, strict=True))
-        )
+        self.vehicles: tuple[SitlVehicle, ...] = ()
+        try:
+            for index, (vehicle, card) in enumerate(zip(spec.vehicles, cards, strict=True)):
+                made = SitlVehicle(
+                    vehicle, index, spec, self.world, self.targets, field, terrain, signing, card, backend
+                )
+                self.vehicles += (made,)
+        except BaseException:
+            for made in self.vehicles:  # a real firmware's process ends with it
+                made.backend.close()
+            raise
         self._elsewhere = any(vehicle.computes_elsewhere for vehicle in self.vehicles)
         self.shared_links: list[SharedLink] = []
         self._step_us = 1_000_000 // spec.physics_rate_hz

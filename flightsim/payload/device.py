@@ -65,7 +65,7 @@ class Carrier:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DeviceParameters(Options):
+class DeviceParameters(Options, ABC):
     """Parameters of a device.
 
     Attributes:
@@ -74,13 +74,13 @@ class DeviceParameters(Options):
 
     can_fail: ClassVar[bool] = True
 
+    @abstractmethod
     def build(self, carrier: Carrier) -> Device[Any]:
         """The device, on a vehicle.
 
         Raises:
             ValueError: it does not suit the vehicle or the world; the message names the value.
         """
-        raise NotImplementedError(f"{type(self).__name__} makes no device: override `build`")
 
 
 def first_of(kind: type[T], among: Iterable[object]) -> T | None:

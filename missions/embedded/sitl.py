@@ -1,6 +1,6 @@
 """An embedded SITL: the simulated world in this process, on virtual time, one memory link per vehicle."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,6 +39,7 @@ class EmbeddedSitl:
         max_flight_s: vehicle time, s, after which a run that has not ended fails.
         firmware: the real firmware that flies the vehicles; None: the emulated autopilots.
         logs_to: existing folder for the logs of a real firmware; None: they are not kept.
+        on_log: called with each file that was put there.
 
     Attributes:
         sitl: the world.
@@ -61,10 +62,11 @@ class EmbeddedSitl:
         max_flight_s: float = MAX_FLIGHT_S,
         firmware: FirmwareBuild | None = None,
         logs_to: Path | None = None,
+        on_log: Callable[[Path], object] = lambda _path: None,
     ) -> None:
         if speedup is not None and not 0.0 < speedup < float("inf"):
             raise ValueError(f"speed factor {speedup} is not accepted; give a number above 0")
-        backend = emulated if firmware is None else firmware_backend(firmware, logs_to=logs_to)
+        backend = emulated if firmware is None else firmware_backend(firmware, logs_to=logs_to, on_log=on_log)
         self.sitl = sitl = Sitl(world, backend=backend)
         field = world.magnetic_field
         self.published_map = field.map_file if isinstance(field, MagneticSpec) else None

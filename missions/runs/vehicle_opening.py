@@ -107,6 +107,7 @@ class VehicleOpener:
                 speedup=request.speedup,
                 firmware=request.firmware,
                 logs_to=folder.path,
+                on_log=folder.published.append,
             )
         except ValueError as error:
             raise PlanError(str(error)) from error

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.firmware_process import FirmwareBuild, FirmwareError, ardupilot, firmware_backend, px4
-from autopilot_bridge.firmware_process.ardupilot import position_ned_m
+from autopilot_bridge.firmware_process.ardupilot import ArduPilotBackend, position_ned_m
 from autopilot_bridge.firmware_process.ardupilot_faults import parameter_changes
 from autopilot_bridge.links import MemoryLink
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
-from autopilot_bridge.sitl import Sitl, VehicleFailure
+from autopilot_bridge.sitl import AutopilotBackend, BackendSetup, Sitl, VehicleFailure
+from autopilot_bridge.sitl.backend import Boot
 from flightsim.airframe import AirframeKind
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.home import Home
@@ -199,6 +200,29 @@ def test_a_program_that_does_not_answer_is_ended(
     monkeypatch.setenv("STAND_IN", "deaf")
     with pytest.raises(FirmwareError, match=named):
         sitl_of(request.getfixturevalue(f"{firmware}_build"))
+
+
+def test_a_team_of_which_one_does_not_start_leaves_no_process(ardupilot_build: FirmwareBuild) -> None:
+    started: list[ArduPilotBackend] = []
+
+    def make(setup: BackendSetup) -> Boot:
+        maker = firmware_backend(
+            ardupilot_build if not started else FirmwareBuild("ardupilot", Path("/bin/false"))
+        )
+
+        def boot(unix_epoch_us: int) -> AutopilotBackend:
+            backend = maker(setup)(unix_epoch_us)
+            assert isinstance(backend, ArduPilotBackend)
+            started.append(backend)
+            return backend
+
+        return boot
+
+    vehicles = tuple(VehicleSpec(system_id=number, autopilot="ardupilot") for number in (1, 2))
+    with pytest.raises(FirmwareError):
+        Sitl(WorldSpec(vehicles=vehicles), backend=make)
+    with pytest.raises(FirmwareError, match="ended"):
+        started[0]._process.require_running()
 
 
 def test_a_program_for_another_class_of_vehicle_is_refused(

@@ -19,8 +19,8 @@ from missions.cli.mission_command import FlightOption
 from missions.errors import PlanError
 from missions.flown.run_folder import wind_words
 from missions.library import MISSIONS
+from missions.runs.results import title as run_title
 from missions.runs.session import Flight, RunResult
-from missions.runs.session import title as run_title
 from missions.vehicle.vehicle import Vehicle
 
 
