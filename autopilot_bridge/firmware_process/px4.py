@@ -27,7 +27,7 @@ from autopilot_bridge.firmware_process.process import FirmwareProcess
 from autopilot_bridge.firmware_process.px4_files import AIRFRAME_NUMBER, write_start_files
 from autopilot_bridge.firmware_process.relay import LOOPBACK, FirmwareLinks, ports_to
 from autopilot_bridge.firmware_process.working_folder import WorkingFolder
-from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, decode_as, dialect, wire_units
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode_as, dialect, wire_units
 from autopilot_bridge.mavlink.components import SIMULATOR_COMPONENT
 from autopilot_bridge.sitl.backend import BackendSetup
 from flightsim import interface as i
@@ -85,7 +85,7 @@ class Px4Backend:
         self._parser = FrameParser()
         instance, listener = _free_instance()
         ports = dict(zip(_ROLES, ports_to(len(_ROLES)), strict=True))
-        self._links = FirmwareLinks(setup.vehicle.system_id, ports, self._look)
+        self._links = FirmwareLinks(setup.vehicle.system_id, ports)
         self._folder = folder
         try:
             etc = write_start_files(
@@ -202,9 +202,6 @@ class Px4Backend:
         if self._aircraft:
             commands[i.THROTTLE] = max(0.0, commands[i.THROTTLE])  # -1 is a motor that stands
         self._actuators[:] = commands
-
-    def _look(self, frame: Frame) -> None:
-        """PX4's own messages are not needed here."""
 
     def _sensors(self, time_us: int) -> bytes:
         readings = self._readings

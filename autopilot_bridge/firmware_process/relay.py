@@ -90,7 +90,10 @@ class FirmwareLinks:
     """
 
     def __init__(
-        self, system_id: int, ports: Mapping[str, FirmwarePort], on_frame: Callable[[Frame], None]
+        self,
+        system_id: int,
+        ports: Mapping[str, FirmwarePort],
+        on_frame: Callable[[Frame], None] = lambda _frame: None,
     ) -> None:
         self._system_id = system_id
         self._ports: Sequence[FirmwarePort] = tuple(ports.values())
