@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.checks import Positive, Share
+from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
 
 __all__ = ["AppearanceParameters", "KnownLook", "Look", "LookMean"]
@@ -70,13 +71,10 @@ class LookMean:
         found: Array = self._sum / self.count
         return found
 
-    def variance(self, parameters: AppearanceParameters) -> Array:
-        """(d,) of the mean against the target's own."""
-        slow, noise = np.square(parameters.slow_sigma), np.square(parameters.noise_sigma)
-        # the mean of a first-order process over a time of many correlation times
-        apart = 1.0 + (self._last_us - self._first_us) * 1e-6 / (2.0 * parameters.slow_s)
-        found: Array = slow / apart + noise / self.count
-        return found
+    @property
+    def span_s(self) -> float:
+        """Time from the first look to the last."""
+        return (self._last_us - self._first_us) * 1e-6
 
 
 class KnownLook:
@@ -91,12 +89,14 @@ class KnownLook:
         self.mean: Array = np.array(parameters.mean)
         self.variance: Array = np.square(parameters.sigma)
         self.known = False
+        self._any_mean, self._any_variance = self.mean, self.variance
+        self._slow, self._noise = np.square(parameters.slow_sigma), np.square(parameters.noise_sigma)
 
     def learn(self, looks: LookMean) -> None:
         """Looks that are of the target."""
         if not looks.count:
             return
-        of_looks = looks.variance(self.parameters)
+        of_looks = self._variance_of(looks)
         gain = self.variance / (self.variance + of_looks)
         self.mean = self.mean + gain * (looks.mean() - self.mean)
         self.variance = (1.0 - gain) * self.variance
@@ -106,12 +106,24 @@ class KnownLook:
         """How many times as probable looks are of the target as of any other; 1: nothing is known."""
         if not (self.known and looks.count):
             return 1.0
-        p = self.parameters
-        seen, of_looks = looks.mean(), looks.variance(p)
-        as_target = _log_density(seen - self.mean, self.variance + of_looks)
-        as_other = _log_density(seen - np.array(p.mean), np.square(p.sigma) + of_looks)
-        return p.unlike + (1.0 - p.unlike) * math.exp(min(50.0, as_target - as_other))
+        unlike = self.parameters.unlike
+        seen, of_looks = looks.mean(), self._variance_of(looks)
+        as_target = _log_density(seen, self.mean, self.variance, of_looks)
+        as_other = _log_density(seen, self._any_mean, self._any_variance, of_looks)
+        return unlike + (1.0 - unlike) * math.exp(min(50.0, as_target - as_other))
+
+    def _variance_of(self, looks: LookMean) -> Array:
+        """(d,) of the mean of looks against the target's own."""
+        # the mean of a first-order process over a time of many correlation times
+        apart = 1.0 + looks.span_s / (2.0 * self.parameters.slow_s)
+        found: Array = self._slow / apart + self._noise / looks.count
+        return found
 
 
-def _log_density(off: Array, variance: Array) -> float:
-    return -0.5 * float(np.sum(off * off / variance + np.log(variance)))
+@kernel
+def _log_density(seen: Array, mean: Array, variance: Array, of_looks: Array) -> float:
+    summed = 0.0
+    for k in range(seen.size):
+        total = variance[k] + of_looks[k]
+        summed += (seen[k] - mean[k]) ** 2 / total + math.log(total)
+    return -0.5 * summed

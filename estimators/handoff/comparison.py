@@ -60,6 +60,10 @@ class TrackComparison(ABC):
     def __init__(self) -> None:
         self.decided: int | None = None
 
+    def due(self, time_us: int) -> bool:
+        """Whether `update` compares at a time; windows of other times need not be made."""
+        return True
+
     @abstractmethod
     def update(self, windows: TrackWindows, pose: PoseMode) -> None:
         """Compare the tracks of one time.

@@ -31,9 +31,11 @@ from numpy.typing import NDArray
 from estimators.handoff.comparison import TrackComparison, TrackWindows
 from estimators.relative_pose.belief import PoseMode
 from flightsim.foundation.checks import Positive, Share
+from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 _POSE: Final = [0, 1, 3]  # forward, right and heading of the pose's covariance
 _TRACKER_TRACKS: Final = 4  # the target and the nearest others
@@ -102,12 +104,18 @@ class _Pairs:
             are 1; the first three are the pose's errors, not scaled.
         own: (2 n, 2 n) covariance of the noise of one pair.
         apart: (2 n, 2 n) covariance of the way from one target to another.
+        inner: (i, q, q) common' own^-1 common.
+        mixed: (i, q, k) common' own^-1 off.
+        squares: (i, k) off' own^-1 off.
     """
 
     off: Array
     common: Array
     own: Array
     apart: Array
+    inner: Array
+    mixed: Array
+    squares: Array
 
 
 class EvidenceComparison(TrackComparison):
@@ -124,9 +132,13 @@ class EvidenceComparison(TrackComparison):
         self._above: tuple[int, int] | None = None  # track above the decision, and since when
         self._compared_us: int | None = None
 
+    def due(self, time_us: int) -> bool:
+        every_us = 1e6 * self.parameters.every_s
+        return self._compared_us is None or not 0 <= time_us - self._compared_us < every_us
+
     def update(self, windows: TrackWindows, pose: PoseMode) -> None:
         p = self.parameters
-        if self._compared_us is not None and 0 <= windows.time_us - self._compared_us < 1e6 * p.every_s:
+        if not self.due(windows.time_us):
             return
         self._compared_us = windows.time_us
         self._scores = {}
@@ -185,16 +197,26 @@ class EvidenceComparison(TrackComparison):
         common = np.concatenate(parts, axis=-1).reshape(len(turned), 2 * n, -1)
         noise = p.slow_sigma_m**2 * np.exp(-apart_s / p.slow_s) + p.sigma_m**2 * np.eye(n)
         away = p.apart_m**2 + _walked(-times_s, p.speed_m_s, p.turn_s)
+        own = _on_both_axes(noise)
+        off = off.reshape(*off.shape[:2], 2 * n).transpose(0, 2, 1)
+        white = np.linalg.inv(np.linalg.cholesky(own))
+        white_common, white_off = white @ common, white @ off
         return numbers, _Pairs(
-            off=off.reshape(*off.shape[:2], 2 * n).transpose(0, 2, 1),
+            off=off,
             common=common,
-            own=_on_both_axes(noise),
+            own=own,
             apart=_on_both_axes(away),
+            inner=white_common.transpose(0, 2, 1) @ white_common,
+            mixed=white_common.transpose(0, 2, 1) @ white_off,
+            squares=(white_off * white_off).sum(axis=1),
         )
 
     def _hypotheses(self, pairs: _Pairs, pose: Array, scale: float) -> Array:
         """Logarithm of the density, summed over all hypotheses, with each track of the handoff aircraft as
         the target, and, last, with none.
+
+        The noise of the pairs is independent, so what they have in common is estimated from them (the
+        information form), and a joint density takes one matrix of its size, whatever the number of pairs.
 
         Args:
             pairs: of tracks.
@@ -203,12 +225,15 @@ class EvidenceComparison(TrackComparison):
         """
         p = self.parameters
         count, size, tracks = pairs.off.shape
-        root = np.linalg.cholesky(pose)
-        common = np.concatenate((pairs.common[..., :3] @ root, pairs.common[..., 3:]), axis=-1)
-        own = scale**2 * pairs.own
+        root = np.eye(pairs.common.shape[-1])
+        root[:3, :3] = np.linalg.cholesky(pose)
+        common, own = pairs.common[0] @ root, scale**2 * pairs.own
         # the same for all tracks: as if they were near the target
-        lower = np.linalg.cholesky(common[0] @ common[0].T + own + pairs.apart)
+        lower = np.linalg.cholesky(common @ common.T + own + pairs.apart)
         free = _log(p.free) - _log_normal(np.linalg.solve(lower, pairs.off[0]), lower)
+        inner, mixed = root.T @ pairs.inner @ root / scale**2, root.T @ pairs.mixed / scale**2
+        squares = pairs.squares / scale**2
+        spread = 0.5 * np.linalg.slogdet(own)[1] + 0.5 * size * math.log(math.tau)  # of one pair
         found: list[list[Array]] = [[] for _ in range(tracks + 1)]
         for some in _subsets(count):
             prior = len(some) * _log(p.seen) + (count - len(some)) * _log(1.0 - p.seen)
@@ -217,13 +242,9 @@ class EvidenceComparison(TrackComparison):
             if not 0 < len(some) <= tracks:
                 continue
             joined = _joined(len(some), tracks)
-            stacked = common[list(some)].reshape(len(some) * size, -1)
-            lower = np.linalg.cholesky(stacked @ stacked.T + np.kron(np.eye(len(some)), own))
-            white = np.linalg.inv(lower).reshape(-1, len(some), size)
-            left = np.zeros((len(some) * size, len(joined)))
-            for row, i in enumerate(some):
-                left += (white[:, row] @ pairs.off[i])[:, joined[:, row]]
-            logs = prior - _log_normal(left, lower) - free[joined].sum(axis=1)
+            misfits = np.empty(len(joined))
+            log = _misfits(inner, mixed, squares, np.array(some), joined, misfits)
+            logs = prior - log - len(some) * spread - 0.5 * misfits - free[joined].sum(axis=1)
             if some[0]:
                 found[-1].append(logs)
                 continue
@@ -241,13 +262,60 @@ class EvidenceComparison(TrackComparison):
         self.decided = None
 
 
+@kernel
+def _misfits(
+    inner: Array, mixed: Array, squares: Array, some: Indices, joined: Indices, misfits: Array
+) -> float:
+    """Squared normalized deviations of joint densities, of all ways to join some tracks of the tracker.
+
+    Args:
+        inner, mixed, squares: of the pairs.
+        some: (m,) tracks of the tracker.
+        joined: (p, m) tracks of the handoff aircraft to which they are joined.
+        misfits: (p,) result.
+
+    Returns:
+        Half of the logarithm of the determinant of the information about what the pairs have in common.
+    """
+    count, size, tracks = some.size, inner.shape[1], mixed.shape[2]
+    lower, shown = np.zeros((size, size)), np.empty((size, count * tracks))
+    for m in range(count):
+        lower += inner[some[m]]
+        shown[:, m * tracks : (m + 1) * tracks] = mixed[some[m]]
+    log = 0.0
+    for i in range(size):  # Cholesky factor by rows, and the solution of lower x = shown in place
+        lower[i, i] += 1.0
+        for j in range(i + 1):
+            value = lower[i, j]
+            for k in range(j):
+                value -= lower[i, k] * lower[j, k]
+            lower[i, j] = math.sqrt(value) if i == j else value / lower[j, j]
+        for j in range(i):
+            for c in range(shown.shape[1]):
+                shown[i, c] -= lower[i, j] * shown[j, c]
+        for c in range(shown.shape[1]):
+            shown[i, c] /= lower[i, i]
+        log += math.log(lower[i, i])
+    # what two pairs explain together, by both tracks of the handoff aircraft
+    explained = shown.T @ shown
+    for p in range(joined.shape[0]):
+        value = 0.0
+        for m in range(count):
+            one = m * tracks + joined[p, m]
+            value += squares[some[m], joined[p, m]] - explained[one, one]
+            for other in range(m):
+                value -= 2.0 * explained[one, other * tracks + joined[p, other]]
+        misfits[p] = value
+    return log
+
+
 @cache
 def _subsets(count: int) -> tuple[tuple[int, ...], ...]:
     return tuple(some for size in range(count + 1) for some in combinations(range(count), size))
 
 
 @cache
-def _joined(count: int, tracks: int) -> NDArray[np.int64]:
+def _joined(count: int, tracks: int) -> Indices:
     """(p, count) all ways to join tracks to different others."""
     return np.array(list(permutations(range(tracks), count)))
 

@@ -167,6 +167,8 @@ class HandoffProcess:
         if self._compared_us is not None and time_us - self._compared_us < every_us - _EARLY_US:
             return
         self._compared_us = time_us
+        if not self.comparison.due(time_us):
+            return
         self.comparison.update(self.track_windows(time_us, height_m, best, self.windows), best)
         if self.comparison.decided is not None and self.decided_us is None:
             self.decided_us = time_us
@@ -231,8 +233,10 @@ class HandoffProcess:
         the decision, and between them as the score of the best track rises (45); None: not known.
         """
         relative = self.by_pose()
-        own = self.tracks.level()
         decided = self.comparison.decided
+        if decided is None and (relative is None or not self.comparison.scores):
+            return relative
+        own = self.tracks.level()
         if decided is not None and decided in own:
             return own[decided]
         scores = {number: score for number, score in self.comparison.scores.items() if number in own}

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.relative_pose.parameters import RelativePoseParameters
+from flightsim.foundation.kernels import kernel
 from flightsim.foundation.vectors import wrap_pi
 
 Array = NDArray[np.float64]
@@ -237,59 +238,89 @@ def joined_modes(
         weights: (n,), sum one.
         means: (n, 4) of forward, right, down and heading.
         covariances: (n, 4, 4).
-        apart_sigmas: two Gaussians are joined when their horizontal distance is below this many standard
-            deviations of both along the line between them.
+        apart_sigmas: two Gaussians are joined within this distance (`close`).
         least_weight: lighter modes are left out; the remaining weights add up to one.
     """
-    parts = [
-        (float(weights[k]), means[k].copy(), covariances[k].copy())
-        for k in np.argsort(-weights, kind="stable")
-    ]
-    joined = True
-    while joined:
-        joined = False
-        for i in range(len(parts)):
-            for j in range(i + 1, len(parts)):
-                if _close(parts[i], parts[j], apart_sigmas):
-                    parts[i] = _joined(parts[i], parts[j])
-                    del parts[j]
-                    joined = True
-                    break
-            if joined:
-                break
-    parts = [part for part in parts if part[0] >= least_weight] or parts[:1]
-    total = sum(part[0] for part in parts)
+    heaviest = np.argsort(-weights, kind="stable")
+    weights, means, covariances = weights[heaviest], means[heaviest], covariances[heaviest]
+    count = _join(weights, means, covariances, apart_sigmas)
+    chosen = np.flatnonzero(weights[:count] >= least_weight)
+    if not len(chosen):
+        chosen = np.arange(min(1, count))
+    total = sum(weights[chosen].tolist())
     return tuple(
         PoseMode(
-            weight=weight / total,
-            forward_m=float(mean[FORWARD]),
-            right_m=float(mean[RIGHT]),
-            down_m=float(mean[DOWN]),
-            heading_rad=wrap_pi(float(mean[HEADING])),
-            covariance=covariance,
+            weight=float(weights[k]) / total,
+            forward_m=float(means[k, FORWARD]),
+            right_m=float(means[k, RIGHT]),
+            down_m=float(means[k, DOWN]),
+            heading_rad=wrap_pi(float(means[k, HEADING])),
+            covariance=covariances[k].copy(),
         )
-        for weight, mean, covariance in sorted(parts, key=lambda part: -part[0])
+        for k in chosen[np.argsort(-weights[chosen], kind="stable")]
     )
 
 
-_Part = tuple[float, Array, Array]
+@kernel
+def _join(weights: Array, means: Array, covariances: Array, apart_sigmas: float) -> int:
+    """Join Gaussians that are close to each other, until none are; returns the number that is left, which
+    are moved to the front.
+    """
+    count, i = weights.size, 0
+    while i < count:
+        for j in range(i + 1, count):
+            if close(means, covariances, i, j, apart_sigmas):
+                merge(weights, means, covariances, i, j)
+                for k in range(j, count - 1):
+                    weights[k] = weights[k + 1]
+                    means[k] = means[k + 1]
+                    covariances[k] = covariances[k + 1]
+                count -= 1
+                i = -1  # the sum is wider, and may be close to any other
+                break
+        i += 1
+    return count
 
 
-def _close(a: _Part, b: _Part, apart_sigmas: float) -> bool:
-    off = b[1][:2] - a[1][:2]
-    distance = float(np.hypot(off[0], off[1]))
-    if distance == 0.0:
-        return True
-    line = off / distance
-    sigmas = sum(math.sqrt(max(0.0, float(line @ part[2][:2, :2] @ line))) for part in (a, b))
-    return distance < apart_sigmas * sigmas
+@kernel
+def close(means: Array, covariances: Array, a: int, b: int, apart_sigmas: float) -> bool:
+    """Whether the horizontal distance of two Gaussians is at most this many standard deviations of both along
+    the line between them.
+
+    Args:
+        means, covariances: (n, 4), (n, 4, 4) of all.
+        a, b: the two.
+        apart_sigmas: number of standard deviations.
+    """
+    x, y = means[b, FORWARD] - means[a, FORWARD], means[b, RIGHT] - means[a, RIGHT]
+    distance = math.sqrt(x * x + y * y)
+    if distance > 0.0:
+        x, y = x / distance, y / distance
+    sigmas = 0.0
+    for k in (a, b):
+        p = covariances[k]
+        sigmas += math.sqrt(max(0.0, p[0, 0] * x * x + 2.0 * p[0, 1] * x * y + p[1, 1] * y * y))
+    return distance <= apart_sigmas * sigmas
 
 
-def _joined(a: _Part, b: _Part) -> _Part:
-    """Mean and covariance of both together."""
-    weight = a[0] + b[0]
-    off = b[1] - a[1]
-    off[HEADING] = wrap_pi(float(off[HEADING]))
-    share = b[0] / weight if weight > 0.0 else 0.0
-    covariance = (1.0 - share) * a[2] + share * b[2] + share * (1.0 - share) * np.outer(off, off)
-    return weight, a[1] + share * off, covariance
+@kernel
+def merge(weights: Array, means: Array, covariances: Array, a: int, b: int) -> None:
+    """Give the first of two Gaussians the weight, the mean and the covariance of both together.
+
+    Args:
+        weights, means, covariances: (n,), (n, 4), (n, 4, 4) of all.
+        a, b: the two.
+    """
+    weight = weights[a] + weights[b]
+    share = weights[b] / weight if weight > 0.0 else 0.0
+    off = means[b] - means[a]
+    off[HEADING] -= math.tau * round(off[HEADING] / math.tau)
+    for i in range(STATES):
+        for j in range(STATES):
+            covariances[a, i, j] = (
+                (1.0 - share) * covariances[a, i, j]
+                + share * covariances[b, i, j]
+                + share * (1.0 - share) * off[i] * off[j]
+            )
+        means[a, i] += share * off[i]
+    weights[a] = weight

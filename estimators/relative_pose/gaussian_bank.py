@@ -18,7 +18,9 @@ from estimators.relative_pose.belief import (
     PoseMeasurement,
     PoseMode,
     RelativePoseBelief,
+    close,
     joined_modes,
+    merge,
 )
 from estimators.relative_pose.parameters import RelativePoseParameters
 from estimators.relative_pose.particle_belief import motion_array
@@ -228,27 +230,8 @@ def _merge(weights: Array, means: Array, covariances: Array) -> int:
             continue
         merged = False
         for m in range(count):
-            x, y = means[k, 0] - means[m, 0], means[k, 1] - means[m, 1]
-            distance = math.sqrt(x * x + y * y)
-            if distance > 0.0:
-                x, y = x / distance, y / distance
-            sigmas = 0.0
-            for i in (k, m):
-                a = covariances[i]
-                sigmas += math.sqrt(max(0.0, a[0, 0] * x * x + 2.0 * a[0, 1] * x * y + a[1, 1] * y * y))
-            if distance <= _SAME * sigmas:
-                share = weights[k] / (weights[k] + weights[m])
-                off = means[k] - means[m]
-                off[3] -= math.tau * round(off[3] / math.tau)
-                for i in range(4):
-                    for j in range(4):
-                        covariances[m, i, j] = (
-                            (1.0 - share) * covariances[m, i, j]
-                            + share * covariances[k, i, j]
-                            + share * (1.0 - share) * off[i] * off[j]
-                        )
-                    means[m, i] += share * off[i]
-                weights[m] += weights[k]
+            if close(means, covariances, m, k, _SAME):
+                merge(weights, means, covariances, m, k)
                 merged = True
                 break
         if not merged:

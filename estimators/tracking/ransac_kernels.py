@@ -254,6 +254,19 @@ def fit(ages: Array, places: Array, noises: Array, order: int, mean: Array, cova
 
 
 @kernel
+def inlier_ratios(count: int, hits: Flags, ratios: Array) -> None:
+    """Share of the window's scans with a measurement of each of the first `count` hypotheses.
+
+    Args:
+        count: number of hypotheses.
+        hits: (m, window) whether a scan has one.
+        ratios: (m,) result.
+    """
+    for k in range(count):
+        ratios[k] = hits[k].sum() / hits.shape[1]
+
+
+@kernel
 def duplicates(
     count: int, means: Array, covariances: Array, ratios: Array, near_squared: float, drop: Flags
 ) -> None:

@@ -144,6 +144,7 @@ class RecursiveRansac:
         self._means = np.zeros((room, size))
         self._covariances = np.zeros((room, size, size))
         self._hits = np.zeros((room, p.window), dtype=np.bool_)  # newest scan last
+        self._ratios = np.zeros(room)  # share of hits
         self._ages = np.zeros(room, dtype=np.int64)  # scans since it was seeded
         self._missed = np.zeros(room, dtype=np.int64)
         self._numbers = np.zeros(room, dtype=np.int64)  # 0: no track yet
@@ -152,6 +153,7 @@ class RecursiveRansac:
         self._last_number = 0
         self._time_us: int | None = None
         self._window: deque[tuple[int, Array, Array]] = deque(maxlen=p.window - 1)
+        self._tracks: tuple[RansacTrack, ...] | None = None  # of the newest scan, when they were asked for
 
     @property
     def hypotheses(self) -> int:
@@ -169,6 +171,7 @@ class RecursiveRansac:
         if self._time_us is not None and time_us <= self._time_us:
             return
         p = self.parameters
+        self._tracks = None
         places = np.ascontiguousarray(places, dtype=np.float64).reshape(-1, 2)
         if covariances is None:
             covariances = np.tile(p.sigma_m**2 * np.eye(2), (len(places), 1, 1))
@@ -270,7 +273,8 @@ class RecursiveRansac:
     def _drop_worst(self) -> None:
         """Limit the bank to its size: of one hypothesis too many the worst is dropped, a track last."""
         if self._count > self.parameters.hypotheses:
-            ratios = self._hits[: self._count].mean(axis=1) + (self._numbers[: self._count] > 0)
+            kernels.inlier_ratios(self._count, self._hits, self._ratios)
+            ratios = self._ratios[: self._count] + (self._numbers[: self._count] > 0)
             keep = np.ones(self._count, dtype=np.bool_)
             keep[int(np.argmin(ratios))] = False
             self._keep(keep)
@@ -280,7 +284,8 @@ class RecursiveRansac:
         p, count = self.parameters, self._count
         if not count:
             return
-        ratios = self._hits[:count].mean(axis=1)
+        kernels.inlier_ratios(count, self._hits, self._ratios)
+        ratios = self._ratios[:count]
         # an older track wins over a younger hypothesis with the same inliers
         kernels.duplicates(
             count,
@@ -294,18 +299,20 @@ class RecursiveRansac:
         self._keep(~(self._drop[:count] | lost))
         self._drop_worst()
         count = self._count
-        ratios = self._hits[:count].mean(axis=1)
-        for k in np.flatnonzero((self._numbers[:count] == 0) & (ratios >= p.good_ratio)):
-            if self._ages[k] >= p.good_age:
-                self._last_number += 1
-                self._numbers[k] = self._last_number
+        good = (self._ratios[:count] >= p.good_ratio) & (self._ages[:count] >= p.good_age)
+        for k in np.flatnonzero(good & (self._numbers[:count] == 0)):
+            self._last_number += 1
+            self._numbers[k] = self._last_number
 
     def _keep(self, keep: NDArray[np.bool_]) -> None:
+        if keep.all():
+            return
         rows = np.flatnonzero(keep)
         for values in (
             self._means,
             self._covariances,
             self._hits,
+            self._ratios,
             self._ages,
             self._missed,
             self._numbers,
@@ -317,15 +324,17 @@ class RecursiveRansac:
     @property
     def tracks(self) -> Sequence[RansacTrack]:
         """The tracks, by number."""
-        rows = np.flatnonzero(self._numbers[: self._count])
-        return [
-            RansacTrack(
-                number=int(self._numbers[k]),
-                state=self._means[k].copy(),
-                covariance=self._covariances[k].copy(),
-                inlier_ratio=float(self._hits[k].mean()),
-                scans=int(self._ages[k]),
-                seen=bool(self._found[k]),
+        if self._tracks is None:
+            rows = np.flatnonzero(self._numbers[: self._count])
+            self._tracks = tuple(
+                RansacTrack(
+                    number=int(self._numbers[k]),
+                    state=self._means[k].copy(),
+                    covariance=self._covariances[k].copy(),
+                    inlier_ratio=float(self._ratios[k]),
+                    scans=int(self._ages[k]),
+                    seen=bool(self._found[k]),
+                )
+                for k in rows[np.argsort(self._numbers[rows])]
             )
-            for k in rows[np.argsort(self._numbers[rows])]
-        ]
+        return self._tracks

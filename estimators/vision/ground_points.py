@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.kernels import kernel
+
 Array = NDArray[np.float64]
 
 
@@ -33,22 +35,24 @@ class CameraAxes:
         distance = math.sqrt(forward_m**2 + right_m**2 + down_m**2)
         if not distance > 0.0:
             raise ValueError("a camera cannot point at its own place")
-        along = np.array([forward_m, right_m, down_m]) / distance
-        level = math.hypot(along[0], along[1])
+        x, y, z = forward_m / distance, right_m / distance, down_m / distance
+        level = math.hypot(x, y)
         # straight down there is no horizontal part: the image's top is forward then
-        right = np.array([-along[1], along[0], 0.0]) / level if level > 1e-9 else np.array([0.0, 1.0, 0.0])
-        return cls(axes=np.array([right, np.cross(along, right), along]))
+        u, v = (-y / level, x / level) if level > 1e-9 else (0.0, 1.0)
+        # the image's down is along x right
+        return cls(axes=np.array([[u, v, 0.0], [-z * v, z * u, x * v - y * u], [x, y, z]]))
 
     def project(self, places: Array) -> Array:
         """Normalized image points (n, 2) of places (n, 3) of the level frame; NaN behind the camera."""
         x, y, depth = self.axes @ places.T
         ahead = np.where(depth > 1e-9, depth, np.nan)
-        found: Array = np.column_stack((x / ahead, y / ahead))
+        found = np.empty((len(places), 2))
+        found[:, 0], found[:, 1] = x / ahead, y / ahead
         return found
 
     def directions(self, points: Array) -> Array:
         """Directions (n, 3) in the level frame of normalized image points (n, 2): equation 37."""
-        found: Array = np.column_stack((points, np.ones(len(points)))) @ self.axes
+        found: Array = points @ self.axes[:2] + self.axes[2]
         return found
 
 
@@ -63,11 +67,27 @@ def on_ground(directions: Array, height_m: float, angle_sigma_rad: float) -> tup
     Returns:
         (n, 2) forward and right, and (n, 2, 2).
     """
-    down = np.where(directions[:, 2] > 1e-6, directions[:, 2], np.nan)
-    places = height_m * directions[:, :2] / down[:, None]
-    away = np.hypot(places[:, 0], places[:, 1])
-    slant = np.hypot(away, height_m)
-    along, across = np.square(angle_sigma_rad * slant * slant / height_m), np.square(angle_sigma_rad * slant)
-    unit = places / np.maximum(away, 1e-9)[:, None]
-    outer = unit[:, :, None] * unit[:, None, :]
-    return places, across[:, None, None] * np.eye(2) + (along - across)[:, None, None] * outer
+    places, covariances = np.empty((len(directions), 2)), np.empty((len(directions), 2, 2))
+    _project(directions, height_m, angle_sigma_rad, places, covariances)
+    return places, covariances
+
+
+@kernel
+def _project(
+    directions: Array, height_m: float, angle_sigma_rad: float, places: Array, covariances: Array
+) -> None:
+    for k in range(directions.shape[0]):
+        down = directions[k, 2]
+        if not down > 1e-6:
+            places[k] = math.nan
+            covariances[k] = math.nan
+            continue
+        x, y = height_m * directions[k, 0] / down, height_m * directions[k, 1] / down
+        away = math.hypot(x, y)
+        slant = math.hypot(away, height_m)
+        along, across = (angle_sigma_rad * slant * slant / height_m) ** 2, (angle_sigma_rad * slant) ** 2
+        u, v = x / max(away, 1e-9), y / max(away, 1e-9)
+        places[k, 0], places[k, 1] = x, y
+        covariances[k, 0, 0] = across + (along - across) * (u * u)
+        covariances[k, 0, 1] = covariances[k, 1, 0] = (along - across) * (u * v)
+        covariances[k, 1, 1] = across + (along - across) * (v * v)

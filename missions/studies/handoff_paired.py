@@ -40,6 +40,9 @@ class _Observers(TrackComparison):
         self.flight: TrialFlight | None = None
         self.undecided = {cell: comparison_of(cell) for cell in cells}
 
+    def due(self, time_us: int) -> bool:
+        return any(comparison.due(time_us) for comparison in self.undecided.values())
+
     def update(self, windows: TrackWindows, pose: PoseMode) -> None:
         assert self.flight is not None
         process, every_s = self.flight.process, self.flight.process.windows.every_s

@@ -204,6 +204,11 @@ class HandoffWorld:
             s.clothes_mean, s.clothes_sigma, (n, 3)
         )
         self._look_noise = [streams.generator("handoff", "looks", k) for k in range(2)]
+        # as arrays: a generator takes longer to read a tuple than to draw
+        self._clothes_mean, self._clothes_sigma = np.array(s.clothes_mean), np.array(s.clothes_sigma)
+        self._look_slow_sigma = np.array(s.look_slow_sigma)
+        self._look_noise_sigma = np.array(s.look_noise_sigma)
+        self._half_view = np.array(s.half_view)
         self._gps = streams.generator("handoff", "gps")
         self._heading_bias_rad = s.heading_bias_rad * deviation.choice((-1.0, 1.0))
         self._clock_steps = round(s.clock_s * s.rate_hz)
@@ -243,15 +248,17 @@ class HandoffWorld:
         s, steps = self.setting, 5
         dt = 1.0 / (s.rate_hz * steps)
         before = [aircraft.heading_rad for aircraft in self._aircraft]
-        for _ in range(steps):
-            for aircraft, roll in zip(self._aircraft, rolls_rad, strict=True):
+        wind_north_m_s, wind_east_m_s = self.wind.tolist()
+        for aircraft, roll in zip(self._aircraft, rolls_rad, strict=True):
+            north_m, east_m = aircraft.place.tolist()
+            for _ in range(steps):
                 aircraft.roll_rad += (roll - aircraft.roll_rad) * min(1.0, dt / 0.4)
                 rate = GRAVITY_M_S2 * math.tan(aircraft.roll_rad) / s.airspeed_m_s
                 middle = aircraft.heading_rad + 0.5 * rate * dt
-                aircraft.place += dt * (
-                    s.airspeed_m_s * np.array([math.cos(middle), math.sin(middle)]) + self.wind
-                )
+                north_m += dt * (s.airspeed_m_s * math.cos(middle) + wind_north_m_s)
+                east_m += dt * (s.airspeed_m_s * math.sin(middle) + wind_east_m_s)
                 aircraft.heading_rad += rate * dt
+            aircraft.place = np.array([north_m, east_m])
         step, n = 1.0 / s.rate_hz, len(self.targets)
         for aircraft, heading in zip(self._aircraft, before, strict=True):
             aircraft.yaw_rate_rad_s = (aircraft.heading_rad - heading) / step
@@ -264,7 +271,8 @@ class HandoffWorld:
         keep = math.exp(-step / s.look_slow_s)
         for aircraft, noise in zip(self._aircraft, self._look_noise, strict=True):
             aircraft.looks *= keep
-            aircraft.looks += math.sqrt(1.0 - keep * keep) * noise.normal(0.0, s.look_slow_sigma, (n, 3))
+            new = self._look_slow_sigma * noise.standard_normal((n, 3))
+            aircraft.looks += math.sqrt(1.0 - keep * keep) * new
         self._headings += s.turn_rad_sqrt_s * math.sqrt(step) * self._walk.standard_normal(n)
         outside = np.any(np.abs(self.targets) > self._half, axis=1)
         # a target at the edge turns to the middle
@@ -286,10 +294,10 @@ class HandoffWorld:
         """Airspeed and yaw rate as an aircraft measures them."""
         s, a = self.setting, self._aircraft[which]
         more = math.sqrt(s.rate_hz / _MEASURED_HZ)
-        speed, rate = a.rng.normal(0.0, (more * s.airspeed_sigma_m_s, more * s.yaw_rate_sigma_rad_s)).tolist()
+        speed, rate = a.rng.standard_normal(2).tolist()
         return LevelMotion(
-            forward_m_s=s.airspeed_m_s + a.speed_bias_m_s + speed,
-            yaw_rate_rad_s=a.yaw_rate_rad_s + a.rate_bias_rad_s + rate,
+            forward_m_s=s.airspeed_m_s + a.speed_bias_m_s + more * s.airspeed_sigma_m_s * speed,
+            yaw_rate_rad_s=a.yaw_rate_rad_s + a.rate_bias_rad_s + more * s.yaw_rate_sigma_rad_s * rate,
         )
 
     def measured(self) -> PoseMeasurement:
@@ -316,36 +324,40 @@ class HandoffWorld:
         """
         s, a = self.setting, self._aircraft[which]
         camera = CameraAxes.towards(*pointing, a.height_m)
-        inside, points = self._image_points(which, camera)
-        slant_m = np.hypot(np.hypot(*self.seen_from(which, self.targets).T), a.height_m)
+        inside, points, slant_m = self._image_points(which, camera)
         seen = inside & (ndtr(a.hidden) < self.detectable(slant_m))
         count, noise = int(seen.sum()), self._look_noise[which]
         points = points[seen] + a.rng.normal(0.0, s.pixel_rad, (count, 2))
-        false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * s.half_view
-        looks = np.vstack(
-            ((self._clothes + a.looks)[seen], noise.normal(s.clothes_mean, s.clothes_sigma, (len(false), 3)))
-        )
-        looks += noise.normal(0.0, s.look_noise_sigma, looks.shape)
-        directions = camera.directions(np.vstack((points, false)))
+        false = a.rng.uniform(-1.0, 1.0, (a.rng.poisson(s.false_points), 2)) * self._half_view
+        looks = (self._clothes + a.looks)[seen]
+        if len(false):
+            points = np.concatenate((points, false))
+            false_looks = self._clothes_mean + self._clothes_sigma * noise.standard_normal((len(false), 3))
+            looks = np.concatenate((looks, false_looks))
+        looks += self._look_noise_sigma * noise.standard_normal(looks.shape)
+        directions = camera.directions(points)
         height_m = a.height_m + a.rng.normal(0.0, s.height_sigma_m)
         # only the part of the tilt's error that changes from frame to frame is noise to the tracker
         sigma = math.hypot(s.pixel_rad, 0.3 * s.tilt_sigma_rad)
         places, covariances = on_ground(_tilted(directions, a.attitude_error), height_m, sigma)
-        below = np.isfinite(places).all(axis=1) & (np.hypot(*places.T) < 6.0 * a.height_m)
+        below = np.hypot(places[:, 0], places[:, 1]) < 6.0 * a.height_m  # NaN is above the horizon
         return GroundPoints(places=places[below], covariances=covariances[below], looks=looks[below])
 
-    def _image_points(self, which: int, camera: CameraAxes) -> tuple[NDArray[np.bool_], Array]:
-        """Whether each target is in the picture, and its image point (n, 2), as tangents."""
-        height_m = self._aircraft[which].height_m - self.setting.seen_m
-        level = self.seen_from(which, self.targets)
-        points = camera.project(np.column_stack((level, np.full(len(level), height_m))))
-        return np.all(np.abs(points) < self.setting.half_view, axis=1), points  # NaN is outside
+    def _image_points(self, which: int, camera: CameraAxes) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Whether each target is in the picture, its image point (n, 2), as tangents, and its distance."""
+        height_m = self._aircraft[which].height_m
+        places = np.empty((len(self.targets), 3))
+        places[:, :2] = self.seen_from(which, self.targets)
+        places[:, 2] = height_m - self.setting.seen_m
+        points = camera.project(places)
+        inside: NDArray[np.bool_] = np.all(np.abs(points) < self._half_view, axis=1)  # NaN is outside
+        slant_m: Array = np.hypot(np.hypot(places[:, 0], places[:, 1]), height_m)
+        return inside, points, slant_m
 
     def picture(self, which: int, pointing: tuple[float, float]) -> tuple[SeenTarget, ...]:
         """What a person sees in the picture of a camera: the targets that are in view and not hidden."""
         a = self._aircraft[which]
-        inside, points = self._image_points(which, CameraAxes.towards(*pointing, a.height_m))
-        slant_m = np.hypot(np.hypot(*self.seen_from(which, self.targets).T), a.height_m)
+        inside, points, slant_m = self._image_points(which, CameraAxes.towards(*pointing, a.height_m))
         seen = inside & (ndtr(a.hidden) < self.setting.detected)
         return tuple(
             SeenTarget(
@@ -411,8 +423,11 @@ class HandoffWorld:
 def _tilted(directions: Array, tilt: Array) -> Array:
     """Directions (n, 3) + tilt x directions, of a small tilt about forward and right."""
     roll, pitch = tilt.tolist()
-    found: Array = directions + directions[:, [2, 2, 1]] * (pitch, -roll, roll)
-    found[:, 2] -= pitch * directions[:, 0]
+    x, y, z = directions.T
+    found = np.empty_like(directions)
+    found[:, 0] = x + z * pitch
+    found[:, 1] = y - z * roll
+    found[:, 2] = z + y * roll - pitch * x
     return found
 
 
