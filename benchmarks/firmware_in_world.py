@@ -37,7 +37,7 @@ MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "multi-target": {"copter": (), "plane": ()},
     "vision-search": {"copter": ("--vehicles", "2")},
     "survey": {"copter": (), "plane": ()},
-    "handoff": {"plane": ()},
+    "handoff": {"plane": ("--vehicles", "2")},
 }
 """Options of the missions by the vehicles that fly them."""
 EMULATED: Final = "emulated"
@@ -68,9 +68,9 @@ def fly(out: Path, mission: str, vehicle: str, firmware: str, build: FirmwareBui
     began_s = time.monotonic()
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
-        code, text = done.returncode, done.stdout
+        code, text, error = done.returncode, done.stdout, done.stderr.strip().rpartition("\n")[2]
     except subprocess.TimeoutExpired:
-        code, text = -1, ""
+        code, text, error = -1, "", f"still flying after {_LIMIT_S:g} s"
     summary_path = folder / "summary.json"
     summary = json.loads(summary_path.read_text()) if summary_path.exists() else {}
     return {
@@ -81,7 +81,7 @@ def fly(out: Path, mission: str, vehicle: str, firmware: str, build: FirmwareBui
         "seed": seed,
         "exit_code": code,
         "outcome": summary.get("outcome", "not ended"),
-        "reason": summary.get("reason", ""),
+        "reason": summary.get("reason", "") or error,
         "path_rms_m": summary.get("path_rms_error_m"),
         "path_max_m": summary.get("path_max_error_m"),
         "figures": [line for line in text.splitlines() if not line.startswith(_LEFT_OUT)],

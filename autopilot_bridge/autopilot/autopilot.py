@@ -173,7 +173,7 @@ class Autopilot:
         self._readings = readings
         self._stores = stores = new_stores()
         self.navigation = NavigationFilter(
-            typed.navigation, readings=readings, physics_rate_hz=physics_rate_hz
+            typed.navigation, readings=readings, physics_rate_hz=physics_rate_hz, frame_at=flavour.frame_at
         )
         self.controller = flavour.flight.controller(
             typed.controller, physics_rate_hz=physics_rate_hz, nav=self.navigation.state

@@ -24,6 +24,7 @@ from autopilot_bridge.commander.events import (
     ModeChanged,
     ModeDenied,
     SystemStatus,
+    TakeoffDetected,
 )
 from autopilot_bridge.commander.failsafe import FailsafeMonitor, failsafe_mode
 from autopilot_bridge.commander.fence_keeper import FenceKeeper
@@ -440,6 +441,8 @@ class Commander:
         event = self._disarming.follow(self.context)
         if event is not None:
             self.emit(event)
+        if isinstance(event, TakeoffDetected) and self.policy.home_at_liftoff:
+            self.home.begin_flight()
         reason = self._disarming.due(self.mode, self.context, self.tasks, self.parameters)
         if reason is not None:
             self._disarm(reason)

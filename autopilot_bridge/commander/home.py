@@ -53,7 +53,7 @@ class Home:
         return True
 
     def begin_flight(self) -> None:
-        """At arming, set home to the vehicle's position, unless a client has set it."""
+        """At arming or lift-off, set home to the vehicle's position, unless a client has set it."""
         if not self.commanded:
             self._set_here()
 

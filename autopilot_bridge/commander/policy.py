@@ -30,6 +30,7 @@ class CommanderPolicy:
         armable_s: earliest time at which the arming checks that need no position can pass.
         position_ready_s: earliest time at which the navigation solution counts as a position.
         home_s: earliest time at which home is set.
+        home_at_liftoff: home is set when the vehicle leaves the ground, too, not only when it is armed (PX4).
         armable_modes: modes in which arming is allowed.
         ground_modes: modes that can be selected while disarmed.
         flown_modes: modes that can be entered in flight.
@@ -101,6 +102,7 @@ class CommanderPolicy:
     armable_s: float
     position_ready_s: float
     home_s: float
+    home_at_liftoff: bool
     armable_modes: frozenset[FlightMode]
     ground_modes: frozenset[FlightMode]
     flown_modes: frozenset[FlightMode]

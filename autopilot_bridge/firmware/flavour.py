@@ -20,6 +20,7 @@ from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 from autopilot_bridge.services.channel import AddressRule
 from autopilot_bridge.services.commands.available_modes import ListedMode
 from flightsim.airframe import AirframeKind, LaunchKind
+from flightsim.foundation.geodesy import FrameAt
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
@@ -176,6 +177,7 @@ class Flavour:
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
         reboot_starts_again: a reboot starts the simulated vehicle again too, at its first place and level
             (ArduPilot's SITL); else only the autopilot boots, as on a vehicle.
+        frame_at: the kind of its local frame.
         services: what its services do differently.
         gps_source: which receiver the first GPS is, as the parameters were at boot.
     """
@@ -197,6 +199,7 @@ class Flavour:
     controller_parameters: Callable[..., Any]
     navigation_parameters: Callable[[ParameterStore], NavigationParameters]
     heartbeat_on_mode_change: bool
+    frame_at: FrameAt
     services: FirmwareServices
     reboot_starts_again: bool = False
     gps_source: Callable[[ParameterStore], GpsSource] = own_receiver

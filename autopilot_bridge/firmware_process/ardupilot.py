@@ -35,8 +35,8 @@ from autopilot_bridge.sitl.backend import BackendSetup
 from flightsim import interface as i
 from flightsim import truth as t
 from flightsim.airframe import AirframeKind
-from flightsim.foundation.vectors import wrap_180
-from flightsim.home import Home
+from flightsim.foundation.firmware_frames import ArduPilotFrame
+from flightsim.foundation.geodesy import GeodeticPosition
 
 _FIRST_PORT: Final = 9002  # of the physics; plus 10 for each instance
 _INSTANCES: Final = 100
@@ -47,9 +47,6 @@ _SPEEDUP: Final = 100  # as fast as the world asks it to
 _SERVOS: Final = struct.Struct("<HHI16H")  # magic number, frame rate, frame count, pulse widths, us
 _MAGIC: Final = 18458
 _NEUTRAL_US, _RANGE_US, _LOW_US = 1500.0, 500.0, 1000.0
-_M_PER_DEG: Final = 0.011131884502145034e7
-"""ArduPilot's metres in a degree of latitude; not those of WGS84."""
-
 _VEHICLE_TYPES: Final[Mapping[AirframeKind, frozenset[int]]] = {
     AirframeKind.MULTICOPTER: frozenset({dialect.MAV_TYPE_QUADROTOR}),
     AirframeKind.FIXED_WING: frozenset({dialect.MAV_TYPE_FIXED_WING}),
@@ -86,7 +83,10 @@ class ArduPilotBackend:
         self._truth = setup.truth
         self._readings = setup.readings
         self._kind = setup.airframe.kind
-        self._home = setup.world.place
+        home = setup.world.place
+        self._frame = ArduPilotFrame(  # of the metres that it makes latitude and longitude of again
+            GeodeticPosition(lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt_m=home.alt_m)
+        )
         self._actuators = np.zeros(i.MAX_ACTUATORS)
         self._encoder = FrameEncoder(setup.vehicle.system_id, SIMULATOR_COMPONENT)
         self._boot_us = unix_us - setup.world.unix_epoch_us  # in the time of the world
@@ -111,7 +111,6 @@ class ArduPilotBackend:
                 for number, port in enumerate(ports.values())
                 for part in (f"--serial{number}", f"udpclient:{LOOPBACK}:{port.number}")
             ]
-            home = self._home
             self._process = FirmwareProcess(
                 "ArduPilot",
                 [
@@ -236,11 +235,8 @@ class ArduPilotBackend:
                 "gyro": imu[i.IMU_GYRO_FRD_RAD_S].tolist(),
                 "accel_body": imu[i.IMU_ACCEL_FRD_M_S2].tolist(),
             },
-            "position": position_ned_m(
-                self._home,
-                math.degrees(truth[t.LAT_RAD]),
-                math.degrees(truth[t.LON_RAD]),
-                float(truth[t.ALT_M]),
+            "position": self._frame.ned_from_geodetic(
+                math.degrees(truth[t.LAT_RAD]), math.degrees(truth[t.LON_RAD]), float(truth[t.ALT_M])
             ),
             "quaternion": truth[t.Q_NED_FROM_FRD].tolist(),
             "velocity": truth[t.VEL_NED_M_S].tolist(),
@@ -273,16 +269,6 @@ class ArduPilotBackend:
                 f"ArduPilot's program is for a vehicle of MAV_TYPE {heartbeat.type}, and the model is a "
                 f"{self._kind.value}; give arducopter for multicopters, arduplane for aircraft"
             )
-
-
-def position_ned_m(home: Home, lat_deg: float, lon_deg: float, alt_m: float) -> tuple[float, float, float]:
-    """A place in ArduPilot's metres from home, which it makes latitude and longitude of again."""
-    parallel = math.cos(math.radians(0.5 * (lat_deg + home.lat_deg)))
-    return (
-        (lat_deg - home.lat_deg) * _M_PER_DEG,
-        wrap_180(lon_deg - home.lon_deg) * _M_PER_DEG * parallel,
-        home.alt_m - alt_m,
-    )
 
 
 def _write_parameters(path: Path, setup: BackendSetup) -> None:

@@ -18,7 +18,8 @@ from typing import Final
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, is_geodetic
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.firmware_frames import Px4Frame
+from flightsim.foundation.geodesy import GeodeticPosition
 
 PARAMETERS: Final[Mapping[str, float]] = MappingProxyType({"MIS_TKO_LAND_REQ": 0.0, "FW_LND_ANG": 5.0})
 """Parameters that the rules depend on, with the values that count where the vehicle does not have them."""
@@ -200,7 +201,7 @@ def _approach_problem(
     descent_m = _height_m(entry, home_alt_m) - _height_m(land, home_alt_m)
     if descent_m < _LEAST_HEIGHT_M:
         return "the approach waypoint must be above the landing point"
-    frame = LocalFrame(GeodeticPosition(lat_deg=land.x, lon_deg=land.y, alt_m=0.0))
+    frame = Px4Frame(GeodeticPosition(lat_deg=land.x, lon_deg=land.y, alt_m=0.0))
     distance_m = math.hypot(*frame.ned_from_geodetic(entry.x, entry.y, 0.0)[:2])
     if entry.command == dialect.MAV_CMD_NAV_LOITER_TO_ALT:
         radius_m = abs(entry.param2) if math.isfinite(entry.param2) else 0.0

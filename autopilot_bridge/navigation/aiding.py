@@ -27,7 +27,7 @@ from autopilot_bridge.navigation.report import report
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.terrain import TerrainEstimator, update_terrain
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import FrameAt, GeodeticPosition, LocalFrame
 from flightsim.foundation.kernels import bound
 from flightsim.interface import SensorReadings
 
@@ -55,6 +55,7 @@ class Aiding:
         readings: SensorReadings,
         solution: Solution,
         health: NavigationHealth,
+        frame_at: FrameAt,
     ) -> None:
         self._parameters = parameters
         self._readings = readings
@@ -86,7 +87,9 @@ class Aiding:
         self._terrain = TerrainEstimator(parameters)
         self._heading = HeadingAiding(parameters, parts)
         self._height = HeightAiding(parameters, parts, terrain=self._terrain)
-        self._gps = GpsAiding(parameters, parts, heading=self._heading, height=self._height)
+        self._gps = GpsAiding(
+            parameters, parts, heading=self._heading, height=self._height, frame_at=frame_at
+        )
         self.external: ExternalAiding | None = None
         self.air: AirAiding | None = None
         if parameters.fixed_wing:

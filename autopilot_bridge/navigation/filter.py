@@ -29,7 +29,7 @@ from autopilot_bridge.navigation.layout import (
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import GYRO, GYRO_LAST, HISTORY_Q
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import FrameAt, GeodeticPosition, LocalFrame
 from flightsim.foundation.kernels import bound
 from flightsim.interface import SensorReadings
 
@@ -59,7 +59,12 @@ class NavigationFilter:
     """
 
     def __init__(
-        self, parameters: NavigationParameters, *, readings: SensorReadings, physics_rate_hz: int
+        self,
+        parameters: NavigationParameters,
+        *,
+        readings: SensorReadings,
+        physics_rate_hz: int,
+        frame_at: FrameAt = LocalFrame,
     ) -> None:
         """A filter that reads `readings` and has not aligned yet.
 
@@ -67,6 +72,7 @@ class NavigationFilter:
             parameters: tuning.
             readings: written in place by the sensors before each `step`.
             physics_rate_hz: calls of `step` per second.
+            frame_at: the kind of its NED frame.
 
         Raises:
             ValueError: `covariance_rate_hz` does not divide the physics rate.
@@ -109,7 +115,9 @@ class NavigationFilter:
             (readings.gps, HAS_GPS),
         )
         self._taken_us = [-1] * len(self._slow_readings)
-        self._aiding = Aiding(parameters, readings=readings, solution=self._solution, health=self.health)
+        self._aiding = Aiding(
+            parameters, readings=readings, solution=self._solution, health=self.health, frame_at=frame_at
+        )
         self.reset()
 
     @property

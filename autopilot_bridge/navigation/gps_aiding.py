@@ -25,7 +25,7 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
 from autopilot_bridge.navigation.states import X_POS
 from flightsim import interface as interface
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import FrameAt, GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import wrap_180
 
 _M_PER_DEG: Final = 111_200.0
@@ -175,6 +175,7 @@ class GpsAiding:
         *,
         heading: HeadingAiding,
         height: HeightAiding,
+        frame_at: FrameAt,
     ) -> None:
         self._parameters = parameters
         self._reading = parts.readings.gps
@@ -182,6 +183,7 @@ class GpsAiding:
         self._contradictions, self._standby = parts.contradictions, parts.standby
         self._heading = heading
         self._height = height
+        self._frame_at = frame_at
         self.quality = GpsQuality(parameters)
         self.frame: LocalFrame | None = None
         self._before_rejoining: Array | None = None
@@ -198,8 +200,8 @@ class GpsAiding:
 
     def set_origin(self, origin: GeodeticPosition) -> None:
         """Fix the NED frame; gravity, Earth's rotation and the magnetic field follow from it."""
-        self.frame = LocalFrame(origin)
-        self._solution.set_latitude(origin.lat_deg, origin.alt_m)
+        self.frame = self._frame_at(origin)
+        self._solution.set_frame(self.frame)
         self._heading.set_place(origin)
 
     def prepare(self, time_us: int) -> int:

@@ -27,6 +27,7 @@ from autopilot_bridge.navigation.states import (
     HISTORY_VEL,
     INVALID_SAMPLES,
     SAMPLE_AGE_S,
+    STRETCH,
     SUM_FORCE,
     SUM_GYRO,
     SUM_GYRO_TIME,
@@ -139,7 +140,8 @@ def advance(core: Array, dt: float, sample_timeout_s: float) -> None:
         else:
             acceleration = g - 2.0 * (ex * vy - ey * vx)
         dv += acceleration * dt
-        core[X_POS + i] += (core[X_VEL + i] + 0.5 * dv) * dt
+        moved = (core[X_VEL + i] + 0.5 * dv) * dt
+        core[X_POS + i] += moved * core[STRETCH + i] if i < 2 else moved
         core[X_VEL + i] += dv
     for i in range(9):
         core[SUM_R + i] += core[R + i] * dt

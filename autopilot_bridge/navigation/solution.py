@@ -12,7 +12,7 @@ from autopilot_bridge.navigation.fusion import OBS_SIZE
 from autopilot_bridge.navigation.mechanisation import refresh_rotation
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.foundation.geodesy import earth_rate_ned_rad_s, normal_gravity_m_s2
+from flightsim.foundation.geodesy import LocalFrame, earth_rate_ned_rad_s, normal_gravity_m_s2
 from flightsim.foundation.rotations import multiply, quaternion_from_euler
 
 Array = NDArray[np.float64]
@@ -48,6 +48,7 @@ class Solution:
         self.obs: Array = np.zeros(OBS_SIZE)
         self.process: Array = process_from(parameters)
         self.core[s.GRAVITY] = GRAVITY_M_S2
+        self.core[s.STRETCH : s.STRETCH + 2] = 1.0
         horizontal, vertical = parameters.gps_position_walk_m
         self.gps_error_var = (horizontal**2, horizontal**2, vertical**2)
         self.clear()
@@ -61,12 +62,14 @@ class Solution:
         self.process[cov.GPS_VAR_VERTICAL] = vertical
 
     def clear(self) -> None:
-        """Nothing is known, except where on Earth gravity and rotation were found."""
+        """Nothing is known, except the frame, with the gravity and the rotation of its origin."""
         gravity, rate = self.core[s.GRAVITY], self.core[s.EARTH_RATE : s.EARTH_RATE + 3].copy()
+        stretch = self.core[s.STRETCH : s.STRETCH + 2].copy()
         self.core[:] = 0.0
         self.core[s.Q] = 1.0
         self.core[s.GRAVITY] = gravity
         self.core[s.EARTH_RATE : s.EARTH_RATE + 3] = rate
+        self.core[s.STRETCH : s.STRETCH + 2] = stretch
         self.core[s.TERRAIN_DOWN] = math.nan
         refresh_rotation(self.core)
         self.p[:] = 0.0
@@ -76,10 +79,12 @@ class Solution:
         self.steps = 0
         self._accuracy_step = 0  # when the receiver last reported its accuracy
 
-    def set_latitude(self, lat_deg: float, alt_m: float) -> None:
-        """Gravity and Earth's rotation of the place."""
-        self.core[s.GRAVITY] = normal_gravity_m_s2(lat_deg, alt_m)
-        self.core[s.EARTH_RATE : s.EARTH_RATE + 3] = earth_rate_ned_rad_s(lat_deg)
+    def set_frame(self, frame: LocalFrame) -> None:
+        """Gravity and Earth's rotation of the frame's origin, and the lengths of its metres."""
+        origin = frame.origin
+        self.core[s.GRAVITY] = normal_gravity_m_s2(origin.lat_deg, origin.alt_m)
+        self.core[s.EARTH_RATE : s.EARTH_RATE + 3] = earth_rate_ned_rad_s(origin.lat_deg)
+        self.core[s.STRETCH : s.STRETCH + 2] = frame.stretch
 
     def set_gps_accuracy(self, eph_m: float, epv_m: float) -> None:
         """What the receiver reports beyond its white noise is the slow error's standard deviation.

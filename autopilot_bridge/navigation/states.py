@@ -53,6 +53,7 @@ SAMPLE_AGE_S: Final = _core.place()  # since the newest valid IMU sample
 INVALID_SAMPLES: Final = _core.place()  # IMU samples refused so far
 GRAVITY: Final = _core.place()  # m/s^2
 EARTH_RATE: Final = _core.place(3)  # of the Earth against inertial space, NED, rad/s
+STRETCH: Final = _core.place(2)  # metres of the frame in a metre over ground, north and east
 TERRAIN_DOWN: Final = _core.place()  # down position of the ground below, m; NaN when not known
 
 # core: sums since the last covariance prediction

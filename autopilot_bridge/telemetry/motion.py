@@ -24,7 +24,6 @@ from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView, pressure_altitude_m
 from flightsim import interface
 from flightsim.foundation.kernels import bound, kernel
-from flightsim.foundation.rotations import wrap_180
 from flightsim.interface import SensorReadings
 
 Array = NDArray[np.float64]
@@ -40,7 +39,7 @@ MESSAGES: Final = (
 _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covariance, row by row
 _POSE_ATTITUDE: Final = (15, 18, 20)
 _HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
-_PLACE_SIZE: Final = 5
+_PLACE_SIZE: Final = 3  # latitude and longitude in degrees, altitude in metres
 _GYRO: Final[int] = interface.IMU_GYRO_FRD_RAD_S.start
 _ACCEL: Final[int] = interface.IMU_ACCEL_FRD_M_S2.start
 _MAG: Final[int] = interface.MAG_FRD_GAUSS.start
@@ -86,10 +85,9 @@ def _fill(
     r.local_position_ned__vx, r.local_position_ned__vy, r.local_position_ned__vz = vn, ve, vd
 
     r.global_position_int__time_boot_ms = time_ms
-    longitude = wrap_180(place[1] + east / place[4])
-    r.global_position_int__lat = whole((place[0] + north / place[3]) * 1e7, 1.8e9)
-    r.global_position_int__lon = whole(longitude * 1e7, 1.8e9)
-    r.global_position_int__alt = whole((place[2] - down) * 1e3, 2e9)
+    r.global_position_int__lat = whole(place[0] * 1e7, 1.8e9)
+    r.global_position_int__lon = whole(place[1] * 1e7, 1.8e9)
+    r.global_position_int__alt = whole(place[2] * 1e3, 2e9)
     home_down_m = home_ned_m[2] if home_ned_m[2] == home_ned_m[2] else 0.0
     r.global_position_int__relative_alt = whole((home_down_m - down) * 1e3, 2e9)
     r.global_position_int__vx = whole(vn * 100.0, 32767.0)
@@ -208,8 +206,6 @@ class MotionMessages:
         self._navigation = navigation
         self._readings = readings
         self._place = np.zeros(_PLACE_SIZE)
-        self._place[3:5] = 1.0
-        self._frame: object = None
         self._time_us = -1
         self._record = np.zeros(1, record_type(*map(definition, MESSAGES), prefixed=True))
         self._bytes = self._record.view(np.uint8).data
@@ -317,11 +313,8 @@ class MotionMessages:
         if time_us == self._time_us:
             return self._bytes
         self._time_us = time_us
-        context, place = self._context, self._place
-        frame = context.frame
-        if frame is not self._frame and frame is not None:
-            self._frame = frame
-            origin = frame.origin
-            place[:] = origin.lat_deg, origin.lon_deg, origin.alt_m, *frame.metres_per_degree
+        frame = self._context.frame
+        if frame is not None:
+            self._place[:] = frame.geodetic_from_ned(*self._navigation.state[n.POS_NED_M].tolist())
         self._fill(time_us)
         return self._bytes

@@ -1,10 +1,12 @@
 """The Earth as WGS84 has it (NGA.STND.0036): ellipsoid, gravity, rotation, and local NED frames.
 
-`LocalFrame` linearises around its origin with the local radii of curvature, as autopilots do: against the
-true tangent plane (`pymap3d`) it is off by 1 mm at 100 m, 0.1 m at 1 km, 10 m at 10 km.
+`LocalFrame` linearises around its origin with the local radii of curvature: against the true tangent plane
+(`pymap3d`) it is off by 1 mm at 100 m, 0.1 m at 1 km, 10 m at 10 km. Autopilots have other frames
+(`firmware_frames`).
 """
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -74,6 +76,12 @@ class LocalFrame:
         """Metres per degree of latitude and of longitude at the origin."""
         return self._m_per_deg_lat, self._m_per_deg_lon
 
+    @property
+    def stretch(self) -> tuple[float, float]:
+        """Metres of this frame in a metre over ground, to the north and to the east of the origin."""
+        north_m, east_m = self.metres_per_degree
+        return north_m / self._m_per_deg_lat, east_m / self._m_per_deg_lon
+
     def ned_from_geodetic(self, lat_deg: Angle, lon_deg: Angle, alt_m: Angle) -> tuple[Angle, Angle, Angle]:
         """(north, east, down) in metres of a geodetic point, or of an array of them (n,) each.
 
@@ -94,3 +102,7 @@ class LocalFrame:
             wrap_180(self.origin.lon_deg + east_m / self._m_per_deg_lon),
             self.origin.alt_m - down_m,
         )
+
+
+FrameAt = Callable[[GeodeticPosition], LocalFrame]
+"""A kind of local frame: makes the one with its origin at a position."""

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.geodesy import FrameAt, GeodeticPosition
 from missions.kind import VehicleKind
 from missions.vehicle.limits import Limits
 
@@ -62,6 +62,7 @@ class Firmware:
             (PX4).
         unwrapped_fences: whether longitudes of fence polygons are compared without wrap, so that none may lie
             across 180 degrees (PX4).
+        frame_at: the kind of the autopilot's local frame.
         unset: value of a command or item parameter that is not set.
         system_id_parameter: name of the parameter that sets the vehicle's system id.
         roll_alone: whether a roll command in the guided mode may leave pitch and throttle to the autopilot.
@@ -89,6 +90,7 @@ class Firmware:
     altitude_radius: tuple[str, float] | None = None
     placeless_in_mission_frame: bool
     unwrapped_fences: bool
+    frame_at: FrameAt
     unset: float
     system_id_parameter: str
     roll_alone: bool = False

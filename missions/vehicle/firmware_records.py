@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
+from flightsim.foundation.firmware_frames import ArduPilotFrame, Px4Frame
 from missions.kind import VehicleKind
 from missions.vehicle.firmware import Firmware, Mode
 from missions.vehicle.limits import FixedWingLimits, Limits, MulticopterLimits
@@ -86,6 +87,7 @@ PX4_COPTER: Final = Firmware(
     resting_mode=Mode.HOLD,
     placeless_in_mission_frame=True,
     unwrapped_fences=True,
+    frame_at=Px4Frame,
     unset=math.nan,
     altitude_radius=("NAV_MC_ALT_RAD", 0.8),
     system_id_parameter="MAV_SYS_ID",
@@ -144,6 +146,7 @@ ARDUCOPTER: Final = Firmware(
     resting_mode=Mode.GUIDED,
     placeless_in_mission_frame=False,
     unwrapped_fences=False,
+    frame_at=ArduPilotFrame,
     unset=0.0,  # NaN is refused
     system_id_parameter="SYSID_THISMAV",
     limits_from=_arducopter_limits,

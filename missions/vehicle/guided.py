@@ -7,12 +7,12 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import home_of
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import FrameAt, GeodeticPosition, LocalFrame
 from flightsim.foundation.vectors import Vector
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
-from missions.vehicle.setpoint import AnySetpoint, Setpoint
+from missions.vehicle.setpoint import AnySetpoint, Setpoint, unmoved
 from missions.vehicle.telemetry import LocalPosition, Position
 
 SetpointSource = Callable[[float], AnySetpoint | None]
@@ -22,6 +22,7 @@ _BEFORE_ENTRY_S: Final = 0.6
 _SLOWEST_HZ: Final = 2.5
 # of a period: a setpoint is valid until the next one, so it is computed for the middle of that time
 _LEAD: Final = 0.5
+_ORIGIN_STEPS: Final = 3
 
 
 class GuidedSession:
@@ -31,7 +32,7 @@ class GuidedSession:
     vehicle is still in the guided mode, the source continues from there.
     """
 
-    def __init__(self, commands: VehicleCommands, rate_hz: float, home_offset_ned_m: Vector) -> None:
+    def __init__(self, commands: VehicleCommands, rate_hz: float, local: Callable[[Vector], Vector]) -> None:
         if not _SLOWEST_HZ <= rate_hz <= 200.0:
             raise MissionError(
                 f"a setpoint rate of {rate_hz:g} Hz does not keep a vehicle guided: {_SLOWEST_HZ:g}..200"
@@ -39,7 +40,7 @@ class GuidedSession:
         self._commands = commands
         self._link = commands.link
         self._period_us = round(1e6 / rate_hz)
-        self._offset = home_offset_ned_m
+        self._local = local
         self._source: SetpointSource | None = None
         self._start_us = 0
         self._last: AnySetpoint | None = None
@@ -120,7 +121,7 @@ class GuidedSession:
                 else:
                     self._last = setpoint
             if self._last is not None:
-                link.send(self._last.message(due_us, link.system_id, self._offset))
+                link.send(self._last.message(due_us, link.system_id, self._local))
             due_us += self._period_us
             # too late: continue from the present time, without a burst
             if due_us < clock.time_us - self._period_us:
@@ -176,12 +177,17 @@ class GuidedSession:
 
 @asynccontextmanager
 async def guided_session(
-    commands: VehicleCommands, rate_hz: float, home_offset_ned_m: Vector
+    commands: VehicleCommands, rate_hz: float, local: Callable[[Vector], Vector] = unmoved
 ) -> AsyncIterator[GuidedSession]:
     """A session that ends with a hold. When the block fails where the vehicle will be left safe, the vehicle
     is kept in its place by setpoints until that is done.
+
+    Args:
+        commands: commands to the vehicle.
+        rate_hz: setpoints per vehicle second.
+        local: the place in the autopilot's local frame of a setpoint's place.
     """
-    session = GuidedSession(commands, rate_hz, home_offset_ned_m)
+    session = GuidedSession(commands, rate_hz, local)
     try:
         yield session
         await session.finish()
@@ -231,13 +237,30 @@ class LocalOrigin:
             timeout_s=5.0,
         )
         here = GeodeticPosition(lat_deg=p.lat_deg, lon_deg=p.lon_deg, alt_m=p.alt_m)
-        lat, lon, alt = LocalFrame(here).geodetic_from_ned(*(-value for value in q.pos_ned_m))
-        return GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+        return _origin_of(here, q.pos_ned_m, self._link.firmware.frame_at)
 
-    async def home_ned_m(self) -> Vector:
-        """Home as a point of the autopilot's local frame."""
-        home = self._link.home
-        return LocalFrame(await self.find()).ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
+    async def from_home(self) -> Callable[[Vector], Vector]:
+        """The conversion of places in NED from home, in the metres of WGS84, into the autopilot's local
+        frame, which has metres of its own.
+        """
+        home, local = LocalFrame(self._link.home), self._link.firmware.frame_at(await self.find())
+
+        def convert(place_ned_m: Vector) -> Vector:
+            return local.ned_from_geodetic(*home.geodetic_from_ned(*place_ned_m))
+
+        return convert
+
+
+def _origin_of(place: GeodeticPosition, pos_ned_m: Vector, frame_at: FrameAt) -> GeodeticPosition:
+    """The origin of the local frame in which a place has a position."""
+    origin = place
+    for _ in range(_ORIGIN_STEPS):  # a frame's metres differ by 0.3 %, so each step is 300 times closer
+        at = frame_at(origin).ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
+        lat, lon, alt = LocalFrame(origin).geodetic_from_ned(
+            *(now - wanted for now, wanted in zip(at, pos_ned_m, strict=True))
+        )
+        origin = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+    return origin
 
 
 def _held(setpoint: AnySetpoint | None) -> AnySetpoint | None:

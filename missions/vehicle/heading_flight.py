@@ -138,7 +138,7 @@ async def open_heading_flight(
             flight.end()
         await commands.set_mode(Mode.HOLD)
         return
-    async with guided_session(commands, _RATE_HZ, (0.0, 0.0, 0.0)) as session:
+    async with guided_session(commands, _RATE_HZ) as session:
         following = asyncio.ensure_future(session.follow(flight.setpoint))
         try:
             await link.wait_until(

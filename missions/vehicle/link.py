@@ -33,6 +33,7 @@ from missions.vehicle.command_authority import CommandAuthority
 from missions.vehicle.connection import Connection, MessageStream
 from missions.vehicle.firmware import Firmware
 from missions.vehicle.firmware_records import FIRMWARE_NAMES, FIRMWARES
+from missions.vehicle.flight_home import FlightHome
 from missions.vehicle.link_watch import LOST_AFTER_S, QUIET_AFTER_S, LinkWatch
 from missions.vehicle.mode_tasks import ModeTasks
 from missions.vehicle.notes import FlightNotes, LinkLoss
@@ -99,6 +100,7 @@ class VehicleLink:
         self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
         self._check: SystemIdCheck | None = None
+        self._flight_home = FlightHome()
         self.contradiction = ""
         self._reported: tuple[int, int] | None = None  # base mode and custom mode of the newest heartbeat
         # when the heartbeats began to report disarmed after armed; None: they did not
@@ -194,13 +196,19 @@ class VehicleLink:
 
         for name in ("MISSION_CURRENT", "MISSION_ITEM_REACHED"):
             listen(name, lambda frame: tasks.on_mission_message(decode(frame), self.clock.stamp_us))
-        listen(
-            "EXTENDED_SYS_STATE",
-            lambda frame: tasks.on_landed_state(
-                decode_as(frame, dialect.MAVLink_extended_sys_state_message).landed_state
-            ),
-        )
+        listen("EXTENDED_SYS_STATE", self._on_landed_state)
+        listen("HOME_POSITION", self._on_home)
         listen("GLOBAL_POSITION_INT", self._on_position)
+
+    def _on_landed_state(self, frame: Frame) -> None:
+        state = decode_as(frame, dialect.MAVLink_extended_sys_state_message).landed_state
+        self.tasks.on_landed_state(state)
+        self._flight_home.on_landed_state(state)
+
+    def _on_home(self, frame: Frame) -> None:
+        reported = home_of(decode_as(frame, dialect.MAVLink_home_position_message))
+        if reported is not None:
+            self._flight_home.on_home(reported, armed=self.armed)
 
     def _on_position(self, frame: Frame) -> None:
         at = place(*_read_position(frame))
@@ -391,13 +399,15 @@ class VehicleLink:
         return usable if before is not None and now_us - before[2] <= _USABLE_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
-        """Home as reported by the vehicle, or None."""
-        message = self.message(dialect.MAVLink_home_position_message)
+        """Home as reported by the vehicle, or None; see `home`."""
+        if self._flight_home.place is not None:
+            return self._flight_home.place
+        message = self.message(dialect.MAVLink_home_position_message)  # from before the first heartbeat
         return None if message is None else home_of(message)
 
     @property
     def home(self) -> GeodeticPosition:
-        """Home as reported by the vehicle."""
+        """Home as reported by the vehicle; in flight that from before the take-off (`FlightHome`)."""
         place = self.home_or_none()
         if place is None:
             raise VehicleTimeout("the vehicle has not reported its home position: call wait_ready first")

@@ -1,6 +1,7 @@
 """Streamed setpoints: SET_POSITION_TARGET_LOCAL_NED and SET_ATTITUDE_TARGET with their type masks."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +19,11 @@ _IGNORE_PITCH_AND_YAW_RATE: Final = 0x06
 _IGNORE_THRUST: Final = 0x40
 _IGNORE_ATTITUDE: Final = 0x80
 _ZERO: Final[Vector] = (0.0, 0.0, 0.0)
+
+
+def unmoved(place_ned_m: Vector) -> Vector:
+    """The same place: it is one of the autopilot's local frame already."""
+    return place_ned_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,17 +58,17 @@ class Setpoint:
             | (_IGNORE_YAW_RATE if self.yaw_rate_rad_s is None else 0)
         )
 
-    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> MAVLinkMessage:
-        """The MAVLink message, with the position moved by `offset_ned_m` (the place of home in the local
-        frame).
+    def message(
+        self, time_us: int, system_id: int, local: Callable[[Vector], Vector] = unmoved
+    ) -> MAVLinkMessage:
+        """The MAVLink message.
+
+        Args:
+            time_us: vehicle time.
+            system_id: of the vehicle.
+            local: the place in the autopilot's local frame of the setpoint's place.
         """
-        position = self.position_ned_m or _ZERO
-        if self.position_ned_m is not None:
-            position = (
-                position[0] + offset_ned_m[0],
-                position[1] + offset_ned_m[1],
-                position[2] + offset_ned_m[2],
-            )
+        position = _ZERO if self.position_ned_m is None else local(self.position_ned_m)
         return dialect.MAVLink_set_position_target_local_ned_message(
             time_us // 1000 & 0xFFFFFFFF,
             system_id,
@@ -113,10 +119,10 @@ class AttitudeSetpoint:
             return _IGNORE_ATTITUDE | _IGNORE_PITCH_AND_YAW_RATE | thrust
         return _IGNORE_RATES | thrust
 
-    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> MAVLinkMessage:
-        """The setpoint as a MAVLink message. An attitude has no position, so the offset of the local frame
-        has no effect.
-        """
+    def message(
+        self, time_us: int, system_id: int, local: Callable[[Vector], Vector] = unmoved
+    ) -> MAVLinkMessage:
+        """The setpoint as a MAVLink message; it has no place, so `local` has no effect."""
         return dialect.MAVLink_set_attitude_target_message(
             time_us // 1000 & 0xFFFFFFFF,
             system_id,

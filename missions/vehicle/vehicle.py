@@ -158,7 +158,9 @@ class Vehicle:
 
     @property
     def home(self) -> GeodeticPosition:
-        """Home as reported by the vehicle."""
+        """Home as reported by the vehicle. In flight it stays the place from before the take-off, from which
+        heights and local positions are measured; a return may lead to another one, set since.
+        """
         return self.link.home
 
     @property
@@ -356,7 +358,7 @@ class Vehicle:
         PX4 receives setpoints before and continuously in OFFBOARD; between two calls of `follow` the last one
         is repeated. At the end the vehicle holds its position.
         """
-        async with guided_session(self.commands, rate_hz, await self.local_origin.home_ned_m()) as session:
+        async with guided_session(self.commands, rate_hz, await self.local_origin.from_home()) as session:
             yield session
 
     async def follow(self, source: SetpointSource, rate_hz: float = 25.0) -> None:

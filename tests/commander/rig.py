@@ -162,6 +162,9 @@ class Rig:
         commander.tasks.enter(commander.mode)
         self.tick()
         assert commander.airborne
+        self.context.nav[nav.POS_NED_M] = 0.0
+        commander.home.begin_flight()  # home where it stood, not where it appeared
+        self.context.nav[nav.POS_NED_M] = (0.0, 0.0, -height_m)
 
     def waypoint(
         self,

@@ -170,6 +170,21 @@ def test_home_is_set_when_the_position_is_good_and_again_at_arming() -> None:
     assert rig.context.home_ned_m[0] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_px4_alone_sets_home_where_it_lifts_off(flavour: str) -> None:
+    rig = Rig(flavour)
+    if flavour == "ardupilot":
+        assert rig.commander.set_mode(FlightMode.GUIDED).accepted
+    assert rig.commander.arm().accepted
+    rig.tick()
+    rig.context.nav[nav_layout.POS] = 4.0  # down the runway
+    before = len(rig.happened(HomeSet))
+    assert rig.commander.guidance.takeoff(down_m=-8.0, yaw_rad=math.nan).accepted
+    rig.run_until(lambda: bool(rig.happened(TakeoffDetected)), 10.0)
+    assert len(rig.happened(HomeSet)) - before == (1 if flavour == "px4" else 0)
+    assert rig.context.home_ned_m[0] == pytest.approx(4.0 if flavour == "px4" else 0.0, abs=0.01)
+
+
 def test_a_commanded_home_stays_when_arming() -> None:
     rig = Rig("px4")
     assert rig.commander.home.command(47.4, 8.55, 500.0)

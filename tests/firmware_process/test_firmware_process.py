@@ -1,26 +1,22 @@
 """Real firmware as a backend, with stand-ins for its programs: lockstep, links, failures, start files."""
 
 import json
-import math
 import os
 import signal
 import sys
 import threading
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from autopilot_bridge.firmware_process import FirmwareBuild, FirmwareError, ardupilot, firmware_backend, px4
-from autopilot_bridge.firmware_process.ardupilot import ArduPilotBackend, position_ned_m
+from autopilot_bridge.firmware_process.ardupilot import ArduPilotBackend
 from autopilot_bridge.firmware_process.ardupilot_faults import parameter_changes
 from autopilot_bridge.links import MemoryLink
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
 from autopilot_bridge.sitl import AutopilotBackend, BackendSetup, Sitl, VehicleFailure
 from autopilot_bridge.sitl.backend import Boot
 from flightsim.airframe import AirframeKind
-from flightsim.foundation.geodesy import LocalFrame
-from flightsim.home import Home
 from flightsim.hover_figures import hover_figures
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.sensors.fault_kinds import FaultType
@@ -298,20 +294,6 @@ def test_what_ardupilot_is_answered(ardupilot_build: FirmwareBuild) -> None:
     assert times_us == [2000 * (number + 1) for number in range(len(states))]  # two in a step of 4 ms
     assert abs(states[-1]["quaternion"][1]) < 0.01 > abs(states[-1]["quaternion"][2])  # level
     assert states[-1]["position"][2] < 0.0 < states[-1]["battery"]["voltage"]
-
-
-def test_a_place_in_ardupilots_metres_is_the_place_again() -> None:
-    """ArduPilot turns the metres into degrees by its own scale (1e-7 degree = 0.0111318845 m)."""
-    home = Home(lat_deg=47.4, lon_deg=8.5, alt_m=400.0)
-    lat_deg, lon_deg = home.offset(800.0, -600.0)
-    north_m, east_m, down_m = position_ned_m(home, lat_deg, lon_deg, 420.0)
-    back_lat = home.lat_deg + north_m / 0.011131884502145034e7
-    back_lon = home.lon_deg + east_m / (
-        0.011131884502145034e7 * math.cos(math.radians(0.5 * (back_lat + home.lat_deg)))
-    )
-    back = LocalFrame(home).ned_from_geodetic(back_lat, back_lon, 420.0)
-    assert np.asarray(back)[:2] == pytest.approx([800.0, -600.0], abs=1e-3)
-    assert down_m == -20.0 and abs(north_m - 800.0) > 0.5  # WGS84's metres would be wrong
 
 
 def test_the_rotors_of_the_quadrotor_are_measured() -> None:

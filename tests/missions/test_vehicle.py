@@ -149,8 +149,8 @@ def test_px4_first_mode_acknowledgement_is_not_accepted(flown):
 def test_follows_setpoints_from_home_whatever_the_local_origin(flown, flavour):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(10.0)
-        offset = await vehicle.local_origin.home_ned_m()
-        assert offset == pytest.approx((1.5, -2.0, 0.3), abs=0.03)
+        from_home = await vehicle.local_origin.from_home()
+        assert from_home((0.0, 0.0, 0.0)) == pytest.approx((1.5, -2.0, 0.3), abs=0.03)
 
         def circle(t):
             if t > 20.0:

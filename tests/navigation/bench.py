@@ -9,6 +9,7 @@ from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, 
 from autopilot_bridge.navigation import states as s
 from estimators.tracking import metrics
 from flightsim import truth as t
+from flightsim.foundation.geodesy import FrameAt, LocalFrame
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from tests.navigation.kinematic_flight import MAG_NED_GAUSS, RATE_HZ
@@ -40,6 +41,7 @@ class Bench:
         sensors: SensorSuiteParameters | None = None,
         parameters: NavigationParameters = PARAMETERS,
         rate_hz: int = RATE_HZ,
+        frame_at: FrameAt = LocalFrame,
     ) -> None:
         self.truths = truth
         self.truth = truth[0].copy()
@@ -50,7 +52,9 @@ class Bench:
             truth=self.truth,
             seeds=lambda name: streams.child("vehicle", 0, "sensor", name),
         )
-        self.filter = NavigationFilter(parameters, readings=self.suite.readings, physics_rate_hz=rate_hz)
+        self.filter = NavigationFilter(
+            parameters, readings=self.suite.readings, physics_rate_hz=rate_hz, frame_at=frame_at
+        )
         self.period_us = 1_000_000 // rate_hz
         self.rate_hz = rate_hz
         self.step = 0

@@ -35,6 +35,7 @@ def core_with(error: Array) -> Array:
     core[s.X_MAG_BIAS : s.X_MAG_BIAS + 3] = 0.01, 0.02, -0.01
     core[s.X_WIND : s.X_WIND + 2] = -2.0, 5.0
     core[s.GRAVITY] = 9.81
+    core[s.STRETCH : s.STRETCH + 2] = 1.0
     work = np.zeros(s.WORK_SIZE)
     work[:SIZE] = error
     covariance.inject(core, work)

@@ -23,6 +23,7 @@ def start(truth: Array, position_ned_m: Array) -> Array:
     core[s.Q : s.Q + 4] = truth[t.Q_NED_FROM_FRD]
     core[s.X_VEL : s.X_VEL + 3] = truth[t.VEL_NED_M_S]
     core[s.X_POS : s.X_POS + 3] = position_ned_m
+    core[s.STRETCH : s.STRETCH + 2] = 1.0
     core[s.GRAVITY] = GRAVITY_M_S2
     core[s.EARTH_RATE : s.EARTH_RATE + 3] = earth_rate_ned_rad_s(HOME.lat_deg)
     imu = np.zeros(7)
@@ -148,8 +149,9 @@ def test_one_step_with_vectors(dt_s: float, alive: bool) -> None:
     coriolis = -2.0 * np.cross(of(s.EARTH_RATE), of(s.X_VEL))
     change = impulse + (coriolis + np.array([0.0, 0.0, 9.81])) * dt_s
     np.testing.assert_allclose(of(s.X_VEL, core), of(s.X_VEL) + change, rtol=1e-12)
+    stretch = np.append(before[s.STRETCH : s.STRETCH + 2], 1.0)
     np.testing.assert_allclose(
-        of(s.X_POS, core), of(s.X_POS) + (of(s.X_VEL) + 0.5 * change) * dt_s, rtol=1e-12
+        of(s.X_POS, core), of(s.X_POS) + (of(s.X_VEL) + 0.5 * change) * dt_s * stretch, rtol=1e-12
     )
     np.testing.assert_allclose(of(s.FORCE_NED, core), force, atol=1e-12)
     np.testing.assert_allclose(of(s.GYRO_LAST, core), gyro)

@@ -11,7 +11,8 @@ from autopilot_bridge.navigation import covariance as cov
 from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.solution import Solution, process_from
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
-from flightsim.foundation.geodesy import earth_rate_ned_rad_s, normal_gravity_m_s2
+from flightsim.foundation.firmware_frames import Px4Frame
+from flightsim.foundation.geodesy import GeodeticPosition, earth_rate_ned_rad_s, normal_gravity_m_s2
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.foundation.rotations import quaternion_from_euler
 from tests.rotations import rotation_matrix, yaw_rad
@@ -279,7 +280,8 @@ def test_the_past_is_seen_with_the_corrections_since() -> None:
 
 def test_clearing_forgets_all_but_the_place() -> None:
     made = solution()
-    made.set_latitude(47.0, 500.0)
+    frame = Px4Frame(GeodeticPosition(lat_deg=47.0, lon_deg=8.0, alt_m=500.0))
+    made.set_frame(frame)
     assert made.core[s.GRAVITY] == normal_gravity_m_s2(47.0, 500.0)
     np.testing.assert_array_equal(made.core[s.EARTH_RATE : s.EARTH_RATE + 3], earth_rate_ned_rad_s(47.0))
     made.row, made.steps, made.work[:] = 7, 9, 1.0
@@ -289,6 +291,7 @@ def test_clearing_forgets_all_but_the_place() -> None:
     expected[s.R : s.R + 9] = np.eye(3).ravel()
     expected[s.GRAVITY] = normal_gravity_m_s2(47.0, 500.0)
     expected[s.EARTH_RATE : s.EARTH_RATE + 3] = earth_rate_ned_rad_s(47.0)
+    expected[s.STRETCH : s.STRETCH + 2] = frame.stretch
     expected[s.TERRAIN_DOWN] = math.nan
     np.testing.assert_array_equal(made.core, expected)
     for array in (made.p, made.history, made.work):

@@ -21,6 +21,7 @@ from autopilot_bridge.firmware.vehicle_classes import MULTICOPTER
 from autopilot_bridge.flight.plan_reading import ARDUCOPTER_PLANS
 from autopilot_bridge.mavlink.simulation_marks import FLIGHTSTACK_UID2
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.firmware_frames import ArduPilotFrame
 
 _MODES: Final = load_data("ardupilot.copter", "modes.toml")
 _FLOWN: Final = modes(_MODES["flown"])
@@ -38,6 +39,7 @@ POLICY: Final = CommanderPolicy(
     armable_s=23.4,
     position_ready_s=41.5,
     home_s=19.9,
+    home_at_liftoff=False,
     armable_modes=modes(_MODES["armable"]),
     ground_modes=_FLOWN | _GROUND_ONLY,
     flown_modes=_FLOWN,
@@ -129,6 +131,7 @@ ARDUPILOT: Final = Flavour(
     flight_parameters=ardupilot_mapping.flight_parameters,
     controller_parameters=ardupilot_mapping.controller_parameters,
     navigation_parameters=ardupilot_mapping.navigation_parameters,
+    frame_at=ArduPilotFrame,
     heartbeat_on_mode_change=True,
     reboot_starts_again=True,
     gps_source=ardupilot_gps_source,

@@ -20,6 +20,7 @@ from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.simulation_marks import PX4_SITL_UID
 from autopilot_bridge.services.channel import AddressRule
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.firmware_frames import Px4Frame
 
 _MODES: Final = load_data("px4.copter", "modes.toml")
 _SELECTABLE: Final = modes(_MODES["selectable"])
@@ -35,6 +36,7 @@ POLICY: Final = CommanderPolicy(
     armable_s=3.66,
     position_ready_s=3.66,
     home_s=3.03,
+    home_at_liftoff=True,
     armable_modes=_SELECTABLE - _PREVENT_ARMING,
     ground_modes=_SELECTABLE,
     flown_modes=_SELECTABLE,
@@ -117,6 +119,7 @@ PX4: Final = Flavour(
     flight_parameters=px4_mapping.flight_parameters,
     controller_parameters=px4_mapping.controller_parameters,
     navigation_parameters=px4_mapping.navigation_parameters,
+    frame_at=Px4Frame,
     heartbeat_on_mode_change=False,
     services=SERVICES,
 )
