@@ -41,7 +41,7 @@ MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
 }
 """Options of the missions by the vehicles that fly them."""
 EMULATED: Final = "emulated"
-_LIMIT_S: Final = 1800.0
+_LIMIT_S: Final = 7200.0
 _LEFT_OUT: Final = (
     "completed:",
     "failed:",
