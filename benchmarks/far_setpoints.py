@@ -11,7 +11,8 @@ import math
 import sys
 
 from flightsim.foundation.geodesy import LocalFrame
-from flightstack import FlightOptions, MissionError, MulticopterLimits, PlanError, Position, Setpoint, Vehicle
+from flightstack import FlightOptions, MissionError, PlanError, Position, Setpoint, Vehicle
+from missions.vehicle.limits import MulticopterLimits
 
 _ACCELERATION_M_S2 = 1.5
 _SETTLING_S = 8.0
@@ -63,7 +64,8 @@ async def fly(vehicle: Vehicle, options: FlightOptions) -> None:
     mean = [sum(values) / len(places) for values in zip(*places, strict=True)]
     off = [a - b for a, b in zip(frame.ned_from_geodetic(*mean), (north_m, east_m, -height_m), strict=True)]
     sys.stdout.write(
-        f"meant {meant[0]:.7f}, {meant[1]:.7f}: {math.hypot(*off[:2]):.2f} m beside it, {off[2]:+.2f} m down\n"
+        f"meant {meant[0]:.7f}, {meant[1]:.7f}: {math.hypot(*off[:2]):.2f} m beside it, "
+        f"{off[2]:+.2f} m down\n"
     )
     await vehicle.land()
     if math.hypot(*off) > _BOUND_M:

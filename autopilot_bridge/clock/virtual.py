@@ -37,9 +37,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         monotonic: wall clock in seconds, for pacing.
 
     Attributes:
-        time_us: as passed to the constructor.
+        time_us: the loop's time.
 
-    An exception in `advance` ends the run with that exception.
+    An exception in `advance` ends the run with that exception. Then the world stands still; tasks that are
+    cancelled clean up on a time that jumps to each of their timers.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         monotonic: Callable[[], float] = wall_time_s,
     ) -> None:
         self.time_us = time_us
-        self._world_selector = _WorldSelector(advance, time_us, max_time_us)
+        self._world_selector = _WorldSelector(advance, time_us, max_time_us, self._go_on_without_world)
         if speedup is not None:
             self._world_selector.pacer = Pacer(speedup, monotonic)
         super().__init__(self._world_selector)
@@ -73,6 +74,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             selector.due_us = due_us
         return super().call_at(when, callback, *args, context=context)
 
+    def _go_on_without_world(self, passed_us: int) -> None:
+        now_us = self.time_us() + passed_us
+        self.time_us = lambda: now_us
+
     @property
     def slipped_s(self) -> float:
         """Wall seconds lost because the world could not keep pace; 0 when not paced."""
@@ -84,7 +89,11 @@ class _WorldSelector(selectors.DefaultSelector):
     """Steps the world where the loop would wait for file descriptors."""
 
     def __init__(
-        self, advance: Callable[[], object], time_us: Callable[[], int], max_time_us: int | None
+        self,
+        advance: Callable[[], object],
+        time_us: Callable[[], int],
+        max_time_us: int | None,
+        pass_time: Callable[[int], None],
     ) -> None:
         super().__init__()
         self.ready: Any = ()
@@ -92,14 +101,18 @@ class _WorldSelector(selectors.DefaultSelector):
         self.pacer: Pacer | None = None
         self._advance = advance
         self._time_us = time_us
+        self._pass_time = pass_time
         self._limit_us = _NEVER_US if max_time_us is None else max_time_us
         self._max_time_us = max_time_us
         self._until_poll = 0
         self._rounds = 0
         self._broken: BaseException | None = None
+        self._grace_us = _LIMIT_GRACE_US
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """Step the world until a task can run or a timer is due; `timeout` counts in the world's time."""
+        if self._broken is not None:
+            return self._select_without_world(self._broken, timeout)
         if timeout is not None and timeout <= 0.0:
             self._rounds += 1
             if self._rounds < _MAX_ROUNDS_WITHOUT_STEP:
@@ -113,8 +126,6 @@ class _WorldSelector(selectors.DefaultSelector):
         yielding = self._rounds >= _MAX_ROUNDS_WITHOUT_STEP
         self._rounds = 0
         advance, time_us, ready, pacer = self._advance, self._time_us, self.ready, self.pacer
-        if self._broken is not None:
-            raise self._broken
         now_us = time_us()
         while True:
             if now_us >= self._limit_us:
@@ -134,6 +145,16 @@ class _WorldSelector(selectors.DefaultSelector):
             now_us = time_us()
             if ready or yielding or now_us >= self.due_us:
                 return []
+
+    def _select_without_world(
+        self, broken: BaseException, timeout: float | None
+    ) -> list[tuple[selectors.SelectorKey, int]]:
+        passed_us = _NEVER_US if timeout is None else math.ceil(timeout * 1e6)
+        self._grace_us -= passed_us + 1  # tasks that only yield to each other end, too
+        if self._grace_us < 0:
+            raise broken
+        self._pass_time(passed_us)
+        return super().select(0)
 
     def _poll(self) -> list[tuple[selectors.SelectorKey, int]]:
         self._until_poll = _STEPS_PER_POLL

@@ -1,8 +1,9 @@
 """PX4 as a backend: `simulator_mavlink`, in lockstep with the world.
 
-PX4 is the client of a TCP port and takes its clock from HIL_SENSOR, one for each physics step; it answers
-each with HIL_ACTUATOR_CONTROLS. Its start script stands still until the first HIL_SENSOR, and needs real time
-until the first answer: so long the world goes no faster than that.
+PX4 is the client of a TCP port and takes its clock from HIL_SENSOR, one for each physics step, or for each
+second, third, ... of a world that is faster than 250 Hz: PX4 answers one with HIL_ACTUATOR_CONTROLS only when
+its rate loop has run, at 400 Hz at most (IMU_GYRO_RATEMAX). Its start script stands still until the first
+HIL_SENSOR, and needs real time until the first answer: so long the world goes no faster than that.
 
 Source: MAVLink common.xml (HIL_SENSOR, HIL_GPS, HIL_ACTUATOR_CONTROLS, HIL_SENSOR_UPDATED_FLAGS); PX4 user
 guide, "Simulation", "Simulator MAVLink API" and "Lockstep simulation".
@@ -40,6 +41,7 @@ _CONNECTING_S: Final = 20.0
 _BOOT_STEP_S: Final = 0.004  # real time that the start script gets for a step of the clock
 _BOOT_LIMIT_S: Final = 60.0
 _ANSWER_LIMIT_S: Final = 30.0  # a process may be paused for as long
+_FASTEST_HZ: Final = 250  # of HIL_SENSOR
 _GYRO_AND_ACCEL: Final = 0x3F
 _MAG: Final = 0x1C0
 _DIFFERENTIAL_PRESSURE: Final = 0x400
@@ -77,6 +79,18 @@ class Px4Backend:
         self._aircraft = setup.airframe.kind is AirframeKind.FIXED_WING
         self._unix_us = unix_us
         self._given = tuple(setup.vehicle.parameters)
+        self._every = -(-setup.world.physics_rate_hz // _FASTEST_HZ)
+        self._steps = 0
+        self._sent = False  # the readings of this step
+        readings = setup.readings
+        self._slow = (
+            readings.magnetometer,
+            readings.barometer,
+            readings.airspeed,
+            readings.rangefinder,
+            readings.gps,
+        )
+        self._new: list[i.Reading] = []  # those of `_slow` that are new since the last HIL_SENSOR
         self._time_us = 0
         self._answered_us = -1  # newest time that PX4 has answered
         self._boot_until_s = wall_time_s() + _BOOT_LIMIT_S
@@ -137,21 +151,29 @@ class Px4Backend:
         return self._links
 
     def begin_step(self, time_us: int) -> None:
-        """Send the readings of a step, and with them its time."""
+        """Send the readings of a step, and with them its time, when they are due."""
         self._time_us = time_us
+        self._new += [reading for reading in self._slow if reading.fresh]
+        self._sent = self._steps % self._every == 0
+        self._steps += 1
+        if not self._sent:
+            return
         data = self._sensors(time_us)
-        if self._readings.rangefinder.fresh:
+        if self._readings.rangefinder in self._new:
             data = self._range(time_us) + data
-        if self._readings.gps.fresh:
+        if self._readings.gps in self._new:
             data = self._position() + data
+        self._new.clear()
         try:
             self._simulator.sendall(data)
         except OSError:
             self._process.link_closed("its simulator link")
 
     def step(self, time_us: int) -> NDArray[np.float64]:
-        """The actuator commands of a step."""
-        if self._answered_us < 0:
+        """The actuator commands of a step, or still those before."""
+        if not self._sent:
+            pass
+        elif self._answered_us < 0:
             self._boot()
             if self._answered_us >= 0:
                 self._process.require_known(self._given, _UNKNOWN_PARAMETER)
@@ -208,11 +230,11 @@ class Px4Backend:
         fields = 0
         if readings.imu.fresh or self._answered_us < 0:
             fields |= _GYRO_AND_ACCEL
-        if readings.magnetometer.fresh:
+        if readings.magnetometer in self._new:
             fields |= _MAG
-        if readings.barometer.fresh:
+        if readings.barometer in self._new:
             fields |= _BAROMETER
-        if readings.airspeed.fresh:
+        if readings.airspeed in self._new:
             fields |= _DIFFERENTIAL_PRESSURE
         imu, mag = readings.imu.values, readings.magnetometer.values
         accel, gyro = imu[i.IMU_ACCEL_FRD_M_S2], imu[i.IMU_GYRO_FRD_RAD_S]

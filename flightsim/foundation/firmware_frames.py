@@ -64,7 +64,7 @@ class Px4Frame(FirmwareFrame):
 
     def project(self, lat_deg: float, lon_deg: float) -> NorthEast:
         """As of the base."""
-        lat, dlon = math.radians(lat_deg), math.radians(lon_deg - self.origin.lon_deg)
+        lat, dlon = math.radians(lat_deg), math.radians(wrap_180(lon_deg - self.origin.lon_deg))
         sin_lat, cos_lat, cos_dlon = math.sin(lat), math.cos(lat), math.cos(dlon)
         north = self._cos * sin_lat - self._sin * cos_lat * cos_dlon
         east = cos_lat * math.sin(dlon)

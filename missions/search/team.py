@@ -281,21 +281,24 @@ class SearchTeam(Generic[Options]):
         place.
         """
         vehicle, own, searcher = self._vehicles[index], self._options[index], self.searchers[index]
-        home = vehicle.home
-        north_m, east_m, _ = self._frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
-        own_frame = LocalFrame(home)
+        own_frame = LocalFrame(vehicle.home)
         down_m = -own.own_altitude_m
 
         def from_home(place: NorthEast) -> Vector:
-            return place[0] - north_m, place[1] - east_m, down_m
+            there = self._frame.geodetic_from_ned(*place, 0.0)
+            north_m, east_m, _ = own_frame.ned_from_geodetic(*there)
+            return north_m, east_m, down_m
 
-        def measured() -> tuple[Vector, Vector]:
+        def measured() -> Position:
             p = vehicle.latest(Position)
             if p is None:
                 raise MissionError(f"the vehicle reports no position; {vehicle.link.last_received()}")
-            return own_frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m), p.vel_ned_m_s
+            return p
 
-        start, _ = measured()
+        def own_place(p: Position) -> Vector:
+            return own_frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+
+        start = own_place(measured())
         law: StepLaw = (TrajectoryLaw if own.law is StepLawKind.TRAJECTORY else BacksteppingLaw)(
             place_ned_m=(start[0], start[1], down_m),
             speed_m_s=own.speed_m_s or 4.0,
@@ -306,17 +309,22 @@ class SearchTeam(Generic[Options]):
         def source(time_s: float) -> Setpoint | None:
             if self.search.over:
                 return None
-            here, velocity = measured()
+            here = measured()
             if time_s >= _TURN_S:
                 if searcher.began_us < 0:
                     self._begin(index)
                     law.aim(from_home(searcher.goal), self._heading_rad(index))
-                elif self._advance(index, (here[0] + north_m, here[1] + east_m)):
+                elif self._advance(index, self._team_place(here)):
                     law.aim(from_home(searcher.goal), self._heading_rad(index))
-            return law.setpoint(time_s, here, velocity)
+            return law.setpoint(time_s, own_place(here), here.vel_ned_m_s)
 
         async with vehicle.guided(own.rate_hz) as session:
             await session.follow(source)
+
+    def _team_place(self, position: Position) -> NorthEast:
+        """A place in the frame of the team."""
+        north_m, east_m, _ = self._frame.ned_from_geodetic(position.lat_deg, position.lon_deg, position.alt_m)
+        return north_m, east_m
 
     async def _search_by_headings(self, index: int) -> None:
         """Fly an aircraft along headings to one place after the other."""
@@ -335,7 +343,7 @@ class SearchTeam(Generic[Options]):
                     p = vehicle.latest(Position)
                     if p is None:
                         continue
-                    north_m, east_m, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+                    north_m, east_m = self._team_place(p)
                     self._advance(index, (north_m, east_m))
                     if self.search.over:
                         break

@@ -85,9 +85,11 @@ def outcome_of(
         debriefing: of the flight.
         options: of the vehicle.
         plan: lines that were commanded; None: a calibration.
-        home: the vehicle's home.
+        home: the vehicle's home, for a flight without a commanded path.
     """
     notes = debriefing.flights[0][0]
+    if notes.commanded is not None:
+        home = notes.commanded.origin  # a vehicle that has landed reports that of its next flight
     survey_map = survey_map_of(options)
     origin = home if survey_map is None else survey_map.home
     compensation = compensation_of(options)

@@ -199,15 +199,41 @@ def test_an_error_of_the_world_ends_the_run():
 
     world.at(8000, crash)
 
-    async def main():
+    cleaned = []
+
+    async def task(name):
         try:
             await asyncio.sleep(1.0)
         finally:
-            await asyncio.sleep(1.0)  # never ends: the world is broken
+            await asyncio.sleep(1.0)  # on a time that goes on without the world
+            cleaned.append(name)
+
+    async def main():
+        await asyncio.gather(task("first"), asyncio.shield(task("second")))
 
     with pytest.raises(ArithmeticError, match="the model diverged"):
         run(main(), world.loop())
     assert world.now_us == 8000
+    assert sorted(cleaned) == ["first", "second"]
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_tasks_that_do_not_end_after_an_error_of_the_world_are_left(waits):
+    world = World()
+
+    def crash():
+        raise ArithmeticError("the model diverged")
+
+    world.at(8000, crash)
+
+    async def main():
+        try:
+            await asyncio.sleep(1.0)
+        finally:
+            await (asyncio.get_running_loop().create_future() if waits else asyncio.sleep(1e6))
+
+    with pytest.raises(ArithmeticError, match="the model diverged"):
+        run(main(), world.loop())
 
 
 def test_left_over_tasks_are_cancelled_and_cleaned_up():

@@ -14,6 +14,7 @@ import sys
 import time
 from pathlib import Path
 
+GYRO_RATE_MAX_HZ = 400
 THROTTLE = 0.62  # the quadrotor climbs slowly
 PWM = 1000 + round(1000 * THROTTLE)
 
@@ -50,11 +51,14 @@ def px4(arguments: list[str]) -> None:
         sockets.append(each)
     world = socket.create_connection(("127.0.0.1", 4560 + instance))
     reader, writer = mavlink.MAVLink(None), mavlink.MAVLink(None, srcSystem=own, srcComponent=1)
-    steps = 0
+    steps = answered_us = 0
     while data := world.recv(4096):
         for message in reader.parse_buffer(data) or ():
             if message.get_type() != "HIL_SENSOR":
                 continue
+            if message.time_usec - answered_us < 1_000_000 / GYRO_RATE_MAX_HZ:
+                continue  # as PX4's rate loop
+            answered_us = message.time_usec
             steps += 1
             if what == "end" and steps > number:
                 say("PX4 stand-in: end of its life")

@@ -51,8 +51,15 @@ def ardupilot_build(tmp_path: Path) -> FirmwareBuild:
     return FirmwareBuild("ardupilot", program)
 
 
-def sitl_of(build: FirmwareBuild, count: int = 1, logs_to: Path | None = None, **vehicle: object) -> Sitl:
+def sitl_of(
+    build: FirmwareBuild,
+    count: int = 1,
+    logs_to: Path | None = None,
+    physics_rate_hz: int = 250,
+    **vehicle: object,
+) -> Sitl:
     world = WorldSpec(
+        physics_rate_hz=physics_rate_hz,
         vehicles=tuple(
             VehicleSpec(
                 system_id=number,
@@ -61,7 +68,7 @@ def sitl_of(build: FirmwareBuild, count: int = 1, logs_to: Path | None = None, *
                 **vehicle,  # type: ignore[arg-type]
             )
             for number in range(1, count + 1)
-        )
+        ),
     )
     return Sitl(world, backend=firmware_backend(build, logs_to=logs_to))
 
@@ -98,6 +105,18 @@ def test_a_firmware_flies_the_vehicle_in_lockstep(firmware: str, request: pytest
         start(sitl)
         assert climb_m(sitl, 200, index=0) > 0.1
         assert set(received(link)) == {(2, 1, "HEARTBEAT")}  # of the autopilot alone
+    finally:
+        sitl.close()
+
+
+@pytest.mark.parametrize("physics_rate_hz", [500, 1000])
+def test_px4_flies_in_a_world_that_is_faster_than_its_rate_loop(
+    px4_build: FirmwareBuild, physics_rate_hz: int
+) -> None:
+    sitl = sitl_of(px4_build, physics_rate_hz=physics_rate_hz)
+    try:
+        start(sitl)
+        assert climb_m(sitl, physics_rate_hz) > 0.1
     finally:
         sitl.close()
 
