@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from autopilot_bridge.firmware_process.build import FIRMWARES, FirmwareBuild
+from benchmarks.same_flights import HOME, PLAN, write_plan
 from flightsim.airframe import AirframeKind
 
 VEHICLES: Final[Mapping[str, tuple[AirframeKind, str]]] = {
@@ -38,8 +39,11 @@ MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "vision-search": {"copter": ("--vehicles", "2")},
     "survey": {"copter": (), "plane": ()},
     "handoff": {"plane": ("--vehicles", "2")},
+    "plan-file": {"copter": ("--home", f"{HOME[0]},{HOME[1]},488")},
+    "own-script": {"copter": ()},
 }
 """Options of the missions by the vehicles that fly them."""
+FILES: Final = {"plan-file": PLAN, "own-script": "examples/own_mission.py"}
 EMULATED: Final = "emulated"
 _LIMIT_S: Final = 7200.0
 _LEFT_OUT: Final = (
@@ -59,8 +63,12 @@ def fly(out: Path, mission: str, vehicle: str, firmware: str, build: FirmwareBui
     """Fly one mission; its row."""
     name = f"{mission}-{vehicle}-{firmware}-{'emulated' if build is None else 'real'}-{seed}"
     folder = out / name
+    flown = FILES.get(mission, mission)
+    if flown == PLAN:
+        write_plan(out)
+        flown = str(out / PLAN)
     command = [
-        *(sys.executable, "-m", "missions", "fly", mission),
+        *(sys.executable, "-m", "missions", "fly", flown),
         *("--model", VEHICLES[vehicle][1], "--seed", str(seed), "--out", str(folder)),
         *MISSIONS[mission][vehicle],
         *(("--autopilot", firmware) if build is None else ("--firmware", str(build))),

@@ -87,7 +87,8 @@ async def fly(vehicle: "Vehicle", options: "FlightOptions") -> None:
     await vehicle.land()
 
 
-def _write_plan(folder: Path) -> None:
+def write_plan(folder: Path) -> None:
+    """Write `PLAN`, a plan with pictures, into a folder."""
     rows = [(16, (0, 0, 0, 0), (0.0, 0.0), 488), *_ITEMS]
     lines = ["QGC WPL 110"]
     for number, (command, params, (north, east), altitude_m) in enumerate(rows):
@@ -123,7 +124,7 @@ def _measured(name: str, logs: dict[str, Path]) -> str:
                 str(out),
             ]
             return _hash_of(command, out / "estimates.npz")
-        _write_plan(folder)
+        write_plan(folder)
         mission, *options = FLIGHTS[name].split()
         if mission == PLAN:
             mission = str(folder / PLAN)
