@@ -179,6 +179,13 @@ class CommandDenied(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CommandAccepted(Event):
+    """A command was accepted that some firmwares report as a text."""
+
+    command: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FailsafeActivated(Event):
     """A failsafe condition became active and its action is taken."""
 
@@ -222,6 +229,19 @@ class MissionFinished(Event):
     """The last item of the mission is finished; `landed`: it ended on the ground."""
 
     landed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReturnStarted(Event):
+    """A return begins: its altitude over mean sea level, and its height over the destination."""
+
+    alt_amsl_m: float
+    above_destination_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReturnLandingStarted(Event):
+    """A return has come to its destination and lands there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

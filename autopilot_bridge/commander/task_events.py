@@ -3,7 +3,13 @@
 from functools import partial
 
 from autopilot_bridge.commander.commanded_vehicle import CommandedVehicle
-from autopilot_bridge.commander.events import ItemCommanded, MissionFinished, MissionItemReached
+from autopilot_bridge.commander.events import (
+    ItemCommanded,
+    MissionFinished,
+    MissionItemReached,
+    ReturnLandingStarted,
+    ReturnStarted,
+)
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight import context as flight
 
@@ -39,6 +45,18 @@ class TaskFollower:
                     commander.end_mission(FlightMode.RETURN)
             case flight.ItemCommanded(seq=seq):
                 commander.emit(ItemCommanded(time_us=commander.time_us, index=seq))
+            case flight.ReturnStarted(down_m=down_m, destination_down_m=destination_down_m):
+                frame = commander.context.frame
+                if frame is not None:
+                    commander.emit(
+                        ReturnStarted(
+                            time_us=commander.time_us,
+                            alt_amsl_m=frame.origin.alt_m - down_m,
+                            above_destination_m=destination_down_m - down_m,
+                        )
+                    )
+            case flight.ReturnLandingStarted():
+                commander.emit(ReturnLandingStarted(time_us=commander.time_us))
             case flight.HomeChangeRequested():
                 frame = commander.context.frame
                 if frame is not None:

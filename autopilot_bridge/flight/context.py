@@ -151,6 +151,19 @@ class TaskFinished:
 
 
 @dataclass(frozen=True, slots=True)
+class ReturnStarted:
+    """A return begins: down coordinates, local NED, of its flight and of its destination."""
+
+    down_m: float
+    destination_down_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnLandingStarted:
+    """A return lands at its destination."""
+
+
+@dataclass(frozen=True, slots=True)
 class TouchedDown:
     """A landing task has detected the final touchdown."""
 
@@ -163,6 +176,8 @@ FlightEvent = (
     | HomeChangeRequested
     | ItemCommanded
     | TaskFinished
+    | ReturnStarted
+    | ReturnLandingStarted
     | TouchedDown
 )
 

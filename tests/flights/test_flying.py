@@ -5,6 +5,7 @@ section 6.
 """
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -282,6 +283,26 @@ def test_return_from_afar(flavour: str, height_m: float) -> None:
     flight.fly_until(home, 200.0, "return and landing")
     altitude_m = 30.0 if flavour == "px4" else 15.0  # RTL_RETURN_ALT, RTL_ALT
     assert highest == pytest.approx(max(altitude_m, height_m), abs=1.2)
+    said = [text for _, text in flight.texts if text.startswith("RTL: ")]
+    if flavour == "px4":
+        started = re.fullmatch(r"RTL: start return at \d+ m \((\d+) m above destination\)", said[0].strip())
+        assert started is not None, said
+        assert int(started[1]) == pytest.approx(highest, abs=1.5)
+        assert [text.strip() for text in said[1:]] == ["RTL: land at destination"]
+    else:
+        assert said == []
     assert fastest < 11.5
     assert math.hypot(*flight.position_ned_m[:2]) < 1.0
     assert flight.tilt_deg < 3.0
+
+
+@pytest.mark.slow
+def test_px4_changes_its_height_where_it_is() -> None:
+    """DO_CHANGE_ALTITUDE: an altitude over mean sea level."""
+    flight = Flight("px4", seed=2)
+    flight.take_off(HEIGHT_M)
+    place = flight.position_ned_m
+    flight.command(dialect.MAV_CMD_DO_CHANGE_ALTITUDE, flight.newest["GLOBAL_POSITION_INT"].alt * 1e-3 + 8.0)
+    flight.fly(10.0)
+    assert flight.height_m == pytest.approx(HEIGHT_M + 8.0, abs=0.7)
+    assert math.dist(flight.position_ned_m[:2], place[:2]) < 1.0

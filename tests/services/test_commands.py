@@ -70,6 +70,8 @@ PX4_TABLE = [
     (mavlink.MAV_CMD_DO_REPOSITION, (-1, 1, 0, NAN, NAN, NAN, NAN), "ready", [0]),
     (mavlink.MAV_CMD_DO_REPOSITION, (-1, 1, 0, NAN, NAN, NAN, NAN), "flying", [0]),
     (mavlink.MAV_CMD_DO_REPOSITION, (-1, 0, 0, NAN, NAN, NAN, NAN), "flying", [3]),
+    (mavlink.MAV_CMD_DO_CHANGE_ALTITUDE, (500, 0), "ready", [0]),
+    (mavlink.MAV_CMD_DO_CHANGE_ALTITUDE, (NAN, 0), "flying", [0]),
     (mavlink.MAV_CMD_DO_ORBIT, (10, 2, 0, NAN, NAN, NAN, NAN), "ready", [0]),
     (mavlink.MAV_CMD_DO_ORBIT, (10, 2, 0, NAN, NAN, NAN, NAN), "flying", [0]),
     (mavlink.MAV_CMD_DO_CHANGE_SPEED, (1, 3, -1), "ready", [0]),
@@ -323,6 +325,29 @@ def test_px4_texts_of_refused_commands() -> None:
     assert rig.channel.texts() == ["Unsupported auto mode\t"]
     rig.long(MODE, 1, 4, 4)
     assert rig.channel.texts() == ["Switching to Mission is currently not available\t"]
+
+
+def test_px4_texts_of_accepted_commands() -> None:
+    rig = rig_of("px4", "flying")
+    rig.long(RTL)
+    assert rig.channel.texts()[0] == "Returning to launch\t"
+    rig.long(LAND)
+    assert rig.channel.texts() == ["Landing at current position\t"]
+    rig.long(MODE, 1, 4, 5)
+    assert "Returning to launch\t" not in rig.channel.texts()  # the text of the command, not of the mode
+
+
+@pytest.mark.parametrize(
+    ("message_id", "state", "acks"),
+    [
+        (mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION, "ready", [0]),
+        (mavlink.MAVLINK_MSG_ID_ATTITUDE, "ready", [0]),
+        (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, "ready", [0]),
+        (mavlink.MAVLINK_MSG_ID_RC_CHANNELS, "ready", [2]),
+    ],
+)
+def test_px4_requested_messages(message_id: int, state: str, acks: list[int]) -> None:
+    assert rig_of("px4", state).long(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id) == acks
 
 
 def test_ardupilot_pause_outside_guided_and_auto() -> None:

@@ -26,7 +26,8 @@ POLICY = IntervalPolicy(
     unknown_request=Result.UNSUPPORTED,
     fixed=frozenset({HEARTBEAT}),
     not_requestable=frozenset({SECRET}),
-    refuse_running=True,
+    refuse_empty=True,
+    refuse_running=frozenset({HEARTBEAT}),
     max_rate_hz=200.0,
     groups={10: (ATTITUDE,), 11: (VFR_HUD, HEARTBEAT)},
     unknown_text="no message {}",
@@ -154,8 +155,9 @@ def test_the_interval_is_answered(
     ("message_id", "interval_us", "result"),
     [
         (ATTITUDE, None, Result.ACCEPTED),
-        (ATTITUDE, 100_000, Result.ACCEPTED),
-        (ATTITUDE, 99_999, Result.DENIED),  # it comes soon enough by itself
+        (ATTITUDE, 10_000, Result.ACCEPTED),
+        (HEARTBEAT, 1_000_000, Result.DENIED),  # the stream has sent its newest sample
+        (VFR_HUD, None, Result.DENIED),  # it has no values now
         (UNKNOWN, None, Result.UNSUPPORTED),
         (SECRET, None, Result.UNSUPPORTED),
         (HOME, 1, Result.ACCEPTED),

@@ -2,7 +2,7 @@
 
 import math
 
-from autopilot_bridge.commander.events import CommandDenied, ModeDenied
+from autopilot_bridge.commander.events import CommandAccepted, CommandDenied, ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.dispatch import command, receives
@@ -84,7 +84,17 @@ class Px4Commands(CommandHandlers):
     @command(dialect.MAV_CMD_NAV_LAND)
     def land(self, command: Command, source: Source) -> Result:
         """NAV_LAND: land at the current position."""
-        return self.commander.guidance.land().result
+        return self._reported(command, self.commander.guidance.land().result)
+
+    def return_to_launch(self, command: Command, source: Source) -> Result:
+        """NAV_RETURN_TO_LAUNCH."""
+        return self._reported(command, super().return_to_launch(command, source))
+
+    def _reported(self, command: Command, result: Result) -> Result:
+        """Report a command that was accepted."""
+        if result is Result.ACCEPTED:
+            self.commander.emit(CommandAccepted(time_us=self.commander.time_us, command=command.id))
+        return result
 
     @command(dialect.MAV_CMD_DO_REPOSITION)
     def reposition(self, command: Command, source: Source) -> Result:
@@ -97,6 +107,12 @@ class Px4Commands(CommandHandlers):
         return self.commander.guidance.reposition(
             north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=command.p4, speed_m_s=command.p1
         ).result
+
+    @command(dialect.MAV_CMD_DO_CHANGE_ALTITUDE)
+    def change_altitude(self, command: Command, source: Source) -> Result:
+        """DO_CHANGE_ALTITUDE: p1 altitude over mean sea level, whatever the frame in p2."""
+        down_m = self.down_from(command.p1, relative=False)
+        return self.commander.guidance.reposition(north_m=math.nan, east_m=math.nan, down_m=down_m).result
 
     @command(dialect.MAV_CMD_DO_ORBIT)
     def orbit(self, command: Command, source: Source) -> Result:

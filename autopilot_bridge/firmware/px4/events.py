@@ -148,6 +148,13 @@ LAUNCH: Final = EventKind(
 )
 
 
+RETURN: Final = EventKind(
+    name="rtl_start_return",
+    message="RTL: start return at {1m_v} ({2m_v} above destination)",
+    arguments=(Argument("altitude", "int32_t"), Argument("above_destination", "int32_t")),
+)
+
+
 def _kind_of(notice: Notice) -> EventKind:
     name = re.sub(r"[^a-z0-9]+", "_", notice.text.lower()).strip("_")
     return EventKind(name=name, message=notice.text, level=notice.severity)
@@ -162,6 +169,7 @@ KINDS: Final = (
     FAILSAFE_CLEARED,
     *LINKS.values(),
     LAUNCH,
+    RETURN,
     ARMING_SUMMARY,
     *CHECKS.values(),
     HEALTH_SUMMARY,
@@ -190,6 +198,8 @@ def occurrences(event: events.Event, notices: tuple[Notice, ...]) -> tuple[Occur
             return (Occurrence(FAILSAFE_CLEARED, (_CAUSE_NUMBERS[kind],)),)
         case events.LaunchDetected(delay_s=delay_s) if notices and notices[0].text not in _OF_TEXT:
             return (Occurrence(LAUNCH, (delay_s,)),)
+        case events.ReturnStarted():
+            return (Occurrence(RETURN, px4_texts.return_metres(event)),)
     return tuple(Occurrence(_OF_TEXT[notice.text]) for notice in notices if notice.text in _OF_TEXT)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from autopilot_bridge.commander import events
 from autopilot_bridge.dispatch import streams
 from autopilot_bridge.firmware.data import load_data, message_rates
 from autopilot_bridge.mavlink import dialect
@@ -27,6 +28,7 @@ _M = dialect
 _ESTIMATOR_STATUS: Final = fields("ESTIMATOR_STATUS")
 _ORBIT_EXECUTION_STATUS: Final = fields("ORBIT_EXECUTION_STATUS")
 _ALTITUDE: Final = fields("ALTITUDE")
+_FLIGHT_INFORMATION: Final = fields("FLIGHT_INFORMATION")
 _OPEN_DRONE_ID_LOCATION: Final = fields("OPEN_DRONE_ID_LOCATION")
 _OPEN_DRONE_ID_SYSTEM: Final = fields("OPEN_DRONE_ID_SYSTEM")
 _ACTUATOR_OUTPUTS: Final = 32  # fields of ACTUATOR_OUTPUT_STATUS
@@ -61,12 +63,32 @@ class Px4Messages(CommonMessages):
     def __init__(self, parts: AutopilotParts) -> None:
         super().__init__(parts)
         self._ping_sequence = -1
+        self._armed_us = self._takeoff_us = 0
+
+    def follow(self, event: events.Event) -> None:
+        """Keep the times of the flight."""
+        if isinstance(event, events.Armed):
+            self._armed_us, self._takeoff_us = event.time_us, 0
+        elif isinstance(event, events.Disarmed):
+            self._armed_us = self._takeoff_us = 0
+        elif isinstance(event, events.TakeoffDetected):
+            self._takeoff_us = event.time_us
 
     @streams(_M.MAVLink_ping_message)
     def ping(self) -> Values:
         """PING (4), to all systems."""
         self._ping_sequence += 1
         return (self.view.time_us, self._ping_sequence, 0, 0)
+
+    @streams(_M.MAVLink_flight_information_message)
+    def flight_information(self) -> FieldValues:
+        """FLIGHT_INFORMATION (264). PX4's times are since its boot, 0 while disarmed or on the ground."""
+        return _FLIGHT_INFORMATION(
+            time_boot_ms=self.view.time_ms,
+            arming_time_utc=self._armed_us,
+            takeoff_time_utc=self._takeoff_us,
+            flight_uuid=int(self.parts.parameters.get("COM_FLIGHT_UUID") or 0),
+        )
 
     @streams(_M.MAVLink_actuator_output_status_message)
     def actuator_output_status(self) -> Values:

@@ -231,7 +231,10 @@ SERVICES: Final = FirmwareServices(
         unknown_get=Result.ACCEPTED,
         unknown_request=Result.DENIED,
         fixed=frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT}),
-        refuse_running=True,
+        refuse_empty=True,
+        refuse_running=frozenset(
+            {dialect.MAVLINK_MSG_ID_GPS_RAW_INT, dialect.MAVLink_current_event_sequence_message.id}
+        ),
     ),
     card=CARD,
     make=_copter_services,

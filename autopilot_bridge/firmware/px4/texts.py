@@ -6,6 +6,7 @@ status text service ends texts that events repeat with a tab, so that clients th
 them twice.
 """
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
@@ -31,6 +32,10 @@ _COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
     (176, Reason.MODE_UNKNOWN): Notice(Severity.CRITICAL, "Unsupported auto mode"),
 }
 
+_ACCEPTED: Final[Mapping[int, Notice]] = {
+    20: Notice(Severity.INFO, "Returning to launch"),
+    21: Notice(Severity.INFO, "Landing at current position"),
+}
 _SWITCHING: Final = "Switching to {} is currently not available"
 _BATTERY: Final[Mapping[BatteryLevel, str]] = {
     BatteryLevel.LOW: "Low battery level, return advised",
@@ -59,6 +64,7 @@ _AIRSPEED_HEALTHY: Final = Notice(Severity.INFO, "Airspeed sensor healthy, start
 _RUNWAY: Final = Notice(Severity.INFO, "Takeoff on runway")
 _FLARING: Final = Notice(Severity.INFO, "Landing, flaring")
 _ABORTED: Final = Notice(Severity.CRITICAL, "Landing aborted")
+_RETURN_LANDS: Final = Notice(Severity.INFO, "RTL: land at destination")
 _LAUNCH_M_S2: Final = 6.0  # no propeller accelerates an aircraft so from rest, any launcher does
 
 FIXED: Final = (
@@ -84,6 +90,8 @@ FIXED: Final = (
     _RUNWAY,
     _FLARING,
     _ABORTED,
+    _RETURN_LANDS,
+    *_ACCEPTED.values(),
 )
 """Texts without numbers that have a separate event."""
 
@@ -112,6 +120,22 @@ def _mode_denied(event: events.ModeDenied) -> tuple[Notice, ...]:
 def _command_denied(event: events.CommandDenied) -> tuple[Notice, ...]:
     known = _COMMANDS.get((event.command, event.reason))
     return () if known is None else (known,)
+
+
+def _command_accepted(event: events.CommandAccepted) -> tuple[Notice, ...]:
+    known = _ACCEPTED.get(event.command)
+    return () if known is None else (known,)
+
+
+def return_metres(event: events.ReturnStarted) -> tuple[int, int]:
+    """Altitude over mean sea level and height over the destination of a return, as PX4 rounds them."""
+    return math.ceil(event.alt_amsl_m), math.ceil(event.above_destination_m)
+
+
+def _return_started(event: events.ReturnStarted) -> tuple[Notice, ...]:
+    alt_m, above_m = return_metres(event)
+    text = f"RTL: start return at {alt_m} m ({above_m} m above destination)"
+    return (Notice(Severity.INFO, text),)
 
 
 def _setpoint_denied(event: events.SetpointDenied) -> tuple[Notice, ...]:
@@ -162,6 +186,7 @@ COPTER: Final[TextTable] = MappingProxyType(
         events.DisarmingDenied: _DISARMING_DENIED,
         events.ModeDenied: _mode_denied,
         events.CommandDenied: _command_denied,
+        events.CommandAccepted: _command_accepted,
         events.SetpointDenied: _setpoint_denied,
         events.FailsafeActivated: _failsafe,
         events.BatteryWarning: _battery,
@@ -169,6 +194,8 @@ COPTER: Final[TextTable] = MappingProxyType(
         events.TakeoffDetected: _TAKEOFF,
         events.LandingDetected: _LANDING,
         events.MissionFinished: _MISSION_FINISHED,
+        events.ReturnStarted: _return_started,
+        events.ReturnLandingStarted: _RETURN_LANDS,
     }
 )
 """Texts on a multicopter."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.context import Array, FlightContext, ReturnStarted
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, LandingTask
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
@@ -80,6 +80,7 @@ class ReturnTask(HomewardTask, AircraftTask):
         wanted = return_height(height, p)
         own_down = place.altitude_down_m
         self._home[2] = own_down if math.isfinite(own_down) else ground_down - wanted
+        ctx.events.append(ReturnStarted(float(self._home[2]), ground_down))
         if p.return_climbs and wanted - height > p.acceptance_altitude_m:
             self.phase = ReturnPhase.CLIMB
             self._set_sub(ctx, LoiterTask(np.array([math.nan, math.nan, self._home[2]])))

@@ -7,7 +7,13 @@ import math
 
 import numpy as np
 
-from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
+from autopilot_bridge.flight.context import (
+    Array,
+    FlightContext,
+    FlightPhase,
+    ReturnLandingStarted,
+    ReturnStarted,
+)
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.precision_land import landing_task
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
@@ -82,6 +88,7 @@ class ReturnTask(HomewardTask):
         brake_s = float(np.hypot(velocity[0], velocity[1])) / (2.0 * p.acceleration_m_s2)
         self._target = position + velocity * brake_s
         self._target[2] = float(home[2]) - height
+        ctx.events.append(ReturnStarted(float(self._target[2]), float(home[2])))
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Set another speed on the way home (DO_CHANGE_SPEED); the landing has its own speeds."""
@@ -166,6 +173,7 @@ class ReturnTask(HomewardTask):
             self._wait_s += ctx.dt_s
             if 0.0 <= wait <= self._wait_s:
                 if ctx.multicopter.return_stays_at_m <= 0.0:
+                    ctx.events.append(ReturnLandingStarted())
                     self._start_landing(ctx)
                     assert self._land is not None
                     return self._land.update(ctx)

@@ -19,7 +19,6 @@ from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 
 ALL_STREAMS: Final = dialect.MAV_DATA_STREAM_ALL
-_FASTEST_REQUESTABLE_US: Final = 100_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +30,9 @@ class IntervalPolicy:
         fixed: messages whose interval can't be set (PX4: HEARTBEAT).
         not_requestable: messages that only the firmware decides to send: a client can neither
             request them nor set their interval.
-        refuse_running: a request for a message that a fast stream already sends is refused (PX4).
+        refuse_empty: a request for a message that has no values now is refused (PX4).
+        refuse_running: messages whose request is refused while the link streams them: the stream has sent
+            their newest sample already (PX4).
         max_rate_hz: fastest stream that is accepted; faster ones are denied with a text.
         groups: REQUEST_DATA_STREAM group -> message ids; empty: the message is ignored.
         unknown_text, too_fast_text: texts to the pilot, with the message id; empty: no text.
@@ -42,7 +43,8 @@ class IntervalPolicy:
     unknown_request: Result
     fixed: frozenset[int] = frozenset()
     not_requestable: frozenset[int] = frozenset()
-    refuse_running: bool = False
+    refuse_empty: bool = False
+    refuse_running: frozenset[int] = frozenset()
     max_rate_hz: float = math.inf
     groups: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     unknown_text: str = ""
@@ -151,10 +153,10 @@ class MessageIntervalService(Microservice):
         if message_id not in DEFINITIONS or not self._known(message_id):
             return policy.unknown_request
         table = self._tables.get(source.channel.name)
-        if policy.refuse_running and table is not None:
-            interval_us = table.intervals_us.get(message_id)
-            if interval_us is not None and interval_us < _FASTEST_REQUESTABLE_US:
-                return Result.DENIED
+        if message_id in policy.refuse_running and table is not None and message_id in table.intervals_us:
+            return Result.DENIED
+        if policy.refuse_empty and self._cache.payload(message_id, self._time_us) is None:
+            return Result.DENIED
         self._pending[source.channel, message_id, parameter] = None
         return Result.ACCEPTED
 
