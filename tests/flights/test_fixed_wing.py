@@ -150,7 +150,8 @@ def test_no_crew_launches_an_aircraft_that_does_not_ask(flavour: str) -> None:
     assert flight.speed_m_s < 0.1 and flight.armed
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS[::-1]))
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.slow
 def test_mission_from_the_ground_to_the_ground(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)
     flight.get_ready()

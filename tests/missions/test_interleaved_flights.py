@@ -93,7 +93,7 @@ SMALL = {
 }
 
 
-QUICK = ("multi-target", "sector")  # of the default suite: a team object, and a vehicle for itself
+QUICK = ("sector",)  # of the default suite
 
 
 def request(name: str, seed: int, out: Path) -> RunRequest:

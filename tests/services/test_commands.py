@@ -337,19 +337,6 @@ def test_px4_texts_of_accepted_commands() -> None:
     assert "Returning to launch\t" not in rig.channel.texts()  # the text of the command, not of the mode
 
 
-@pytest.mark.parametrize(
-    ("message_id", "state", "acks"),
-    [
-        (mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION, "ready", [0]),
-        (mavlink.MAVLINK_MSG_ID_ATTITUDE, "ready", [0]),
-        (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, "ready", [0]),
-        (mavlink.MAVLINK_MSG_ID_RC_CHANNELS, "ready", [2]),
-    ],
-)
-def test_px4_requested_messages(message_id: int, state: str, acks: list[int]) -> None:
-    assert rig_of("px4", state).long(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id) == acks
-
-
 def test_ardupilot_pause_outside_guided_and_auto() -> None:
     rig = rig_of("ardupilot", "flying")
     rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))

@@ -140,7 +140,10 @@ ACCEPTED, DENIED, FAILED = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENI
         ("px4", INTERVAL, (12345, 100_000), FAILED),
         ("px4", INTERVAL, (mavlink.MAVLINK_MSG_ID_VFR_HUD, 50_000), ACCEPTED),
         ("px4", REQUEST, (12345,), DENIED),
-        ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_ATTITUDE,), DENIED),
+        ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_ATTITUDE,), ACCEPTED),
+        ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,), DENIED),  # the stream has sent the newest
+        ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_RC_CHANNELS,), DENIED),  # no sticks
+        ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION,), ACCEPTED),
         ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,), ACCEPTED),
         ("px4", REQUEST, (mavlink.MAVLINK_MSG_ID_HOME_POSITION,), ACCEPTED),
         ("px4", GET_INTERVAL, (12345,), ACCEPTED),

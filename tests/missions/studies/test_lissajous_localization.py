@@ -15,7 +15,7 @@ from missions.studies.lissajous_table import cells_of, lines_of
 from missions.studies.lissajous_trial import errors_of, sample_run, simulate
 from missions.studies.options import LocalizationStudyOptions
 
-RUNS = 100
+RUNS = 50
 
 REPRODUCED = {
     (0.0, 0.5): (2.8076, 0.2555, 0.2555, 0.2555),

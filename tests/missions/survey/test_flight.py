@@ -124,6 +124,7 @@ def test_a_replay_with_the_files_of_the_flight_makes_its_map(flown, tmp_path):
     np.testing.assert_allclose(again.total_field_nt, own.total_field_nt, atol=0.02)
 
 
+@pytest.mark.slow
 def test_an_estimator_beside_the_flight_agrees_with_the_mission(tmp_path):
     options = replace(
         SMALL,
