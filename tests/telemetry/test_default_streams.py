@@ -164,7 +164,7 @@ ACCEPTED, DENIED, FAILED = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENI
 def test_results_of_stream_commands(
     flavour: str, command: int, parameters: tuple[float, ...], result: int
 ) -> None:
-    assert Client(ready(flavour, 3.0)).command(command, *parameters)[0] == result
+    assert Client(ready(flavour, 4.0)).command(command, *parameters)[0] == result
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

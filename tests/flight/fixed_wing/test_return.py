@@ -60,7 +60,7 @@ def test_px4_climbs_where_it_is_flies_home_and_circles_down() -> None:
     log = mass.run(60.0)
     assert -log[-1, 2] == pytest.approx(80.0, abs=1.0)
     assert np.hypot(log[:, 0], log[:, 1]).mean() == pytest.approx(80.0, rel=0.03)
-    assert mass.ctx.events == [ReturnStarted(-140.0, 0.0)]  # circles on for ever
+    assert mass.ctx.events == [ReturnStarted(-150.0, 0.0)]  # circles on for ever
 
 
 def test_arduplane_circles_home_at_its_altitude_the_other_way_round() -> None:
