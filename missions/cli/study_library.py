@@ -4,9 +4,12 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
+import click
+
 from missions.base.options import PlanOptions
 from missions.cli.later import later
 from missions.cli.mission_command import FlightOption, Given, declared_options, made
+from missions.cli.options import FIRMWARE_HELP
 from missions.cli.study_command import StudyCommand
 from missions.studies.options import (
     HandoffStudyOptions,
@@ -20,11 +23,19 @@ from missions.studies.options import (
 
 T = TypeVar("T")
 
+_FIRMWARE: Final = click.Option(["--firmware"], metavar="NAME[=BUILD]", help=FIRMWARE_HELP)
+
 
 def _study(name: str, kind: type[PlanOptions]) -> Callable[[Given], Any]:
     """What makes the study of a module of `missions.studies` from its options."""
     study = later(f"missions.studies.{name}", "study")
     return lambda given: study(_made(kind, declared_options(kind), given))
+
+
+def _flights(name: str, kind: type[PlanOptions]) -> Callable[[Given], Any]:
+    """As `_study`, of a study whose trials are flights."""
+    study = _study(name, kind)
+    return lambda given: later("missions.cli.bodies.study", "by_firmware")(study(given), given)
 
 
 def _made(kind: type[T], options: Iterable[FlightOption], given: Given) -> T:
@@ -64,8 +75,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "The tag is read off rendered pictures. The folder gets search.png, the share of searches "
                 "that have found it over time."
             ),
-            options=declared_options(LissajousStudyOptions),
-            build=_study("lissajous_search", LissajousStudyOptions),
+            options=(*declared_options(LissajousStudyOptions), _FIRMWARE),
+            build=_flights("lissajous_search", LissajousStudyOptions),
         ),
         "magnetic-identification": StudyCommand(
             help=(
@@ -97,8 +108,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "detours and ergodic coverage; every run of E2 has a terrain of its own. Worlds that the "
                 "filter does not expect are chosen by --world. The folder gets found.png."
             ),
-            options=declared_options(MultiTargetStudyOptions),
-            build=_study("multi_target_search", MultiTargetStudyOptions),
+            options=(*declared_options(MultiTargetStudyOptions), _FIRMWARE),
+            build=_flights("multi_target_search", MultiTargetStudyOptions),
         ),
         "vision-search": StudyCommand(
             help=(
@@ -108,8 +119,8 @@ STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(
                 "consistency; the measured pose errors; the error budget of Table II. The folder gets "
                 "errors.png."
             ),
-            options=declared_options(VisionStudyOptions),
-            build=_study("vision_search", VisionStudyOptions),
+            options=(*declared_options(VisionStudyOptions), _FIRMWARE),
+            build=_flights("vision_search", VisionStudyOptions),
         ),
     }
 )

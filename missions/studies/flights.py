@@ -2,16 +2,19 @@
 
 import math
 from collections.abc import Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, Self
+from typing import Any, Final, Generic, Self
 
+from autopilot_bridge.firmware_process.build import FirmwareBuild
 from missions.base.mission import Mission
 from missions.base.request import RunRequest
 from missions.process.ending import EndedBySignal
 from missions.runs.session import COMPLETED, INTERRUPTED, RunResult, fly
+from missions.studies.study import Parameters, Row, Study
 from missions.studies.trial_runner import trial_folder
 
-__all__ = ["FlightRow", "fly_trial"]
+__all__ = ["FlightRow", "flown_by", "fly_trial"]
 
 _OTHER: Final = frozenset({"seed", "wall_time_s", "speedup", "planned_wind_m_s"})
 
@@ -62,6 +65,38 @@ class FlightRow:
         )
 
 
+_firmware: ContextVar[FirmwareBuild | None] = ContextVar("firmware", default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class _FlownBy(Generic[Parameters, Row]):
+    """A trial whose flights are flown by a real firmware.
+
+    Attributes:
+        study: the study of the trial.
+        firmware: the firmware.
+    """
+
+    study: Study[Parameters, Row]
+    firmware: FirmwareBuild
+
+    def __call__(self, parameters: Parameters, seed: int) -> Row:
+        before = _firmware.set(self.firmware)
+        try:
+            return self.study.trial(parameters, seed)
+        finally:
+            _firmware.reset(before)
+
+
+def flown_by(study: Study[Parameters, Row], firmware: FirmwareBuild | None) -> Study[Parameters, Row]:
+    """A study whose flights (`fly_trial`) are flown by a real firmware; None: by the emulated autopilot."""
+    if firmware is None:
+        return study
+    return replace(
+        study, trial=_FlownBy(study, firmware), options={**study.options, "firmware": str(firmware)}
+    )
+
+
 def fly_trial(mission: Mission[Any] | str, request: RunRequest) -> RunResult:
     """Fly a mission as (a part of) the running trial, in the trial's folder and without a picture.
 
@@ -69,6 +104,11 @@ def fly_trial(mission: Mission[Any] | str, request: RunRequest) -> RunResult:
         KeyboardInterrupt: the flight was interrupted by a signal; the trial has no result.
         PlanError, MissionError: see `missions.fly`.
     """
+    firmware = _firmware.get()
+    if firmware is not None:
+        world = request.embedded_world
+        vehicles = tuple(replace(vehicle, autopilot=firmware.firmware) for vehicle in world.vehicles)
+        request = replace(request, firmware=firmware, world=replace(world, vehicles=vehicles))
     result = fly(mission, replace(request, out=trial_folder(), picture=False))
     if result.outcome == INTERRUPTED:
         raise EndedBySignal(result.signal) if result.signal else KeyboardInterrupt

@@ -16,6 +16,7 @@ from typing import Any, Final
 import click
 
 from missions.cli.bodies.status_line import StatusLine
+from missions.cli.bodies.world import firmware_of
 from missions.cli.mission_command import Given
 from missions.cli.mission_commands import arguments_of
 from missions.cli.options import in_options, report
@@ -23,6 +24,7 @@ from missions.cli.study_command import StudyCommand
 from missions.errors import MissionError, PlanError
 from missions.process.ending import EndedBySignal, EndSignalHandler
 from missions.studies.engine import Engine, Progress
+from missions.studies.flights import flown_by
 from missions.studies.folder import StudyFolder
 from missions.studies.inline import Inline
 from missions.studies.job import load_study_module
@@ -46,6 +48,18 @@ def run(declared: StudyCommand, name: str, given: dict[str, Any]) -> int:
         raise click.UsageError(in_options(error)) from error
     except MissionError as error:
         raise click.ClickException(in_options(error)) from error
+
+
+def by_firmware(study: Study[Any, Any], given: Given) -> Study[Any, Any]:
+    """The study with its flights flown by the real firmware of the option `--firmware`, if it is given.
+
+    Raises:
+        PlanError: the option is not accepted.
+    """
+    try:
+        return flown_by(study, firmware_of(given))
+    except ValueError as error:
+        raise PlanError(str(error)) from error
 
 
 def _run(declared: StudyCommand, name: str, given: dict[str, Any]) -> int:
