@@ -6,6 +6,7 @@ from missions.studies.design import latin_hypercube as latin_hypercube
 from missions.studies.design import listed as listed
 from missions.studies.design import random_sample as random_sample
 from missions.studies.flights import FlightRow as FlightRow
+from missions.studies.flights import flown_by as flown_by
 from missions.studies.flights import fly_trial as fly_trial
 from missions.studies.inline import Inline as Inline
 from missions.studies.pool import Pool as Pool
