@@ -13,6 +13,7 @@ from estimators.relative_pose import (
     RelativePoseParameters,
 )
 from estimators.relative_pose import particles as kernels
+from estimators.relative_pose.belief import joined_modes
 from estimators.relative_pose.particle_belief import motion_array
 from tests.estimators.relative_pose.encounters import RATE_HZ, Encounter, pose_error
 from tests.slow import slow
@@ -106,6 +107,28 @@ def test_weights_are_products_of_gaussian_likelihoods():
     before = weights.copy()
     assert math.isnan(kernels.weigh(particles, weights, np.full(3, math.nan), sigmas, np.empty(n)))
     assert weights == pytest.approx(before)
+
+
+def test_gaussians_that_are_joined_have_the_mean_and_the_covariance_of_both():
+    """The moments of the sum, written out; the headings are on both sides of pi."""
+    weights = np.array([0.2, 0.5, 0.3])
+    means = np.array([[3.0, -1.0, 2.0, -3.1], [0.0, 1.0, 1.0, 3.1], [500.0, 0.0, 0.0, 0.0]])
+    rng = np.random.default_rng(5)
+    roots = rng.normal(0.0, 1.0, (3, 4, 4))
+    covariances = roots @ roots.transpose(0, 2, 1) + np.eye(4)
+    joined, far = joined_modes(weights, means, covariances, apart_sigmas=2.0, least_weight=0.05)
+    turned = means[:2] + np.array([[0.0, 0.0, 0.0, math.tau], [0.0] * 4])
+    shares = weights[:2] / 0.7
+    mean = shares @ turned
+    second = sum(
+        share * (covariance + np.outer(one, one))
+        for share, covariance, one in zip(shares, covariances[:2], turned, strict=True)
+    )
+    found = np.array([joined.forward_m, joined.right_m, joined.down_m, joined.heading_rad])
+    assert found == pytest.approx([*mean[:3], math.remainder(mean[3], math.tau)])
+    np.testing.assert_allclose(joined.covariance, second - np.outer(mean, mean), atol=1e-9)
+    assert (joined.weight, far.weight, far.forward_m) == pytest.approx((0.7, 0.3, 500.0))
+    np.testing.assert_allclose(far.covariance, covariances[2])
 
 
 @pytest.mark.parametrize("kind", KINDS)
