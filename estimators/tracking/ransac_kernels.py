@@ -59,10 +59,12 @@ def associate(
 ) -> None:
     """Update each hypothesis by the measurements in its gate, by probabilistic data association.
 
-    A measurement in the gates of several tracks is shared out among them: its weight for track k is
-    G_k / (S_k + R + B) with the likelihoods G, their sum S over k's measurements, their sum R over the other
-    tracks, and B for none (the "cheap JPDA" of Fitzgerald 1986, "Development of practical PDA logic for
-    multitarget tracking by microprocessor"). Targets that cross would attract each other's tracks otherwise.
+    Measurements in the gates of several tracks are assigned first, each to one of them, and count for no
+    other: targets that cross would attract each other's tracks otherwise, which become one (the coalescence
+    that Blom and Bloem 2000, "Probabilistic data association avoiding track coalescence", prune away). What
+    is left in several gates is shared out: its weight for track k is G_k / (S_k + R + B) with the likelihoods
+    G, their sum S over k's measurements, their sum R over the other tracks, and B for none (the "cheap JPDA"
+    of Fitzgerald 1986, "Development of practical PDA logic for multitarget tracking by microprocessor").
 
     Args:
         count: number of hypotheses.
@@ -93,6 +95,8 @@ def associate(
                 found[k] = True
                 if rivals[k]:
                     shared[i] += scores[k, i]
+    missed = clutter * (1.0 - detected * (1.0 - math.exp(-0.5 * gate_squared)))
+    assign(scores, rivals, missed, shared, found)
     for k in range(count):
         if not found[k]:
             continue
@@ -103,7 +107,6 @@ def associate(
             summed += scores[k, i]
             if scores[k, i] > scores[k, best]:
                 best = i
-        missed = clutter * (1.0 - detected * (1.0 - math.exp(-0.5 * gate_squared)))
         any_true = x = y = xx = xy = yy = 0.0
         for i in range(total):
             others = shared[i] - (scores[k, i] if rivals[k] else 0.0)
@@ -137,6 +140,76 @@ def associate(
                     xy * gain[j, 0] + yy * gain[j, 1]
                 )
                 covariance[i, j] += spread - any_true * update
+
+
+@kernel
+def assign(scores: Array, rivals: Flags, missed: float, shared: Array, found: Flags) -> None:
+    """Assign measurements to tracks, so that the product of the likelihoods is greatest (shortest augmenting
+    paths: Jonker and Volgenant 1987, "A shortest augmenting path algorithm for dense and sparse linear
+    assignment problems"), and take them from all other tracks. Without a measurement in the gates of two
+    tracks nothing is done.
+
+    Args:
+        scores: (m, n) likelihoods, 0 outside of the gate; changed.
+        rivals: (m,) whether a hypothesis is a track.
+        missed: density of a track without a measurement and a false measurement in its place.
+        shared: (n,) sums of the likelihoods over the tracks; changed.
+        found: (m,) whether a hypothesis has a measurement; changed.
+    """
+    total = scores.shape[1]
+    rows = np.flatnonzero(rivals & found[: rivals.size])
+    disputed = False
+    for i in range(total):
+        gates = 0
+        for k in rows:
+            gates += scores[k, i] > 0.0
+        disputed |= gates > 1
+    if not disputed:
+        return
+    size = rows.size
+    columns = total + size  # a column for each track without a measurement
+    costs = np.full((size + 1, columns + 1), 1e6)  # row and column 0 are those of the search
+    for r in range(size):
+        for i in range(total):
+            if scores[rows[r], i] > 0.0:
+                costs[r + 1, i + 1] = -math.log(scores[rows[r], i] / missed)
+        costs[r + 1, total + r + 1] = 0.0
+    by_row, by_column = np.zeros(size + 1), np.zeros(columns + 1)
+    taken, way = np.zeros(columns + 1, np.int64), np.zeros(columns + 1, np.int64)
+    for r in range(1, size + 1):
+        taken[0], column = r, 0
+        least, used = np.full(columns + 1, np.inf), np.zeros(columns + 1, np.bool_)
+        while taken[column]:
+            used[column] = True
+            row, step, following = taken[column], np.inf, 0
+            for j in range(1, columns + 1):
+                if used[j]:
+                    continue
+                reduced = costs[row, j] - by_row[row] - by_column[j]
+                if reduced < least[j]:
+                    least[j], way[j] = reduced, column
+                if least[j] < step:
+                    step, following = least[j], j
+            for j in range(columns + 1):
+                if used[j]:
+                    by_row[taken[j]] += step
+                    by_column[j] -= step
+                else:
+                    least[j] -= step
+            column = following
+        while column:
+            taken[column] = taken[way[column]]
+            column = way[column]
+    for i in range(total):
+        if not taken[i + 1] or scores[rows[taken[i + 1] - 1], i] <= 0.0:
+            continue
+        owner = rows[taken[i + 1] - 1]
+        for k in rows:
+            if k != owner:
+                scores[k, i] = 0.0
+        shared[i] = scores[owner, i]
+    for k in rows:
+        found[k] = scores[k].max() > 0.0
 
 
 @kernel
