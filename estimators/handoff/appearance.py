@@ -15,7 +15,7 @@ from flightsim.foundation.checks import Positive, Share
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
 
-__all__ = ["AppearanceParameters", "KnownLook", "Look", "LookMean"]
+__all__ = ["Appearance", "AppearanceParameters", "Look", "Looks"]
 
 Array = NDArray[np.float64]
 Look = NDArray[np.float64]
@@ -44,41 +44,25 @@ class AppearanceParameters(Options):
     unlike: Share = 0.02
 
 
-class LookMean:
-    """Mean of the looks of one track while it certainly is of one target.
+class Looks:
+    """The looks of one track, by two hypotheses: it is of the target, or of another.
 
     Attributes:
-        count: number of looks.
+        as_target, as_other: (d, 5) what is known of the look by each: for each number the means of the own
+            look and of the slow part, the variances of both, and their covariance.
+        time_us: time of the newest look.
+        log_ratio: logarithm of how many times as probable the looks are of the target as of another, since
+            they were counted.
     """
 
-    def __init__(self) -> None:
-        self.count = 0
-        self._sum: Array | None = None
-        self._first_us = self._last_us = 0
-
-    def add(self, time_us: int, look: Look) -> None:
-        """Add a look; one that was not measured is left out."""
-        if math.isfinite(float(look.sum())):
-            self._sum = look.copy() if self._sum is None else self._sum + look
-            if not self.count:
-                self._first_us = time_us
-            self._last_us = time_us
-            self.count += 1
-
-    def mean(self) -> Array:
-        """(d,) of the looks; there must be one."""
-        assert self._sum is not None, "no look yet"
-        found: Array = self._sum / self.count
-        return found
-
-    @property
-    def span_s(self) -> float:
-        """Time from the first look to the last."""
-        return (self._last_us - self._first_us) * 1e-6
+    def __init__(self, time_us: int, as_target: Array, as_other: Array) -> None:
+        self.as_target, self.as_other = as_target, as_other
+        self.time_us = time_us
+        self.log_ratio = 0.0
 
 
-class KnownLook:
-    """What is known of how the designated target looks: a Gaussian for each number.
+class Appearance:
+    """What the target looks like, and how well looks fit it.
 
     Args:
         parameters: spread of looks.
@@ -86,44 +70,72 @@ class KnownLook:
 
     def __init__(self, parameters: AppearanceParameters) -> None:
         self.parameters = parameters
-        self.mean: Array = np.array(parameters.mean)
-        self.variance: Array = np.square(parameters.sigma)
-        self.known = False
-        self._any_mean, self._any_variance = self.mean, self.variance
-        self._slow, self._noise = np.square(parameters.slow_sigma), np.square(parameters.noise_sigma)
+        self._any = np.zeros((len(parameters.mean), 5))
+        self._any[:, 0], self._any[:, 2] = parameters.mean, np.square(parameters.sigma)
+        self._any[:, 3] = self._slow = np.square(parameters.slow_sigma)
+        self._noise = np.square(parameters.noise_sigma)
+        self._known: tuple[int, Array] | None = None  # of the target, when it was certain last
 
-    def learn(self, looks: LookMean) -> None:
-        """Looks that are of the target."""
-        if not looks.count:
-            return
-        of_looks = self._variance_of(looks)
-        gain = self.variance / (self.variance + of_looks)
-        self.mean = self.mean + gain * (looks.mean() - self.mean)
-        self.variance = (1.0 - gain) * self.variance
-        self.known = True
+    def learn(self, looks: Looks | None) -> None:
+        """The looks of a track are those of the target."""
+        if looks is not None:
+            self._known = looks.time_us, looks.as_target.copy()
 
-    def likelihood_ratio(self, looks: LookMean) -> float:
-        """How many times as probable looks are of the target as of any other; 1: nothing is known."""
-        if not (self.known and looks.count):
+    def designate(self, looks: Looks | None) -> None:
+        """A track turns out to be the target: so are all its looks."""
+        if looks is not None:
+            looks.as_target = looks.as_other.copy()
+            self.learn(looks)
+
+    def add(self, looks: Looks | None, time_us: int, look: Look) -> Looks | None:
+        """Add a look of a track.
+
+        Args:
+            looks: of the track so far; None: it is the first one since the track may have changed its target.
+            time_us: of the look.
+            look: (d,); one that was not measured is left out.
+        """
+        if not math.isfinite(float(look.sum())):
+            return looks
+        if looks is None:
+            as_target = self._any.copy() if self._known is None else self._known[1].copy()
+            if self._known is not None:
+                self._wait(as_target, time_us - self._known[0])
+            looks = Looks(time_us, as_target, self._any.copy())
+        for filtered in (looks.as_target, looks.as_other):
+            self._wait(filtered, time_us - looks.time_us)
+        looks.time_us = time_us
+        looks.log_ratio += _observe(looks.as_target, look, self._noise)
+        looks.log_ratio -= _observe(looks.as_other, look, self._noise)
+        return looks
+
+    def _wait(self, filtered: Array, time_us: int) -> None:
+        kept = math.exp(-1e-6 * time_us / self.parameters.slow_s)
+        filtered[:, 1] *= kept
+        filtered[:, 3] = kept * kept * filtered[:, 3] + (1.0 - kept * kept) * self._slow
+        filtered[:, 4] *= kept
+
+    def ratio(self, looks: Looks | None) -> float:
+        """How many times as probable looks are of the target as of another; 1: nothing is known."""
+        if looks is None:
             return 1.0
         unlike = self.parameters.unlike
-        seen, of_looks = looks.mean(), self._variance_of(looks)
-        as_target = _log_density(seen, self.mean, self.variance, of_looks)
-        as_other = _log_density(seen, self._any_mean, self._any_variance, of_looks)
-        return unlike + (1.0 - unlike) * math.exp(min(50.0, as_target - as_other))
-
-    def _variance_of(self, looks: LookMean) -> Array:
-        """(d,) of the mean of looks against the target's own."""
-        # the mean of a first-order process over a time of many correlation times
-        apart = 1.0 + looks.span_s / (2.0 * self.parameters.slow_s)
-        found: Array = self._slow / apart + self._noise / looks.count
-        return found
+        return unlike + (1.0 - unlike) * math.exp(min(50.0, looks.log_ratio))
 
 
 @kernel
-def _log_density(seen: Array, mean: Array, variance: Array, of_looks: Array) -> float:
-    summed = 0.0
-    for k in range(seen.size):
-        total = variance[k] + of_looks[k]
-        summed += (seen[k] - mean[k]) ** 2 / total + math.log(total)
-    return -0.5 * summed
+def _observe(filtered: Array, look: Array, noise: Array) -> float:
+    """Kalman filter of the sum of both states; returns the logarithm of the look's density."""
+    log = 0.0
+    for k in range(look.size):
+        own, slow, both = filtered[k, 2], filtered[k, 3], filtered[k, 4]
+        off = look[k] - filtered[k, 0] - filtered[k, 1]
+        total = own + slow + 2.0 * both + noise[k]
+        log -= 0.5 * (off * off / total + math.log(total))
+        first, second = (own + both) / total, (slow + both) / total
+        filtered[k, 0] += first * off
+        filtered[k, 1] += second * off
+        filtered[k, 2] = own - first * first * total
+        filtered[k, 3] = slow - second * second * total
+        filtered[k, 4] = both - first * second * total
+    return log

@@ -5,10 +5,13 @@ that have no track at present ("identity management": Shin, Guibas and Zhao 2003
 managing multi-target identities in wireless ad-hoc sensor networks"). It changes when
 
 * two tracks come close to each other: a tracker of several targets may exchange them, and nothing in the
-  tracks shows it. The probabilities of both are mixed, the more the closer they came;
+  tracks shows it. The probabilities of both are mixed, the more the closer they came. When one of them ends
+  there, both may have been of one target: the other one is of either;
 * a track is lost: its probability goes to the place where its target may be, which widens as the target walks
   on, and from there to a new track that begins near it;
-* a new track begins beside a living one: a tracker often has two tracks of one target for a second;
+* a lost target stays without a track, although one in view soon has one;
+* a new track begins beside a living one: a tracker often has two tracks of one target for a second, but it
+  may be of a lost one, which shows when they part;
 * tracks look like the designated target, or do not (`appearance`); without looks they are all alike.
 """
 
@@ -16,12 +19,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from estimators.handoff.appearance import AppearanceParameters, KnownLook, Look, LookMean
+from estimators.handoff.appearance import Appearance, AppearanceParameters, Look, Looks
 from flightsim.foundation.checks import Positive, Share
 from flightsim.foundation.options import Options
 
 Place = tuple[float, float]
 _NO_LOOKS: Mapping[int, Look] = {}
+_CERTAIN = 0.95  # the looks of a track that is the target with this probability are the target's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,14 +36,18 @@ class DesignationParameters(Options):
         exchange_m: a track that comes as near as this to another one has exchanged targets with it with a
             probability of 0.5 exp(-1/2).
         beside_m: a track that begins this close to a living one may be of the same target.
-        doubled: probability that it is, once that one is lost; in none of 252 frames was such a track of
-            another target. It must leave room for a decision at 0.99.
+        doubled: probability that it is, if no target is lost there; in none of 252 frames was such a track
+            of another target. It must leave room for a decision at 0.99.
+        merged_m: a track that ends at this distance from another one was of the same target as that one with
+            a probability of exp(-1/2).
         lost_sigma_m, lost_sigma_m_s: standard deviations per axis of the place and of the velocity of a
             target when its track is lost.
         speed_m_s, turn_s: the same of a walker's velocity per axis, and its correlation time.
         elsewhere: probability that a lost target is anywhere in the area.
         area_m2: of the area.
         untracked: mean number of other targets without a track, lost ones not counted, in the area.
+        found_s: mean time after which a moving target in view has a track.
+        unseen: probability that a lost target gets none: it stands still, or is out of view.
         forget_s: time after which a lost track that is not the target is forgotten.
         lost_s: time without a track after which the target is lost, and a designation is needed.
         least: a track with a smaller probability is not reported as the target.
@@ -48,8 +56,9 @@ class DesignationParameters(Options):
     """
 
     exchange_m: Positive = 2.0
-    beside_m: Positive = 10.0
-    doubled: Share = 0.995
+    beside_m: Positive = 12.5
+    doubled: Share = 0.998
+    merged_m: Positive = 4.0
     lost_sigma_m: Positive = 3.0
     lost_sigma_m_s: Positive = 0.5
     speed_m_s: Positive = 1.0
@@ -57,6 +66,8 @@ class DesignationParameters(Options):
     elsewhere: Share = 0.05
     area_m2: Positive = 40_000.0
     untracked: Positive = 1.0
+    found_s: Positive = 10.0
+    unseen: Share = 0.05
     forget_s: Positive = 30.0
     lost_s: Positive = 60.0
     least: Share = 0.2
@@ -69,18 +80,21 @@ class _Living:
     """A track.
 
     Attributes:
-        weight: probability that it is the target, without the looks since it was alone.
+        weight: probability that it is the target, without the looks that have not been counted.
         place, velocity: smoothed.
-        looks: since it has been alone.
-        beside: living tracks beside which it began, and from which it has not been away.
+        looks: since it has been alone; None: none yet.
+        beside: living tracks beside which it began, and from which it has not been away, with the probability
+            that both are of one target.
+        begun: time and place of its beginning.
         nearest: least distance of other tracks in the present encounter, by number.
     """
 
     weight: float
     place: Place
     velocity: Place = (0.0, 0.0)
-    looks: LookMean = field(default_factory=LookMean)
-    beside: set[int] = field(default_factory=set)
+    looks: Looks | None = None
+    beside: dict[int, float] = field(default_factory=dict)
+    begun: tuple[int, Place] = (0, (0.0, 0.0))
     nearest: dict[int, float] = field(default_factory=dict)
 
 
@@ -93,13 +107,17 @@ class _Lost:
         exists: probability that no new track is of it.
         since_us: time at which its track was lost.
         place, velocity: at that time.
+        sigma_m_s: standard deviation per axis of the velocity.
+        counted: probability of no track since then that is in the weight already.
     """
 
     weight: float
     exists: float
     since_us: int
     place: Place
-    velocity: Place
+    velocity: Place = (0.0, 0.0)
+    sigma_m_s: float
+    counted: float = 1.0
 
 
 class Designation:
@@ -123,27 +141,42 @@ class Designation:
         self._seen_us = 0
         self._living: dict[int, _Living] = {}
         self._lost: list[_Lost] = []
-        self._look = KnownLook(self.parameters.appearance)
+        self._appearance = Appearance(self.parameters.appearance)
 
-    def designate(self, time_us: int, number: int, place: Place, sure: float = 1.0) -> None:
+    def designate(
+        self,
+        time_us: int,
+        number: int,
+        place: Place,
+        sure: float = 1.0,
+        doubles: frozenset[int] = frozenset(),
+    ) -> None:
         """An operator designates a track, or confirms that it is the target.
 
         Args:
             time_us: of the track.
             number, place: of the track.
             sure: probability that it is the target.
+            doubles: other tracks that are of the same target.
         """
-        self._join_looks()
+        self._count_looks()
         known = self._living.setdefault(number, _Living(weight=0.0, place=place))
         others = [entry for entry in self._entries() if entry is not known]
         if not others and sure < 1.0:  # then the target is one that has no track
-            unseen = _Lost(weight=0.0, exists=1.0 - sure, since_us=time_us, place=place, velocity=(0.0, 0.0))
+            unseen = self._without_track(0.0, time_us, place)
+            unseen.exists = 1.0 - sure
             self._lost.append(unseen)
             others = [unseen]
         total = sum(entry.weight for entry in others)
         for entry in others:
             entry.weight = (1.0 - sure) * (entry.weight / total if total > 0.0 else 1.0 / len(others))
         known.weight = sure
+        known.beside.update(dict.fromkeys(doubles & self._living.keys(), self.parameters.doubled))
+        if sure > _CERTAIN:
+            self._appearance.designate(known.looks)
+            for other in self._living.values():
+                if other is not known:
+                    other.looks = None
         self.count += 1
         self._seen_us = time_us
         self._choose()
@@ -158,10 +191,20 @@ class Designation:
         """
         for entry in self._entries():
             entry.weight *= 1.0 - sure
-        self._lost.append(_Lost(weight=sure, exists=1.0, since_us=time_us, place=place, velocity=(0.0, 0.0)))
+        # a track of it may have ended shortly before: there is one target, and not two
+        near_m = self.parameters.beside_m
+        self._lost = [
+            lost for lost in self._lost if math.dist(self._walked(lost, time_us)[0], place) > near_m
+        ]
+        self._lost.append(self._without_track(sure, time_us, place))
         self.count += 1
         self._seen_us = time_us
         self._choose()
+
+    def _without_track(self, weight: float, time_us: int, place: Place) -> _Lost:
+        """A target that has had no track yet, somewhere near a place."""
+        speed_m_s = self.parameters.speed_m_s
+        return _Lost(weight=weight, exists=1.0, since_us=time_us, place=place, sigma_m_s=speed_m_s)
 
     def refuse(self, number: int, sure: float = 1.0) -> None:
         """An operator says that a track is not the target.
@@ -170,7 +213,7 @@ class Designation:
             number: of the track.
             sure: probability that it is not.
         """
-        self._join_looks()
+        self._count_looks()
         track = self._living.get(number)
         if track is None:
             return
@@ -182,7 +225,11 @@ class Designation:
         self._choose()
 
     def update(
-        self, time_us: int, places: Mapping[int, Place], looks: Mapping[int, Look] = _NO_LOOKS
+        self,
+        time_us: int,
+        places: Mapping[int, Place],
+        looks: Mapping[int, Look] = _NO_LOOKS,
+        doubtful: frozenset[int] = frozenset(),
     ) -> None:
         """Process the tracks of a frame.
 
@@ -190,18 +237,19 @@ class Designation:
             time_us: its time.
             places: of the tracks by number, in a frame in which targets move smoothly.
             looks: of the tracks that were seen in it.
+            doubtful: tracks that have been measured seldom lately: their targets may have left them.
         """
         dt_s = (time_us - self._time_us) * 1e-6
         self._time_us = time_us
         self._lose(time_us, places)
         self._move(dt_s, places)
         self._begin(time_us, places)
-        self._meet()
+        self._meet(doubtful)
         p = self.parameters
         for number, look in looks.items():
             track = self._living.get(number)
             if track is not None and all(m > p.alone_m for m in track.nearest.values()):
-                track.looks.add(time_us, look)
+                track.looks = self._appearance.add(track.looks, time_us, look)
         self._lost = [
             lost for lost in self._lost if lost.weight > 1e-6 or (time_us - lost.since_us) * 1e-6 < p.forget_s
         ]
@@ -231,7 +279,7 @@ class Designation:
         track = self._living.get(number)
         if track is None:
             return frozenset()
-        return frozenset(track.beside | {k for k, other in self._living.items() if number in other.beside})
+        return frozenset(track.beside.keys() | {k for k, t in self._living.items() if number in t.beside})
 
     def _entries(self) -> list[_Living | _Lost]:
         return [*self._living.values(), *self._lost]
@@ -242,20 +290,34 @@ class Designation:
         """Tracks that have ended."""
         ended = [number for number in self._living if number not in places]
         if ended:
-            self._join_looks()
+            self._count_looks()
         for number in ended:
             track = self._living.pop(number)
-            weight = track.weight
             for k, other in self._living.items():
-                if number in other.beside or k in track.beside:
-                    moved = self.parameters.doubled * weight
-                    other.weight += moved
-                    weight -= moved
+                doubled = max(other.beside.pop(number, 0.0), track.beside.get(k, 0.0))
+                if doubled:
+                    self._give(track, other, doubled)
+                    self._claim(k, 1.0 - doubled)
+                elif k in track.nearest:
+                    away = math.dist(track.place, other.place) / self.parameters.merged_m
+                    _exchange(track, other, 0.5 * math.exp(-0.5 * away * away))
                 other.nearest.pop(number, None)
-                other.beside.discard(number)
             self._lost.append(
-                _Lost(weight=weight, exists=1.0, since_us=time_us, place=track.place, velocity=track.velocity)
+                _Lost(
+                    weight=track.weight,
+                    exists=1.0,
+                    since_us=time_us,
+                    place=track.place,
+                    velocity=track.velocity,
+                    sigma_m_s=self.parameters.lost_sigma_m_s,
+                )
             )
+
+    @staticmethod
+    def _give(track: _Living, other: _Living, share: float) -> None:
+        """Give a share of the probability of a track to another one."""
+        moved = share * track.weight
+        track.weight, other.weight = track.weight - moved, other.weight + moved
 
     def _move(self, dt_s: float, places: Mapping[int, Place]) -> None:
         share = min(1.0, max(0.0, dt_s / 2.0))
@@ -274,17 +336,40 @@ class Designation:
         p = self.parameters
         for number in sorted(places.keys() - self._living.keys()):
             place = places[number]
-            beside = {k for k, track in self._living.items() if math.dist(track.place, place) <= p.beside_m}
-            new = _Living(weight=0.0, place=place, beside=beside)
-            if not beside:
-                densities = [lost.exists * self._density(lost, time_us, place) for lost in self._lost]
-                every = sum(densities) + p.untracked / p.area_m2
-                for lost, density in zip(self._lost, densities, strict=True):
-                    share = density / every
-                    new.weight += share * lost.weight
-                    lost.weight -= share * lost.weight
-                    lost.exists *= 1.0 - share
+            new = _Living(weight=0.0, place=place, begun=(time_us, place))
+            near = [k for k, track in self._living.items() if math.dist(track.place, place) <= p.beside_m]
             self._living[number] = new
+            if not near:
+                self._claim(number, 1.0)
+                continue
+            # doubles are so much more frequent there than targets that had no track
+            other = sum(self._densities(new)) + p.untracked / p.area_m2
+            doubles = p.doubled / (1.0 - p.doubled) * p.untracked / p.area_m2
+            new.beside = dict.fromkeys(near, doubles / (doubles + other))
+
+    def _densities(self, track: _Living) -> list[float]:
+        """Densities of the lost targets at the beginning of a track."""
+        time_us, place = track.begun
+        return [
+            lost.exists * self._density(lost, time_us, place) if lost.since_us <= time_us else 0.0
+            for lost in self._lost
+        ]
+
+    def _claim(self, number: int, real: float) -> None:
+        """A track is of a lost target, or of another one that had no track.
+
+        Args:
+            number: of the track.
+            real: probability that it is not of the same target as another track.
+        """
+        track = self._living[number]
+        densities = self._densities(track)
+        every = sum(densities) + self.parameters.untracked / self.parameters.area_m2
+        for lost, density in zip(self._lost, densities, strict=True):
+            share = real * density / every
+            track.weight += share * lost.weight
+            lost.weight -= share * lost.weight
+            lost.exists *= 1.0 - share
 
     def _walked(self, lost: _Lost, time_us: int) -> tuple[Place, float]:
         """Mean and variance per axis of the place of a lost target."""
@@ -296,8 +381,14 @@ class Designation:
         spread = (p.speed_m_s * p.turn_s) ** 2 * max(
             0.0, 2.0 * ages - 3.0 + 4.0 * math.exp(-ages) - math.exp(-2.0 * ages)
         )
-        variance = p.lost_sigma_m**2 + (p.lost_sigma_m_s * way_s) ** 2 + spread
+        variance = p.lost_sigma_m**2 + (lost.sigma_m_s * way_s) ** 2 + spread
         return (lost.place[0] + way_s * lost.velocity[0], lost.place[1] + way_s * lost.velocity[1]), variance
+
+    def _still_lost(self, lost: _Lost) -> float:
+        """Probability that a lost target has no track until now."""
+        p = self.parameters
+        age_s = max(0.0, (self._time_us - lost.since_us) * 1e-6)
+        return p.unseen + (1.0 - p.unseen) * math.exp(-age_s / p.found_s)
 
     def _density(self, lost: _Lost, time_us: int, place: Place) -> float:
         p = self.parameters
@@ -307,8 +398,8 @@ class Designation:
             math.tau * variance
         ) + p.elsewhere / p.area_m2
 
-    def _meet(self) -> None:
-        """Tracks that come close to each other."""
+    def _meet(self, doubtful: frozenset[int]) -> None:
+        """Tracks that come close to each other, or leave each other."""
         p = self.parameters
         numbers = list(self._living)
         for i, a in enumerate(numbers):
@@ -319,44 +410,56 @@ class Designation:
                 if away_m > 5.0 * p.exchange_m:
                     if b in one.nearest:  # the encounter is over
                         del one.nearest[b], other.nearest[a]
-                    one.beside.discard(b)
-                    other.beside.discard(a)
-                    continue
-                if a in other.beside or b in one.beside:
+                    if b in one.beside or a in other.beside:
+                        self._part(a, b, doubtful)
                     continue
                 before_m = one.nearest.get(b, math.inf)
                 if away_m >= before_m:
                     continue
                 if before_m == math.inf:
-                    self._join_looks()
+                    self._count_looks()
+                    one.looks = other.looks = None
                 one.nearest[b] = other.nearest[a] = away_m
+                doubled = max(one.beside.get(b, 0.0), other.beside.get(a, 0.0))
                 mixed = 0.5 * (1.0 - _kept(away_m / p.exchange_m) / _kept(before_m / p.exchange_m))
-                one.weight, other.weight = (
-                    one.weight + mixed * (other.weight - one.weight),
-                    other.weight + mixed * (one.weight - other.weight),
-                )
+                _exchange(one, other, (1.0 - doubled) * mixed)
+
+    def _part(self, a: int, b: int, doubtful: frozenset[int]) -> None:
+        """Two tracks that were beside each other are no longer: both are of targets, unless one of them has
+        hardly been measured, which has then left the target that both had.
+        """
+        self._count_looks()
+        one, other = self._living[a], self._living[b]
+        younger = b if a in other.beside else a
+        doubled = max(one.beside.pop(b, 0.0), other.beside.pop(a, 0.0))
+        if (a in doubtful) == (b in doubtful):
+            if not self._living[younger].beside:
+                self._claim(younger, 1.0)
+            return
+        left, kept = (one, other) if a in doubtful else (other, one)
+        self._give(left, kept, doubled)
 
     # looks
 
-    def _join_looks(self) -> None:
-        """Put the looks so far into the probabilities, and begin new ones."""
+    def _count_looks(self) -> None:
+        """Put the looks so far into the probabilities, each once."""
         posterior, lost = self._posterior()
         for number, track in self._living.items():
             track.weight = posterior[number]
+            if track.looks is not None:
+                track.looks.log_ratio = 0.0
+            if track.weight > _CERTAIN:
+                self._appearance.learn(track.looks)
         for entry, weight in zip(self._lost, lost, strict=True):
-            entry.weight = weight
-        for track in self._living.values():
-            if track.weight > 0.95:
-                self._look.learn(track.looks)
-            track.looks = LookMean()
+            entry.weight, entry.counted = weight, self._still_lost(entry)
 
     def _posterior(self) -> tuple[dict[int, float], list[float]]:
         """Probabilities of the tracks with their looks, and of the lost targets."""
         found = {
-            number: track.weight * (self._look.likelihood_ratio(track.looks) if track.weight else 1.0)
+            number: track.weight * (self._appearance.ratio(track.looks) if track.weight else 1.0)
             for number, track in self._living.items()
         }
-        lost = [entry.weight for entry in self._lost]
+        lost = [entry.weight * self._still_lost(entry) / entry.counted for entry in self._lost]
         total = sum(found.values()) + sum(lost)
         if not total > 0.0:
             return found, lost
@@ -373,6 +476,14 @@ class Designation:
             self.number = None
             return
         self.number, self.probability = best, posterior[best]
+
+
+def _exchange(one: _Living, other: _Living, probability: float) -> None:
+    """Two tracks have exchanged their targets with a probability."""
+    one.weight, other.weight = (
+        one.weight + probability * (other.weight - one.weight),
+        other.weight + probability * (one.weight - other.weight),
+    )
 
 
 def _kept(apart: float) -> float:

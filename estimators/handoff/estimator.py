@@ -300,7 +300,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         taken = self.sight.path.at(taken_us)
         if taken is None:
             return Outcome.WAITING
-        designation.update(taken_us, tracks.places)
+        designation.update(taken_us, tracks.places, tracks.looks, tracks.doubtful)
         if not designation.count or designation.lost_s > _LOST_S:  # by its place
             level = tracks.level(taken)
             expected = self._place.level(time_us)

@@ -70,10 +70,12 @@ class Answer:
     Attributes:
         point: where it was clicked in the picture, right and down from its middle; None: not at all.
         yes: the marked track is the target.
+        clear: no other person was close to the target in the picture.
     """
 
     point: Pixel | None = None
     yes: bool = False
+    clear: bool = False
 
 
 class Person:
@@ -131,7 +133,8 @@ class Person:
             return None
         others = [target for target in seen if target is not wanted]
         away = [math.hypot(t.x_px - wanted.x_px, t.y_px - wanted.y_px) for t in others]
-        if not late and min(away, default=math.inf) < p.clear_px:
+        clear = min(away, default=math.inf) >= p.clear_px
+        if not (late or clear):
             return None
         self._from_us = None
         taken = self._taken(wanted, others, away)
@@ -139,9 +142,9 @@ class Person:
             off_px = [(math.dist(marked, (t.x_px, t.y_px)), t is taken) for t in seen]
             nearest_px, is_it = min(off_px)
             if is_it and nearest_px < p.clear_px:
-                return Answer(yes=True)
+                return Answer(yes=True, clear=clear)
         x_px, y_px = self._rng.normal((taken.x_px, taken.y_px), p.click_px).tolist()
-        return Answer(point=(x_px, y_px))
+        return Answer(point=(x_px, y_px), clear=clear)
 
     def _taken(
         self, wanted: SeenTarget, others: Sequence[SeenTarget], away_px: Sequence[float]

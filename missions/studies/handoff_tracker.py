@@ -83,7 +83,7 @@ class Tracker:
         frame = world.frame(which, pointing)
         if frame is not None:
             self.tracks.scan(world.time_us, frame.places, frame.covariances, looks=frame.looks)
-            designation.update(world.time_us, self.tracks.places, self.tracks.looks)
+            designation.update(world.time_us, self.tracks.places, self.tracks.looks, self.tracks.doubtful)
         if self._operator is Operator.WATCHES:
             self._watch()
         else:
@@ -146,8 +146,7 @@ class Tracker:
                 designation.refuse(designation.number, _NOT_SEEN)
             return
         if number is not None:
-            sure = self._surety(places, number)
-            designation.designate(now_us, number, self.tracks.places[number], sure)
+            self._designate(places, number, clear=answer.clear)
 
     def _in_picture(self, camera: CameraAxes) -> dict[int, Place]:
         """Where the tracks are in the picture, from its middle, by number."""
@@ -177,22 +176,30 @@ class Tracker:
         self.designation.designate_place(self._world.time_us, (x_m, y_m), 1.0 - self.person.parameters.lapse)
         return None
 
-    def _surety(self, places: dict[int, Place], number: int) -> float:
-        """Probability that a person who points at a track means it, by what the picture shows."""
-        p = self.person.parameters
+    def _designate(self, places: dict[int, Place], number: int, *, clear: bool) -> None:
+        """Designate the track that the person means.
+
+        Args:
+            places: of the tracks in the picture.
+            number: of the track.
+            clear: the person saw no other one close to it: tracks that are close are of the same target.
+        """
+        p, designation = self.person.parameters, self.designation
+        same, sure = {number, *designation.beside(number)}, 1.0 - p.lapse
         here = places.get(number)
         if here is None:
-            return 0.5
-        slant_m = math.hypot(
-            *self.tracks.level()[number], self._world.setting.heights_m[HandoffWorld.TRACKER]
+            sure = 0.5  # it has left the picture
+        else:
+            height_m = self._world.setting.heights_m[HandoffWorld.TRACKER]
+            height_px = FOCAL_PX * PERSON_M / math.hypot(*self.tracks.level()[number], height_m)
+            away_px = {k: math.dist(here, there) for k, there in places.items() if k not in same}
+            if clear:
+                same |= {k for k, away in away_px.items() if away < p.clear_px}
+            for k in away_px.keys() - same:
+                sure *= 1.0 - slip(away_px[k], height_px, p)
+        designation.designate(
+            self._world.time_us, number, self.tracks.places[number], sure, frozenset(same - {number})
         )
-        height_px = FOCAL_PX * PERSON_M / slant_m
-        sure = 1.0 - p.lapse
-        same = {number, *self.designation.beside(number)}
-        for k, there in places.items():
-            if k not in same:
-                sure *= 1.0 - slip(math.dist(here, there), height_px, p)
-        return sure
 
     # the operator who watches
 

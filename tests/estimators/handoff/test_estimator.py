@@ -193,7 +193,29 @@ def test_a_lost_target_is_found_again_by_its_place_the_less_surely_the_later():
         designation.update(3_000_000 + 1_000_000 * gap_s, {2: (60.0, 0.0), 3: (3.0 + gap_s, 0.0)})
         found.append(designation.probability)
         assert designation.number == 3
-    assert found == sorted(found, reverse=True) and found[0] > 0.99 and found[-1] < 0.98
+    assert found == sorted(found, reverse=True) and found[0] > 0.99 and found[-1] < 0.995
+
+
+def test_a_track_that_leaves_its_target_leaves_the_identity_to_the_one_that_is_measured():
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0))
+    for k in range(1, 60):
+        places = {1: (0.3 * k, 0.0), 2: (1.0, 0.0)} if k > 1 else {1: (0.0, 0.0)}
+        designation.update(100_000 * k, places, doubtful=frozenset({1} if k > 20 else ()))
+    assert designation.number == 2 and designation.probability == pytest.approx(0.998)
+
+
+def test_a_target_that_stays_lost_is_less_probably_lost_and_never_surely_another_one():
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0), 0.9)
+    designation.update(100_000, {1: (0.0, 0.0)})  # one tenth: a target without a track
+    before = designation.probability
+    for k in range(2, 600):
+        designation.update(100_000 * k, {1: (0.0, 0.0), 2: (60.0, 0.0)})
+    assert before == pytest.approx(0.9, abs=0.01) and 0.98 < designation.probability < 1.0
+    for k in range(600, 1200):
+        designation.update(100_000 * k, {2: (60.0, 0.0)})
+    assert designation.number is None
 
 
 def test_looks_tell_which_of_two_tracks_that_met_is_the_target():
@@ -233,7 +255,7 @@ def test_a_second_track_of_the_same_target_leaves_no_doubt():
     designation.update(100, {1: (0.0, 0.0), 2: (1.0, 0.0)})
     assert designation.probability == 1.0
     designation.update(200, {2: (1.0, 0.0)})
-    assert designation.number == 2 and designation.probability == pytest.approx(0.995)
+    assert designation.number == 2 and designation.probability == pytest.approx(0.998)
     designation.update(300, {2: (1.0, 0.0), 3: (20.0, 0.0)})
     designation.update(400, {2: (1.0, 0.0), 3: (2.0, 0.0)})
     assert designation.probability < 0.6
