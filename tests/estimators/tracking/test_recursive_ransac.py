@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.optimize import linear_sum_assignment
 
 from estimators.tracking import ransac_kernels as kernels
 from estimators.tracking.ospa import gospa
@@ -133,6 +134,44 @@ def test_targets_that_cross_keep_two_tracks():
         assert np.linalg.norm(after[number] - velocity) < 0.6
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_measurements_are_assigned_as_by_the_hungarian_method(seed):
+    rng = np.random.default_rng(seed)
+    tracks, measurements, missed = 5, 6, 1e-6
+    given = rng.uniform(1e-4, 0.1, (tracks, measurements)) * (rng.random((tracks, measurements)) < 0.6)
+    scores, found = given.copy(), given.any(axis=1)
+    kernels.assign(scores, np.ones(tracks, dtype=np.bool_), missed, given.sum(axis=0), found)
+    costs = np.hstack(
+        (np.where(given > 0.0, -np.log(np.maximum(given, 1e-300) / missed), 1e6), np.zeros((5, 5)))
+    )
+    rows, columns = linear_sum_assignment(costs)
+    for row, column in zip(rows, columns, strict=True):
+        if column < measurements:
+            others = [k for k in range(tracks) if k != row]
+            assert scores[row, column] == given[row, column] and not scores[others, column].any()
+    taken = set(columns)
+    free = [i for i in range(measurements) if i not in taken]
+    assert np.array_equal(scores[:, free], given[:, free])
+    assert np.array_equal(found, scores.any(axis=1))
+
+
+def test_targets_that_walk_side_by_side_for_a_time_keep_their_tracks():
+    """They come within two standard deviations: measurements that were shared made one track of both."""
+    rng = np.random.default_rng(7)
+    changed = 0
+    for _ in range(8):
+        tracker, owners = RecursiveRansac(RansacParameters(window=20, noise_density=0.5, lost_after=40)), {}
+        for k in range(300):
+            gap = 1.0 + 9.0 * abs(k - 150) / 150.0
+            targets = np.array([[0.12 * k, 0.5 * gap], [0.12 * k, -0.5 * gap]])
+            places = targets[rng.random(2) < 0.9]
+            tracker.scan(100_000 * (k + 1), places + rng.normal(0.0, 0.5, places.shape))
+            for track in tracker.tracks if k in (60, 280) else ():
+                owners.setdefault(track.number, []).append(track.state[1] > 0.0)
+        changed += sum(len(owner) != 2 or owner[0] != owner[1] for owner in owners.values())
+    assert changed <= 2
+
+
 def test_a_target_that_leaves_is_dropped_and_its_number_is_not_used_again():
     rng = np.random.default_rng(8)
     tracker = RecursiveRansac(RansacParameters(clutter_per_m2=1e-4))
@@ -208,14 +247,17 @@ def test_the_update_of_one_hypothesis_is_that_of_probabilistic_data_association(
     density = detected * np.exp(-0.5 * squared) / (math.tau * math.sqrt(np.linalg.det(innovation)))
     none = clutter * (1.0 - detected * (1.0 - math.exp(-0.5 * gate)))
     gain = prior[:, :2] @ np.linalg.inv(innovation)
-    for copies in (1, 2):  # two tracks at one place share the measurements
-        shares = density / (density.sum() + (copies - 1) * density + none)
+    for copies in (1, 2):  # two tracks at one place share the measurement that is assigned to none
+        found, rivals = np.ones(copies, dtype=bool), np.ones(copies, dtype=bool)
+        scores, shared = np.tile(density, (copies, 1)), copies * density
+        kernels.assign(scores, rivals, none, shared, found)
+        assert np.count_nonzero(scores[0]) == (3, 2)[copies - 1]
+        shares = scores[0] / (scores[0].sum() + shared - scores[0] + none)
         mean_off = shares @ offs
         spread = np.einsum("n,ni,nj->ij", shares, offs, offs) - np.outer(mean_off, mean_off)
         expected = prior - shares.sum() * gain @ innovation @ gain.T + gain @ spread @ gain.T
         means, covariances = np.tile(before, (copies, 1)), np.tile(prior, (copies, 1, 1))
         found, explained = np.zeros(copies, dtype=bool), np.zeros(3, dtype=bool)
-        rivals = np.ones(copies, dtype=bool)
         kernels.associate(
             *(copies, means, covariances, places, noises, gate, detected, clutter, rivals, found, explained)
         )
